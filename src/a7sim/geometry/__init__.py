@@ -1,0 +1,57 @@
+"""Pure functions of projective geometry on component-first arrays.
+
+Axes: X along the base, Y away from the operator, Z up, right-handed, millimetres. A picture lies at
+z = -c of its camera. Angles are radians here and gon everywhere else. An array of points has shape
+``(3, ...)``, one of image points ``(2, ...)``, one of rotations ``(3, 3, ...)``: one point and ten thousand
+sessions are the same call.
+"""
+
+from a7sim.geometry._parallax import (
+    PARALLAX_ELEMENTS,
+    near_vertical_parallax_coefficients,
+    parallax_coefficients,
+    y_parallax,
+)
+from a7sim.geometry._rays import (
+    at_level,
+    image_of,
+    ray_of,
+    stereoscopic_intersection,
+)
+from a7sim.geometry._rotation import (
+    GON,
+    Array,
+    angle_between,
+    angles_of,
+    dots,
+    length_of,
+    mxm,
+    mxv,
+    plane_rotation,
+    rotation,
+    transposed,
+    turn_of,
+)
+
+__all__ = [
+    "GON",
+    "PARALLAX_ELEMENTS",
+    "Array",
+    "angle_between",
+    "angles_of",
+    "at_level",
+    "dots",
+    "image_of",
+    "length_of",
+    "mxm",
+    "mxv",
+    "near_vertical_parallax_coefficients",
+    "parallax_coefficients",
+    "plane_rotation",
+    "ray_of",
+    "rotation",
+    "stereoscopic_intersection",
+    "transposed",
+    "turn_of",
+    "y_parallax",
+]

@@ -1,0 +1,92 @@
+"""The y-parallax of a model point and how every orientation element changes it."""
+
+import numpy as np
+import numpy.typing as npt
+
+from a7sim.geometry._rays import at_level, ray_of
+from a7sim.geometry._rotation import Array, mxv, rotation
+
+PARALLAX_ELEMENTS = (
+    "kappa1", "kappa2", "phi1", "phi2", "omega1", "omega2", "by1", "by2", "bz1", "bz2",
+)  # fmt: skip
+"""Order of the coefficients; 1 is the left-hand photograph of the model, 2 the right-hand one."""
+
+
+def y_parallax(
+    image1: Array,
+    image2: Array,
+    centre1: Array,
+    centre2: Array,
+    rotation1: Array,
+    rotation2: Array,
+    c1: npt.ArrayLike,
+    c2: npt.ArrayLike,
+    level: npt.ArrayLike,
+) -> Array:
+    """Return ``p = y1 - y2`` in mm where the rays of two image points meet the plane Z = level."""
+    y1 = at_level(centre1, ray_of(image1, rotation1, c1), level)[1]
+    y2 = at_level(centre2, ray_of(image2, rotation2, c2), level)[1]
+    return np.asarray(y1 - y2)
+
+
+def parallax_coefficients(
+    image1: Array,
+    image2: Array,
+    centre1: Array,
+    centre2: Array,
+    angles1: Array,
+    angles2: Array,
+    c1: npt.ArrayLike,
+    c2: npt.ArrayLike,
+    level: npt.ArrayLike,
+) -> Array:
+    """Return the derivatives of `y_parallax` by the ten elements, shape ``(10, ...)``, for any tilt.
+
+    Angles are ``(omega, phi, kappa)`` in radians. A small turn about the axis a through the centre moves the
+    point r of the ray, seen from there, by a x r, and the ray leaves the plane Z = level at
+    ``dy = (a x r)_y - (r_y / r_z) (a x r)_z``; near the vertical this is `near_vertical_parallax_coefficients`.
+    """
+    left = _changes_of_y(image1, centre1, angles1, c1, level)
+    right = _changes_of_y(image2, centre2, angles2, c2, level)
+    signed = np.array([left, -right])
+    return np.concatenate([signed[:, i] for i in range(5)])
+
+
+def _changes_of_y(
+    image: Array, centre: Array, angles: Array, c: npt.ArrayLike, level: npt.ArrayLike
+) -> Array:
+    omega, phi, kappa = angles
+    turned = rotation(omega, phi, kappa)
+    r = at_level(np.zeros_like(centre), ray_of(image, turned, c), np.asarray(level) - centre[2])
+    slope = r[1] / r[2]
+    unit_x, unit_y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    axes = (
+        turned[:, 2],
+        mxv(rotation(omega, 0.0, 0.0), unit_y),
+        unit_x,
+    )
+    shape = r.shape[1:]
+
+    def turn(axis: Array) -> Array:
+        axis = axis.reshape(axis.shape + (1,) * (len(shape) - axis.ndim + 1))
+        moved = np.cross(np.broadcast_to(axis, r.shape), r, axis=0)
+        return np.asarray(moved[1] - slope * moved[2])
+
+    return np.array([*(turn(axis) for axis in axes), np.full(shape, -1.0), -slope])
+
+
+def near_vertical_parallax_coefficients(
+    x: npt.ArrayLike, y: npt.ArrayLike, z: npt.ArrayLike, b: npt.ArrayLike
+) -> Array:
+    """Return the coefficients of thesis 2.32, shape ``(10, ...)``, in mm a radian or mm a mm.
+
+    x and y are counted from the left-hand centre in mm, z is the distance below the centres, b the base.
+    """
+    x, y, z, b = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (x, y, z, b)))
+    across = z * (1.0 + y**2 / z**2)
+    one = np.ones_like(x)
+    return np.array(
+        [
+            x, -(x - b), -x * y / z, (x - b) * y / z, across, -across, -one, one, y / z, -y / z,
+        ]
+    )  # fmt: skip

@@ -1,0 +1,56 @@
+"""Picture carriers: a photograph as it lies in a projector."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.geometry import GON, Array, plane_rotation
+from a7sim.scene.camera import fiducial_places
+from a7sim.scene.photograph import Photograph
+
+
+@dataclass
+class Carrier:
+    """A photograph on its carrier: laid by hand, then shifted and turned until it is centred."""
+
+    photograph: Photograph
+    laid: tuple[float, float, float]
+    """dx, dy in mm and dkappa in gon, as it came to lie."""
+    centring: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        self._set()
+
+    def centre(self, dx: float, dy: float, dkappa: float) -> None:
+        """Shift (mm) and turn (gon) the picture from where it was laid."""
+        self.centring = (dx, dy, dkappa)
+        self._set()
+
+    def _set(self) -> None:
+        self._turn = plane_rotation((self.laid[2] + self.centring[2]) * GON)
+        self._shift = np.array([self.laid[0] + self.centring[0], self.laid[1] + self.centring[1]])
+
+    def on_carrier(self, film: Array) -> Array:
+        """Return film places ``(2, ...)`` in mm as places on the carrier about its collimating centre."""
+        shift = self._shift.reshape((2,) + (1,) * (film.ndim - 1))
+        return np.asarray(np.einsum("ij,j...->i...", self._turn, film) + shift)
+
+    def on_film(self, carrier: Array) -> Array:
+        """Return places on the carrier ``(2, ...)`` as film places: the inverse of `on_carrier`."""
+        shift = self._shift.reshape((2,) + (1,) * (carrier.ndim - 1))
+        return np.asarray(np.einsum("ji,j...->i...", self._turn, carrier - shift))
+
+    def point(self, name: str) -> Array | None:
+        """Return where an image point lies on the carrier ``(2,)``, or None where the picture has none such."""
+        film = self.photograph.points.get(name)
+        return None if film is None else self._turn @ film + self._shift
+
+    def fiducial_displacements(self) -> list[tuple[str, float, float]]:
+        """Return name, dx, dy in mm of every fiducial from its collimating mark."""
+        names, calibrated = fiducial_places(self.photograph.camera)
+        marks = {name: calibrated[:, i] for i, name in enumerate(names)}
+        placed = self.on_carrier(self.photograph.fiducials.xy)
+        return [
+            (name, float(placed[0, i] - marks[name][0]), float(placed[1, i] - marks[name][1]))
+            for i, name in enumerate(self.photograph.fiducials.names)
+        ]

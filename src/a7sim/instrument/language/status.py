@@ -1,0 +1,78 @@
+"""The status model of IEEE 488.2 and SCPI-1999, one a client."""
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from a7sim.instrument.language.errors import ErrorNumber, entry
+
+QUEUE_LENGTH = 32
+
+POWER_ON, COMMAND_ERROR, EXECUTION_ERROR, DEVICE_ERROR, OPERATION_COMPLETE = 128, 32, 16, 8, 1
+_ERROR_AVAILABLE, _QUESTIONABLE, _EVENT_SUMMARY, _MASTER_SUMMARY, _OPERATION = 4, 8, 32, 64, 128
+
+
+@dataclass
+class Register:
+    """A SCPI status register: the condition, the events it has risen to, and what of them is reported."""
+
+    condition: int = 0
+    event: int = 0
+    enable: int = 0
+
+    def set_condition(self, condition: int) -> None:
+        """Change the condition; bits that rise become events."""
+        self.event |= condition & ~self.condition
+        self.condition = condition
+
+    def read_event(self) -> int:
+        """Return the events and clear them."""
+        event, self.event = self.event, 0
+        return event
+
+
+@dataclass
+class Status:
+    """Event status, service request, the two SCPI registers and the error queue of one client."""
+
+    event: int = POWER_ON
+    event_enable: int = 0
+    service_enable: int = 0
+    operation: Register = field(default_factory=Register)
+    questionable: Register = field(default_factory=Register)
+    errors: deque[str] = field(default_factory=deque)
+
+    def report(self, number: ErrorNumber, detail: str = "") -> None:
+        """Queue an error and raise its bit; a full queue makes its last entry an overflow."""
+        if len(self.errors) < QUEUE_LENGTH:
+            self.errors.append(entry(number, detail))
+        else:
+            self.errors[-1] = entry(ErrorNumber.QUEUE_OVERFLOW)
+            self.event |= DEVICE_ERROR
+        if -200 < number <= -100:
+            self.event |= COMMAND_ERROR
+        elif -300 < number <= -200:
+            self.event |= EXECUTION_ERROR
+        elif -400 < number <= -300:
+            self.event |= DEVICE_ERROR
+
+    def next_error(self) -> str:
+        """Return and take off the oldest error."""
+        return self.errors.popleft() if self.errors else entry(ErrorNumber.NO_ERROR)
+
+    def read_event(self) -> int:
+        """Return the standard event status and clear it."""
+        event, self.event = self.event, 0
+        return event
+
+    def status_byte(self) -> int:
+        """Return the status byte with the master summary in bit 6."""
+        byte = _ERROR_AVAILABLE if self.errors else 0
+        byte |= _QUESTIONABLE if self.questionable.event & self.questionable.enable else 0
+        byte |= _EVENT_SUMMARY if self.event & self.event_enable else 0
+        byte |= _OPERATION if self.operation.event & self.operation.enable else 0
+        return byte | (_MASTER_SUMMARY if byte & self.service_enable else 0)
+
+    def clear(self) -> None:
+        """Clear events and errors; enables and conditions stay (`*CLS`)."""
+        self.event = self.operation.event = self.questionable.event = 0
+        self.errors.clear()

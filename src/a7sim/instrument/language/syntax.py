@@ -1,0 +1,124 @@
+"""Taking a command line apart: units, headers, parameters. Nothing here knows a command."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+
+LONGEST_NUMBER = 255
+"""Digits and signs of a number (IEEE 488.2 7.7.2.4.1)."""
+
+_HEADER = re.compile(r"(\*[A-Za-z]+|:?[A-Za-z][A-Za-z0-9_]*(?::[A-Za-z][A-Za-z0-9_]*)*)(\?)?")
+_MNEMONIC = re.compile(r"([A-Za-z_]+?)(\d*)")
+_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z]*)")
+_WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A parameter in quotes."""
+
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A parameter of letters and digits, in capitals."""
+
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number with its unit in capitals, '' where none came."""
+
+    value: float
+    unit: str
+
+
+Parameter = Text | Word | Number
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """One program message unit; mnemonics in capitals with their numeric suffixes, None where none came."""
+
+    mnemonics: tuple[tuple[str, int | None], ...]
+    rooted: bool
+    common: bool
+    query: bool
+    parameters: tuple[Parameter, ...]
+
+
+def units_of(line: str) -> Iterator[str]:
+    """Yield the texts between the semicolons of a line, quotes protecting, blank ones left out."""
+    for text in _split(line, ";"):
+        if text.strip():
+            yield text.strip()
+
+
+def _split(text: str, separator: str) -> Iterator[str]:
+    start, quote = 0, ""
+    for i, character in enumerate(text):
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "\"'":
+            quote = character
+        elif character == separator:
+            yield text[start:i]
+            start = i + 1
+    yield text[start:]
+
+
+def unit_of(text: str) -> Unit:
+    """Return a unit taken apart. Raises LanguageError."""
+    for character in text:
+        if not (" " <= character <= "~" or character == "\t"):
+            raise LanguageError(ErrorNumber.INVALID_CHARACTER, f"character number {ord(character)}")
+    header = _HEADER.match(text)
+    if header is None:
+        raise LanguageError(ErrorNumber.SYNTAX_ERROR, f"expected a header, got {text[:20]}")
+    rest = text[header.end() :]
+    if rest and rest[0] not in " \t":
+        raise LanguageError(ErrorNumber.SYNTAX_ERROR, f"expected a blank after {header[0]}, got {rest[:10]}")
+    name = header[1]
+    common = name.startswith("*")
+    mnemonics = ((name.upper(), None),) if common else tuple(map(_mnemonic, name.lstrip(":").split(":")))
+    parameters = tuple(_parameter(each.strip()) for each in _split(rest, ",")) if rest.strip() else ()
+    return Unit(mnemonics, name.startswith(":"), common, header[2] == "?", parameters)
+
+
+def _mnemonic(text: str) -> tuple[str, int | None]:
+    found = _MNEMONIC.fullmatch(text)
+    if found is None or len(found[2]) > 9:
+        raise LanguageError(ErrorNumber.UNDEFINED_HEADER, text[:20])
+    return found[1].upper(), int(found[2]) if found[2] else None
+
+
+def _parameter(text: str) -> Parameter:
+    if not text:
+        raise LanguageError(ErrorNumber.SYNTAX_ERROR, "expected a parameter between the commas")
+    if text[0] in "\"'":
+        return _text(text)
+    number = _NUMBER.fullmatch(text)
+    if number is not None:
+        if len(number[1]) > LONGEST_NUMBER:
+            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected at most {LONGEST_NUMBER} digits")
+        return Number(float(number[1]), number[2].upper())
+    if _WORD.fullmatch(text):
+        return Word(text.upper())
+    raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a number, a word or a text in quotes, got {text[:20]}")
+
+
+def _text(text: str) -> Text:
+    quote = text[0]
+    inner = text[1:-1]
+    if len(text) < 2 or text[-1] != quote or quote in inner.replace(quote * 2, ""):
+        raise LanguageError(ErrorNumber.SYNTAX_ERROR, f"expected a text in quotes, got {text[:20]}")
+    return Text(inner.replace(quote * 2, quote))
+
+
+def quoted(text: str) -> str:
+    """Return a text in quotes, as string response data."""
+    return '"' + text.replace('"', '""') + '"'

@@ -1,0 +1,261 @@
+"""What a command looks like, and a table of them expanded once into a dictionary."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any, Protocol
+
+from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.syntax import Number, Parameter, Text, Unit, Word
+
+_LENGTHS = {"": 1.0, "MM": 1.0, "UM": 1e-3}
+_ANGLES = {"": 1.0, "GON": 1.0, "DEG": 10.0 / 9.0}
+_BARE = {"": 1.0}
+UNITS: Mapping[str, Mapping[str, float]] = {"mm": _LENGTHS, "gon": _ANGLES, "": _BARE}
+
+Limits = tuple[float, float, float]
+"""MIN, MAX, DEF."""
+
+
+class Client(Protocol):
+    """Whoever a handler acts for; the engine's session with one client."""
+
+
+Handler = Callable[[Any, "Call"], str | bytes | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A command with its header suffix and its parameters, checked and in base units."""
+
+    suffix: int
+    arguments: tuple[Any, ...]
+
+
+class Taken(Protocol):
+    """A kind of parameter: how it reads what came, and how it is described."""
+
+    optional: bool
+
+    def read(self, parameter: Parameter, client: Any, suffix: int) -> Any:
+        """Return the value. Raises LanguageError."""
+
+    def described(self) -> str:
+        """Return how the parameter is written, for people."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number in mm, in gon or bare; MIN, MAX and DEF where it has limits."""
+
+    unit: str = ""
+    limits: Callable[[Any, int], Limits] | None = None
+    whole: bool = False
+    optional: bool = False
+    name: str = "value"
+
+    def read(self, parameter: Parameter, client: Any, suffix: int) -> float:
+        """Return the number in its base unit."""
+        if isinstance(parameter, Word):
+            return self._named(parameter, client, suffix)
+        if not isinstance(parameter, Number):
+            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a number, got the text '{parameter.value}'")
+        factors = UNITS[self.unit]
+        if parameter.unit not in factors:
+            if len(factors) == 1:
+                raise LanguageError(ErrorNumber.SUFFIX_NOT_ALLOWED, f"expected a bare number, got {parameter.unit}")
+            known = " or ".join(unit for unit in factors if unit)
+            raise LanguageError(ErrorNumber.INVALID_SUFFIX, f"expected {known}, got {parameter.unit}")
+        value = parameter.value * factors[parameter.unit]
+        if not abs(value) < 1e12:
+            raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected less than 1E12, got {parameter.value:g}")
+        return float(round(value)) if self.whole else value
+
+    def _named(self, word: Word, client: Any, suffix: int) -> float:
+        places = {"MIN": 0, "MINIMUM": 0, "MAX": 1, "MAXIMUM": 1, "DEF": 2, "DEFAULT": 2}
+        if self.limits is None or word.value not in places:
+            allowed = "a number, MIN, MAX or DEF" if self.limits else "a number"
+            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected {allowed}, got {word.value}")
+        return self.limits(client, suffix)[places[word.value]]
+
+    def described(self) -> str:
+        """Return how the number is written."""
+        return f"<{self.name}{' ' + self.unit if self.unit else ''}>"
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of a few words, short or long form."""
+
+    words: tuple[str, ...]
+    optional: bool = False
+
+    def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
+        """Return the chosen word in lower case, whole."""
+        if not isinstance(parameter, Word):
+            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected {self.described()}")
+        for word in self.words:
+            if parameter.value in (short_form(word), word.upper()):
+                return word.lower()
+        raise LanguageError(
+            ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected {self.described()}, got {parameter.value}"
+        )
+
+    def described(self) -> str:
+        """Return the words with a bar between them."""
+        return "|".join(self.words)
+
+
+@dataclass(frozen=True, slots=True)
+class Quoted:
+    """A text in quotes."""
+
+    name: str = "text"
+    optional: bool = False
+
+    def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
+        """Return the text."""
+        if not isinstance(parameter, Text):
+            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a text in quotes, got {parameter.value}")
+        return parameter.value
+
+    def described(self) -> str:
+        """Return the name in quotes."""
+        return f'"{self.name}"'
+
+
+@dataclass(frozen=True, slots=True)
+class QuotedOrNumber:
+    """A text in quotes or a bare number."""
+
+    name: str = "name"
+    optional: bool = False
+
+    def read(self, parameter: Parameter, client: Any, suffix: int) -> str | float:
+        """Return the text or the number."""
+        if isinstance(parameter, Text):
+            return parameter.value
+        return Quantity().read(parameter, client, suffix)
+
+    def described(self) -> str:
+        """Return both ways."""
+        return f'"{self.name}"|<value>'
+
+
+@dataclass(frozen=True, slots=True)
+class AnyWord:
+    """A word that the handler makes out."""
+
+    name: str = "word"
+    optional: bool = True
+
+    def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
+        """Return the word in capitals."""
+        if not isinstance(parameter, Word):
+            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a word, got {parameter.value}")
+        return parameter.value
+
+    def described(self) -> str:
+        """Return the name."""
+        return f"[{self.name}]"
+
+
+@dataclass(frozen=True)
+class Command:
+    """A header as SCPI writes it, what it takes, what it does. `<n>` in the header stands for 1 or 2."""
+
+    header: str
+    handler: Handler
+    takes: tuple[Taken, ...] = ()
+    repeats: Taken | None = None
+    """A parameter that may follow the others any number of times."""
+    turns: bool = False
+    """Whether it moves something, which the holder of the lock may do alone."""
+    about: str = ""
+    suffixes: tuple[int, ...] = field(default=(1, 2))
+
+    @property
+    def query(self) -> bool:
+        """Whether the header ends in a question mark."""
+        return self.header.endswith("?")
+
+    def written(self) -> str:
+        """Return header and parameters as the manual prints them."""
+        parts = [f"[{each.described()}]" if each.optional else each.described() for each in self.takes]
+        if self.repeats:
+            parts.append(f"{self.repeats.described()}...")
+        return " ".join([self.header, ",".join(parts)]).strip()
+
+    def call(self, unit: Unit, suffix: int, client: Any) -> Call:
+        """Return the call that a unit makes of this command. Raises LanguageError."""
+        given = unit.parameters
+        least = sum(not each.optional for each in self.takes)
+        if len(given) < least:
+            raise LanguageError(ErrorNumber.MISSING_PARAMETER, f"expected {self.written()}")
+        if len(given) > len(self.takes) and self.repeats is None:
+            raise LanguageError(ErrorNumber.PARAMETER_NOT_ALLOWED, f"expected {self.written()}")
+        taken = [*self.takes, *([self.repeats] * max(0, len(given) - len(self.takes)))]
+        values = [
+            kind.read(parameter, client, suffix)
+            for kind, parameter in zip(taken, given, strict=False)
+            if kind is not None
+        ]
+        return Call(suffix, tuple(values))
+
+
+def short_form(word: str) -> str:
+    """Return the capitals of a word written as SCPI writes it, such as MODE or BACK or FRON of FRONt."""
+    return "".join(c for c in word if not c.islower())
+
+
+@dataclass(frozen=True)
+class _Found:
+    command: Command
+    numbered: tuple[bool, ...]
+
+
+class CommandTable:
+    """Commands by header, every short and long form and optional node expanded once."""
+
+    def __init__(self, commands: Sequence[Command]) -> None:
+        self.commands = tuple(commands)
+        self._commands: dict[tuple[tuple[str, ...], bool], _Found] = {}
+        for command in commands:
+            for path in _paths_of(command.header):
+                self._enter(command, path)
+
+    def _enter(self, command: Command, path: tuple[str, ...]) -> None:
+        bare = [node.removesuffix("<n>") for node in path]
+        found = _Found(command, tuple(node.endswith("<n>") for node in path))
+        for names in product(*({short_form(node), node.upper()} for node in bare)):
+            if self._commands.setdefault((names, command.query), found) is not found:
+                raise ValueError(f"{command.header} stands twice in the table")
+
+    def find(self, mnemonics: Sequence[tuple[str, int | None]], query: bool) -> tuple[Command, int]:
+        """Return the command of a whole header path and its suffix. Raises LanguageError."""
+        shown = ":".join(f"{name}{'' if number is None else number}" for name, number in mnemonics)
+        try:
+            found = self._commands[tuple(name for name, _ in mnemonics), query]
+        except KeyError:
+            raise LanguageError(ErrorNumber.UNDEFINED_HEADER, shown + ("?" if query else "")) from None
+        suffix = 1
+        for (_, number), numbered in zip(mnemonics, found.numbered, strict=True):
+            if number is not None and not numbered:
+                raise LanguageError(ErrorNumber.UNDEFINED_HEADER, shown)
+            if numbered and number is not None:
+                if number not in found.command.suffixes:
+                    raise LanguageError(ErrorNumber.HEADER_SUFFIX_OUT_OF_RANGE, f"expected 1 or 2, got {number}")
+                suffix = number
+        return found.command, suffix
+
+    def headers(self) -> list[str]:
+        """Return all headers in the order of the table."""
+        return [command.header for command in self.commands]
+
+
+def _paths_of(header: str) -> list[tuple[str, ...]]:
+    """Return the node paths of a header with every optional node once left out and once in."""
+    nodes = re.findall(r"\[:?[^\]]+\]|[^:\[\]]+", header.rstrip("?"))
+    choices = [((node.strip("[]:"),), ()) if node.startswith("[") else ((node,),) for node in nodes]
+    return [tuple(name for part in combination for name in part) for combination in product(*choices)]

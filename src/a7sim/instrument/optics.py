@@ -1,0 +1,44 @@
+"""The fittings and what they do to the view and to the handwheels (thesis 3.2.3.6).
+
+Nothing here refuses anything: with wrong fittings the observer gets the wrong view.
+The thesis tables which position belongs to which picture and base; what a wrong one does to the view is
+this model's reading of it: a Dove prism with the wrong index leaves the picture mirrored top to bottom, a
+diapositive lever on the wrong side leaves it mirrored left to right, the triangulation lever decides which
+projector the left eye sees, and a collar that does not belong to the picture reverses its handwheel.
+"""
+
+import numpy as np
+
+from a7sim.geometry import GON, Array, plane_rotation
+from a7sim.manual import RIGHT_FITTINGS, Fittings
+
+
+def projector_seen(eyepiece: int, fittings: Fittings) -> int:
+    """Return which projector, 1 or 2, an eyepiece shows; eyepiece 1 is the observer's left eye."""
+    straight = fittings.triangulation == "back"
+    return eyepiece if straight else 3 - eyepiece
+
+
+def view(fittings: Fittings, polarity: str, base: str, kappa_gon: float) -> Array:
+    """Return the matrix ``(2, 2)`` from displacements on the carrier to those in the eyepiece, both in mm.
+
+    The optics stand still while the camera swings, so a swung picture is seen swung.
+    """
+    right = RIGHT_FITTINGS[polarity, base]
+    mirrored = np.array(
+        [
+            1.0 if fittings.diapositive == right.diapositive else -1.0,
+            1.0 if fittings.dove == right.dove else -1.0,
+        ]
+    )
+    return np.asarray(mirrored[:, None] * plane_rotation(kappa_gon * GON))
+
+
+def wheel_senses(fittings: Fittings, polarity: str) -> dict[str, float]:
+    """Return +1, or -1 where a collar does not belong to the picture, for the X and Y handwheels and the Z disc."""
+    right = RIGHT_FITTINGS[polarity, "inside"]
+    return {
+        "X": 1.0 if fittings.xcollar == right.xcollar else -1.0,
+        "Y": 1.0 if fittings.ycollar == right.ycollar else -1.0,
+        "Z": 1.0,
+    }

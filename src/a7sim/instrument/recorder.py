@@ -1,0 +1,35 @@
+"""The recording device: what the operator registered, numbered, never erased."""
+
+from dataclasses import dataclass, field, replace
+
+from a7sim.instrument.refusals import OutOfRange
+
+
+@dataclass(frozen=True)
+class Registration:
+    """Counters and elements registered under a point; a struck one stays, marked."""
+
+    number: int
+    point: str
+    readings: tuple[tuple[str, str], ...]
+    """Name and reading as the counter showed it."""
+    struck: str | None = None
+
+
+@dataclass
+class Recorder:
+    """The registrations in order, numbered from 1."""
+
+    registrations: list[Registration] = field(default_factory=list)
+
+    def register(self, point: str, readings: list[tuple[str, str]]) -> Registration:
+        """Add a registration and return it."""
+        registration = Registration(len(self.registrations) + 1, point, tuple(readings))
+        self.registrations.append(registration)
+        return registration
+
+    def strike(self, number: int, why: str) -> None:
+        """Mark a registration as struck out. Raises OutOfRange for a number that is not there."""
+        if not 1 <= number <= len(self.registrations):
+            raise OutOfRange(f"expected a registration 1 to {len(self.registrations)}, got {number}")
+        self.registrations[number - 1] = replace(self.registrations[number - 1], struck=why)

@@ -1,0 +1,90 @@
+"""Spindles with their drums: what is set, what is read, and what really moves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.instrument.refusals import OutOfRange
+from a7sim.manual import COUNTER_DECIMALS, Element
+
+
+@dataclass
+class Spindle:
+    """A spindle whose drum is turned by hand and whose shaft follows with play and a setting error."""
+
+    low: float
+    high: float
+    at: float
+    """What the drum shows, unrounded."""
+    endless: bool = False
+    play: float = 0.0
+    setting_sigma: float = 0.0
+    fault: float = 0.0
+    """Zero error: the shaft stands that much further than the drum says."""
+
+    def __post_init__(self) -> None:
+        self._shaft = self.at
+        self._error = 0.0
+
+    @classmethod
+    def of(cls, element: Element, play: float, setting_sigma: float, fault: float) -> "Spindle":
+        """Return the spindle of an element, at its counter zero."""
+        return cls(element.low, element.high, element.zero, element.endless, play, setting_sigma, fault)
+
+    @property
+    def position(self) -> float:
+        """Where the shaft really stands, in mm or gon."""
+        return self._shaft + self._error + self.fault
+
+    @property
+    def shown(self) -> float:
+        """What the counter shows."""
+        shown = round(self.at, COUNTER_DECIMALS)
+        return shown % self.high if self.endless else shown + 0.0
+
+    def allows(self, value: float) -> bool:
+        """Whether the drum can be turned to a value."""
+        return self.low - 1e-9 <= value <= self.high + 1e-9
+
+    def turn_to(self, value: float, rng: np.random.Generator) -> None:
+        """Turn the drum to a value. Raises OutOfRange; then nothing has moved."""
+        if not self.allows(value):
+            raise OutOfRange(f"expected {self.low:.2f} to {self.high:.2f}, got {value:.10g}")
+        if self.endless:
+            value += self.high * round((self.at - value) / self.high)
+        self.at = value
+        half = self.play / 2.0
+        self._shaft = min(max(self._shaft, value - half), value + half)
+        if self.setting_sigma:
+            self._error = self.setting_sigma * rng.standard_normal()
+
+
+@dataclass
+class Counter:
+    """A counter geared to a carriage: ``reading = offset + units_per_mm * position``."""
+
+    units_per_mm: float = 1.0
+    decimals: int = COUNTER_DECIMALS
+    offset: float = 0.0
+
+    def reading(self, position: float) -> float:
+        """Return what the counter shows at a carriage position in mm."""
+        return round(self.offset + self.units_per_mm * position, self.decimals) + 0.0
+
+    def position(self, reading: float) -> float:
+        """Return the carriage position in mm where the counter shows a reading, rounded to its last digit."""
+        return (round(reading, self.decimals) - self.offset) / self.units_per_mm
+
+    def preset(self, reading: float, position: float) -> None:
+        """Make the counter show a reading at the present position."""
+        self.offset = round(reading, self.decimals) - self.units_per_mm * position
+
+    def engage(self, units_per_mm: float, decimals: int, position: float) -> None:
+        """Change the gear; the counter goes on from what it shows."""
+        reading = self.offset + self.units_per_mm * position
+        self.units_per_mm, self.decimals = units_per_mm, decimals
+        self.preset(reading, position)
+
+    def clear(self) -> None:
+        """Take off the preset: the counter shows mm of the instrument frame times its gear."""
+        self.offset = 0.0

@@ -1,0 +1,156 @@
+"""The serial line to an instrument in the same process: a pyserial object without a wire."""
+
+import threading
+from typing import Any
+
+from serial import PortNotOpenError, SerialBase
+
+from a7sim.instrument.language import Desk, Engine
+from a7sim.link.clock import Clock
+
+
+class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
+    """A pyserial port whose other end is an engine on a desk.
+
+    Whatever is written is obeyed before `write` returns; its replies wait to be read. Line settings
+    (baud rate, parity ...) are taken and change nothing. Several ports may share one desk.
+    """
+
+    def __init__(
+        self, port: str | None = None, *args: Any, desk: Desk | None = None, clock: Clock | None = None, **kwargs: Any
+    ) -> None:
+        self.clock = clock or Clock()
+        self._desk = desk
+        self._engine: Engine | None = None
+        self._replies = bytearray()
+        self._arrived = threading.Condition()
+        self._cancelled = False
+        super().__init__(None, *args, **kwargs)
+        self.port = port if port is not None or desk is None else "in process"
+        if self.port is not None and desk is not None:
+            self.open()
+
+    def _connect(self) -> Desk:
+        if self._desk is None:
+            raise PortNotOpenError
+        return self._desk
+
+    def open(self) -> None:
+        """Open a conversation with the instrument."""
+        if not self.is_open:
+            self._engine = self._connect().open()
+            self._cancelled = False
+            self.is_open = True
+
+    def close(self) -> None:
+        """End the conversation; a lock that it holds is free again."""
+        if self.is_open and self._engine is not None:
+            self._engine.desk.close(self._engine.client)
+        self._engine = None
+        self.is_open = False
+        self.cancel_read()
+
+    def _opened(self) -> Engine:
+        if self._engine is None:
+            raise PortNotOpenError
+        return self._engine
+
+    def write(self, data: Any) -> int:
+        """Send bytes and return how many."""
+        received = bytes(data)
+        with self._arrived:
+            self._replies += self._opened().feed(received, self.clock.now)
+            self._arrived.notify_all()
+        return len(received)
+
+    def read(self, size: int = 1) -> bytes:
+        """Return `size` bytes, or those there are when the timeout ends."""
+        return self._take(lambda: size if len(self._replies) >= size else None, size)
+
+    def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
+        """Return the bytes up to and with `expected`, at most `size`, or those there are at the timeout."""
+
+        def length() -> int | None:
+            found = self._replies.find(expected)
+            end = found + len(expected) if found >= 0 else None
+            if size is not None and len(self._replies) >= size:
+                return min(size, end) if end is not None else size
+            return end
+
+        return self._take(length, size)
+
+    def readline(self, size: int | None = -1, /) -> bytes:
+        """Return a line with its end, or what there is when the timeout ends."""
+        return self.read_until(b"\n", None if size is None or size < 0 else size)
+
+    def _take(self, length: Any, most: int | None) -> bytes:
+        with self._arrived:
+            self._opened()
+            self._arrived.wait_for(lambda: length() is not None or self._cancelled, self._timeout)
+            self._cancelled = False
+            end = length()
+            if end is None:
+                end = len(self._replies) if most is None else min(most, len(self._replies))
+            taken = bytes(self._replies[:end])
+            del self._replies[:end]
+            return taken
+
+    @property
+    def in_waiting(self) -> int:
+        """Number of bytes that can be read at once."""
+        self._opened()
+        return len(self._replies)
+
+    @property
+    def out_waiting(self) -> int:
+        """Number of bytes written and not yet obeyed: none, ever."""
+        self._opened()
+        return 0
+
+    def flush(self) -> None:
+        """Wait until all is obeyed, which it is."""
+        self._opened()
+
+    def reset_input_buffer(self) -> None:
+        """Forget replies that were not read."""
+        with self._arrived:
+            self._opened()
+            self._replies.clear()
+
+    def reset_output_buffer(self) -> None:
+        """Forget what was not yet sent: nothing."""
+        self._opened()
+
+    def cancel_read(self) -> None:
+        """Make a waiting read return what there is."""
+        with self._arrived:
+            self._cancelled = True
+            self._arrived.notify_all()
+
+    def cancel_write(self) -> None:
+        """Do nothing: a write never waits."""
+
+    def _reconfigure_port(self) -> None: ...
+    def _update_break_state(self) -> None: ...
+    def _update_rts_state(self) -> None: ...
+    def _update_dtr_state(self) -> None: ...
+
+    @property
+    def cts(self) -> bool:
+        """Clear to send: while open."""
+        return bool(self.is_open)
+
+    @property
+    def dsr(self) -> bool:
+        """Data set ready: while open."""
+        return bool(self.is_open)
+
+    @property
+    def ri(self) -> bool:
+        """Ring indicator: never."""
+        return False
+
+    @property
+    def cd(self) -> bool:
+        """Carrier detect: while open."""
+        return bool(self.is_open)

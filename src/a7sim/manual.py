@@ -1,0 +1,120 @@
+"""The manual of the plotters as frozen data: what each has, how far it goes, how it is fitted.
+
+The instrument is built from it and the operator has read it. Source unless said otherwise: the thesis,
+tables 3.2, 3.3 and 3.7 and section 3.2.3.6 (geometry.md, Counters and ranges, Gears, Fittings).
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from types import MappingProxyType
+
+LEAST_COUNT = 0.01
+"""mm and gon, of every counter of the elements and of X and Y (thesis table 3.7)."""
+
+COUNTER_DECIMALS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """An orientation element: its range and its counter zero, in mm or gon."""
+
+    low: float
+    high: float
+    zero: float
+    unit: str
+    endless: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Gear:
+    """A height gear: how many units its counter advances a mm, and the decimals it shows."""
+
+    units_per_mm: float
+    decimals: int = COUNTER_DECIMALS
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A type of plotter. An element that is not in `elements` is one the instrument does not have."""
+
+    name: str
+    elements: Mapping[str, Element]
+    carriages: Mapping[str, tuple[float, float]]
+    """mm; Z as height of the mark below the base line, hence negative."""
+    height_gears: Mapping[str, Gear]
+    base_modes: tuple[str, ...]
+    carriages_at_rest: Mapping[str, float] = field(
+        default_factory=lambda: MappingProxyType({"X": 0.0, "Y": 0.0, "Z": -300.0})
+    )
+    field_radius_mm: float = 10.0
+    """Radius of the field of view at photo scale [assumption; no source at hand]."""
+    rod_limit_gon: float = 62.0
+    """Inclination from the plumb line that a space rod can take [assumption; no source at hand]."""
+    centring_mm: float = 15.0
+    centring_gon: float = 20.0
+    """How far a picture can be shifted and turned on its carrier [assumption; no source at hand]."""
+
+
+def _both(name: str, element: Element) -> dict[str, Element]:
+    return {f"{name}1": element, f"{name}2": element}
+
+
+A7 = Variant(
+    name="A7",
+    elements=MappingProxyType(
+        {
+            **_both("c", Element(98.0, 215.0, 150.0, "mm")),
+            **_both("kappa", Element(0.0, 400.0, 0.0, "gon", endless=True)),
+            "phi1": Element(70.0, 106.0, 100.0, "gon"),
+            "phi2": Element(94.0, 130.0, 100.0, "gon"),
+            **_both("omega", Element(70.0, 109.0, 100.0, "gon")),
+            **_both("by", Element(-50.0, 50.0, 0.0, "mm")),
+            **_both("bz", Element(-27.0, 27.0, 0.0, "mm")),
+            "bx": Element(-280.0, 280.0, 0.0, "mm"),
+        }
+    ),
+    carriages=MappingProxyType({"X": (-280.0, 280.0), "Y": (-420.0, 350.0), "Z": (-490.0, -140.0)}),
+    height_gears=MappingProxyType(
+        {"Bd": Gear(3.0), "Dc": Gear(10.0 / 3.0, decimals=1), "Cd": Gear(3.75)},
+    ),
+    base_modes=("inside", "outside"),
+)
+
+VARIANTS: Mapping[str, Variant] = MappingProxyType({"A7": A7})
+
+
+@dataclass(frozen=True, slots=True)
+class Fittings:
+    """The positions of the five fittings."""
+
+    dove: str
+    triangulation: str
+    diapositive: str
+    xcollar: str
+    ycollar: str
+
+    def as_words(self) -> dict[str, str]:
+        """Return the position of every fitting by its name."""
+        return asdict(self)
+
+
+POSITIONS_OF: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "dove": ("inside", "outside"),
+        "triangulation": ("back", "front"),
+        "diapositive": ("right", "left"),
+        "xcollar": ("in", "out"),
+        "ycollar": ("in", "out"),
+    }
+)
+"""The two positions that every fitting has."""
+
+RIGHT_FITTINGS: Mapping[tuple[str, str], Fittings] = MappingProxyType(
+    {
+        ("negative", "inside"): Fittings("inside", "back", "right", "in", "in"),
+        ("negative", "outside"): Fittings("outside", "front", "right", "in", "in"),
+        ("positive", "inside"): Fittings("outside", "back", "left", "in", "out"),
+        ("positive", "outside"): Fittings("inside", "front", "left", "in", "out"),
+    }
+)
+"""The thesis's table: the fittings that belong to a picture and a base."""

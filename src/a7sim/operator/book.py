@@ -1,0 +1,69 @@
+"""The observation book: what the operator wrote down, in order; a struck entry stays."""
+
+import csv
+import io
+from dataclasses import dataclass, field, replace
+
+COLUMNS = ("number", "time_s", "model", "form", "round", "point", "item", "reading", "struck", "remark")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of the book; `reading` is the text of a counter, `struck` why it was struck out."""
+
+    number: int
+    time: float
+    model: str
+    form: str
+    round: int
+    point: str
+    item: str
+    reading: str
+    remark: str = ""
+    struck: str = ""
+
+
+@dataclass
+class Book:
+    """The entries, and the heading under which the next ones go."""
+
+    entries: list[Entry] = field(default_factory=list)
+    model: str = ""
+    form: str = ""
+    round: int = 0
+
+    def head(self, model: str, form: str, round: int = 0) -> None:
+        """Begin a form; what follows is entered under it."""
+        self.model, self.form, self.round = model, form, round
+
+    def enter(self, time: float, point: str, item: str, reading: str, remark: str = "") -> int:
+        """Enter a reading and return its number."""
+        number = len(self.entries) + 1
+        self.entries.append(
+            Entry(number, time, self.model, self.form, self.round, point, item, reading, remark)
+        )
+        return number
+
+    def strike(self, number: int, why: str) -> None:
+        """Strike an entry out; it stays, marked."""
+        self.entries[number - 1] = replace(self.entries[number - 1], struck=why)
+
+    def remark(self, time: float, text: str) -> None:
+        """Enter a remark."""
+        self.enter(time, "", "remark", "", text)
+
+    @property
+    def remarks(self) -> list[str]:
+        """All remarks in order."""
+        return [entry.remark for entry in self.entries if entry.item == "remark"]
+
+    def as_csv(self) -> str:
+        """Return the book as CSV with a header line."""
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for e in self.entries:
+            writer.writerow(
+                (e.number, f"{e.time:.1f}", e.model, e.form, e.round or "", e.point, e.item, e.reading, e.struck, e.remark)
+            )
+        return out.getvalue()

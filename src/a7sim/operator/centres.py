@@ -1,0 +1,48 @@
+"""Observing the perspective centres at two Z levels (thesis 3.6)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from a7sim.geometry import Array
+from a7sim.operator.bench import Bench
+from a7sim.operator.job import ModelJob
+from a7sim.reduction import PerspectiveCentre, perspective_centre
+
+SLIPPED = 2.5
+"""A point whose removal lowers the rms by this factor was misread at one of the levels."""
+
+MOST_REPETITIONS = 3
+
+
+def observe_centre(
+    bench: Bench, model: ModelJob, hand: int, levels: tuple[float, float]
+) -> PerspectiveCentre:
+    """Point monocularly at points 1 to 6 at both levels and compute the centre of one photograph.
+
+    hand is 1 for the left-hand photograph, 2 for the right-hand one. A point that does not fit the others is
+    struck out and pointed at again.
+    """
+    points = [model.standard_points[label] for label in model.points_of_case("A")]
+    low, high = (bench.point_with(hand, points, level) for level in levels)
+    bench.compute()
+    for _ in range(MOST_REPETITIONS):
+        misread = _misread_point(low, high, levels)
+        if misread is None:
+            break
+        why = "does not agree with the other points at the two levels"
+        for pointings, level in zip((low, high), levels, strict=True):
+            pointings[:, misread] = bench.point_again(hand, points[misread], level, why)
+        bench.compute()
+    return perspective_centre(low, high, *levels)
+
+
+def _misread_point(low: Array, high: Array, levels: tuple[float, float]) -> int | None:
+    everywhere: Sequence[int] = range(low.shape[1])
+    of_all = float(perspective_centre(low, high, *levels).rms)
+    without = [
+        float(perspective_centre(np.delete(low, i, axis=1), np.delete(high, i, axis=1), *levels).rms)
+        for i in everywhere
+    ]
+    worst = int(np.argmin(without))
+    return worst if of_all > SLIPPED * without[worst] and of_all > 0.05 else None

@@ -1,0 +1,58 @@
+"""What the operator is told: the job sheet. Nothing of it is the truth about a photograph."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from a7sim.scenario import Camera, Plan
+
+CASES: Mapping[str, str] = {
+    "A": "123456",
+    "B": "123456abc",
+    "C": "123456ghi",
+    "D": "123456def",
+    "E": "123456abcdefghi",
+}
+"""Standard points used for numerical relative orientation (thesis 3.4.2, geometry.md)."""
+
+
+@dataclass(frozen=True)
+class ModelJob:
+    """A model to be set up: its two photographs, the base, and the names of its standard points by position."""
+
+    name: str
+    left: str
+    right: str
+    base: str
+    polarity: str
+    standard_points: Mapping[str, str]
+
+    @property
+    def left_projector(self) -> int:
+        """The projector of the left-hand photograph: 1 with base in, 2 with base out."""
+        return 1 if self.base == "inside" else 2
+
+    @property
+    def right_projector(self) -> int:
+        """The projector of the right-hand photograph."""
+        return 3 - self.left_projector
+
+    def hand_of(self, projector: int) -> int:
+        """Return 1 if a projector holds the left-hand photograph, 2 if the right-hand one."""
+        return 1 if projector == self.left_projector else 2
+
+    def points_of_case(self, case: str) -> list[str]:
+        """Return the positions of a case that this model has."""
+        return [label for label in CASES[case] if label in self.standard_points]
+
+    def all_positions(self) -> list[str]:
+        """Return all standard positions that this model has."""
+        return self.points_of_case("E")
+
+
+@dataclass(frozen=True)
+class Job:
+    """The camera's certificate, the settings, and the models in order."""
+
+    certificate: Camera
+    plan: Plan
+    models: tuple[ModelJob, ...]

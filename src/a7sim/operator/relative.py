@@ -1,0 +1,166 @@
+"""Numerical relative orientation with by' and by" (thesis 3.4.2)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.geometry import GON, Array
+from a7sim.operator.bench import Bench, CannotFuse
+from a7sim.operator.job import ModelJob
+from a7sim.operator.person import DoesNotFit
+from a7sim.reduction import Undetermined, element_corrections
+
+MOST_ROUNDS = 12
+MOST_ROUGH_ROUNDS = 3
+STILL_FALLING = 0.8
+"""Residuals go on falling while their rms is below this share of the best so far."""
+
+GROSS_MM = 0.5
+"""While the rms is above this the mean stays in: it comes of the swings and omega, which are still to be found."""
+
+ALL_ELEMENTS = tuple(f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz") for n in (1, 2))
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round: the parallaxes at the points of the case, their mean, and their rms about it, mm."""
+
+    settings: Mapping[str, float]
+    parallaxes: Mapping[str, float]
+    mean: float
+    rms: float
+    sigmas: Mapping[str, float]
+    """Standard deviations of the corrections computed from this round, gon and mm; empty where none were."""
+
+
+@dataclass(frozen=True)
+class RelativeOrientation:
+    """The orientation as set: method, case, rounds, elements as the counters show them, residuals by position."""
+
+    method: str
+    case: str
+    rounds: Sequence[Round]
+    rough_rounds: int
+    elements: Mapping[str, float]
+    residuals: Mapping[str, float]
+    places: Mapping[str, tuple[float, float, float]]
+
+    @property
+    def rms(self) -> float:
+        """Rms in mm of the residual parallaxes at all standard points."""
+        return float(np.sqrt(np.mean(np.square(list(self.residuals.values())))))
+
+
+def unknowns_of(method: str, model: ModelJob) -> tuple[str, ...]:
+    """Return the elements that a method turns.
+
+    Independent (swing-swing): kappa', kappa", phi', phi", omega'. Dependent: kappa, phi, omega, by, bz of the
+    projector with the new, right-hand photograph: the right one with base in, the left one with base out.
+    """
+    if method == "independent":
+        return ("kappa1", "kappa2", "phi1", "phi2", "omega1")
+    n = model.right_projector
+    return tuple(f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz"))
+
+
+def relative_orientation(
+    bench: Bench, model: ModelJob, method: str, case: str, readings: int, base: float
+) -> RelativeOrientation:
+    """Clear the y-parallaxes of a model in rounds of measuring, computing and setting.
+
+    In the independent method the mean is taken off the parallaxes of a round once they are no longer gross; when
+    they no longer fall, the best settings stand and their mean goes on by'. Raises DoesNotFit when they do
+    not fall at all.
+    """
+    labels = model.points_of_case(case)
+    unknowns = unknowns_of(method, model)
+    points = [model.standard_points[label] for label in labels]
+    rounds: list[Round] = []
+    rough_rounds = best = 0
+    while len(rounds) < MOST_ROUNDS:
+        settings = bench.elements(unknowns)
+        try:
+            seen = bench.parallaxes(points, readings)
+        except CannotFuse as apart:
+            rough_rounds += 1
+            _bring_together(bench, model, points, unknowns, base, str(apart), rough_rounds)
+            continue
+        gross = float(np.sqrt(np.mean(seen.p**2))) > GROSS_MM
+        mean = 0.0 if gross or method == "dependent" else float(seen.p.mean())
+        rms = float(np.sqrt(np.mean((seen.p - mean) ** 2)))
+        rounds.append(Round(settings, dict(zip(labels, seen.p.tolist(), strict=True)), mean, rms, {}))
+        falling = len(rounds) == 1 or rms < STILL_FALLING * rounds[best].rms
+        if len(rounds) == 1 or rms < rounds[best].rms:
+            best = len(rounds) - 1
+        if not falling:
+            break
+        corrections, sigmas = _corrections(bench, model, seen.places, seen.p - mean, unknowns, base)
+        rounds[-1] = Round(settings, rounds[-1].parallaxes, mean, rms, sigmas)
+        bench.set_elements({name: settings[name] + corrections[name] for name in unknowns})
+    if rounds[best].rms > 0.5 * rounds[0].rms and rounds[best].rms > 0.1:
+        raise _given_up(
+            bench,
+            f"{model.name}: the y-parallaxes do not fall: rms {rounds[0].rms:.2f} mm at first, "
+            f"{rounds[best].rms:.2f} mm at best",
+        )
+    _restore(bench, rounds[best].settings)
+    if method == "independent":
+        sense = 1.0 if model.left_projector == 1 else -1.0
+        bench.set_elements({"by1": bench.elements(["by1"])["by1"] + sense * rounds[best].mean})
+    everywhere = model.all_positions()
+    left = bench.parallaxes([model.standard_points[label] for label in everywhere], readings)
+    places = dict(zip(everywhere, zip(*left.places.tolist(), strict=True), strict=True))
+    residuals = dict(zip(everywhere, left.p.tolist(), strict=True))
+    return RelativeOrientation(
+        method, case, rounds, rough_rounds, bench.elements(ALL_ELEMENTS), residuals, places
+    )
+
+
+def _restore(bench: Bench, settings: Mapping[str, float]) -> None:
+    now = bench.elements(list(settings))
+    changed = {name: value for name, value in settings.items() if now[name] != value}
+    if changed:
+        bench.set_elements(changed)
+
+
+def _bring_together(
+    bench: Bench,
+    model: ModelJob,
+    points: Sequence[str],
+    unknowns: Sequence[str],
+    base: float,
+    apart: str,
+    rough_round: int,
+) -> None:
+    """Orient roughly, where images are too far apart for by, from the Y readings of each eye alone."""
+    if rough_round > MOST_ROUGH_ROUNDS:
+        raise _given_up(bench, f"{model.name}: the images of {apart} stay too far apart to be fused")
+    bench.remark(f"{model.name}: the images of {apart} are too far apart for by: rough orientation, each eye alone")
+    level = bench.level_now
+    left, right = (bench.point_with(hand, points, level) for hand in (1, 2))
+    settings = bench.elements(unknowns)
+    places = bench.in_frame(left, level)
+    corrections, _ = _corrections(bench, model, places, left[1] - right[1], unknowns, base)
+    bench.set_elements({name: settings[name] + corrections[name] for name in unknowns})
+
+
+def _given_up(bench: Bench, text: str) -> DoesNotFit:
+    bench.remark(f"does not fit: {text}")
+    return DoesNotFit(text)
+
+
+def _corrections(
+    bench: Bench, model: ModelJob, places: Array, parallaxes: Array, unknowns: Sequence[str], base: float
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return corrections and their standard deviations by element, gon and mm."""
+    hands = [f"{name[:-1]}{model.hand_of(int(name[-1]))}" for name in unknowns]
+    bench.compute()
+    try:
+        solution = element_corrections(parallaxes, places, base, hands)
+    except Undetermined as undetermined:
+        raise _given_up(bench, f"{model.name}: {undetermined}") from undetermined
+    factor = [1.0 if name[:2] in ("by", "bz") else 1.0 / GON for name in unknowns]
+    values = {n: float(v) * f for n, v, f in zip(unknowns, solution.unknowns, factor, strict=True)}
+    sigmas = {n: float(s) * f for n, s, f in zip(unknowns, solution.sigmas, factor, strict=True)}
+    return values, sigmas

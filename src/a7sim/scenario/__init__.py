@@ -1,0 +1,41 @@
+"""Scenarios: what a file may say about a flight, photographs, an instrument and an operator."""
+
+from a7sim.scenario.loading import (
+    ScenarioError,
+    find_scenario,
+    load_scenario,
+    scenario_of,
+    scenario_schema,
+)
+from a7sim.scenario.references import POSITIONS
+from a7sim.scenario.schema import (
+    SCHEMA_VERSION,
+    Camera,
+    Condition,
+    Instrument,
+    Observer,
+    Photo,
+    Plan,
+    ProjectorCondition,
+    Scenario,
+)
+from a7sim.scenario.schema import Model as ModelPlan
+
+__all__ = [
+    "POSITIONS",
+    "SCHEMA_VERSION",
+    "Camera",
+    "Condition",
+    "Instrument",
+    "ModelPlan",
+    "Observer",
+    "Photo",
+    "Plan",
+    "ProjectorCondition",
+    "Scenario",
+    "ScenarioError",
+    "find_scenario",
+    "load_scenario",
+    "scenario_of",
+    "scenario_schema",
+]

@@ -1,0 +1,115 @@
+"""Reading a scenario from its TOML file."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from a7sim.mistakes import Mistake
+from a7sim.scenario.references import mistakes_of_reference
+from a7sim.scenario.schema import Scenario
+from a7sim.scenario.validation import mistakes_of_form
+
+
+class ScenarioError(Mistake):
+    """A scenario that cannot be used; `mistakes` names each mistake with its path."""
+
+    def __init__(self, source: str, mistakes: Sequence[str]) -> None:
+        self.source = source
+        self.mistakes = list(mistakes)
+        super().__init__("\n".join(f"{source}: {mistake}" for mistake in self.mistakes))
+
+
+def find_scenario(name: str | Path) -> Path:
+    """Return the path of a scenario file, by path or by the bare name of one that comes with a7sim.
+
+    Raises ScenarioError when there is none.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    shelves = (
+        Path(__file__).parents[1] / "scenarios",
+        Path(__file__).parents[3] / "scenarios",
+    )
+    for shelf in shelves:
+        found = shelf / f"{path.name.removesuffix('.toml')}.toml"
+        if path.parent in (Path(), Path("scenarios")) and found.is_file():
+            return found
+    known = sorted({file.stem for shelf in shelves for file in shelf.glob("*.toml")})
+    raise ScenarioError(str(name), [f"expected a scenario file or one of {', '.join(known)}, found no such file"])
+
+
+def load_scenario(name: str | Path, overrides: Mapping[str, str] | None = None) -> Scenario:
+    """Return the scenario of a file with overrides such as ``{"plan.case": '"B"'}`` (values in TOML).
+
+    Raises ScenarioError, which names every mistake at once.
+    """
+    path = find_scenario(name)
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(str(path), [f"expected TOML, got a file that breaks its rules: {error}"]) from error
+    except OSError as error:
+        raise ScenarioError(str(path), [f"expected a readable file: {error.strerror}"]) from error
+    for key, text in (overrides or {}).items():
+        _override(raw, key, text)
+    return scenario_of(raw, path.parent, str(path))
+
+
+def scenario_of(raw: Mapping[str, Any], folder: Path, source: str = "scenario") -> Scenario:
+    """Return the scenario of raw tables whose files stand in `folder`. Raises ScenarioError."""
+    mistakes = [
+        *mistakes_of_form(raw, _expected()),
+        *mistakes_of_reference(raw, folder),
+    ]
+    if mistakes:
+        raise ScenarioError(source, mistakes)
+    scenario = msgspec.convert(raw, Scenario)
+    photos = [
+        msgspec.structs.replace(
+            photo,
+            measured=msgspec.structs.replace(photo.measured, file=str(folder / photo.measured.file)),
+        )
+        if photo.measured
+        else photo
+        for photo in scenario.photos
+    ]
+    return msgspec.structs.replace(scenario, photos=photos)
+
+
+def scenario_schema() -> dict[str, Any]:
+    """Return the JSON Schema of scenario files."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(Scenario)}
+
+
+@cache
+def _expected() -> msgspec.inspect.Type:
+    return msgspec.inspect.type_info(Scenario)
+
+
+def _override(raw: dict[str, Any], key: str, text: str) -> None:
+    source = f"--set {key}={text}"
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text
+    *parents, last = key.split(".")
+    table: Any = raw
+    for parent in parents:
+        try:
+            table = table[int(parent)] if isinstance(table, list) else table.setdefault(parent, {})
+        except (ValueError, IndexError):
+            table = None
+        if not isinstance(table, dict | list):
+            raise ScenarioError(source, [f"expected the path of a scenario value such as plan.case, got {key!r}"])
+    try:
+        if isinstance(table, list):
+            table[int(last)] = value
+        else:
+            table[last] = value
+    except (ValueError, IndexError):
+        raise ScenarioError(source, [f"expected the path of a scenario value, got {key!r}"]) from None

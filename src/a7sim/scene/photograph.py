@@ -1,0 +1,88 @@
+"""A photograph as it lies on the table: film with fiducials, named image points and perhaps a picture."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from a7sim.geometry import Array
+from a7sim.scenario.schema import Camera, Film
+
+FORMAT_MM = 230.0
+"""Side of the picture."""
+
+SKETCH_SIGMA_MM = 0.3
+"""Points are pricked on the paper print to about half a millimetre (protocol.md)."""
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Named places on film: names in order and coordinates ``(2, n)`` in mm."""
+
+    names: tuple[str, ...]
+    xy: Array
+
+    @cached_property
+    def _places(self) -> dict[str, Array]:
+        return {name: self.xy[:, i] for i, name in enumerate(self.names)}
+
+    def get(self, name: str) -> Array | None:
+        """Return the place ``(2,)`` of a mark, or None where there is none of that name."""
+        return self._places.get(name)
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """Film coordinates in mm from the fiducial centre; `content` gives grey values 0..1 of film places."""
+
+    name: str
+    camera: Camera
+    fiducials: Marks
+    points: Marks
+    sketch: Marks
+    polarity: str = "positive"
+    laid: str = "right way up"
+    content: Callable[[Array], Array] | None = field(default=None, compare=False)
+
+
+def sketched(points: Marks, rng: np.random.Generator) -> Marks:
+    """Return the points as somebody pricked them on the paper print."""
+    return Marks(points.names, points.xy + rng.normal(0.0, SKETCH_SIGMA_MM, points.xy.shape))
+
+
+@dataclass(frozen=True)
+class Deformation:
+    """The affine and irregular deformation of one photograph's film."""
+
+    matrix: Array
+    irregular_mm: float
+    identification_mm: float
+
+    @classmethod
+    def drawn(cls, film: Film, rng: np.random.Generator) -> "Deformation":
+        """Return the deformation of one photograph on this film."""
+        shrink = np.asarray(film.shrinkage_ppm) + film.shrinkage_sigma_ppm * rng.standard_normal(2)
+        shear = film.shear_sigma_ppm * rng.standard_normal()
+        matrix = np.eye(2) - 1e-6 * np.array([[shrink[0], shear], [shear, shrink[1]]])
+        return cls(matrix, film.irregular_um / 1000.0, film.identification_um / 1000.0)
+
+    def of_fiducials(self, xy: Array, rng: np.random.Generator) -> Array:
+        """Return fiducials ``(2, n)`` as the film has them."""
+        return np.asarray(self.matrix @ xy + self.irregular_mm * rng.standard_normal(xy.shape))
+
+    def of_points(self, xy: Array, rng: np.random.Generator) -> Array:
+        """Return image points ``(2, n)`` as the film has them and as they are identified."""
+        spread = np.hypot(self.irregular_mm, self.identification_mm)
+        return np.asarray(self.matrix @ xy + spread * rng.standard_normal(xy.shape))
+
+
+def within_format(xy: Array, half_width_mm: float = 107.0) -> Array:
+    """Return which places ``(2, n)`` lie in the part of the format that shows a usable image."""
+    return np.asarray((np.abs(xy) <= half_width_mm).all(axis=0))
+
+
+def chosen(marks: Marks, keep: Sequence[bool] | Array) -> Marks:
+    """Return the marks for which `keep` is true."""
+    kept = np.asarray(keep, dtype=bool)
+    return Marks(tuple(np.array(marks.names, dtype=object)[kept]), marks.xy[:, kept])

@@ -1,0 +1,50 @@
+"""The ground under the flight."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.geometry import Array
+from a7sim.scenario.schema import Terrain
+
+_WAVES = 7
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Rolling ground: a sum of plane waves that stays within mean_height -+ relief."""
+
+    mean_height: float
+    amplitudes: Array
+    wave_numbers: Array
+    phases: Array
+
+    @classmethod
+    def of(cls, terrain: Terrain) -> "Ground":
+        """Return the ground that a scenario describes; the same terrain is the same ground."""
+        rng = np.random.default_rng(terrain.seed)
+        azimuths = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+        lengths = terrain.wavelength * rng.uniform(0.5, 1.5, _WAVES)
+        shares = rng.uniform(0.5, 1.0, _WAVES)
+        return cls(
+            terrain.mean_height,
+            terrain.relief * shares / shares.sum(),
+            2.0 * np.pi / lengths * np.array([np.cos(azimuths), np.sin(azimuths)]),
+            rng.uniform(0.0, 2.0 * np.pi, _WAVES),
+        )
+
+    def height(self, east: Array, north: Array) -> Array:
+        """Return the heights in m at places of any shape, in m."""
+        plan = np.array([east, north], dtype=float)
+        phases = np.einsum("iw,i...->w...", self.wave_numbers, plan)
+        waves = np.sin(phases + self.phases.reshape((_WAVES,) + (1,) * (plan.ndim - 1)))
+        return np.asarray(self.mean_height + np.einsum("w,w...->...", self.amplitudes, waves))
+
+    def met_by(self, centre: Array, direction: Array) -> Array:
+        """Return where rays ``(3, ...)`` going down from a centre ``(3,)`` meet the ground, ``(3, ...)`` in m."""
+        centre = centre.reshape((3,) + (1,) * (direction.ndim - 1))
+        level = np.full(direction.shape[1:], self.mean_height)
+        for _ in range(6):
+            met = centre + (level - centre[2]) / direction[2] * direction
+            level = self.height(met[0], met[1])
+        return np.asarray(met)

@@ -1,0 +1,176 @@
+"""The scene of a scenario: the ground, the stations, the photographs, and the truth about them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.geometry import GON, Array, image_of, length_of, mxm, mxv, rotation, transposed
+from a7sim.scenario.references import POSITIONS
+from a7sim.scenario.schema import Model, Photo, Published, Scenario
+from a7sim.scene.camera import distorted, fiducial_places, lowered_by_curvature, refracted
+from a7sim.scene.content import picture_of_ground, picture_of_marks
+from a7sim.scene.measured import measured_marks
+from a7sim.scene.photograph import Deformation, Marks, Photograph, chosen, sketched, within_format
+from a7sim.scene.terrain import Ground
+
+FILM_STREAM, SKETCH_STREAM = 1, 2
+"""Spawn keys of the scene's random numbers; the instrument's and the operator's follow."""
+
+_COLUMNS = {"1": 0.0, "3": 0.0, "5": 0.0, "2": 1.0, "4": 1.0, "6": 1.0}
+_COLUMNS |= {"a": 0.25, "b": 0.25, "c": 0.25, "d": 0.5, "e": 0.5, "f": 0.5, "g": 0.75, "h": 0.75, "i": 0.75}
+_ROWS = {label: 1.0 for label in "3adg4"} | {label: 0.0 for label in "1beh2"} | {label: -1.0 for label in "5cfi6"}
+
+
+@dataclass(frozen=True)
+class Station:
+    """Where a photograph was taken from: centre ``(3,)`` in m, rotation ``(3, 3)`` of camera vectors to the ground."""
+
+    centre: Array
+    rotation: Array
+
+
+@dataclass(frozen=True)
+class RelativeTruth:
+    """The orientation of the right photograph relative to the left: rotation ``(3, 3)`` and base ``(3,)``."""
+
+    rotation: Array
+    base: Array
+    source: str
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that is true of a scenario and that no operator is told."""
+
+    photographs: dict[str, Photograph]
+    stations: dict[str, Station]
+    ground_points: dict[str, Array]
+    standard_points: dict[str, dict[str, str]]
+    """Model name to position to point name."""
+    published: dict[str, RelativeTruth]
+
+    def relative_truth(self, model: Model) -> RelativeTruth | None:
+        """Return the true (flown) or published relative orientation of a model, if any is known."""
+        if model.left in self.stations and model.right in self.stations:
+            left, right = self.stations[model.left], self.stations[model.right]
+            to_left = transposed(left.rotation)
+            return RelativeTruth(
+                mxm(to_left, right.rotation),
+                mxv(to_left, right.centre - left.centre),
+                "the flight",
+            )
+        return self.published.get(model.name)
+
+
+def build_scene(scenario: Scenario, seed: int) -> Scene:
+    """Return the scene of a scenario; the seed draws the film and the pricking. Raises Mistake for bad files."""
+    ground = Ground.of(scenario.terrain)
+    stations = {
+        photo.name: Station(
+            np.array(photo.position),
+            rotation(photo.omega * GON, photo.phi * GON, photo.kappa * GON),
+        )
+        for photo in scenario.photos
+        if photo.position is not None
+    }
+    signalised = {
+        point.point: np.array([point.X, point.Y, _height_of(ground, point.X, point.Y) if point.Z is None else point.Z])
+        for point in scenario.ground
+    }
+    standard: dict[str, dict[str, str]] = {}
+    for model in scenario.models:
+        if model.standard_points is not None:
+            standard[model.name] = dict(model.standard_points)
+        else:
+            standard[model.name] = _lay_out_standard_points(scenario, model, stations, ground, signalised)
+    photographs = {
+        photo.name: _photograph(scenario, photo, index, seed, stations, ground, signalised)
+        for index, photo in enumerate(scenario.photos)
+    }
+    published = {model.name: _as_truth(model.published) for model in scenario.models if model.published is not None}
+    return Scene(photographs, stations, signalised, standard, published)
+
+
+def _height_of(ground: Ground, east: float, north: float) -> float:
+    return float(ground.height(np.asarray(east), np.asarray(north)))
+
+
+def _as_truth(published: Published) -> RelativeTruth:
+    return RelativeTruth(
+        rotation(published.omega * GON, published.phi * GON, published.kappa * GON),
+        np.array(published.base),
+        published.source,
+    )
+
+
+def _lay_out_standard_points(
+    scenario: Scenario, model: Model, stations: dict[str, Station], ground: Ground, signalised: dict[str, Array]
+) -> dict[str, str]:
+    left, right = stations[model.left].centre, stations[model.right].centre
+    along = (right - left)[:2]
+    across = np.array([-along[1], along[0]]) / length_of(along)
+    flying_height = (left[2] + right[2]) / 2.0 - ground.mean_height
+    half_width = scenario.plan.half_width * flying_height / scenario.camera.c
+    names = {}
+    for label in POSITIONS:
+        east, north = left[:2] + _COLUMNS[label] * along + _ROWS[label] * half_width * across
+        names[label] = _standard_name(model, label)
+        signalised.setdefault(names[label], np.array([east, north, _height_of(ground, east, north)]))
+    return names
+
+
+def _standard_name(model: Model, label: str) -> str:
+    """Return a point's name: a pass point is numbered by the photograph in whose nadir line it lies."""
+    if label in "135":
+        return f"{model.left}{label}"
+    if label in "246":
+        return f"{model.right}{int(label) - 1}"
+    return f"{model.name}{label}"
+
+
+def _photograph(
+    scenario: Scenario,
+    photo: Photo,
+    index: int,
+    seed: int,
+    stations: dict[str, Station],
+    ground: Ground,
+    signalised: dict[str, Array],
+) -> Photograph:
+    camera = scenario.camera
+    sketching = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(SKETCH_STREAM, index)))
+    if photo.measured is not None:
+        fiducials, points = measured_marks(photo.measured, photo.name, camera)
+        content = picture_of_marks(points)
+    else:
+        filming = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(FILM_STREAM, index)))
+        deformation = Deformation.drawn(scenario.film, filming)
+        names, calibrated = fiducial_places(camera)
+        fiducials = Marks(names, deformation.of_fiducials(calibrated, filming))
+        station = stations[photo.name]
+        imaged = Marks(tuple(signalised), _imaged(scenario, station, ground, np.array(list(signalised.values())).T))
+        before = np.array(list(signalised.values())).T[2] < station.centre[2]
+        imaged = Marks(imaged.names, deformation.of_points(imaged.xy, filming))
+        points = chosen(imaged, within_format(imaged.xy) & before)
+        to_film = deformation.matrix
+        content = picture_of_ground(ground, station.centre, station.rotation, camera.c, to_film, points)
+    return Photograph(
+        photo.name,
+        camera,
+        fiducials,
+        points,
+        sketched(points, sketching),
+        photo.polarity,
+        photo.laid,
+        content,
+    )
+
+
+def _imaged(scenario: Scenario, station: Station, ground: Ground, points: Array) -> Array:
+    if scenario.air.earth_curvature:
+        points = lowered_by_curvature(points, station.centre)
+    image = image_of(points, station.centre[:, None], station.rotation, scenario.camera.c)
+    if scenario.air.refraction:
+        image = refracted(image, scenario.camera.c, float(station.centre[2]), ground.mean_height)
+    image = distorted(scenario.camera, image)
+    return image + np.array(scenario.camera.principal_point)[:, None]
