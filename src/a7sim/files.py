@@ -52,8 +52,7 @@ def read_rows(path: str | Path, texts: Sequence[str], numbers: Sequence[str]) ->
         )
     places = {column: header.index(column) for column in [*texts, *numbers]}
     return [
-        _row(path, line, cells, header, places, numbers)
-        for (line, _), cells in zip(lines[1:], rows[1:], strict=True)
+        _row(path, line, cells, header, places, numbers) for (line, _), cells in zip(lines[1:], rows[1:], strict=True)
     ]
 
 

@@ -52,9 +52,7 @@ def parallax_coefficients(
     return np.concatenate([signed[:, i] for i in range(5)])
 
 
-def _changes_of_y(
-    image: Array, centre: Array, angles: Array, c: npt.ArrayLike, level: npt.ArrayLike
-) -> Array:
+def _changes_of_y(image: Array, centre: Array, angles: Array, c: npt.ArrayLike, level: npt.ArrayLike) -> Array:
     omega, phi, kappa = angles
     turned = rotation(omega, phi, kappa)
     r = at_level(np.zeros_like(centre), ray_of(image, turned, c), np.asarray(level) - centre[2])

@@ -55,6 +55,7 @@ class Autograph:
             for axis, (low, high) in variant.carriages.items()
         }
         self._counters = {axis: Counter() for axis in variant.carriages}
+        self._guides = _guides_of(self._condition)
         self._carriers: dict[int, Carrier] = {}
         self.base_mode = variant.base_modes[0]
         self.fittings = RIGHT_FITTINGS["positive", self.base_mode]
@@ -294,16 +295,19 @@ class Autograph:
 
     def mark_in_model(self) -> Array:
         """Return where the floating mark really stands in the instrument frame, ``(3,)`` in mm."""
-        x, y, z = (self._carriages[axis].position for axis in ("X", "Y", "Z"))
-        scale = self._condition.carriage_scale_ppm
-        xy, xz, yz = self._condition.carriage_skew_ppm
-        return np.array(
-            [
-                x + 1e-6 * (scale[0] * x + xy * y + xz * z),
-                y + 1e-6 * (scale[1] * y + yz * z),
-                z + 1e-6 * scale[2] * z,
-            ]
-        )
+        carriage = np.array([self._carriages[axis].position for axis in "XYZ"])
+        return np.asarray(self._guides @ carriage)
+
+    def readings_at(self, place: Array) -> dict[str, float]:
+        """Return what the counters would show, unrounded, with the mark at a place ``(3,)`` of the frame.
+
+        Part of the truth: no command of the language asks it.
+        """
+        carriage = np.linalg.solve(self._guides, place)
+        return {
+            axis: counter.offset + counter.units_per_mm * float(position)
+            for (axis, counter), position in zip(self._counters.items(), carriage, strict=True)
+        }
 
     def mark_on_carrier(self, projector: int) -> Array:
         """Return the place ``(2,)`` in mm on a carrier where the space rod brings the floating mark."""
@@ -350,7 +354,7 @@ class Autograph:
         if carrier is None:
             grey = np.zeros((rows, columns))
         else:
-            offset = mxv(np.linalg.inv(self._view(projector, carrier)), seen)
+            offset = mxv(transposed(self._view(projector, carrier)), seen)
             film = carrier.on_film(offset + self.mark_on_carrier(projector)[:, None, None])
             content = carrier.photograph.content
             grey = content(film) if content else np.full((rows, columns), 0.5)
@@ -369,6 +373,13 @@ class Autograph:
             self.base_mode,
             self._really(f"kappa{projector}"),
         )
+
+
+def _guides_of(condition: Condition) -> Array:
+    """Return the matrix ``(3, 3)`` from positions on the spindles to places in the frame."""
+    x, y, z = condition.carriage_scale_ppm
+    xy, xz, yz = condition.carriage_skew_ppm
+    return np.eye(3) + 1e-6 * np.array([[x, xy, xz], [0.0, y, yz], [0.0, 0.0, z]])
 
 
 def build_autograph(instrument: Instrument, photographs: Mapping[str, Photograph], seed: int) -> Autograph:

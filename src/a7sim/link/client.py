@@ -55,7 +55,7 @@ class Client:
 
     def errors(self) -> list[str]:
         """Take all entries off the instrument's error queue, oldest first."""
-        entries = []
+        entries: list[str] = []
         while True:
             self.send("SYST:ERR?")
             reply = self._port.readline().decode("ascii").rstrip("\n")

@@ -16,8 +16,15 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
     (baud rate, parity ...) are taken and change nothing. Several ports may share one desk.
     """
 
+    is_open: bool
+
     def __init__(
-        self, port: str | None = None, *args: Any, desk: Desk | None = None, clock: Clock | None = None, **kwargs: Any
+        self,
+        port: str | None = None,
+        *args: Any,
+        desk: Desk | None = None,
+        clock: Clock | None = None,
+        **kwargs: Any,
     ) -> None:
         self.clock = clock or Clock()
         self._desk = desk

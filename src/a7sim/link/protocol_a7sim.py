@@ -5,6 +5,7 @@ pyserial finds this module by its name; importing a7sim adds its package to
 with a7sim; `seed` draws its photographs.
 """
 
+from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from serial import SerialException
@@ -22,7 +23,7 @@ _EXAMPLE = "a7sim://scenarios/akwanga.toml?seed=7"
 class Serial(InProcessSerial):
     """A pyserial port to a new instrument that the URL describes. Raises SerialException for a bad URL."""
 
-    def __init__(self, port: str | None = None, *args: object, **kwargs: object) -> None:
+    def __init__(self, port: str | None = None, *args: Any, **kwargs: Any) -> None:
         super().__init__(None, *args, **kwargs)
         self.port = port
         if port is not None:

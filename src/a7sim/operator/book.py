@@ -39,9 +39,7 @@ class Book:
     def enter(self, time: float, point: str, item: str, reading: str, remark: str = "") -> int:
         """Enter a reading and return its number."""
         number = len(self.entries) + 1
-        self.entries.append(
-            Entry(number, time, self.model, self.form, self.round, point, item, reading, remark)
-        )
+        self.entries.append(Entry(number, time, self.model, self.form, self.round, point, item, reading, remark))
         return number
 
     def strike(self, number: int, why: str) -> None:
@@ -64,6 +62,17 @@ class Book:
         writer.writerow(COLUMNS)
         for e in self.entries:
             writer.writerow(
-                (e.number, f"{e.time:.1f}", e.model, e.form, e.round or "", e.point, e.item, e.reading, e.struck, e.remark)
+                (
+                    e.number,
+                    f"{e.time:.1f}",
+                    e.model,
+                    e.form,
+                    e.round or "",
+                    e.point,
+                    e.item,
+                    e.reading,
+                    e.struck,
+                    e.remark,
+                )
             )
         return out.getvalue()

@@ -28,9 +28,7 @@ class InteriorOrientation:
     principal_distance: float
 
 
-def interior_orientation(
-    person: Person, projector: int, photograph: str, certificate: Camera
-) -> InteriorOrientation:
+def interior_orientation(person: Person, projector: int, photograph: str, certificate: Camera) -> InteriorOrientation:
     """Mount a photograph in a projector and centre it on the calibrated principal point.
 
     Uniform film shrinkage, seen as a change of scale at the fiducials, goes into the principal distance.
@@ -41,7 +39,9 @@ def interior_orientation(
     person.set(f'PHOT{projector}:LOAD "{photograph}"')
     lies_there = client.ask(f"PHOT{projector}?").strip('"')
     if lies_there != photograph:
-        raise person.give_up(f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it")
+        raise person.give_up(
+            f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it"
+        )
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
     for round_ in range(1, MOST_ROUNDS + 1):
         names, displacements = _fiducials_seen(person, projector)
@@ -55,7 +55,9 @@ def interior_orientation(
         wanted = -np.array(certificate.principal_point)
         off = np.array([lie.dx - wanted[0], lie.dy - wanted[1]])
         if np.abs(off).max() <= CENTRED_MM and abs(lie.turn) * np.abs(places).max() <= CENTRED_MM:
-            return _set_principal_distance(person, projector, photograph, certificate, round_, lie, displacements, places)
+            return _set_principal_distance(
+                person, projector, photograph, certificate, round_, lie, displacements, places
+            )
         now = client.numbers(f"PHOT{projector}:CENT?")
         turn = lie.turn / GON
         person.set(

@@ -274,7 +274,12 @@ class LinkBench:
     # --- stereoscopic setting -------------------------------------------------------------------------
 
     def _settle(
-        self, point: str, plan_error: Errors, height_error: float, by: str | None = None, parallax_error: float = 0.0
+        self,
+        point: str,
+        plan_error: Errors,
+        height_error: float,
+        by: str | None = None,
+        parallax_error: float = 0.0,
     ) -> None:
         """Turn X, Y, Z, and by where one is given, until the mark seems to stand on the point."""
         sense = 0.0 if by is None else (1.0 if self.model.hand_of(int(by[-1])) == 1 else -1.0)
@@ -314,8 +319,8 @@ class LinkBench:
     def _see_that_it_fuses(self, point: str, running_away: Array, by: str | None) -> None:
         if running_away[2]:
             raise self.person.give_up(
-                f"{self.model.name}: point {point}: the x-parallax grows when the mark is moved to clear it, the relief "
-                "is inside out: the eyes see each other's pictures (triangulation lever, base)"
+                f"{self.model.name}: point {point}: the x-parallax grows when the mark is moved to clear it, the "
+                "relief is inside out: the eyes see each other's pictures (triangulation lever, base)"
             )
         if by and running_away[3]:
             raise self.person.give_up(

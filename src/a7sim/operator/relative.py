@@ -19,7 +19,7 @@ STILL_FALLING = 0.8
 GROSS_MM = 0.5
 """While the rms is above this the mean stays in: it comes of the swings and omega, which are still to be found."""
 
-ALL_ELEMENTS = tuple(f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz") for n in (1, 2))
+ALL_ELEMENTS = (*(f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz", "c") for n in (1, 2)), "bx")
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,7 @@ def relative_orientation(
     left = bench.parallaxes([model.standard_points[label] for label in everywhere], readings)
     places = dict(zip(everywhere, zip(*left.places.tolist(), strict=True), strict=True))
     residuals = dict(zip(everywhere, left.p.tolist(), strict=True))
-    return RelativeOrientation(
-        method, case, rounds, rough_rounds, bench.elements(ALL_ELEMENTS), residuals, places
-    )
+    return RelativeOrientation(method, case, rounds, rough_rounds, bench.elements(ALL_ELEMENTS), residuals, places)
 
 
 def _restore(bench: Bench, settings: Mapping[str, float]) -> None:

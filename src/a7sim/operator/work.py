@@ -16,7 +16,6 @@ from a7sim.operator.relative import RelativeOrientation, relative_orientation
 from a7sim.reduction import PerspectiveCentre
 
 
-
 @dataclass(frozen=True)
 class ModelRecord:
     """What the operator found of a model, in counter readings."""
@@ -33,7 +32,10 @@ class ModelRecord:
 
 
 def work(
-    person: Person, job: Job, tick: Callable[[], None] = lambda: None, begins: Callable[[str], None] = lambda _: None
+    person: Person,
+    job: Job,
+    tick: Callable[[], None] = lambda: None,
+    begins: Callable[[str], None] = lambda _: None,
 ) -> Iterator[ModelRecord]:
     """Yield the models of a job as they are done. Raises DoesNotFit when one cannot be set up.
 
@@ -78,7 +80,13 @@ def work(
 def _set_base_and_fittings(person: Person, model: ModelJob) -> None:
     right = RIGHT_FITTINGS[model.polarity, model.base].as_words()
     short = {"inside": "IN", "outside": "OUT", "front": "FRON", "right": "RIGH"}
-    nodes = {"dove": "DOVE", "triangulation": "TRI", "diapositive": "DIAP", "xcollar": "XCOL", "ycollar": "YCOL"}
+    nodes = {
+        "dove": "DOVE",
+        "triangulation": "TRI",
+        "diapositive": "DIAP",
+        "xcollar": "XCOL",
+        "ycollar": "YCOL",
+    }
     person.set(
         f"BASE:MODE {short[model.base]}",
         *(f"FITT:{nodes[name]} {short.get(word, word.upper())}" for name, word in right.items()),

@@ -52,5 +52,7 @@ def perspective_centre(low: Array, high: Array, level_low: float, level_high: fl
     )
     observed = np.concatenate([low[0], low[1], np.full_like(zero, level_low)])
     solution = adjusted(np.swapaxes(design, 0, 1), observed, redundancy=2 * n - 3)
-    residuals = solution.residuals.reshape((3, n) + low.shape[2:])
-    return PerspectiveCentre(*solution.unknowns, *solution.sigmas, solution.s0, residuals)
+    residuals = solution.residuals.reshape((3, n, *low.shape[2:]))
+    X0, Y0, Z0, T0 = solution.unknowns
+    sigma_X0, sigma_Y0, sigma_Z0, sigma_T0 = solution.sigmas
+    return PerspectiveCentre(X0, Y0, Z0, T0, sigma_X0, sigma_Y0, sigma_Z0, sigma_T0, solution.s0, residuals)

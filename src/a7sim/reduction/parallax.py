@@ -11,9 +11,7 @@ from a7sim.reduction.least_squares import Adjustment, adjusted
 FEWEST_POINTS = 5
 
 
-def element_corrections(
-    parallaxes: Array, points: Array, base: npt.ArrayLike, unknowns: Sequence[str]
-) -> Adjustment:
+def element_corrections(parallaxes: Array, points: Array, base: npt.ArrayLike, unknowns: Sequence[str]) -> Adjustment:
     """Return the corrections, radians and mm, that make y-parallaxes vanish in the least-squares sense.
 
     `parallaxes` has shape ``(n, ...)`` in mm, `points` ``(3, n, ...)``: x from the left-hand centre, y, and
@@ -21,5 +19,5 @@ def element_corrections(
     photograph. Raises Undetermined for points that do not determine them.
     """
     rows = [PARALLAX_ELEMENTS.index(name) for name in unknowns]
-    coefficients = near_vertical_parallax_coefficients(*points, base)
+    coefficients = near_vertical_parallax_coefficients(points[0], points[1], points[2], base)
     return adjusted(np.swapaxes(coefficients[rows], 0, 1), -parallaxes)

@@ -46,8 +46,8 @@ def _mistakes_in_names(raw: Mapping[str, Any]) -> Iterator[str]:
         count = Counter(name for name in names if isinstance(name, str))
         for index, name in enumerate(names):
             if isinstance(name, str) and count[name] > 1 and index != names.index(name):
-                first = names.index(name)
-                yield f"{prefix}{key}[{index}].{field}: expected a name of its own, got {name!r} as {key}[{first}]"
+                first = f"{prefix}{key}[{names.index(name)}]"
+                yield f"{prefix}{key}[{index}].{field}: expected a name of its own, got {name!r} as in {first}"
 
 
 def _mistakes_in_camera(camera: Mapping[str, Any]) -> Iterator[str]:

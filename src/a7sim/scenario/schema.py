@@ -25,7 +25,7 @@ class _Data(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Frozen data read from a file; unknown keys are mistakes."""
 
 
-class Fiducial(_Data, kw_only=True):
+class Fiducial(_Data, frozen=True, kw_only=True):
     """A fiducial mark by its calibrated place."""
 
     name: Text
@@ -33,7 +33,7 @@ class Fiducial(_Data, kw_only=True):
     y: PictureMm
 
 
-class Camera(_Data, kw_only=True):
+class Camera(_Data, frozen=True, kw_only=True):
     """A calibrated taking camera."""
 
     name: Text = "RC5"
@@ -45,7 +45,7 @@ class Camera(_Data, kw_only=True):
     """k1, k2, ... of the outward displacement k1 r^3 + k2 r^5 + ..., r and result in mm."""
 
 
-class Film(_Data, kw_only=True):
+class Film(_Data, frozen=True, kw_only=True):
     """How film and pricking deform the imaged coordinates; standard deviations are drawn anew per photograph."""
 
     shrinkage_ppm: tuple[Ppm, Ppm] = (0.0, 0.0)
@@ -60,7 +60,7 @@ class Film(_Data, kw_only=True):
     """Identity of a point from one photograph to the next, each coordinate."""
 
 
-class Measured(_Data, kw_only=True):
+class Measured(_Data, frozen=True, kw_only=True):
     """Image coordinates that somebody measured: the photograph comes from a file."""
 
     file: Text
@@ -74,7 +74,7 @@ class Measured(_Data, kw_only=True):
     """Size of a count; taken from the fiducials when absent, which hides any uniform film shrinkage."""
 
 
-class Photo(_Data, kw_only=True):
+class Photo(_Data, frozen=True, kw_only=True):
     """A photograph: where it was taken from, or the file of its measured image coordinates."""
 
     name: Text
@@ -89,7 +89,7 @@ class Photo(_Data, kw_only=True):
     """How the picture was laid in its carrier; upside down is a slip for training."""
 
 
-class Terrain(_Data, kw_only=True):
+class Terrain(_Data, frozen=True, kw_only=True):
     """Rolling ground about a mean height."""
 
     mean_height: Metres = 0.0
@@ -99,14 +99,14 @@ class Terrain(_Data, kw_only=True):
     seed: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] = 0
 
 
-class Air(_Data, kw_only=True):
+class Air(_Data, frozen=True, kw_only=True):
     """Departures of the rays from straight lines over a plane, as switches."""
 
     earth_curvature: bool = False
     refraction: bool = False
 
 
-class GroundPoint(_Data, kw_only=True):
+class GroundPoint(_Data, frozen=True, kw_only=True):
     """A signalised ground point; without Z it stands on the terrain."""
 
     point: Text
@@ -116,7 +116,7 @@ class GroundPoint(_Data, kw_only=True):
     role: Literal["control", "plan", "height", "check"] = "check"
 
 
-class Published(_Data, kw_only=True):
+class Published(_Data, frozen=True, kw_only=True):
     """A relative orientation that others published, to stand beside the instrument's."""
 
     omega: Gon
@@ -134,7 +134,7 @@ class Published(_Data, kw_only=True):
     source: Text = "the scenario"
 
 
-class Model(_Data, kw_only=True):
+class Model(_Data, frozen=True, kw_only=True):
     """Two photographs to be set up as a model."""
 
     name: Text
@@ -146,7 +146,7 @@ class Model(_Data, kw_only=True):
     published: Published | None = None
 
 
-class ProjectorCondition(_Data, kw_only=True):
+class ProjectorCondition(_Data, frozen=True, kw_only=True):
     """Faults of one projector, zero for a faultless one."""
 
     principal_distance_mm: OffsetMm = 0.0
@@ -160,7 +160,7 @@ class ProjectorCondition(_Data, kw_only=True):
     """By how much the tilt axes miss the projection centre, in the camera's axes."""
 
 
-class Condition(_Data, kw_only=True):
+class Condition(_Data, frozen=True, kw_only=True):
     """The state of maintenance of an instrument; all zero is a faultless one (never true)."""
 
     left: ProjectorCondition = ProjectorCondition()
@@ -180,7 +180,7 @@ class Condition(_Data, kw_only=True):
     """Play of the X, Y and Z spindles."""
 
 
-class Instrument(_Data, kw_only=True):
+class Instrument(_Data, frozen=True, kw_only=True):
     """Which plotter stands in the room, and in what state."""
 
     variant: Literal["A7"] = "A7"
@@ -191,13 +191,13 @@ class Instrument(_Data, kw_only=True):
     """How far from centred a picture lies when it is put on its carrier by hand."""
 
 
-class Observer(_Data, kw_only=True):
+class Observer(_Data, frozen=True, kw_only=True):
     """The person in the chair. um are at photo scale; sources in docs/decisions/0004-observer.md."""
 
     parallax_um: Sigma = 4.0
     """One setting of by on vanishing y-parallax (surveys: 2.2 to 5.7)."""
-    monocular_um: Sigma = 4.0
-    """One monocular pointing, each coordinate."""
+    monocular_um: Sigma = 3.5
+    """One monocular pointing, each coordinate (about 4; the thesis's twenty centres ask for 2.8)."""
     stereo_um: Sigma = 4.0
     """One stereoscopic pointing in plan, each coordinate."""
     height_um: Sigma = 3.0
@@ -218,7 +218,7 @@ class Observer(_Data, kw_only=True):
     seconds_to_drive: Seconds = 15.0
     seconds_to_mount: Seconds = 300.0
     seconds_to_compute: Seconds = 900.0
-    """Pace: estimates of the trade, no source at hand. To compute is one least-squares solution on the desk calculator."""
+    """Pace: estimates of the trade, no source at hand; to compute is one least-squares solution by calculator."""
 
     @classmethod
     def faultless(cls) -> "Observer":
@@ -234,16 +234,17 @@ class Observer(_Data, kw_only=True):
         )
 
 
-class Plan(_Data, kw_only=True):
+class Plan(_Data, frozen=True, kw_only=True):
     """The settings and the procedure on the operator's job sheet."""
 
     method: Literal["independent", "dependent"] = "independent"
     case: Literal["A", "B", "C", "D", "E"] = "A"
     bx: Annotated[float, Meta(ge=10, le=280, description="a base of 10 to 280 mm")]
     projection_height: Annotated[float, Meta(ge=140, le=490, description="a projection height of 140 to 490 mm")]
-    height_gear: Annotated[float, Meta(gt=0, le=100, description="counter units a mm, above 0 to 100")] | Literal[
-        "Bd", "Dc", "Cd"
-    ] = 8.0
+    height_gear: (
+        Annotated[float, Meta(gt=0, le=100, description="counter units a mm, above 0 to 100")]
+        | Literal["Bd", "Dc", "Cd"]
+    ) = 8.0
     """Units of the Z counter a mm; 8 is this project's assumption (geometry.md, Gears)."""
     plan_gear: Text = "1-2-1"
     preset: tuple[float, float, float] = (5000.0, 5000.0, 5000.0)
@@ -255,7 +256,7 @@ class Plan(_Data, kw_only=True):
     """Distance of the outer rows of standard points from the base, mm in the photograph."""
 
 
-class Scenario(_Data, kw_only=True):
+class Scenario(_Data, frozen=True, kw_only=True):
     """A flight, a camera, photographs, an instrument with its faults and an operator with theirs."""
 
     schema_version: Literal[1]

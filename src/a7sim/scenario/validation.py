@@ -1,5 +1,6 @@
 """Naming every mistake of a scenario at once, each with its path."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
@@ -107,7 +108,7 @@ def _fits(raw: Raw, constraint: inspect.Type) -> bool:
             return isinstance(raw, str) and low <= len(raw) and (high is None or len(raw) <= high)
         case inspect.IntType() | inspect.FloatType():
             kinds = int if isinstance(constraint, inspect.IntType) else int | float
-            if not isinstance(raw, kinds) or isinstance(raw, bool) or raw != raw:
+            if not isinstance(raw, kinds) or isinstance(raw, bool) or math.isnan(raw):
                 return False
             bounds = (
                 constraint.ge is None or raw >= constraint.ge,

@@ -16,10 +16,10 @@ _OCTAVES_M = (160.0, 47.0, 13.0, 3.7, 1.1)
 
 def ground_texture(east: Array, north: Array) -> Array:
     """Return grey values 0..1 of the ground in several octaves, the same for every photograph."""
-    grey = np.full(np.shape(east), 0.5)
+    grey: Array = np.full(np.shape(east), 0.5)
     for octave, length in enumerate(_OCTAVES_M):
         grey += 0.28 * 0.72**octave * _value_noise(east / length, north / length, octave)
-    return np.clip(grey, 0.0, 1.0)
+    return np.asarray(np.clip(grey, 0.0, 1.0))
 
 
 def _value_noise(x: Array, y: Array, salt: int) -> Array:

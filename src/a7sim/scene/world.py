@@ -18,7 +18,7 @@ FILM_STREAM, SKETCH_STREAM = 1, 2
 
 _COLUMNS = {"1": 0.0, "3": 0.0, "5": 0.0, "2": 1.0, "4": 1.0, "6": 1.0}
 _COLUMNS |= {"a": 0.25, "b": 0.25, "c": 0.25, "d": 0.5, "e": 0.5, "f": 0.5, "g": 0.75, "h": 0.75, "i": 0.75}
-_ROWS = {label: 1.0 for label in "3adg4"} | {label: 0.0 for label in "1beh2"} | {label: -1.0 for label in "5cfi6"}
+_ROWS = dict.fromkeys("3adg4", 1.0) | dict.fromkeys("1beh2", 0.0) | dict.fromkeys("5cfi6", -1.0)
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,11 @@ def _as_truth(published: Published) -> RelativeTruth:
 
 
 def _lay_out_standard_points(
-    scenario: Scenario, model: Model, stations: dict[str, Station], ground: Ground, signalised: dict[str, Array]
+    scenario: Scenario,
+    model: Model,
+    stations: dict[str, Station],
+    ground: Ground,
+    signalised: dict[str, Array],
 ) -> dict[str, str]:
     left, right = stations[model.left].centre, stations[model.right].centre
     along = (right - left)[:2]
@@ -173,4 +177,4 @@ def _imaged(scenario: Scenario, station: Station, ground: Ground, points: Array)
     if scenario.air.refraction:
         image = refracted(image, scenario.camera.c, float(station.centre[2]), ground.mean_height)
     image = distorted(scenario.camera, image)
-    return image + np.array(scenario.camera.principal_point)[:, None]
+    return np.asarray(image + np.array(scenario.camera.principal_point)[:, None])

@@ -118,7 +118,9 @@ def _registers(node: str, which: Callable[["Engine"], Register]) -> list[Command
 
     return [
         Command(
-            f"STATus:{node}[:EVENt]?", lambda e, c: str(which(e).read_event()), about="events, cleared by reading"
+            f"STATus:{node}[:EVENt]?",
+            lambda e, c: str(which(e).read_event()),
+            about="events, cleared by reading",
         ),
         Command(f"STATus:{node}:CONDition?", lambda e, c: str(which(e).condition), about="condition now"),
         Command(f"STATus:{node}:ENABle", enable, (Quantity(whole=True, name="mask"),), about="what is reported"),
@@ -134,7 +136,12 @@ _SYSTEM = [
     Command("*IDN?", _identity, about="maker, type, serial number, version"),
     Command("*OPC", _complete, about="raise bit 0 of the events when all movement is done"),
     Command("*OPC?", lambda e, c: "1", about="1 when all movement is done"),
-    Command("*RST", _reset, turns=True, about="elements to their zeros, base inside, fittings for a positive, no presets"),
+    Command(
+        "*RST",
+        _reset,
+        turns=True,
+        about="elements to their zeros, base inside, fittings for a positive, no presets",
+    ),
     Command("*SRE", _enable_service, (Quantity(whole=True, name="mask"),), about="bits that ask for service"),
     Command("*SRE?", lambda e, c: str(e.status.service_enable)),
     Command("*STB?", lambda e, c: str(e.status.status_byte()), about="status byte"),
@@ -229,10 +236,20 @@ _HANDLES = [
     *_element("COMMon:PHI", lambda suffix: "common_phi", "gon", "common longitudinal tilt (A8)"),
     *(command for fitting in _FITTING_NODES for command in _fitting(*fitting)),
     Command(
-        "GEAR:HEIGht", _height_gear, (QuotedOrNumber("combination"),), turns=True, about="height gear, or units a mm"
+        "GEAR:HEIGht",
+        _height_gear,
+        (QuotedOrNumber("combination"),),
+        turns=True,
+        about="height gear, or units a mm",
     ),
     Command("GEAR:HEIGht?", lambda e, c: _gear_text(_autograph(e).height_gear)),
-    Command("GEAR:PLAN", _plan_gear, (QuotedOrNumber("combination"),), turns=True, about="gear to the plotting table"),
+    Command(
+        "GEAR:PLAN",
+        _plan_gear,
+        (QuotedOrNumber("combination"),),
+        turns=True,
+        about="gear to the plotting table",
+    ),
     Command("GEAR:PLAN?", lambda e, c: _gear_text(_autograph(e).plan_gear)),
 ]
 
@@ -364,7 +381,9 @@ _PICTURES = [
     ),
     Command("PHOTo<n>:CENTring?", _centring),
     Command(
-        "PHOTo<n>:FIDucial?", _fiducials, about="name,dx,dy,... of the fiducials from their collimating marks, mm"
+        "PHOTo<n>:FIDucial?",
+        _fiducials,
+        about="name,dx,dy,... of the fiducials from their collimating marks, mm",
     ),
     Command("PHOTo<n>:SKETch?", _sketch, about="name,x,y,... of the points pricked on the paper print, mm"),
     Command(
@@ -383,7 +402,12 @@ _PICTURES = [
         ),
         about="block of grey bytes, row by row from the top",
     ),
-    Command("EYEPiece:STEReo?", _stereo, (Quoted("point"),), about="px,py, left image minus right, um at photo scale"),
+    Command(
+        "EYEPiece:STEReo?",
+        _stereo,
+        (Quoted("point"),),
+        about="px,py, left image minus right, um at photo scale",
+    ),
 ]
 
 # --- recording -----------------------------------------------------------------------------------------

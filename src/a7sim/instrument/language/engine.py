@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 from a7sim.instrument.language.status import Status
-from a7sim.instrument.language.syntax import units_of, unit_of
+from a7sim.instrument.language.syntax import unit_of, units_of
 from a7sim.instrument.refusals import OutOfRange, Refusal, SettingsConflict, UnknownName
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class Engine:
     def __init__(self, desk: "Desk", client: str, cr_ends_line: bool = True) -> None:
         self.desk = desk
         self.client = client
-        self.status = Status()
+        self.status: Status = Status()
         self._ends = re.compile(rb"[\r\n]" if cr_ends_line else rb"\n")
         self._pending = bytearray()
         self._overrun = False

@@ -36,7 +36,9 @@ class Call:
 class Taken(Protocol):
     """A kind of parameter: how it reads what came, and how it is described."""
 
-    optional: bool
+    @property
+    def optional(self) -> bool:
+        """Whether the parameter may be left out."""
 
     def read(self, parameter: Parameter, client: Any, suffix: int) -> Any:
         """Return the value. Raises LanguageError."""
@@ -98,9 +100,7 @@ class Choice:
         for word in self.words:
             if parameter.value in (short_form(word), word.upper()):
                 return word.lower()
-        raise LanguageError(
-            ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected {self.described()}, got {parameter.value}"
-        )
+        raise LanguageError(ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected {self.described()}, got {parameter.value}")
 
     def described(self) -> str:
         """Return the words with a bar between them."""

@@ -1,0 +1,64 @@
+"""The command line: one thin click command a verb."""
+
+import importlib
+import sys
+
+import click
+
+import a7sim
+from a7sim.mistakes import Mistake
+
+EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_INTERRUPTED = 1, 2, 130
+
+_VERBS = {
+    "run": "a7sim.cli.run",
+    "scenario": "a7sim.cli.scenario",
+}
+
+
+class _Verbs(click.Group):
+    """Commands imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in their order."""
+        return list(_VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import and return a verb's command."""
+        if cmd_name not in _VERBS:
+            return None
+        command = importlib.import_module(_VERBS[cmd_name]).command
+        return command if isinstance(command, click.Command) else None
+
+
+@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(a7sim.__version__, prog_name="a7sim")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+def cli(debug: bool) -> None:
+    """A simulated Wild A7 stereoplotter and the operator who works it.
+
+    Example: a7sim run akwanga
+    """
+
+
+def main() -> None:
+    """Run the command line; bad input gets one sentence and exit code 2."""
+    arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
+    debug = len(arguments) < len(sys.argv) - 1
+    try:
+        code = cli.main(arguments, prog_name="a7sim", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        if debug:
+            raise
+        click.echo("a7sim: interrupted", err=True)
+        code = EXIT_INTERRUPTED
+    except Mistake as mistake:
+        if debug:
+            raise
+        for line in str(mistake).splitlines():
+            click.echo(f"a7sim: {line}", err=True)
+        code = EXIT_MISTAKE
+    sys.exit(code if isinstance(code, int) else 0)

@@ -1,0 +1,89 @@
+"""`a7sim run`: the operator works through a scenario."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+import msgspec
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from a7sim.cli import EXIT_DOES_NOT_FIT
+from a7sim.mistakes import Mistake
+from a7sim.scenario import Observer, Scenario, load_scenario
+from a7sim.session import Watcher, prepare_folder, run
+from a7sim.session.results import as_json
+from a7sim.session.tables import of_session
+
+_POINTS_A_MODEL = 130
+"""About how many points an operator works on in a model; the bar only needs the order of it."""
+
+
+@click.command("run")
+@click.argument("scenario")
+@click.option("--case", type=click.Choice(list("ABCDE"), case_sensitive=False), help="Standard points used (thesis).")
+@click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one.")
+@click.option("--seed", type=click.IntRange(min=0), help="Draws film, instrument and operator.")
+@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario.")
+@click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for journal, book, models and results.")
+@click.option("--force", is_flag=True, help="Write into a folder that exists.")
+@click.option("--json", "as_document", is_flag=True, help="Print the results as one JSON document.")
+@click.option("--quiet", is_flag=True, help="Print nothing.")
+def command(
+    scenario: str,
+    case: str | None,
+    method: str | None,
+    seed: int | None,
+    settings: tuple[str, ...],
+    perfect_observer: bool,
+    out: Path | None,
+    force: bool,
+    as_document: bool,
+    quiet: bool,
+) -> None:
+    """Let the operator set up the models of SCENARIO, a file or the name of one that comes with a7sim.
+
+    Example: a7sim run akwanga --case E --seed 7 --out runs/akwanga-e
+    """
+    overrides = _overrides(settings, {"plan.case": case, "plan.method": method})
+    loaded = load_scenario(scenario, overrides)
+    if perfect_observer:
+        loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
+    if out is not None:
+        prepare_folder(out, force)
+    chosen = loaded.seed if seed is None else seed
+    document = _run_watched(loaded, chosen, out, quiet or as_document or not sys.stderr.isatty())
+    _show(document, as_document, quiet)
+    if document["status"] != "complete":
+        click.echo(f"a7sim: the operator gave up: {document['message']}", err=True)
+        raise click.exceptions.Exit(EXIT_DOES_NOT_FIT)
+
+
+def _overrides(settings: tuple[str, ...], options: dict[str, str | None]) -> dict[str, str]:
+    overrides = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not equals or not key:
+            raise Mistake(f"--set: expected PATH=VALUE such as plan.bx=190.0, got {setting!r}")
+        overrides[key] = value
+    return overrides | {key: f'"{value}"' for key, value in options.items() if value is not None}
+
+
+def _run_watched(scenario: Scenario, seed: int, out: Path | None, unwatched: bool) -> dict[str, Any]:
+    columns = (TextColumn("{task.description:<38}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
+        task = progress.add_task("sitting down", total=_POINTS_A_MODEL * len(scenario.models))
+        watcher = Watcher(
+            lambda activity: progress.update(task, description=activity),
+            lambda: progress.advance(task),
+        )
+        return run(scenario, seed, out, watcher)
+
+
+def _show(document: dict[str, Any], as_document: bool, quiet: bool) -> None:
+    if as_document:
+        click.echo(as_json(document), nl=False)
+    elif not quiet:
+        Console().print(of_session(document))

@@ -1,0 +1,156 @@
+"""What a session found, as one document for machines and as model files."""
+
+import csv
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+
+import a7sim
+from a7sim.instrument import Autograph
+from a7sim.operator import ModelRecord
+from a7sim.reduction import PerspectiveCentre
+from a7sim.scenario import Scenario
+from a7sim.scene import RelativeTruth
+from a7sim.session.truth import Relative, true_centre
+
+SCHEMA_VERSION = 1
+
+SIDES = {1: "left", 2: "right"}
+
+_CENTRE_FIELDS = ("X0", "Y0", "Z0", "T0", "sigma_X0", "sigma_Y0", "sigma_Z0", "sigma_T0", "rms")
+
+
+def header(scenario: Scenario, seed: int) -> dict[str, Any]:
+    """Return what a document of results says first."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "command": "run",
+        "software": f"a7sim {a7sim.__version__}",
+        "scenario": scenario.title,
+        "seed": seed,
+        "variant": scenario.instrument.variant,
+        "method": scenario.plan.method,
+        "case": scenario.plan.case,
+    }
+
+
+def of_model(record: ModelRecord, autograph: Autograph, truth: RelativeTruth | None) -> dict[str, Any]:
+    """Return the results of a model beside the truth; the instrument must stand as the operator left it."""
+    orientation = record.orientation
+    model = record.model
+    found = {hand: _centre(centre) for hand, centre in record.centres.items()}
+    return {
+        "model": model.name,
+        "left": model.left,
+        "right": model.right,
+        "base": model.base,
+        "z_units_per_mm": record.z_units_per_mm,
+        "finished_at_s": round(record.finished_at, 1),
+        "interior_orientation": [
+            {
+                "photo": each.photograph,
+                "rounds": each.rounds,
+                "residual_mm": round(each.residual_mm, 4),
+                "film_scale_ppm": round(1e6 * each.film_scale, 1),
+                "principal_distance": each.principal_distance,
+            }
+            for each in record.interior.values()
+        ],
+        "relative_orientation": {
+            "method": orientation.method,
+            "case": orientation.case,
+            "iterations": len(orientation.rounds),
+            "rough_iterations": orientation.rough_rounds,
+            "rounds": [
+                {
+                    "rms_mm": round(each.rms, 6),
+                    "mean_mm": round(each.mean, 6),
+                    "parallax_mm": _rounded(each.parallaxes),
+                    "sigmas": _rounded(each.sigmas),
+                }
+                for each in orientation.rounds
+            ],
+            "rms_parallax_mm": round(orientation.rms, 6),
+            "residual_parallax_mm": _rounded(orientation.residuals),
+            "elements": dict(orientation.elements),
+        },
+        "perspective_centres": {SIDES[hand]: centre for hand, centre in found.items()},
+        "points": {
+            point: {axis: round(value, 3) for axis, value in zip("XYZ", place, strict=True)}
+            for point, place in record.points.items()
+        },
+        "standard_points": dict(model.standard_points),
+        "truth": _beside_truth(record, autograph, truth, found),
+    }
+
+
+def _centre(centre: PerspectiveCentre) -> dict[str, float]:
+    return {name: round(float(getattr(centre, name)), 5) for name in _CENTRE_FIELDS}
+
+
+def _rounded(values: Any) -> dict[str, float]:
+    return {name: round(value, 6) for name, value in values.items()}
+
+
+def _beside_truth(
+    record: ModelRecord, autograph: Autograph, truth: RelativeTruth | None, found: dict[int, dict[str, float]]
+) -> dict[str, Any]:
+    model = record.model
+    projectors = {1: model.left_projector, 2: model.right_projector}
+    centres = {hand: true_centre(autograph, projectors[hand]) for hand in found}
+    beside: dict[str, Any] = {
+        "centres": {SIDES[hand]: {name: round(v, 5) for name, v in centre.items()} for hand, centre in centres.items()},
+        "centre_differences": {
+            SIDES[hand]: {name: round(found[hand][name] - value, 5) for name, value in centre.items()}
+            for hand, centre in centres.items()
+        },
+    }
+    if truth is not None:
+        measured = Relative.of_counters(record.orientation.elements, model, autograph.variant)
+        true = Relative.of_truth(truth)
+        turn, swing = measured.differences_gon(true)
+        beside |= {
+            "source": truth.source,
+            "relative_rotation": _matrix(true.rotation),
+            "base_direction": _vector(true.base),
+            "found_relative_rotation": _matrix(measured.rotation),
+            "found_base_direction": _vector(measured.base),
+            "rotation_difference_gon": round(turn, 5),
+            "base_difference_gon": round(swing, 5),
+        }
+    return beside
+
+
+def _vector(values: Any) -> list[float]:
+    return [round(float(value), 9) for value in values]
+
+
+def _matrix(values: Any) -> list[list[float]]:
+    return [_vector(row) for row in values]
+
+
+def as_json(document: dict[str, Any]) -> str:
+    """Return a document as indented JSON with a line end."""
+    return msgspec.json.format(msgspec.json.encode(document), indent=2).decode() + "\n"
+
+
+def models_csv(models: Sequence[dict[str, Any]]) -> str:
+    """Return model coordinates and centres in mm, Z upward (the geared counter divided by its units a mm)."""
+    out = io.StringIO()
+    out.write("# mm at model scale, Z up; the Z counter is divided by its units a mm\n")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(("model", "point", "X", "Y", "Z"))
+    for model in models:
+        units = model["z_units_per_mm"]
+        for point, place in model["points"].items():
+            writer.writerow((model["model"], point, *_mm(place["X"], place["Y"], place["Z"] / units)))
+        for side, centre in model["perspective_centres"].items():
+            name = f"{model[side]}:centre"
+            writer.writerow((model["model"], name, *_mm(centre["X0"], centre["Y0"], centre["Z0"] / units)))
+    return out.getvalue()
+
+
+def _mm(*values: float) -> tuple[str, ...]:
+    return tuple(f"{value:.4f}" for value in values)

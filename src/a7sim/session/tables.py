@@ -1,0 +1,111 @@
+"""The results as the thesis prints them, beside the truth, for a terminal."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.rule import Rule
+from rich.table import Table
+from rich.text import Text
+
+FIGURE_4_1 = ("3adg4", "1beh2", "5cfi6")
+"""Standard points as they lie in the model."""
+
+_ELEMENTS = (
+    ("κ", "kappa", "gon"),
+    ("φ", "phi", "gon"),
+    ("ω", "omega", "gon"),
+    ("by", "by", "mm"),
+    ("bz", "bz", "mm"),
+)
+
+
+def of_session(document: dict[str, Any]) -> RenderableType:
+    """Return the tables of a session."""
+    parts: list[RenderableType] = []
+    for model in document["models"]:
+        parts.extend(_of_model(model))
+    operator = document["operator"]
+    parts.append(
+        Text(
+            f"{operator['hours']:.1f} hours at the instrument, {operator['lines_over_the_link']} lines over the link, "
+            f"{operator['book_entries']} readings in the book, {operator['struck_out']} struck out"
+        )
+    )
+    if document["message"]:
+        parts.append(Text(f"{document['status']}: {document['message']}", style="bold"))
+    return Group(*parts)
+
+
+def _of_model(model: dict[str, Any]) -> Iterator[RenderableType]:
+    orientation = model["relative_orientation"]
+    yield Rule(f"Model {model['model']}: {model['left']} and {model['right']}, base {model['base']}", align="left")
+    yield _rounds(orientation)
+    yield _elements(orientation["elements"])
+    yield _residuals(orientation)
+    yield _centres(model)
+    yield _truth(model["truth"])
+    yield Text()
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    table.add_column(columns[0])
+    for column in columns[1:]:
+        table.add_column(column, justify="right")
+    return table
+
+
+def _titled(title: str, table: Table) -> RenderableType:
+    return Group(Text(), Text(title, style="bold"), table)
+
+
+def _rounds(orientation: dict[str, Any]) -> RenderableType:
+    table = _table("iteration", "mean p, mm", "rms, mm")
+    for number, each in enumerate(orientation["rounds"], start=1):
+        table.add_row(str(number), f"{each['mean_mm']:.4f}", f"{each['rms_mm']:.4f}")
+    title = f"Numerical relative orientation, {orientation['method']}, case {orientation['case']}"
+    return _titled(title, table)
+
+
+def _elements(elements: dict[str, float]) -> RenderableType:
+    table = _table("", "left '", 'right "', "")
+    for symbol, name, unit in _ELEMENTS:
+        table.add_row(symbol, f"{elements[f'{name}1']:.2f}", f"{elements[f'{name}2']:.2f}", unit)
+    table.add_row("c", f"{elements['c1']:.2f}", f"{elements['c2']:.2f}", "mm")
+    table.add_row("bx", f"{elements['bx']:.2f}", "", "mm")
+    return _titled("Elements as set", table)
+
+
+def _residuals(orientation: dict[str, Any]) -> RenderableType:
+    residuals = orientation["residual_parallax_mm"]
+    rms = orientation["rms_parallax_mm"]
+    table = _table(*[""] * 5)
+    table.show_header = False
+    for row in FIGURE_4_1:
+        present = [label for label in row if label in residuals]
+        table.add_row(*(f"{label} {residuals[label]:+.3f}" for label in present))
+    return _titled(f"Residual y-parallaxes at the standard points, mm (rms {rms:.4f})", table)
+
+
+def _centres(model: dict[str, Any]) -> RenderableType:
+    table = _table("", "left", "±", "true", "right", "±", "true")
+    sides = ("left", "right")
+    centres, truth = model["perspective_centres"], model["truth"]["centres"]
+    for name in ("X0", "Y0", "Z0", "T0"):
+        cells = []
+        for side in sides:
+            cells += [f"{centres[side][name]:.3f}", f"{centres[side][f'sigma_{name}']:.3f}"]
+            cells.append(f"{truth[side][name]:.3f}" if name in truth[side] else "")
+        table.add_row(name, *cells)
+    table.add_row("rms", *(cell for side in sides for cell in (f"{centres[side]['rms']:.3f}", "", "")))
+    return _titled("Perspective centres, counter units", table)
+
+
+def _truth(truth: dict[str, Any]) -> Text:
+    if "source" not in truth:
+        return Text("\nNo true relative orientation is known.")
+    return Text(
+        f"\nAgainst {truth['source']}: relative rotation off by {truth['rotation_difference_gon']:.4f} gon, "
+        f"base direction by {truth['base_difference_gon']:.4f} gon"
+    )
