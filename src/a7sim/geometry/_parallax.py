@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry._rays import at_level, ray_of
-from a7sim.geometry._rotation import Array, mxv, rotation
+from a7sim.geometry._rotation import Array, rotation
 
 PARALLAX_ELEMENTS = (
     "kappa1", "kappa2", "phi1", "phi2", "omega1", "omega2", "by1", "by2", "bz1", "bz2",
@@ -30,47 +30,34 @@ def y_parallax(
 
 
 def parallax_coefficients(
-    image1: Array,
-    image2: Array,
-    centre1: Array,
-    centre2: Array,
-    angles1: Array,
-    angles2: Array,
-    c1: npt.ArrayLike,
-    c2: npt.ArrayLike,
-    level: npt.ArrayLike,
+    point1: Array, point2: Array, centre1: Array, centre2: Array, angles1: Array, angles2: Array
 ) -> Array:
     """Return the derivatives of `y_parallax` by the ten elements, shape ``(10, ...)``, for any tilt.
 
-    Angles are ``(omega, phi, kappa)`` in radians. A small turn about the axis a through the centre moves the
-    point r of the ray, seen from there, by a x r, and the ray leaves the plane Z = level at
-    ``dy = (a x r)_y - (r_y / r_z) (a x r)_z``; near the vertical this is `near_vertical_parallax_coefficients`.
+    Points ``(3, ...)`` are where the two rays meet the plane Z = level, one point where they intersect; angles
+    ``(3, ...)`` are omega, phi, kappa in radians. A small turn about the axis a through the centre moves the
+    ray's point r, seen from there, by a x r, and the ray leaves the plane at
+    ``dy = (a x r)_y - (r_y / r_z) (a x r)_z``; near the vertical that is `near_vertical_parallax_coefficients`.
     """
-    left = _changes_of_y(image1, centre1, angles1, c1, level)
-    right = _changes_of_y(image2, centre2, angles2, c2, level)
-    signed = np.array([left, -right])
-    return np.concatenate([signed[:, i] for i in range(5)])
+    left = _changes_of_y(point1 - centre1, angles1)
+    right = _changes_of_y(point2 - centre2, angles2)
+    return np.asarray(np.stack([left, -right], axis=1).reshape((10, *left.shape[1:])))
 
 
-def _changes_of_y(image: Array, centre: Array, angles: Array, c: npt.ArrayLike, level: npt.ArrayLike) -> Array:
+def _changes_of_y(r: Array, angles: Array) -> Array:
+    """Return how y changes with kappa, phi, omega, by and bz, shape ``(5, ...)``."""
     omega, phi, kappa = angles
-    turned = rotation(omega, phi, kappa)
-    r = at_level(np.zeros_like(centre), ray_of(image, turned, c), np.asarray(level) - centre[2])
     slope = r[1] / r[2]
-    unit_x, unit_y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-    axes = (
-        turned[:, 2],
-        mxv(rotation(omega, 0.0, 0.0), unit_y),
-        unit_x,
-    )
-    shape = r.shape[1:]
+    about_kappa = rotation(omega, phi, kappa)[:, 2]
+    about_phi = rotation(omega, 0.0, 0.0)[:, 1]
+    about_omega = np.array([1.0, 0.0, 0.0])
 
     def turn(axis: Array) -> Array:
-        axis = axis.reshape(axis.shape + (1,) * (len(shape) - axis.ndim + 1))
+        axis = axis.reshape((*axis.shape, *(1,) * (r.ndim - axis.ndim)))
         moved = np.cross(np.broadcast_to(axis, r.shape), r, axis=0)
         return np.asarray(moved[1] - slope * moved[2])
 
-    return np.array([*(turn(axis) for axis in axes), np.full(shape, -1.0), -slope])
+    return np.array([turn(about_kappa), turn(about_phi), turn(about_omega), np.full_like(slope, -1.0), -slope])
 
 
 def near_vertical_parallax_coefficients(

@@ -53,7 +53,7 @@ class Bench(Protocol):
         """Strike out a pointing and make it once more; X, Y ``(2,)``."""
 
     def measure(self, points: Sequence[str]) -> Array:
-        """Measure model points stereoscopically, two pointings that agree; X, Y, Z ``(3, n)``."""
+        """Measure model points stereoscopically, two pointings that agree; X, Y, Z ``(3, n)``, NaN where not fused."""
 
     def in_frame(self, readings: Array, level: float) -> Array:
         """Return X, Y readings ``(2, n)`` at a Z reading as places x, y, z ``(3, n)`` in mm (see Parallaxes)."""

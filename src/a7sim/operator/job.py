@@ -17,7 +17,7 @@ CASES: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class ModelJob:
-    """A model to be set up: its two photographs, the base, and the names of its standard points by position."""
+    """A model to be set up: its two photographs, the base, and its standard points by position, and others."""
 
     name: str
     left: str
@@ -25,6 +25,8 @@ class ModelJob:
     base: str
     polarity: str
     standard_points: Mapping[str, str]
+    other_points: tuple[str, ...] = ()
+    """Control, check and other points, to be measured where both prints show them."""
 
     @property
     def left_projector(self) -> int:

@@ -25,8 +25,14 @@ AGREEMENT_MM = 0.01
 AT_REST_MM = 0.0015
 """A handwheel is let go when it would have to be turned by less than this."""
 
-HALF_A_COUNT_MM = 0.0052
-"""A by counter shows what was meant when it is within half its least count, and a hair."""
+CONTENT_MM = 0.0045
+"""With by this near, just below half a least count, no other count can be nearer; beyond it the next is tried."""
+
+LONGEST_RISE_MM = 20.0
+"""The foot disc is not turned further than this between two looks."""
+
+RISES_TO_FUSE_MM = (0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0)
+"""Where the mark is taken to find the height at which the right eye sees the point as well."""
 
 SEARCH_RINGS = 3
 SEARCH_STEP_MM = 14.0
@@ -240,7 +246,7 @@ class LinkBench:
         errors = person.errors(person.observer.monocular_um, (2, len(points)))
         slips = person.slips((2, len(points)))
         self._drive(f"DRIV:Z {level:.2f}")
-        person.client.check(f"driving Z to {level:.2f}")
+        person.see_that_it_obeyed(f"driving Z to {level:.2f}")
         readings = np.zeros((2, len(points)))
         for i, point in enumerate(points):
             error = (float(errors[0, i]), float(errors[1, i]))
@@ -285,28 +291,43 @@ class LinkBench:
         sense = 0.0 if by is None else (1.0 if self.model.hand_of(int(by[-1])) == 1 else -1.0)
         by_now = self.elements([by])[by] if by else 0.0
         watch = _Watch()
+        tried: dict[float, float] = {}
         for _ in range(MOST_LOOKS):
             seen = self._looked(point)
             self._see_that_it_fuses(point, watch.running_away(seen), by)
-            self._counters()
+            x, y, _ = self._frame(self._counters())
             scale = 1e-3 * self._z / self._c
-            dx, dy = (seen[:2] + plan_error) * scale
             rise = float(seen[2] + height_error) * scale * self._z / abs(self._bx)
-            by_step = float(sense * (seen[3] + parallax_error) * scale)
-            by_stands = abs(by_step) < HALF_A_COUNT_MM
-            if max(abs(dx), abs(dy), abs(rise)) < AT_REST_MM and by_stands:
-                return
+            rise = min(max(rise, -LONGEST_RISE_MM), LONGEST_RISE_MM)
+            along_the_rays = -rise / self._z * np.array([x - self._bx / 2.0, y])
+            dx, dy = (seen[:2] + plan_error) * scale + along_the_rays
+            at_rest = max(abs(dx), abs(dy), abs(rise)) < AT_REST_MM
             line = f"WHE:X {dx:.3f};Y {dy:.3f};Z {rise * self._units:.3f}"
-            if by and not by_stands:
-                by_now = round(by_now + by_step, 2)
-                low, high = self.manual.elements[by].low, self.manual.elements[by].high
-                if not low <= by_now <= high:
-                    raise CannotFuse(point)
-                line += f";:{_header(by)} {by_now:.2f}"
+            if by is not None:
+                by_step = float(sense * (seen[3] + parallax_error) * scale)
+                tried[by_now] = abs(by_step)
+                by_next = self._next_count(by, by_now, by_step, tried)
+                if by_next != by_now:
+                    at_rest = False
+                    line += f";:{_header(by)} {by_next:.2f}"
+                    by_now = by_next
+            if at_rest:
+                return
             self.person.turn(line)
         raise self.person.give_up(
             f"{self.model.name}: point {point} cannot be brought to rest under the mark stereoscopically"
         )
+
+    def _next_count(self, by: str, now: float, step: float, tried: Mapping[float, float]) -> float:
+        """Return the count of by to go to: here if it is content, else the nearest not tried, else the best tried."""
+        if abs(step) < CONTENT_MM:
+            return now
+        wanted = round(now + np.sign(step) * max(abs(step), 0.01), 2)
+        if not self.manual.elements[by].low <= wanted <= self.manual.elements[by].high:
+            raise CannotFuse(by)
+        if wanted in tried and abs(wanted - now) < 0.015:
+            return min((now, wanted), key=tried.__getitem__)
+        return float(wanted)
 
     def _looked(self, point: str) -> Array:
         """Return what both eyes see: x and y from the mark (mean of both), px, py, in um."""
@@ -330,8 +351,18 @@ class LinkBench:
 
     def _fuse(self, point: str, plan_error: Errors, height_error: float) -> None:
         self._bring_into_view(1, point)
-        self._bisect(1, point, (0.0, 0.0))
-        self._settle(point, plan_error, height_error)
+        height = -self._z
+        for rise in RISES_TO_FUSE_MM:
+            if rise:
+                self._drive_z_to(height + rise)
+                self._bring_into_view(1, point)
+            self._bisect(1, point, (0.0, 0.0))
+            if self._seen(2, point) is not None:
+                self._settle(point, plan_error, height_error)
+                return
+        self._drive_z_to(height)
+        self.person.client.errors()
+        raise CannotFuse(point)
 
     # --- y-parallaxes ---------------------------------------------------------------------------------
 
@@ -365,7 +396,7 @@ class LinkBench:
                 person.turn(";:".join(f"{_header(by)} {rest[by]:.2f}" for by in rest))
                 raise
             self._tick()
-        person.client.check("measuring y-parallaxes")
+        person.see_that_it_obeyed("measuring y-parallaxes")
         return Parallaxes(p, places)
 
     def _read_by(self, point: str, by: str, rest: float, slip: float) -> tuple[str, float, int]:
@@ -402,7 +433,10 @@ class LinkBench:
     # --- model coordinates ----------------------------------------------------------------------------
 
     def measure(self, points: Sequence[str]) -> Array:
-        """Measure model points stereoscopically, two pointings that agree; X, Y, Z readings ``(3, n)``."""
+        """Measure model points stereoscopically, two pointings that agree; X, Y, Z readings ``(3, n)``.
+
+        A point whose images cannot be fused is remarked upon and comes out as NaN.
+        """
         person, observer = self.person, self.person.observer
         n = len(points)
         at_point = person.errors(1.0, (3, n)) * np.sqrt(1.0 - observer.repeat_share**2)
@@ -411,9 +445,14 @@ class LinkBench:
         slips = person.slips((3, n, 2))
         measured = np.zeros((3, n))
         for i, point in enumerate(points):
-            pointings = [
-                self._pointing(point, sigmas * (at_point[:, i] + anew[:, i, k]), slips[:, i, k]) for k in (0, 1)
-            ]
+            try:
+                pointings = [
+                    self._pointing(point, sigmas * (at_point[:, i] + anew[:, i, k]), slips[:, i, k]) for k in (0, 1)
+                ]
+            except CannotFuse:
+                person.remark(f"point {point}: its two images cannot be fused, not measured")
+                measured[:, i] = np.nan
+                continue
             while not self._agree(pointings[-2], pointings[-1]) and len(pointings) < MOST_POINTINGS:
                 self._strike(pointings[-2], "two pointings differ by more than 0.01 mm")
                 again = np.array([person.error_again(observer.repeat_share) for _ in range(3)])
@@ -426,7 +465,7 @@ class LinkBench:
                 measured[:, i] = np.median([readings for readings, _ in pointings], axis=0)
                 person.remark(f"point {point}: no two of {MOST_POINTINGS} pointings agree, median taken")
             self._tick()
-        person.client.check("measuring model coordinates")
+        person.see_that_it_obeyed("measuring model coordinates")
         return measured
 
     def _pointing(self, point: str, error: Array, slips: Array) -> tuple[Array, list[int]]:

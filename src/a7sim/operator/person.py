@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.link.client import Client
+from a7sim.link.client import Client, InstrumentRefused
 from a7sim.link.clock import Clock
 from a7sim.operator.book import Book
 from a7sim.scenario import Observer
@@ -73,7 +73,14 @@ class Person:
         for line in lines:
             self.clock.spend(self.observer.seconds_to_set)
             self.client.send(line)
-        self.client.check(lines[-1])
+        self.see_that_it_obeyed(f"setting {'; '.join(lines)}")
+
+    def see_that_it_obeyed(self, doing: str) -> None:
+        """Give up when the instrument has refused anything since the last look."""
+        try:
+            self.client.check(doing)
+        except InstrumentRefused as refused:
+            raise self.give_up(f"the instrument refuses: {refused}") from refused
 
     def read(self, question: str, slip: float = 0.0) -> float:
         """Read a counter, with a slip if there is one."""

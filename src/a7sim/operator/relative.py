@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import GON, Array
-from a7sim.operator.bench import Bench, CannotFuse
+from a7sim.operator.bench import COUNTER_ZEROS, Bench, CannotFuse, wrapped
 from a7sim.operator.job import ModelJob
 from a7sim.operator.person import DoesNotFit
-from a7sim.reduction import Undetermined, element_corrections
+from a7sim.reduction import Stand, Undetermined, element_corrections
 
 MOST_ROUNDS = 12
 MOST_ROUGH_ROUNDS = 3
@@ -69,9 +69,9 @@ def relative_orientation(
 ) -> RelativeOrientation:
     """Clear the y-parallaxes of a model in rounds of measuring, computing and setting.
 
-    In the independent method the mean is taken off the parallaxes of a round once they are no longer gross; when
-    they no longer fall, the best settings stand and their mean goes on by'. Raises DoesNotFit when they do
-    not fall at all.
+    Once the parallaxes of a round are no longer gross their mean is taken off; in the dependent method, where by is
+    itself unknown, only to see whether they fall. When they no longer do, the best settings stand and their
+    mean goes on by' (dependent: on the by that was turned). Raises DoesNotFit when they do not fall at all.
     """
     labels = model.points_of_case(case)
     unknowns = unknowns_of(method, model)
@@ -87,7 +87,7 @@ def relative_orientation(
             _bring_together(bench, model, points, unknowns, base, str(apart), rough_rounds)
             continue
         gross = float(np.sqrt(np.mean(seen.p**2))) > GROSS_MM
-        mean = 0.0 if gross or method == "dependent" else float(seen.p.mean())
+        mean = 0.0 if gross else float(seen.p.mean())
         rms = float(np.sqrt(np.mean((seen.p - mean) ** 2)))
         rounds.append(Round(settings, dict(zip(labels, seen.p.tolist(), strict=True)), mean, rms, {}))
         falling = len(rounds) == 1 or rms < STILL_FALLING * rounds[best].rms
@@ -95,7 +95,8 @@ def relative_orientation(
             best = len(rounds) - 1
         if not falling:
             break
-        corrections, sigmas = _corrections(bench, model, seen.places, seen.p - mean, unknowns, base)
+        to_clear = seen.p - mean if method == "independent" else seen.p
+        corrections, sigmas = _corrections(bench, model, seen.places, to_clear, unknowns, base)
         rounds[-1] = Round(settings, rounds[-1].parallaxes, mean, rms, sigmas)
         bench.set_elements({name: settings[name] + corrections[name] for name in unknowns})
     if rounds[best].rms > 0.5 * rounds[0].rms and rounds[best].rms > 0.1:
@@ -105,14 +106,17 @@ def relative_orientation(
             f"{rounds[best].rms:.2f} mm at best",
         )
     _restore(bench, rounds[best].settings)
-    if method == "independent":
-        sense = 1.0 if model.left_projector == 1 else -1.0
-        bench.set_elements({"by1": bench.elements(["by1"])["by1"] + sense * rounds[best].mean})
+    _set_mean_on_by(bench, model, "by1" if method == "independent" else unknowns[3], rounds[best].mean)
     everywhere = model.all_positions()
     left = bench.parallaxes([model.standard_points[label] for label in everywhere], readings)
     places = dict(zip(everywhere, zip(*left.places.tolist(), strict=True), strict=True))
     residuals = dict(zip(everywhere, left.p.tolist(), strict=True))
     return RelativeOrientation(method, case, rounds, rough_rounds, bench.elements(ALL_ELEMENTS), residuals, places)
+
+
+def _set_mean_on_by(bench: Bench, model: ModelJob, by: str, mean: float) -> None:
+    sense = 1.0 if model.hand_of(int(by[-1])) == 1 else -1.0
+    bench.set_elements({by: bench.elements([by])[by] + sense * mean})
 
 
 def _restore(bench: Bench, settings: Mapping[str, float]) -> None:
@@ -136,10 +140,11 @@ def _bring_together(
         raise _given_up(bench, f"{model.name}: the images of {apart} stay too far apart to be fused")
     bench.remark(f"{model.name}: the images of {apart} are too far apart for by: rough orientation, each eye alone")
     level = bench.level_now
-    left, right = (bench.point_with(hand, points, level) for hand in (1, 2))
+    left, right = (bench.in_frame(bench.point_with(hand, points, level), level) for hand in (1, 2))
+    where_they_meet = base / (left[0] - right[0] + base)
+    parallaxes = (left[1] - right[1]) * where_they_meet
     settings = bench.elements(unknowns)
-    places = bench.in_frame(left, level)
-    corrections, _ = _corrections(bench, model, places, left[1] - right[1], unknowns, base)
+    corrections, _ = _corrections(bench, model, left * where_they_meet, parallaxes, unknowns, base)
     bench.set_elements({name: settings[name] + corrections[name] for name in unknowns})
 
 
@@ -153,12 +158,21 @@ def _corrections(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Return corrections and their standard deviations by element, gon and mm."""
     hands = [f"{name[:-1]}{model.hand_of(int(name[-1]))}" for name in unknowns]
+    left, right = (_stand(bench, n, x) for n, x in ((model.left_projector, 0.0), (model.right_projector, base)))
     bench.compute()
     try:
-        solution = element_corrections(parallaxes, places, base, hands)
+        solution = element_corrections(parallaxes, places * [[1.0], [1.0], [-1.0]], left, right, hands)
     except Undetermined as undetermined:
         raise _given_up(bench, f"{model.name}: {undetermined}") from undetermined
     factor = [1.0 if name[:2] in ("by", "bz") else 1.0 / GON for name in unknowns]
     values = {n: float(v) * f for n, v, f in zip(unknowns, solution.unknowns, factor, strict=True)}
     sigmas = {n: float(s) * f for n, s, f in zip(unknowns, solution.sigmas, factor, strict=True)}
     return values, sigmas
+
+
+def _stand(bench: Bench, projector: int, x: float) -> Stand:
+    """Return how a projector stands by its counters, its centre at x of the instrument frame."""
+    names = ("omega", "phi", "kappa", "by", "bz")
+    seen = bench.elements([f"{name}{projector}" for name in names])
+    omega, phi, kappa, by, bz = (seen[f"{name}{projector}"] - COUNTER_ZEROS[name] for name in names)
+    return Stand(np.array([x, -by, bz]), GON * np.array([omega, phi, wrapped(kappa)]))

@@ -1,5 +1,6 @@
 """A day's work: the models of a job, one after the other."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -59,7 +60,8 @@ def work(
         orientation = relative_orientation(bench, model, plan.method, plan.case, plan.parallax_readings, plan.bx)
         begins(f"model {model.name}: model coordinates")
         person.book.head(model.name, "model coordinates")
-        common = [name for name in sketches[1] if name in sketches[2]]
+        wanted = dict.fromkeys([*model.standard_points.values(), *model.other_points])
+        common = [name for name in wanted if name in sketches[1] and name in sketches[2]]
         measured = bench.measure(common)
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
@@ -70,7 +72,11 @@ def work(
             model,
             {name: interior[name] for name in (model.left, model.right)},
             orientation,
-            dict(zip(common, zip(*measured.tolist(), strict=True), strict=True)),
+            {
+                point: (x, y, z)
+                for point, x, y, z in zip(common, *measured.tolist(), strict=True)
+                if not math.isnan(x)
+            },
             centres,
             bench.z_units_per_mm,
             person.clock.now,

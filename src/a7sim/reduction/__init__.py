@@ -3,12 +3,13 @@
 from a7sim.reduction.centres import PerspectiveCentre, perspective_centre
 from a7sim.reduction.interior import PictureLie, picture_lie
 from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
-from a7sim.reduction.parallax import element_corrections
+from a7sim.reduction.parallax import Stand, element_corrections
 
 __all__ = [
     "Adjustment",
     "PerspectiveCentre",
     "PictureLie",
+    "Stand",
     "Undetermined",
     "adjusted",
     "element_corrections",

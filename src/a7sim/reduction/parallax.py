@@ -1,23 +1,34 @@
 """Numerical relative orientation from y-parallaxes (thesis 2.33, 2.34)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from a7sim.geometry import PARALLAX_ELEMENTS, Array, near_vertical_parallax_coefficients
+from a7sim.geometry import PARALLAX_ELEMENTS, Array, parallax_coefficients
 from a7sim.reduction.least_squares import Adjustment, adjusted
 
-FEWEST_POINTS = 5
+@dataclass(frozen=True)
+class Stand:
+    """How a projector stands: centre ``(3,)`` in mm, angles omega, phi, kappa ``(3,)`` in radians."""
+
+    centre: Array
+    angles: Array
 
 
-def element_corrections(parallaxes: Array, points: Array, base: npt.ArrayLike, unknowns: Sequence[str]) -> Adjustment:
+def element_corrections(
+    parallaxes: Array, points: Array, left: Stand, right: Stand, unknowns: Sequence[str]
+) -> Adjustment:
     """Return the corrections, radians and mm, that make y-parallaxes vanish in the least-squares sense.
 
-    `parallaxes` has shape ``(n, ...)`` in mm, `points` ``(3, n, ...)``: x from the left-hand centre, y, and
-    z below the centres, in mm. `unknowns` are names of `PARALLAX_ELEMENTS`, 1 for the left-hand
-    photograph. Raises Undetermined for points that do not determine them.
+    `parallaxes` has shape ``(n, ...)`` in mm, `points` ``(3, n, ...)`` in the frame of the projectors. `unknowns`
+    are names of `PARALLAX_ELEMENTS`, 1 for the left-hand photograph. The coefficients are those of thesis
+    2.32, carried over to the tilts at which the projectors stand. Raises Undetermined for points that do not
+    determine the unknowns.
     """
+    shape = (3, *(1,) * (points.ndim - 1))
+    coefficients = parallax_coefficients(
+        points, points, left.centre.reshape(shape), right.centre.reshape(shape), left.angles, right.angles
+    )
     rows = [PARALLAX_ELEMENTS.index(name) for name in unknowns]
-    coefficients = near_vertical_parallax_coefficients(points[0], points[1], points[2], base)
     return adjusted(np.swapaxes(coefficients[rows], 0, 1), -parallaxes)

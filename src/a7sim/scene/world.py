@@ -47,6 +47,8 @@ class Scene:
     ground_points: dict[str, Array]
     standard_points: dict[str, dict[str, str]]
     """Model name to position to point name."""
+    other_points: tuple[str, ...]
+    """Names of the signalised and the measured points that a job sheet lists beside the standard points."""
     published: dict[str, RelativeTruth]
 
     def relative_truth(self, model: Model) -> RelativeTruth | None:
@@ -88,7 +90,9 @@ def build_scene(scenario: Scenario, seed: int) -> Scene:
         for index, photo in enumerate(scenario.photos)
     }
     published = {model.name: _as_truth(model.published) for model in scenario.models if model.published is not None}
-    return Scene(photographs, stations, signalised, standard, published)
+    measured = [photographs[photo.name].points.names for photo in scenario.photos if photo.measured is not None]
+    listed = dict.fromkeys([point.point for point in scenario.ground] + [name for names in measured for name in names])
+    return Scene(photographs, stations, signalised, standard, tuple(listed), published)
 
 
 def _height_of(ground: Ground, east: float, north: float) -> float:

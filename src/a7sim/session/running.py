@@ -52,6 +52,7 @@ def job_of(scenario: Scenario, scene: Scene) -> Job:
             model.base,
             scene.photographs[model.left].polarity,
             scene.standard_points[model.name],
+            scene.other_points,
         )
         for model in scenario.models
     )
