@@ -62,6 +62,9 @@ class Bench(Protocol):
     def level_now(self) -> float:
         """The Z reading where the mark stands."""
 
+    def begin_round(self, number: int) -> None:
+        """Begin a round of a procedure: what is read now is entered under its number."""
+
     def compute(self) -> None:
         """Spend the time of one computation."""
 

@@ -104,6 +104,11 @@ class LinkBench:
         person.set("COUN:X:PRES {:.2f};:COUN:Y:PRES {:.2f};:COUN:Z:PRES {:.2f}".format(*plan.preset))
         self._offset += np.array(plan.preset) - before
 
+    def begin_round(self, number: int) -> None:
+        """Begin a round of a procedure: what is read now is entered under its number."""
+        self.person.book.round = number
+        self.person.note(f"{self.model.name}: {self.person.book.form}, round {number}")
+
     def compute(self) -> None:
         """Spend the time of one computation."""
         self.person.compute()

@@ -94,6 +94,10 @@ class Person:
     def remark(self, text: str) -> None:
         """Write a remark into the book and into the journal of the instrument."""
         self.book.remark(self.clock.now, text)
+        self.note(text)
+
+    def note(self, text: str) -> None:
+        """Write a note into the journal of the instrument."""
         printable = "".join(c if " " <= c <= "~" else "?" for c in text.replace('"', "'"))
         self.client.send(f'NOTE "{printable[:LONGEST_NOTE]}"')
 

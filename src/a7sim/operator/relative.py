@@ -80,6 +80,7 @@ def relative_orientation(
     rough_rounds = best = 0
     while len(rounds) < MOST_ROUNDS:
         settings = bench.elements(unknowns)
+        bench.begin_round(len(rounds) + 1)
         try:
             seen = bench.parallaxes(points, readings)
         except CannotFuse as apart:
@@ -107,6 +108,7 @@ def relative_orientation(
         )
     _restore(bench, rounds[best].settings)
     _set_mean_on_by(bench, model, "by1" if method == "independent" else unknowns[3], rounds[best].mean)
+    bench.begin_round(len(rounds) + 1)
     everywhere = model.all_positions()
     left = bench.parallaxes([model.standard_points[label] for label in everywhere], readings)
     places = dict(zip(everywhere, zip(*left.places.tolist(), strict=True), strict=True))

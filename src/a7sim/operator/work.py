@@ -47,26 +47,22 @@ def work(
     person.book.head("", "preparation")
     bench.prepare()
     for model in job.models:
-        begins(f"model {model.name}: interior orientation")
-        person.book.head(model.name, "interior orientation")
+        _begin(person, model, "interior orientation", begins)
         _set_base_and_fittings(person, model)
         _mount(person, job, model, interior)
         sketches = _prints(person, model)
         bench.begin(model, sketches)
         bench.preset(model.standard_points["1"])
-        begins(f"model {model.name}: relative orientation")
-        person.book.head(model.name, "relative orientation")
+        _begin(person, model, "relative orientation", begins)
         plan = job.plan
         orientation = relative_orientation(bench, model, plan.method, plan.case, plan.parallax_readings, plan.bx)
-        begins(f"model {model.name}: model coordinates")
-        person.book.head(model.name, "model coordinates")
+        _begin(person, model, "model coordinates", begins)
         wanted = dict.fromkeys([*model.standard_points.values(), *model.other_points])
         common = [name for name in wanted if name in sketches[1] and name in sketches[2]]
         measured = bench.measure(common)
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
-            begins(f"model {model.name}: {side} perspective centre")
-            person.book.head(model.name, f"{side} perspective centre")
+            _begin(person, model, f"{side} perspective centre", begins)
             centres[hand] = observe_centre(bench, model, hand, plan.centre_levels)
         yield ModelRecord(
             model,
@@ -81,6 +77,12 @@ def work(
             bench.z_units_per_mm,
             person.clock.now,
         )
+
+
+def _begin(person: Person, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
+    begins(f"model {model.name}: {form}")
+    person.book.head(model.name, form)
+    person.note(f"{model.name}: {form}")
 
 
 def _set_base_and_fittings(person: Person, model: ModelJob) -> None:

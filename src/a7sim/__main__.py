@@ -1,0 +1,5 @@
+"""`python -m a7sim`."""
+
+from a7sim.cli import main
+
+main()
