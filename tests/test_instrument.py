@@ -1,4 +1,4 @@
-"""The instrument: what its parts do to the rays and to the view (geometry.md, Counters, Projection centres, Fittings)."""
+"""The instrument: what its parts do to rays and view (geometry.md: Counters, Projection centres, Fittings)."""
 
 import dataclasses
 
@@ -130,7 +130,11 @@ def test_the_centres_stand_where_the_base_puts_them(base):
 
 
 @given(
-    st.floats(95.0, 105.0), st.floats(95.0, 105.0), st.floats(0.0, 400.0), st.floats(-60.0, 60.0), st.floats(-60.0, 60.0)
+    st.floats(95.0, 105.0),
+    st.floats(95.0, 105.0),
+    st.floats(0.0, 400.0),
+    st.floats(-60.0, 60.0),
+    st.floats(-60.0, 60.0),
 )
 def test_the_rod_brings_the_mark_to_the_image_of_its_point(omega, phi, kappa, x, y):
     a7 = plotter()
@@ -249,10 +253,13 @@ def test_a_swung_picture_is_seen_swung():
 
 
 def test_faults_shift_the_view_and_not_the_counters():
-    faultless, worn = plotter(), plotter(
-        condition=Condition(
-            left=ProjectorCondition(principal_distance_mm=0.02, principal_point_um=(10.0, -5.0), phi_zero_gon=0.01)
-        )
+    faultless, worn = (
+        plotter(),
+        plotter(
+            condition=Condition(
+                left=ProjectorCondition(principal_distance_mm=0.02, principal_point_um=(10.0, -5.0), phi_zero_gon=0.01)
+            )
+        ),
     )
     for a7 in (faultless, worn):
         a7.drive("X", 60.0)

@@ -1,5 +1,6 @@
 """Working one instrument over its line, in closed loop: look, turn, look again."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -327,12 +328,12 @@ class LinkBench:
         """Return the count of by to go to: here if it is content, else the nearest not tried, else the best tried."""
         if abs(step) < CONTENT_MM:
             return now
-        wanted = round(now + np.sign(step) * max(abs(step), 0.01), 2)
+        wanted = round(now + math.copysign(max(abs(step), 0.01), step), 2)
         if not self.manual.elements[by].low <= wanted <= self.manual.elements[by].high:
             raise CannotFuse(by)
         if wanted in tried and abs(wanted - now) < 0.015:
-            return min((now, wanted), key=tried.__getitem__)
-        return float(wanted)
+            return now if tried[now] <= tried[wanted] else wanted
+        return wanted
 
     def _looked(self, point: str) -> Array:
         """Return what both eyes see: x and y from the mark (mean of both), px, py, in um."""

@@ -68,11 +68,7 @@ def work(
             model,
             {name: interior[name] for name in (model.left, model.right)},
             orientation,
-            {
-                point: (x, y, z)
-                for point, x, y, z in zip(common, *measured.tolist(), strict=True)
-                if not math.isnan(x)
-            },
+            {point: (x, y, z) for point, x, y, z in zip(common, *measured.tolist(), strict=True) if not math.isnan(x)},
             centres,
             bench.z_units_per_mm,
             person.clock.now,

@@ -1,0 +1,63 @@
+"""Time an Akwanga session against its floor: the same lines through the same client to a port that only answers.
+
+Prints the ratio of both with the accuracy of the session beside it.
+"""
+
+import statistics
+import time
+
+from a7sim.link.client import Client
+from a7sim.operator import work
+from a7sim.scenario import load_scenario
+from a7sim.session import open_session, run
+
+SEEDS = range(1, 6)
+
+
+class Parrot:
+    """A port that answers every line at once with what the instrument answered in the session."""
+
+    def __init__(self, answers):
+        self._answers = iter(answers)
+
+    def write(self, data):
+        return len(data)
+
+    def readline(self, size=-1):
+        return next(self._answers)
+
+
+def floor_of(scenario, seed):
+    """Seconds that the session's conversation takes with nothing behind it."""
+    said = []
+    session = open_session(scenario, seed, lambda event: said.append((event.direction, event.text)))
+    list(work(session.person, session.job))
+    answers = [text.encode() + b"\n" for direction, text in said if direction == "<"]
+    client = Client(Parrot(answers))
+    began = time.perf_counter()
+    for i, (direction, text) in enumerate(said):
+        if direction == ">":
+            if i + 1 < len(said) and said[i + 1][0] == "<":
+                client.ask(text)
+            else:
+                client.send(text)
+    return time.perf_counter() - began, len(said)
+
+
+def main():
+    scenario = load_scenario("akwanga")
+    print("seed  session s  floor s  ratio  lines  lines/s  rms parallax mm (models 1, 2)")
+    ratios = []
+    for seed in SEEDS:
+        floor, lines = floor_of(scenario, seed)
+        began = time.perf_counter()
+        document = run(scenario, seed)
+        took = time.perf_counter() - began
+        ratios.append(took / floor)
+        rms = ", ".join(f"{m['relative_orientation']['rms_parallax_mm']:.4f}" for m in document["models"])
+        print(f"{seed:4}  {took:9.3f}  {floor:7.4f}  {took / floor:5.0f}  {lines:5}  {lines / took:7.0f}  {rms}")
+    print(f"median ratio to the floor {statistics.median(ratios):.0f}")
+
+
+if __name__ == "__main__":
+    main()
