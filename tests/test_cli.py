@@ -32,7 +32,11 @@ def akwanga_run(tmp_path_factory):
 def test_importing_and_asking_for_help_load_nothing_heavy():
     for program in ("import a7sim", "import sys; sys.argv = ['a7sim', '--help']; import a7sim.cli; a7sim.cli.main()"):
         seen = subprocess.run(
-            [sys.executable, "-c", f"import atexit, sys; atexit.register(lambda: print(sorted(sys.modules)))\n{program}"],
+            [
+                sys.executable,
+                "-c",
+                f"import atexit, sys; atexit.register(lambda: print(sorted(sys.modules)))\n{program}",
+            ],
             capture_output=True,
             text=True,
             check=True,
@@ -76,7 +80,9 @@ def test_results_hold_what_is_promised(akwanga_run):
         assert (orientation["method"], orientation["case"]) == ("independent", "A")
         assert orientation["iterations"] == len(orientation["rounds"]) >= 3
         assert set(orientation["residual_parallax_mm"]) == set("123456abcdefghi")
-        assert {"kappa1", "kappa2", "phi1", "phi2", "omega1", "omega2", "by1", "by2", "bx"} <= set(orientation["elements"])
+        assert {"kappa1", "kappa2", "phi1", "phi2", "omega1", "omega2", "by1", "by2", "bx"} <= set(
+            orientation["elements"]
+        )
         assert all(round(value, 2) == value for value in orientation["elements"].values())
         for side in ("left", "right"):
             names = {"X0", "Y0", "Z0", "T0", "sigma_X0", "sigma_Y0", "sigma_Z0", "sigma_T0", "rms"}

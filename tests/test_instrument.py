@@ -340,3 +340,36 @@ def test_every_variant_is_whole():
         for element in variant.elements.values():
             assert element.low <= element.zero <= element.high
         assert set(variant.carriages) == set(variant.carriages_at_rest) == {"X", "Y", "Z"}
+
+
+@given(st.floats(0.3, 9.0), st.floats(-9000.0, 9000.0), st.sampled_from("XYZ"), st.integers(0, 1))
+def test_a_carriage_can_be_driven_to_what_its_counter_shows_at_its_ends(units, preset, axis, end):
+    a7 = Autograph(A7)
+    a7.drive("Z", -490.0)
+    a7.set_height_gear(units)
+    a7.preset(axis, preset)
+    a7.drive(axis, a7.counter_limits(axis)[end])
+    assert a7.counter(axis) == a7.counter_limits(axis)[end]
+
+
+def test_rods_that_a_reset_left_too_steep_can_be_brought_back_but_not_taken_further():
+    a7 = Autograph(A7)
+    for name, value in (("bz1", 27.0), ("bz2", 27.0), ("by1", 50.0), ("by2", 50.0)):
+        a7.set_element(name, value)
+    a7.drive("Z", -140.0)
+    a7.drive("Y", -250.0)
+    a7.reset()
+    with pytest.raises(OutOfRange):
+        a7.drive("Y", -251.0)
+    a7.drive("Y", -240.0)
+    a7.drive("Y", 0.0)
+    a7.wheel("X", 1.0)
+
+
+def test_a_registration_is_struck_once_and_keeps_its_reason():
+    a7 = Autograph(A7)
+    a7.recorder.register("1", [("X", "0.00")])
+    a7.recorder.strike(1, "wrong point")
+    with pytest.raises(SettingsConflict):
+        a7.recorder.strike(1, "another reason")
+    assert a7.recorder.registrations[0].struck == "wrong point"

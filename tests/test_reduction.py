@@ -133,9 +133,7 @@ def test_cofactors_are_hallerts_closed_forms(reference):
         np.zeros(6), points, left, right, ("kappa1", "kappa2", "phi1", "phi2", "omega1")
     ).cofactors
     for i, name in enumerate(("kappa1", "kappa1", "phi1", "phi2", "omega1")):
-        assert swing[i, i] == pytest.approx(
-            _closed_form(hallert["swing_swing"][f"Q_{name}"], b=b, d=d, h=h), rel=1e-9
-        )
+        assert swing[i, i] == pytest.approx(_closed_form(hallert["swing_swing"][f"Q_{name}"], b=b, d=d, h=h), rel=1e-9)
     correlation = swing[0, 4] / np.sqrt(swing[0, 0] * swing[4, 4])
     assert correlation == pytest.approx(hallert["numeric_b92_d92_h152"]["swing_correlation_k1_w1"], abs=5e-4)
 
@@ -151,7 +149,11 @@ def test_four_points_do_not_orient():
     left, right = _projectors(195.0)
     with pytest.raises(Undetermined):
         element_corrections(
-            np.zeros(4), _six_points(195.0, 180.0, 325.0)[:, 2:], left, right, ("kappa1", "kappa2", "phi1", "phi2", "omega1")
+            np.zeros(4),
+            _six_points(195.0, 180.0, 325.0)[:, 2:],
+            left,
+            right,
+            ("kappa1", "kappa2", "phi1", "phi2", "omega1"),
         )
 
 

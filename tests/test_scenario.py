@@ -77,7 +77,10 @@ def test_every_mistake_is_named_at_once_with_its_path():
         ),
         (lambda raw: raw["plan"].update(height_gear="Xy"), "plan.height_gear: expected counter units a mm"),
         (lambda raw: raw.update(schema_version=2), "schema_version: expected 1, got 2"),
-        (lambda raw: raw["instrument"]["condition"].update(left=1), "instrument.condition.left: expected a table, got 1"),
+        (
+            lambda raw: raw["instrument"]["condition"].update(left=1),
+            "instrument.condition.left: expected a table, got 1",
+        ),
     ],
 )
 def test_a_mistake_of_each_kind_is_one_sentence(change, mistake):

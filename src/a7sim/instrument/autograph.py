@@ -161,8 +161,12 @@ class Autograph:
         self._counters[axis].preset(reading, self._carriages[axis].at)
 
     def drive(self, axis: str, reading: float) -> None:
-        """Run a carriage until its counter shows a reading."""
-        self._move(axis, self._counters[axis].position(reading))
+        """Run a carriage until its counter shows a reading; what an end of the carriage shows leads to that end."""
+        counter = self._counters[axis]
+        low, high = self.variant.carriages[axis]
+        ends = {counter.reading(end): end for end in (low, high)}
+        wanted = round(reading, counter.decimals)
+        self._move(axis, ends.get(wanted, counter.position(wanted)))
 
     def wheel(self, axis: str, amount: float) -> None:
         """Turn a handwheel by so many counter units; its collar decides which way the carriage goes."""
@@ -199,15 +203,21 @@ class Autograph:
         elements: Mapping[str, float] | None = None,
         base_mode: str | None = None,
     ) -> None:
-        at = {axis: spindle.at for axis, spindle in self._carriages.items()} | dict(carriages or {})
-        limit = math.tan(self.variant.rod_limit_gon * GON)
+        """Refuse what brings a rod beyond its limit, or further beyond it where `reset` has left it so."""
         for projector in (1, 2):
-            x, y, z = self._nominal_centre(projector, dict(elements or {}), base_mode or self.base_mode)
-            if math.hypot(at["X"] - x, at["Y"] - y) > limit * (z - at["Z"]):
+            inclination = self._rod_inclination(projector, carriages or {}, elements or {}, base_mode or self.base_mode)
+            if inclination > max(self.variant.rod_limit_gon, self._rod_inclination(projector, {}, {}, self.base_mode)):
                 raise OutOfRange(
                     f"expected space rods within {self.variant.rod_limit_gon:.0f} gon of the plumb line, "
-                    f"got more at projector {projector}"
+                    f"got {inclination:.0f} gon at projector {projector}"
                 )
+
+    def _rod_inclination(
+        self, projector: int, carriages: Mapping[str, float], elements: Mapping[str, float], base_mode: str
+    ) -> float:
+        at = {axis: spindle.at for axis, spindle in self._carriages.items()} | dict(carriages)
+        x, y, z = self._nominal_centre(projector, elements, base_mode)
+        return math.atan2(math.hypot(at["X"] - x, at["Y"] - y), z - at["Z"]) / GON
 
     def _nominal_centre(
         self, projector: int, changed: Mapping[str, float], base_mode: str

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from a7sim.instrument.refusals import OutOfRange
+from a7sim.instrument.refusals import OutOfRange, SettingsConflict
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,12 @@ class Recorder:
         return registration
 
     def strike(self, number: int, why: str) -> None:
-        """Mark a registration as struck out. Raises OutOfRange for a number that is not there."""
+        """Mark a registration as struck out, once.
+
+        Raises OutOfRange for a number that is not there, SettingsConflict for one that is struck already.
+        """
         if not 1 <= number <= len(self.registrations):
             raise OutOfRange(f"expected a registration 1 to {len(self.registrations)}, got {number}")
+        if self.registrations[number - 1].struck is not None:
+            raise SettingsConflict(f"registration {number} is struck out already")
         self.registrations[number - 1] = replace(self.registrations[number - 1], struck=why)

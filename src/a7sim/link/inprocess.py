@@ -3,7 +3,7 @@
 import threading
 from typing import Any
 
-from serial import PortNotOpenError, SerialBase
+from serial import PortNotOpenError, SerialBase, SerialException, to_bytes
 
 from a7sim.instrument.language import Desk, Engine
 from a7sim.link.clock import Clock
@@ -32,22 +32,23 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         self._replies = bytearray()
         self._arrived = threading.Condition()
         self._cancelled = False
-        super().__init__(None, *args, **kwargs)
-        self.port = port if port is not None or desk is None else "in process"
-        if self.port is not None and desk is not None:
-            self.open()
+        super().__init__("in process" if port is None and desk is not None else port, *args, **kwargs)
 
     def _connect(self) -> Desk:
         if self._desk is None:
-            raise PortNotOpenError
+            raise SerialException("expected a desk to connect the port to, got none")
         return self._desk
 
     def open(self) -> None:
-        """Open a conversation with the instrument."""
-        if not self.is_open:
-            self._engine = self._connect().open()
-            self._cancelled = False
-            self.is_open = True
+        """Open a conversation with the instrument. Raises SerialException if it cannot, or is open."""
+        if self.port is None:
+            raise SerialException("expected a port to open, got none")
+        if self.is_open:
+            raise SerialException(f"expected a closed port, got {self.port}, which is open")
+        self._engine = self._connect().open()
+        self._replies.clear()
+        self._cancelled = False
+        self.is_open = True
 
     def close(self) -> None:
         """End the conversation; a lock that it holds is free again."""
@@ -64,7 +65,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
 
     def write(self, data: Any) -> int:
         """Send bytes and return how many."""
-        received = bytes(data)
+        received = to_bytes(data)
         with self._arrived:
             self._replies += self._opened().feed(received, self.clock.now)
             self._arrived.notify_all()

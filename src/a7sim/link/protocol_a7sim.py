@@ -2,11 +2,11 @@
 
 pyserial finds this module by its name; importing a7sim adds its package to
 `serial.protocol_handler_packages`. The path is that of a scenario file, or the bare name of one that comes
-with a7sim; `seed` draws its photographs.
+with a7sim; `seed` draws its photographs. A port that is closed and opened again finds its instrument as it was.
 """
 
-from typing import Any
-from urllib.parse import parse_qs, unquote, urlsplit
+import re
+from urllib.parse import unquote
 
 from serial import SerialException
 
@@ -19,32 +19,34 @@ from a7sim.scene import build_scene
 
 _EXAMPLE = "a7sim://scenarios/akwanga.toml?seed=7"
 
+_URL = re.compile(r"a7sim://([^?#]+)(?:\?seed=([0-9]{1,40}))?", re.IGNORECASE)
+
 
 class Serial(InProcessSerial):
     """A pyserial port to a new instrument that the URL describes. Raises SerialException for a bad URL."""
 
-    def __init__(self, port: str | None = None, *args: Any, **kwargs: Any) -> None:
-        super().__init__(None, *args, **kwargs)
-        self.port = port
-        if port is not None:
-            self.open()
+    _connected_to: str | None = None
 
     def _connect(self) -> Desk:
-        scenario_name, seed = _taken_apart(str(self.port))
-        try:
-            scenario = load_scenario(scenario_name)
-            chosen = scenario.seed if seed is None else seed
-            photographs = build_scene(scenario, chosen).photographs
-        except Mistake as mistake:
-            raise SerialException(str(mistake)) from mistake
-        return Desk(build_autograph(scenario.instrument, photographs, chosen))
+        url = str(self.port)
+        if self._desk is None or self._connected_to != url:
+            self._desk, self._connected_to = _described_by(url), url
+        return self._desk
+
+
+def _described_by(url: str) -> Desk:
+    scenario_name, seed = _taken_apart(url)
+    try:
+        scenario = load_scenario(scenario_name)
+        chosen = scenario.seed if seed is None else seed
+        photographs = build_scene(scenario, chosen).photographs
+    except (Mistake, OSError) as mistake:
+        raise SerialException("; ".join(str(mistake).splitlines())) from mistake
+    return Desk(build_autograph(scenario.instrument, photographs, chosen))
 
 
 def _taken_apart(url: str) -> tuple[str, int | None]:
-    parts = urlsplit(url)
-    options = parse_qs(parts.query, keep_blank_values=True)
-    unknown = sorted(set(options) - {"seed"})
-    seed = options.get("seed", [""])[-1]
-    if parts.scheme != "a7sim" or unknown or (seed and not seed.isdecimal()) or not parts.netloc + parts.path:
+    found = _URL.fullmatch(url)
+    if found is None:
         raise SerialException(f"expected a URL like {_EXAMPLE}, got {url!r}")
-    return unquote(parts.netloc + parts.path), int(seed) if seed else None
+    return unquote(found[1]), int(found[2]) if found[2] else None

@@ -8,6 +8,7 @@ import numpy as np
 from a7sim.geometry import PARALLAX_ELEMENTS, Array, parallax_coefficients
 from a7sim.reduction.least_squares import Adjustment, adjusted
 
+
 @dataclass(frozen=True)
 class Stand:
     """How a projector stands: centre ``(3,)`` in mm, angles omega, phi, kappa ``(3,)`` in radians."""

@@ -217,11 +217,11 @@ def _plan_gear(engine: "Engine", call: Call) -> None:
     gear = call.arguments[0]
     if isinstance(gear, float) and not 0.0 < gear <= 100.0:
         raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected more than 0 to 100, got {gear:g}")
-    _autograph(engine).plan_gear = gear if isinstance(gear, str) else f"{gear:.10g}"
+    _autograph(engine).plan_gear = _text_within(gear) if isinstance(gear, str) else f"{gear:.10g}"
 
 
 def _gear_text(gear: str) -> str:
-    return gear if re.fullmatch(r"[\d.]+(e[+-]?\d+)?", gear) else quoted(gear)
+    return gear if re.fullmatch(r"\d+(\.\d+)?(e[+-]?\d+)?", gear) else quoted(gear)
 
 
 _HANDLES = [

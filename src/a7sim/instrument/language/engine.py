@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from a7sim.instrument.language.desk import Desk
 
 LONGEST_LINE = 4096
+"""Bytes, its end not counted."""
+
+_LONGEST_KEPT = LONGEST_LINE + 2
+"""A line, the CR of its end, and one byte that shows a line to be too long."""
 
 _NUMBER_OF = {
     OutOfRange: ErrorNumber.DATA_OUT_OF_RANGE,
@@ -31,7 +35,6 @@ class Engine:
         self.status: Status = Status()
         self._ends = re.compile(rb"[\r\n]" if cr_ends_line else rb"\n")
         self._pending = bytearray()
-        self._overrun = False
         self._level: tuple[tuple[str, int | None], ...] = ()
 
     def feed(self, received: bytes, time: float) -> bytes:
@@ -46,20 +49,16 @@ class Engine:
         return bytes(replies)
 
     def _keep(self, part: bytes) -> None:
-        if not self._overrun:
-            self._pending += part[: LONGEST_LINE + 1 - len(self._pending)]
-            self._overrun = len(self._pending) > LONGEST_LINE
+        self._pending += part[: _LONGEST_KEPT - len(self._pending)]
 
     def _line_ended(self, time: float) -> bytes:
-        line = bytes(self._pending)
-        overrun = self._overrun
+        line = bytes(self._pending).removesuffix(b"\r")
         self._pending.clear()
-        self._overrun = False
-        if overrun:
+        if len(line) > LONGEST_LINE:
             self.desk.heard(time, self.client, ">", f"(a line of more than {LONGEST_LINE} bytes, dropped)")
             self.status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {LONGEST_LINE} bytes a line")
             return b""
-        text = line.decode("latin-1").removesuffix("\r")
+        text = line.decode("latin-1")
         if not text.strip(" \t"):
             return b""
         self.desk.heard(time, self.client, ">", text)

@@ -42,20 +42,28 @@ Parameter = Text | Word | Number
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """One program message unit; mnemonics in capitals with their numeric suffixes, None where none came."""
+    """One program message unit; mnemonics in capitals with their numeric suffixes, None where none came.
+
+    The parameters stay as they came until the header is known: a header that is none is the first thing wrong.
+    """
 
     mnemonics: tuple[tuple[str, int | None], ...]
     rooted: bool
     common: bool
     query: bool
-    parameters: tuple[Parameter, ...]
+    data: str
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return the parameters taken apart. Raises LanguageError."""
+        return tuple(_parameter(each.strip()) for each in _split(self.data, ",")) if self.data else ()
 
 
 def units_of(line: str) -> Iterator[str]:
     """Yield the texts between the semicolons of a line, quotes protecting, blank ones left out."""
     for text in _split(line, ";"):
-        if text.strip():
-            yield text.strip()
+        unit = text.strip(" \t")
+        if unit:
+            yield unit
 
 
 def _split(text: str, separator: str) -> Iterator[str]:
@@ -72,7 +80,7 @@ def _split(text: str, separator: str) -> Iterator[str]:
 
 
 def unit_of(text: str) -> Unit:
-    """Return a unit taken apart. Raises LanguageError."""
+    """Return a unit with its header taken apart. Raises LanguageError."""
     for character in text:
         if not (" " <= character <= "~" or character == "\t"):
             raise LanguageError(ErrorNumber.INVALID_CHARACTER, f"character number {ord(character)}")
@@ -85,8 +93,7 @@ def unit_of(text: str) -> Unit:
     name = header[1]
     common = name.startswith("*")
     mnemonics = ((name.upper(), None),) if common else tuple(map(_mnemonic, name.lstrip(":").split(":")))
-    parameters = tuple(_parameter(each.strip()) for each in _split(rest, ",")) if rest.strip() else ()
-    return Unit(mnemonics, name.startswith(":"), common, header[2] == "?", parameters)
+    return Unit(mnemonics, name.startswith(":"), common, header[2] == "?", rest.strip())
 
 
 def _mnemonic(text: str) -> tuple[str, int | None]:

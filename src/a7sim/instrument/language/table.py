@@ -189,7 +189,7 @@ class Command:
 
     def call(self, unit: Unit, suffix: int, client: Any) -> Call:
         """Return the call that a unit makes of this command. Raises LanguageError."""
-        given = unit.parameters
+        given = unit.parameters()
         least = sum(not each.optional for each in self.takes)
         if len(given) < least:
             raise LanguageError(ErrorNumber.MISSING_PARAMETER, f"expected {self.written()}")

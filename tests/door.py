@@ -1,0 +1,60 @@
+"""A door to an instrument for the tests: lines in, reply lines out, no wire between."""
+
+from functools import cache
+
+from a7sim.instrument import Autograph, build_autograph
+from a7sim.instrument.language import Desk, Listener
+from a7sim.manual import VARIANTS
+from a7sim.scenario import load_scenario
+from a7sim.scene import build_scene
+from a7sim.scene.photograph import Photograph
+
+SEED = 7
+
+MODEL_1 = (
+    'PHOT1:LOAD "101";:PHOT2:LOAD "102"',
+    "PROJ1:PDIS 152.68;:PROJ2:PDIS 152.68;:BASE:BX 194.99;:DRIV:Z -325.71",
+)
+"""Lines that mount Akwanga's first model; point 1011 then lies in the field of view of both eyepieces."""
+
+
+class Door:
+    """A client of an instrument."""
+
+    def __init__(self, desk: Desk | None = None, cr_ends_line: bool = True) -> None:
+        self.desk = desk or Desk(Autograph(VARIANTS["A7"]))
+        self.engine = self.desk.open(cr_ends_line=cr_ends_line)
+
+    def feed(self, received: bytes) -> bytes:
+        return self.engine.feed(received, 0.0)
+
+    def say(self, line: str) -> str:
+        """Return the reply to a line without its LF, '' where there is none."""
+        reply = self.feed(line.encode("latin-1") + b"\n").decode("ascii")
+        assert reply.count("\n") == (reply != ""), f"{line} was answered {reply!r}"
+        return reply.removesuffix("\n")
+
+    def numbers(self, line: str) -> list[float]:
+        return [float(each) for each in self.say(line).replace(";", ",").split(",")]
+
+    def errors(self) -> list[int]:
+        """Take the error queue off, oldest first."""
+        return [int(self.say("SYST:ERR?").split(",")[0]) for _ in range(int(self.say("SYST:ERR:COUN?")))]
+
+
+@cache
+def _photographs() -> dict[str, Photograph]:
+    return dict(build_scene(load_scenario("akwanga"), SEED).photographs)
+
+
+def with_photographs(listener: Listener | None = None) -> Door:
+    """Return a door to Akwanga's instrument, its pictures in the drawer."""
+    return Door(Desk(build_autograph(load_scenario("akwanga").instrument, _photographs(), SEED), listener))
+
+
+def with_model(listener: Listener | None = None) -> Door:
+    """Return a door to Akwanga's instrument with its first model mounted."""
+    door = with_photographs(listener)
+    for line in MODEL_1:
+        assert door.say(line) == ""
+    return door
