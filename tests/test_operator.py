@@ -103,6 +103,8 @@ def test_without_errors_the_exact_solution_is_found_at_any_tilt_and_base(tilts, 
     assert [model["base"] for model in document["models"]] == ["inside", "outside"]
     for model in document["models"]:
         errors = element_errors(model)
+        beside = {name: model["truth"]["element_differences"][name] for name in errors}
+        assert beside == pytest.approx(errors, abs=1e-5)
         assert max(abs(error) for error in errors.values()) < 0.02, (model["model"], errors)
         for difference in model["truth"]["centre_differences"].values():
             assert abs(difference["X0"]) < 0.1

@@ -13,7 +13,7 @@ from a7sim.operator import ModelRecord
 from a7sim.reduction import PerspectiveCentre
 from a7sim.scenario import Scenario
 from a7sim.scene import RelativeTruth
-from a7sim.session.truth import Relative, true_centre
+from a7sim.session.truth import Relative, true_centre, true_elements
 
 SCHEMA_VERSION = 1
 
@@ -111,6 +111,8 @@ def _beside_truth(
         measured = Relative.of_counters(record.orientation.elements, model, autograph.variant)
         true = Relative.of_truth(truth)
         turn, swing = measured.differences_gon(true)
+        elements = record.orientation.elements
+        exact = true_elements(true, record.orientation.method, elements, model, autograph.variant)
         beside |= {
             "source": truth.source,
             "relative_rotation": _matrix(true.rotation),
@@ -119,6 +121,10 @@ def _beside_truth(
             "found_base_direction": _vector(measured.base),
             "rotation_difference_gon": round(turn, 5),
             "base_difference_gon": round(swing, 5),
+            "elements": _rounded(exact),
+            "element_differences": {
+                name: round((elements[name] - value + 200.0) % 400.0 - 200.0, 6) for name, value in exact.items()
+            },
         }
     return beside
 

@@ -17,6 +17,7 @@ _ELEMENTS = (
     ("ω", "omega", "gon"),
     ("by", "by", "mm"),
     ("bz", "bz", "mm"),
+    ("c", "c", "mm"),
 )
 
 
@@ -41,7 +42,7 @@ def _of_model(model: dict[str, Any]) -> Iterator[RenderableType]:
     orientation = model["relative_orientation"]
     yield Rule(f"Model {model['model']}: {model['left']} and {model['right']}, base {model['base']}", align="left")
     yield _rounds(orientation)
-    yield _elements(orientation["elements"])
+    yield _elements(orientation["elements"], model["truth"].get("elements", {}))
     yield _residuals(orientation)
     yield _centres(model)
     yield _truth(model["truth"])
@@ -68,12 +69,15 @@ def _rounds(orientation: dict[str, Any]) -> RenderableType:
     return _titled(title, table)
 
 
-def _elements(elements: dict[str, float]) -> RenderableType:
-    table = _table("", "left '", 'right "', "")
+def _elements(elements: dict[str, float], true: dict[str, float]) -> RenderableType:
+    table = _table("", "left '", "true", 'right "', "true", "")
+
+    def cells(name: str) -> list[str]:
+        return [f"{elements[name]:.2f}", f"{true[name]:.3f}" if name in true else ""]
+
     for symbol, name, unit in _ELEMENTS:
-        table.add_row(symbol, f"{elements[f'{name}1']:.2f}", f"{elements[f'{name}2']:.2f}", unit)
-    table.add_row("c", f"{elements['c1']:.2f}", f"{elements['c2']:.2f}", "mm")
-    table.add_row("bx", f"{elements['bx']:.2f}", "", "mm")
+        table.add_row(symbol, *cells(f"{name}1"), *cells(f"{name}2"), unit)
+    table.add_row("bx", *cells("bx"), "", "", "mm")
     return _titled("Elements as set", table)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.geometry import GON, Array, angle_between, length_of, mxm, mxv, rotation, transposed, turn_of
+from a7sim.geometry import GON, Array, angle_between, angles_of, length_of, mxm, mxv, rotation, transposed, turn_of
 from a7sim.instrument import Autograph
 from a7sim.manual import Variant
 from a7sim.operator import ModelJob
@@ -30,13 +30,7 @@ class Relative:
             )
             return rotation(omega * GON, phi * GON, kappa * GON)
 
-        base = np.array(
-            [
-                elements["bx"],
-                elements[f"by{left}"] - elements[f"by{right}"],
-                elements[f"bz{right}"] - elements[f"bz{left}"],
-            ]
-        )
+        base = _base_of(elements, model)
         to_left = transposed(turned(left))
         return cls(mxm(to_left, turned(right)), mxv(to_left, base) / length_of(base))
 
@@ -49,6 +43,71 @@ class Relative:
         """Return by what angles the rotations and the bases differ."""
         turn = float(turn_of(mxm(transposed(self.rotation), other.rotation)))
         return turn / GON, float(angle_between(self.base, other.base)) / GON
+
+
+def true_elements(
+    truth: Relative, method: str, elements: Mapping[str, float], model: ModelJob, variant: Variant
+) -> dict[str, float]:
+    """Return what the counters of the elements that a method turns would show if the truth were set.
+
+    The other elements stay as they are. Independent: the left-hand camera brings the true base onto the set one and
+    is turned about it until omega" shows what it shows. Dependent: the left-hand camera stays, the right-hand one and
+    its by and bz follow.
+    """
+    left, right = model.left_projector, model.right_projector
+    set_base = _base_of(elements, model)
+
+    def angle(name: str, n: int) -> float:
+        return (elements[f"{name}{n}"] - variant.elements[f"{name}{n}"].zero) * GON
+
+    if method == "dependent":
+        turned_left = rotation(*(angle(name, left) for name in ("omega", "phi", "kappa")))
+        base = mxv(turned_left, truth.base)
+        base *= elements["bx"] / base[0]
+        true = {
+            f"by{right}": elements[f"by{left}"] - float(base[1]),
+            f"bz{right}": elements[f"bz{left}"] + float(base[2]),
+        }
+        cameras = {right: mxm(turned_left, truth.rotation)}
+    else:
+        turned_left = _laid_onto(truth.base, set_base)
+        for _ in range(_MOST_TURNS):
+            cameras = {left: turned_left, right: mxm(turned_left, truth.rotation)}
+            turned_left = mxm(_about(set_base, angle("omega", 2) - float(angles_of(cameras[2])[0])), turned_left)
+        true = {}
+    for n, turned in cameras.items():
+        for name, radians in zip(("omega", "phi", "kappa"), angles_of(turned), strict=True):
+            shown = float(radians) / GON + variant.elements[f"{name}{n}"].zero
+            true[f"{name}{n}"] = shown % 400.0 if name == "kappa" else shown
+    return true
+
+
+_MOST_TURNS = 12
+
+
+def _base_of(elements: Mapping[str, float], model: ModelJob) -> Array:
+    left, right = model.left_projector, model.right_projector
+    return np.array(
+        [
+            elements["bx"],
+            elements[f"by{left}"] - elements[f"by{right}"],
+            elements[f"bz{right}"] - elements[f"bz{left}"],
+        ]
+    )
+
+
+def _about(axis: Array, angle: float) -> Array:
+    """Return the rotation ``(3, 3)`` through an angle about an axis (Rodrigues)."""
+    x, y, z = axis / length_of(axis)
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew)
+
+
+def _laid_onto(vector: Array, other: Array) -> Array:
+    """Return the smallest rotation ``(3, 3)`` that brings a vector into the direction of another."""
+    if not np.cross(vector, other).any():
+        return np.eye(3)
+    return _about(np.cross(vector, other), float(angle_between(vector, other)))
 
 
 def true_centre(autograph: Autograph, projector: int) -> dict[str, float]:
