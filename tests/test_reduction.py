@@ -168,6 +168,20 @@ def test_least_squares_is_numpys_and_a_batch_is_its_members(seed):
         assert together.s0[i] == pytest.approx(np.sqrt(squares[0] / 5.0), rel=1e-7)
         one = adjusted(design[:, :, i], observed[:, i])
         np.testing.assert_allclose(together.sigmas[:, i], one.sigmas, rtol=1e-9)
+        np.testing.assert_allclose(together.condition[i], one.condition, rtol=1e-6)
+    np.testing.assert_allclose(together.redundancy_numbers.sum(axis=0), 5.0)
+    np.testing.assert_allclose(np.einsum("ii...->i...", together.correlations), 1.0)
+
+
+def test_weights_count_as_repeated_observations():
+    rng = np.random.default_rng(2)
+    design, observed = rng.standard_normal((7, 3)), rng.standard_normal(7)
+    weighted = adjusted(design, observed, weights=np.array([1.0, 2.0, 1.0, 3.0, 1.0, 1.0, 1.0]))
+    rows = [0, 1, 1, 2, 3, 3, 3, 4, 5, 6]
+    repeated = adjusted(design[rows], observed[rows], redundancy=4)
+    np.testing.assert_allclose(weighted.unknowns, repeated.unknowns)
+    np.testing.assert_allclose(weighted.sigmas, repeated.sigmas)
+    assert weighted.redundancy_numbers.sum() == pytest.approx(4.0)
 
 
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-1e-3, 1e-3), st.floats(-1e-3, 1e-3))
