@@ -91,7 +91,8 @@ def adjusted(design: Array, observed: Array, redundancy: int | None = None, weig
 def inverse_of_definite(matrix: Array) -> Array:
     """Return the inverses of symmetric positive definite matrices ``(u, u, ...)``, by Cholesky.
 
-    A batch is worked elementwise over its last axes, a single matrix by LAPACK. Where one is not definite its inverse is infinite, so that its condition shows it.
+    A batch is worked elementwise over its last axes, a single matrix by LAPACK. Where one is not definite its
+    inverse is infinite, so that its condition shows it.
     """
     if matrix.ndim == 2:
         return _inverse_of_one(matrix)
