@@ -177,6 +177,10 @@ def test_an_existing_folder_is_refused_unless_forced_and_nothing_in_it_is_lost(t
         (["run", "akwanga", "--seed", "-1"], ["--seed"]),
         (["run", "akwanga", "--out", "Makefile"], ["Makefile", "folder"]),
         (["scenario", "validate", "LICENSE"], ["LICENSE", "TOML"]),
+        (["run", "x" * 5000], ["x" * 100, "readable"]),
+        (["run", "akwanga", "--set", "instrument.serial=Ä1"], ["instrument.serial", "ASCII"]),
+        (["run", "akwanga", "--set", "photos.-1.phi=1"], ["photos.-1.phi"]),
+        (["run", "akwanga", "--out", "/dev/null/here"], ["/dev/null/here", "folder"]),
         (["stereo"], ["stereo"]),
     ],
 )
@@ -188,6 +192,56 @@ def test_bad_input_gets_a_sentence_and_exit_code_2_without_traceback(arguments, 
     last = done.stderr.strip().splitlines()[-1]
     for word in words:
         assert word in last
+
+
+def test_bad_input_leaves_earlier_results_and_no_new_folder(tmp_path):
+    out = tmp_path / "out"
+    assert a7sim("run", "dewitt-pair", "--out", out, "--quiet").returncode == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    (tmp_path / "dewitt-pair.csv").write_bytes("point,xl,yl,xr,yr\nä,1,2,3,4\n".encode("latin-1"))
+    (tmp_path / "bad.toml").write_bytes((ROOT / "scenarios" / "dewitt-pair.toml").read_bytes())
+    assert a7sim("run", tmp_path / "bad.toml", "--out", out, "--force").returncode == 2
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert a7sim("run", tmp_path / "bad.toml", "--out", tmp_path / "new").returncode == 2
+    assert not (tmp_path / "new").exists()
+
+
+def test_names_with_commas_are_names_like_any_other(tmp_path):
+    scenario = (ROOT / "scenarios" / "akwanga.toml").read_text(encoding="utf-8")
+    scenario = scenario.replace('"C1"', '"C,1"').replace('"101"', '"1,01"')
+    (tmp_path / "commas.toml").write_text(scenario, encoding="utf-8")
+    results = json.loads(a7sim("run", tmp_path / "commas.toml", "--json").stdout)
+    assert results["status"] == "complete"
+    assert "C,1" in results["models"][0]["points"]
+
+
+@pytest.mark.parametrize("environment", [{"PYTHONIOENCODING": "ascii"}, {"COLUMNS": "40"}, {"NO_COLOR": "1"}])
+def test_any_terminal_gets_its_tables(environment):
+    command = [sys.executable, "-m", "a7sim", "run", "dewitt-pair"]
+    done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_full_disk_is_said_in_a_sentence():
+    with Path("/dev/full").open("w", encoding="ascii") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "a7sim", "scenario", "schema"],
+            cwd=ROOT,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+def test_the_readme_shows_what_a_run_prints():
+    printed = " ".join(a7sim("run", "scenarios/akwanga.toml").stdout.split())
+    shown = (ROOT / "README.md").read_text(encoding="utf-8").split("## What `make run` shows")[1].split("##")[0]
+    sample = [line[4:] for line in shown.splitlines() if line.startswith("    ") and "..." not in line]
+    assert len(sample) > 5
+    assert [line for line in sample if " ".join(line.split()) not in printed] == []
 
 
 def test_debug_shows_the_traceback():

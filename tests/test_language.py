@@ -427,9 +427,6 @@ REFUSED = {
         "PROJ1:KAPP #H10",
         "PROJ1:KAPP (1)",
         "PROJ1:KAPP " + "1" * 300,
-        "COUN:X:PRES MIN",
-        "WHE:X MAX",
-        "PHOT1:CENT MIN,0,0",
         "*ESE DEF",
         "BASE:MODE 5",
         "BASE:MODE 'OUT'",
@@ -986,3 +983,17 @@ def test_all_that_crosses_the_link_is_heard_in_order_with_its_time():
     assert [event.text for event in heard[:3]] == ["NOTE 'coffee'", "*OPC?;FOO?;*TST?", "1;0"]
     assert len(heard[3].text) < 100
     assert {event.client for event in heard} == {engine.client}
+
+
+def test_wheels_presets_and_centring_know_min_max_and_def():
+    door = Door()
+    door.say("WHE:Y MIN")
+    assert door.say("COUN:Y?") == "-420.00"
+    door.say("WHE:Y 420;X MAX")
+    assert door.say("COUN:X?;Y?") == "280.00;0.00"
+    door.say("WHE:X DEF")
+    assert door.say("COUN:X?") == "280.00"
+    door.say("COUN:X:PRES MAX")
+    assert door.say("COUN:X?") == "999999.99"
+    door.say("COUN:X:PRES 1E6")
+    assert door.errors() == [-222]

@@ -47,7 +47,7 @@ def test_every_mistake_is_named_at_once_with_its_path():
     assert mistakes_of(raw) == [
         "sed: unknown key; did you mean seed?",
         'title: expected a text of 1 to 64 characters, got ""',
-        'camera.c: expected a principal distance of 30 to 400 mm, got "long"',
+        'camera.c: expected a principal distance of 98 to 215 mm, got "long"',
         "camera.fiducials[2].x: expected mm within the 230 mm format, got 412",
         "film.irregular_um: expected a standard deviation, zero or more, got -1",
         "photos[1].position: expected a list of 3 numbers, got a list of 2",
@@ -57,7 +57,7 @@ def test_every_mistake_is_named_at_once_with_its_path():
         "photos[2].name: expected a name of its own, got '103' as in photos[0]",
         "models[0].left: expected a photograph of this scenario (103, 102), got '101'",
         "models[0].right: expected a photograph of this scenario (103, 102), got '104'",
-        "plan.centre_levels: expected two different levels, got 4900.0 twice",
+        "plan.centre_levels: expected levels 1 or more apart, got 4900 and 4900",
     ]
 
 

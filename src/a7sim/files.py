@@ -1,6 +1,7 @@
 """Reading CSV files that people send: a header line, decimal points, `#` comments, UTF-8."""
 
 import csv
+import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,25 +36,35 @@ def read_rows(path: str | Path, texts: Sequence[str], numbers: Sequence[str]) ->
         raise Mistake(f"{path}: expected UTF-8 text, got bytes that are none ({error.reason})") from error
     except OSError as error:
         raise Mistake(f"{path}: expected a readable file: {error.strerror}") from error
-    lines = [
-        (number, line)
-        for number, line in enumerate(content.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not lines:
+    rows = _rows_of(path, content)
+    if not rows:
         raise Mistake(f"{path}: expected a header line {','.join([*texts, *numbers])}, got an empty file")
-    rows = [[cell.strip() for cell in row] for row in csv.reader(line for _, line in lines)]
-    header = rows[0]
+    header_line, header = rows[0]
     missing = [column for column in [*texts, *numbers] if column not in header]
     if missing:
         raise Mistake(
-            f"{path}, line {lines[0][0]}: expected the columns {','.join([*texts, *numbers])}, "
+            f"{path}, line {header_line}: expected the columns {','.join([*texts, *numbers])}, "
             f"got {','.join(header)[:80]} (no {', '.join(missing)})"
         )
+    if len(rows) == 1:
+        raise Mistake(f"{path}: expected rows under the header, got none")
     places = {column: header.index(column) for column in [*texts, *numbers]}
-    return [
-        _row(path, line, cells, header, places, numbers) for (line, _), cells in zip(lines[1:], rows[1:], strict=True)
-    ]
+    return [_row(path, line, cells, header, places, numbers) for line, cells in rows[1:]]
+
+
+def _rows_of(path: Path, content: str) -> list[tuple[int, list[str]]]:
+    reader = csv.reader(io.StringIO(content), strict=True)
+    rows = []
+    try:
+        for cells in reader:
+            stripped = [cell.strip() for cell in cells]
+            if any(stripped) and not stripped[0].startswith("#"):
+                rows.append((reader.line_num, stripped))
+    except csv.Error as error:
+        raise Mistake(
+            f"{path}, line {reader.line_num}: expected CSV, got a line that breaks its rules: {error}"
+        ) from None
+    return rows
 
 
 def _row(

@@ -13,6 +13,9 @@ LEAST_COUNT = 0.01
 
 COUNTER_DECIMALS = 2
 
+NOT_VISIBLE = "9.91E37"
+"""What the command language answers for what cannot be seen or measured (SCPI's not-a-number)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Element:

@@ -1,6 +1,7 @@
 """The command line: one thin click command a verb."""
 
 import importlib
+import io
 import sys
 
 import click
@@ -45,6 +46,9 @@ def main() -> None:
     """Run the command line; bad input gets one sentence and exit code 2."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     try:
         code = cli.main(arguments, prog_name="a7sim", standalone_mode=False)
     except click.ClickException as error:
@@ -61,4 +65,18 @@ def main() -> None:
         for line in str(mistake).splitlines():
             click.echo(f"a7sim: {line}", err=True)
         code = EXIT_MISTAKE
+    except OSError as error:
+        if debug:
+            raise
+        code = _told(error)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _told(error: OSError) -> int:
+    """Say what the operating system refused; a reader who went away needs to be told nothing."""
+    if isinstance(error, BrokenPipeError):
+        sys.stdout = None
+        return 1
+    place = error.filename or "standard output"
+    click.echo(f"a7sim: {place}: expected to be able to write and read: {error.strerror}", err=True)
+    return EXIT_MISTAKE

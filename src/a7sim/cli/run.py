@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from a7sim.cli import EXIT_DOES_NOT_FIT
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Observer, Scenario, load_scenario
-from a7sim.session import Watcher, prepare_folder, run
+from a7sim.session import Watcher, run
 from a7sim.session.results import as_json
 from a7sim.session.tables import of_session
 
@@ -51,10 +51,8 @@ def command(
     loaded = load_scenario(scenario, overrides)
     if perfect_observer:
         loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
-    if out is not None:
-        prepare_folder(out, force)
     chosen = loaded.seed if seed is None else seed
-    document = _run_watched(loaded, chosen, out, quiet or as_document or not sys.stderr.isatty())
+    document = _run_watched(loaded, chosen, out, force, quiet or as_document or not sys.stderr.isatty())
     _show(document, as_document, quiet)
     if document["status"] != "complete":
         click.echo(f"a7sim: the operator gave up: {document['message']}", err=True)
@@ -71,15 +69,15 @@ def _overrides(settings: tuple[str, ...], options: dict[str, str | None]) -> dic
     return overrides | {key: f'"{value}"' for key, value in options.items() if value is not None}
 
 
-def _run_watched(scenario: Scenario, seed: int, out: Path | None, unwatched: bool) -> dict[str, Any]:
-    columns = (TextColumn("{task.description:<38}"), BarColumn(), TimeElapsedColumn())
+def _run_watched(scenario: Scenario, seed: int, out: Path | None, force: bool, unwatched: bool) -> dict[str, Any]:
+    columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
         task = progress.add_task("sitting down", total=_POINTS_A_MODEL * len(scenario.models))
         watcher = Watcher(
             lambda activity: progress.update(task, description=activity),
             lambda: progress.advance(task),
         )
-        return run(scenario, seed, out, watcher)
+        return run(scenario, seed, out, watcher, force)
 
 
 def _show(document: dict[str, Any], as_document: bool, quiet: bool) -> None:

@@ -29,7 +29,7 @@ def validate(file: str, as_document: bool) -> None:
     except ScenarioError as error:
         mistakes = error.mistakes
     except Mistake as mistake:
-        mistakes = [str(mistake)]
+        mistakes = str(mistake).splitlines()
     if as_document:
         document = {"schema_version": 1, "command": "scenario validate", "file": file, "mistakes": mistakes}
         click.echo(msgspec.json.encode(document))
@@ -43,9 +43,13 @@ def validate(file: str, as_document: bool) -> None:
 
 
 @command.command("schema")
-def schema() -> None:
+@click.option("--json", "as_document", is_flag=True, help="Print it inside one JSON document of a7sim.")
+def schema(as_document: bool) -> None:
     """Print the JSON Schema of scenario files.
 
     Example: a7sim scenario schema > scenario.schema.json
     """
-    click.echo(msgspec.json.format(msgspec.json.encode(scenario_schema()), indent=2))
+    described = scenario_schema()
+    if as_document:
+        described = {"schema_version": 1, "command": "scenario schema", "schema": described}
+    click.echo(msgspec.json.format(msgspec.json.encode(described), indent=2))

@@ -13,8 +13,8 @@ from a7sim.instrument.recorder import Recorder
 from a7sim.instrument.refusals import OutOfRange, SettingsConflict, UnknownName
 from a7sim.instrument.spindles import Counter, Spindle
 from a7sim.manual import LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element, Variant
-from a7sim.scenario.schema import Condition, Instrument, ProjectorCondition
-from a7sim.scene.photograph import FORMAT_MM, Photograph
+from a7sim.scenario.schema import FORMAT_MM, Condition, Instrument, ProjectorCondition
+from a7sim.scene.photograph import Photograph
 
 INSTRUMENT_STREAM = 3
 """Spawn key of the instrument's random numbers; the scene's come before, the operator's after."""
@@ -161,12 +161,8 @@ class Autograph:
         self._counters[axis].preset(reading, self._carriages[axis].at)
 
     def drive(self, axis: str, reading: float) -> None:
-        """Run a carriage until its counter shows a reading; what an end of the carriage shows leads to that end."""
-        counter = self._counters[axis]
-        low, high = self.variant.carriages[axis]
-        ends = {counter.reading(end): end for end in (low, high)}
-        wanted = round(reading, counter.decimals)
-        self._move(axis, ends.get(wanted, counter.position(wanted)))
+        """Run a carriage until its counter shows a reading."""
+        self._move(axis, self._counters[axis].position(reading))
 
     def wheel(self, axis: str, amount: float) -> None:
         """Turn a handwheel by so many counter units; its collar decides which way the carriage goes."""
@@ -176,6 +172,9 @@ class Autograph:
 
     def _move(self, axis: str, position: float) -> None:
         spindle = self._carriages[axis]
+        at_end = min(max(position, spindle.low), spindle.high)
+        if abs(at_end - position) <= self._counters[axis].half_a_count:
+            position = at_end
         if not spindle.allows(position):
             low, high = self.counter_limits(axis)
             got = self._counters[axis].reading(position)

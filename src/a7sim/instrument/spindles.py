@@ -75,6 +75,11 @@ class Counter:
         """Return the carriage position in mm where the counter shows a reading, rounded to its last digit."""
         return (round(reading, self.decimals) - self.offset) / self.units_per_mm
 
+    @property
+    def half_a_count(self) -> float:
+        """Half the last digit, in mm of the carriage: nearer than this the counter shows no difference."""
+        return 0.5000001 * 10.0**-self.decimals / self.units_per_mm
+
     def preset(self, reading: float, position: float) -> None:
         """Make the counter show a reading at the present position."""
         self.offset = round(reading, self.decimals) - self.units_per_mm * position

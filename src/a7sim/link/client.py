@@ -1,8 +1,7 @@
 """Talking to an instrument over any pyserial port."""
 
+import csv
 from typing import Protocol
-
-NOT_VISIBLE = 9.91e37
 
 
 class Port(Protocol):
@@ -48,6 +47,10 @@ class Client:
         if not reply.endswith(b"\n"):
             raise InstrumentRefused(line, self.errors())
         return reply[:-1].decode("ascii")
+
+    def fields(self, line: str) -> list[str]:
+        """Send a line and return the values of its reply, texts without their quotes."""
+        return next(csv.reader([self.ask(line)]))
 
     def numbers(self, line: str) -> list[float]:
         """Send a line and return all numbers of its reply; 9.91E37 stands for what cannot be seen."""

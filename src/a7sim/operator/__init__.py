@@ -1,7 +1,7 @@
 """The operator: a person who works the instrument through its line and knows only what can be seen and read."""
 
-from a7sim.operator.job import CASES, Job, ModelJob
+from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.person import DoesNotFit, Person
 from a7sim.operator.work import ModelRecord, work
 
-__all__ = ["CASES", "DoesNotFit", "Job", "ModelJob", "ModelRecord", "Person", "work"]
+__all__ = ["DoesNotFit", "Job", "ModelJob", "ModelRecord", "Person", "work"]

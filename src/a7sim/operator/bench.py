@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from a7sim.geometry import Array
+from a7sim.operator.person import DoesNotFit
 
 ELEMENT_NODES: Mapping[str, str] = {
     "kappa": "KAPP",
@@ -14,9 +15,6 @@ ELEMENT_NODES: Mapping[str, str] = {
     "bz": "BZ",
     "c": "PDIS",
 }
-
-COUNTER_ZEROS: Mapping[str, float] = {"kappa": 0.0, "phi": 100.0, "omega": 100.0, "by": 0.0, "bz": 0.0}
-"""What the counters show when an element is at zero (geometry.md)."""
 
 
 class CannotFuse(Exception):
@@ -62,6 +60,9 @@ class Bench(Protocol):
     def level_now(self) -> float:
         """The Z reading where the mark stands."""
 
+    def levels_shown(self, levels: tuple[float, float]) -> tuple[float, float]:
+        """Return two Z readings as the counter shows them when it is driven there."""
+
     def begin_round(self, number: int) -> None:
         """Begin a round of a procedure: what is read now is entered under its number."""
 
@@ -70,6 +71,12 @@ class Bench(Protocol):
 
     def remark(self, text: str) -> None:
         """Write a remark into the book."""
+
+
+def given_up(bench: Bench, text: str) -> DoesNotFit:
+    """Write what does not fit into the book and return it as an error to raise."""
+    bench.remark(f"does not fit: {text}")
+    return DoesNotFit(text)
 
 
 def wrapped(gon: float) -> float:

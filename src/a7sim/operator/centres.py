@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.operator.bench import Bench
+from a7sim.operator.bench import Bench, given_up
 from a7sim.operator.job import ModelJob
 from a7sim.reduction import PerspectiveCentre, perspective_centre
 
@@ -18,20 +18,30 @@ SLIPPED = 1.5
 MOST_REPETITIONS = 3
 
 
-def observe_centre(bench: Bench, model: ModelJob, hand: int, levels: tuple[float, float]) -> PerspectiveCentre:
+def observe_centre(
+    bench: Bench, model: ModelJob, hand: int, levels: tuple[float, float], tolerated_rms: float
+) -> PerspectiveCentre:
     """Point monocularly at points 1 to 6 at both levels and compute the centre of one photograph.
 
     hand is 1 for the left-hand photograph, 2 for the right-hand one. A point that does not fit the others is
     struck out and pointed at again; when the rms stays suspicious though no point stands out, a second set
-    is observed and the mean of both is taken.
+    is observed and the mean of both is taken. Raises DoesNotFit when even then the rms is beyond the tolerated.
     """
     points = [model.standard_points[label] for label in model.points_of_case("A")]
+    levels = bench.levels_shown(levels)
     low, high = _one_set(bench, hand, points, levels)
     if float(perspective_centre(low, high, *levels).rms) > SUSPICIOUS_RMS:
         bench.remark(f"{model.name}: the points of the centre fit badly, a second set is observed")
         low_again, high_again = _one_set(bench, hand, points, levels)
         low, high = (low + low_again) / 2.0, (high + high_again) / 2.0
-    return perspective_centre(low, high, *levels)
+    centre = perspective_centre(low, high, *levels)
+    if float(centre.rms) > tolerated_rms:
+        raise given_up(
+            bench,
+            f"{model.name}: the pointings of a perspective centre do not meet: rms {float(centre.rms):.2f}, "
+            f"tolerated {tolerated_rms:.2f}",
+        )
+    return centre
 
 
 def _one_set(bench: Bench, hand: int, points: Sequence[str], levels: tuple[float, float]) -> tuple[Array, Array]:

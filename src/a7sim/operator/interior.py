@@ -6,13 +6,15 @@ import numpy as np
 
 from a7sim.geometry import GON, Array
 from a7sim.operator.person import Person
-from a7sim.reduction import PictureLie, picture_lie
+from a7sim.reduction import PictureLie, Undetermined, picture_lie
 from a7sim.scenario import Camera
 
 CENTRED_MM = 0.02
 """How well pictures are centred where a tolerance is stated (history.md)."""
 
-UPSIDE_DOWN_MM = 50.0
+MISPLACED_MM = 50.0
+"""Beyond this a fiducial is not off its collimating mark, it is somewhere else."""
+
 MOST_ROUNDS = 6
 
 
@@ -37,7 +39,7 @@ def interior_orientation(person: Person, projector: int, photograph: str, certif
     client = person.client
     person.clock.spend(person.observer.seconds_to_mount)
     person.set(f'PHOT{projector}:LOAD "{photograph}"')
-    lies_there = client.ask(f"PHOT{projector}?").strip('"')
+    (lies_there,) = client.fields(f"PHOT{projector}?")
     if lies_there != photograph:
         raise person.give_up(
             f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it"
@@ -45,13 +47,17 @@ def interior_orientation(person: Person, projector: int, photograph: str, certif
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
     for round_ in range(1, MOST_ROUNDS + 1):
         names, displacements = _fiducials_seen(person, projector)
-        if np.abs(displacements).max() > UPSIDE_DOWN_MM:
+        places = np.array([marks[name] for name in names]).T
+        if np.abs(displacements).max() > MISPLACED_MM:
+            how = "upside down" if np.abs(displacements + 2.0 * places).max() < MISPLACED_MM else "beside its marks"
             raise person.give_up(
-                f"picture {photograph} lies upside down in projector {projector}: its fiducials stand "
+                f"picture {photograph} lies {how} in projector {projector}: its fiducials stand up to "
                 f"{np.abs(displacements).max():.0f} mm from the collimating marks of their names"
             )
-        places = np.array([marks[name] for name in names]).T
-        lie = picture_lie(displacements, places)
+        try:
+            lie = picture_lie(displacements, places)
+        except Undetermined as undetermined:
+            raise person.give_up(f"the fiducials of {photograph} do not tell how it lies: {undetermined}") from None
         wanted = -np.array(certificate.principal_point)
         off = np.array([lie.dx - wanted[0], lie.dy - wanted[1]])
         if np.abs(off).max() <= CENTRED_MM and abs(lie.turn) * np.abs(places).max() <= CENTRED_MM:
@@ -67,9 +73,9 @@ def interior_orientation(person: Person, projector: int, photograph: str, certif
 
 
 def _fiducials_seen(person: Person, projector: int) -> tuple[list[str], Array]:
-    fields = person.client.ask(f"PHOT{projector}:FID?").split(",")
+    fields = person.client.fields(f"PHOT{projector}:FID?")
     person.clock.spend(len(fields) / 3 * person.observer.seconds_to_read)
-    names = [name.strip('"') for name in fields[0::3]]
+    names = fields[0::3]
     exact = np.array([fields[1::3], fields[2::3]], dtype=float)
     return names, exact + 1e-3 * person.errors(person.observer.fiducial_um, exact.shape)
 

@@ -4,15 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from a7sim.scenario import Camera, Plan
-
-CASES: Mapping[str, str] = {
-    "A": "123456",
-    "B": "123456abc",
-    "C": "123456ghi",
-    "D": "123456def",
-    "E": "123456abcdefghi",
-}
-"""Standard points used for numerical relative orientation (thesis 3.4.2, geometry.md)."""
+from a7sim.standard_points import CASES
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from a7sim.geometry import GON, Array, plane_rotation
-from a7sim.link.client import NOT_VISIBLE
-from a7sim.manual import VARIANTS, Variant
+from a7sim.manual import NOT_VISIBLE, VARIANTS, Variant
 from a7sim.operator.bench import (
     ELEMENT_NODES,
     CannotFuse,
@@ -105,6 +104,15 @@ class LinkBench:
         person.set("COUN:X:PRES {:.2f};:COUN:Y:PRES {:.2f};:COUN:Z:PRES {:.2f}".format(*plan.preset))
         self._offset += np.array(plan.preset) - before
 
+    def levels_shown(self, levels: tuple[float, float]) -> tuple[float, float]:
+        """Return two Z readings as the counter shows them when it is driven there."""
+        shown = []
+        for level in levels:
+            self._drive(f"DRIV:Z {level:.2f}")
+            self._see_that_nothing_was_refused(f"driving Z to {level:.2f}")
+            shown.append(float(self._counters()[2]))
+        return shown[0], shown[1]
+
     def begin_round(self, number: int) -> None:
         """Begin a round of a procedure: what is read now is entered under its number."""
         self.person.book.round = number
@@ -151,13 +159,18 @@ class LinkBench:
         self._z = float((self._offset[2] - readings[2]) / self._units)
         return readings
 
-    def _drive_z_to(self, height: float) -> None:
+    def _drive_z_to(self, height: float) -> bool:
         reading = self._offset[2] + height * self._units
-        self._drive(f"DRIV:Z {reading:.2f}")
+        return self._drive(f"DRIV:Z {reading:.2f}")
 
-    def _drive(self, line: str) -> None:
+    def _see_that_nothing_was_refused(self, doing: str) -> None:
+        self.person.see_that_it_obeyed(f"{self.model.name}: {doing}")
+
+    def _drive(self, line: str) -> bool:
+        """Run carriages; return whether the instrument let them go there."""
         self.person.clock.spend(self.person.observer.seconds_to_drive)
-        self.person.client.send(line)
+        errors_before, errors = self.person.client.numbers(f"SYST:ERR:COUN?;:{line};:SYST:ERR:COUN?")
+        return errors == errors_before
 
     def _frame(self, readings: Array) -> Array:
         x, y, z = readings - self._offset
@@ -189,11 +202,10 @@ class LinkBench:
         origin = np.array([0.0 if hand == 1 else self._bx, -self._by[hand]]) + self._offset[:2]
         for around in _outward():
             place = origin + (expected + self._strayed[hand] + around) * self._z / self._c
-            self._drive("DRIV:X {:.2f};Y {:.2f}".format(*place))
-            if self._seen(hand, point) is not None:
+            if self._drive("DRIV:X {:.2f};Y {:.2f}".format(*place)) and self._seen(hand, point) is not None:
                 self._seen_from = place
                 return
-        self.person.client.errors()
+        self._see_that_nothing_was_refused(f"looking for point {point}")
         raise self.person.give_up(
             f"{self.model.name}: point {point} is nowhere near where the print shows it in the {_side(hand)} eye, "
             f"not within {SEARCH_RINGS * SEARCH_STEP_MM:.0f} mm: wrong picture in the projector, or the base "
@@ -208,7 +220,7 @@ class LinkBench:
     def _seen(self, hand: int, point: str) -> Array | None:
         self.person.look()
         seen = np.array(self.person.client.numbers(f'EYEP{hand}? "{point}"'))
-        return None if seen[0] == NOT_VISIBLE else seen
+        return None if seen[0] == float(NOT_VISIBLE) else seen
 
     # --- monocular pointing ---------------------------------------------------------------------------
 
@@ -224,7 +236,8 @@ class LinkBench:
             if (np.abs(steps) < AT_REST_MM).all():
                 return
             self.person.turn("WHE:X {:.3f};Y {:.3f}".format(*steps))
-        raise self.person.give_up(f"point {point}: the mark cannot be brought to rest on the image")
+        self._see_that_nothing_was_refused(f"pointing at {point}")
+        raise self.person.give_up(f"{self.model.name}: point {point}: the mark cannot be brought to rest on the image")
 
     def _ran_away(self, hand: int, point: str) -> Exception:
         """Go back to where the point was seen, try each wheel to find out what is wrong, and give up."""
@@ -320,6 +333,7 @@ class LinkBench:
             if at_rest:
                 return
             self.person.turn(line)
+        self._see_that_nothing_was_refused(f"setting the mark on {point}")
         raise self.person.give_up(
             f"{self.model.name}: point {point} cannot be brought to rest under the mark stereoscopically"
         )
@@ -339,7 +353,7 @@ class LinkBench:
         """Return what both eyes see: x and y from the mark (mean of both), px, py, in um."""
         self.person.look()
         lx, ly, rx, ry = self.person.client.numbers(f'EYEP1? "{point}";:EYEP2? "{point}"')
-        if NOT_VISIBLE in (lx, rx):
+        if float(NOT_VISIBLE) in (lx, rx):
             raise CannotFuse(point)
         return np.array([(lx + rx) / 2.0, (ly + ry) / 2.0, lx - rx, ly - ry])
 
@@ -360,14 +374,15 @@ class LinkBench:
         height = -self._z
         for rise in RISES_TO_FUSE_MM:
             if rise:
-                self._drive_z_to(height + rise)
+                if not self._drive_z_to(height + rise):
+                    self.person.client.errors()
+                    continue
                 self._bring_into_view(1, point)
             self._bisect(1, point, (0.0, 0.0))
             if self._seen(2, point) is not None:
                 self._settle(point, plan_error, height_error)
                 return
         self._drive_z_to(height)
-        self.person.client.errors()
         raise CannotFuse(point)
 
     # --- y-parallaxes ---------------------------------------------------------------------------------
@@ -402,7 +417,7 @@ class LinkBench:
                 person.turn(";:".join(f"{_header(by)} {rest[by]:.2f}" for by in rest))
                 raise
             self._tick()
-        person.see_that_it_obeyed("measuring y-parallaxes")
+        person.see_that_it_obeyed(f"{self.model.name}: measuring y-parallaxes")
         return Parallaxes(p, places)
 
     def _read_by(self, point: str, by: str, rest: float, slip: float) -> tuple[str, float, int]:
@@ -471,7 +486,7 @@ class LinkBench:
                 measured[:, i] = np.median([readings for readings, _ in pointings], axis=0)
                 person.remark(f"point {point}: no two of {MOST_POINTINGS} pointings agree, median taken")
             self._tick()
-        person.see_that_it_obeyed("measuring model coordinates")
+        person.see_that_it_obeyed(f"{self.model.name}: measuring model coordinates")
         return measured
 
     def _pointing(self, point: str, error: Array, slips: Array) -> tuple[Array, list[int]]:

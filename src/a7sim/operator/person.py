@@ -1,6 +1,5 @@
 """The person in the chair: acuity, slips, pace and patience."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,14 +72,14 @@ class Person:
         for line in lines:
             self.clock.spend(self.observer.seconds_to_set)
             self.client.send(line)
-        self.see_that_it_obeyed(f"setting {'; '.join(lines)}")
+        self.see_that_it_obeyed("; ".join(lines))
 
     def see_that_it_obeyed(self, doing: str) -> None:
         """Give up when the instrument has refused anything since the last look."""
         try:
             self.client.check(doing)
         except InstrumentRefused as refused:
-            raise self.give_up(f"the instrument refuses: {refused}") from refused
+            raise self.give_up(f"{doing}: the instrument refuses: {'; '.join(refused.errors[:2])}") from refused
 
     def read(self, question: str, slip: float = 0.0) -> float:
         """Read a counter, with a slip if there is one."""
@@ -113,8 +112,3 @@ def _slips(rng: np.random.Generator, observer: Observer, shape: tuple[int, ...])
     gross = rng.choice(_GROSS_SLIPS, shape)
     slipped = np.where(luck < observer.blunder_rate + observer.last_digit_slip, last_digit, 0.0)
     return np.where(luck < observer.blunder_rate, gross, slipped)
-
-
-def in_words(names: Sequence[str]) -> str:
-    """Return names as a list in a sentence."""
-    return ", ".join(names[:-1]) + f" and {names[-1]}" if len(names) > 1 else "".join(names)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import GON, Array
-from a7sim.operator.bench import COUNTER_ZEROS, Bench, CannotFuse, wrapped
+from a7sim.manual import A7
+from a7sim.operator.bench import Bench, CannotFuse, given_up, wrapped
 from a7sim.operator.job import ModelJob
-from a7sim.operator.person import DoesNotFit
 from a7sim.reduction import Stand, Undetermined, element_corrections
 
 MOST_ROUNDS = 12
@@ -65,13 +65,14 @@ def unknowns_of(method: str, model: ModelJob) -> tuple[str, ...]:
 
 
 def relative_orientation(
-    bench: Bench, model: ModelJob, method: str, case: str, readings: int, base: float
+    bench: Bench, model: ModelJob, method: str, case: str, readings: int, base: float, tolerated_rms: float
 ) -> RelativeOrientation:
     """Clear the y-parallaxes of a model in rounds of measuring, computing and setting.
 
     Once the parallaxes of a round are no longer gross their mean is taken off; in the dependent method, where by is
     itself unknown, only to see whether they fall. When they no longer do, the best settings stand and their
-    mean goes on by' (dependent: on the by that was turned). Raises DoesNotFit when they do not fall at all.
+    mean goes on by' (dependent: on the by that was turned). Raises DoesNotFit when the residual parallaxes at all
+    standard points then have a larger rms than tolerated, in mm.
     """
     labels = model.points_of_case(case)
     unknowns = unknowns_of(method, model)
@@ -100,12 +101,6 @@ def relative_orientation(
         corrections, sigmas = _corrections(bench, model, seen.places, to_clear, unknowns, base)
         rounds[-1] = Round(settings, rounds[-1].parallaxes, mean, rms, sigmas)
         bench.set_elements({name: settings[name] + corrections[name] for name in unknowns})
-    if rounds[best].rms > 0.5 * rounds[0].rms and rounds[best].rms > 0.1:
-        raise _given_up(
-            bench,
-            f"{model.name}: the y-parallaxes do not fall: rms {rounds[0].rms:.2f} mm at first, "
-            f"{rounds[best].rms:.2f} mm at best",
-        )
     _restore(bench, rounds[best].settings)
     _set_mean_on_by(bench, model, "by1" if method == "independent" else unknowns[3], rounds[best].mean)
     bench.begin_round(len(rounds) + 1)
@@ -113,7 +108,18 @@ def relative_orientation(
     left = bench.parallaxes([model.standard_points[label] for label in everywhere], readings)
     places = dict(zip(everywhere, zip(*left.places.tolist(), strict=True), strict=True))
     residuals = dict(zip(everywhere, left.p.tolist(), strict=True))
-    return RelativeOrientation(method, case, rounds, rough_rounds, bench.elements(ALL_ELEMENTS), residuals, places)
+    orientation = RelativeOrientation(
+        method, case, rounds, rough_rounds, bench.elements(ALL_ELEMENTS), residuals, places
+    )
+    if orientation.rms > tolerated_rms:
+        worst = max(residuals, key=lambda label: abs(residuals[label]))
+        raise given_up(
+            bench,
+            f"{model.name}: y-parallaxes of {orientation.rms:.3f} mm rms remain, {tolerated_rms:.3f} tolerated; the "
+            f"largest is {residuals[worst]:+.3f} at point {model.standard_points[worst]}: a point is mistaken, or the "
+            "photographs do not belong together",
+        )
+    return orientation
 
 
 def _set_mean_on_by(bench: Bench, model: ModelJob, by: str, mean: float) -> None:
@@ -139,7 +145,7 @@ def _bring_together(
 ) -> None:
     """Orient roughly, where images are too far apart for by, from the Y readings of each eye alone."""
     if rough_round > MOST_ROUGH_ROUNDS:
-        raise _given_up(bench, f"{model.name}: the images of {apart} stay too far apart to be fused")
+        raise given_up(bench, f"{model.name}: the images of {apart} stay too far apart to be fused")
     bench.remark(f"{model.name}: the images of {apart} are too far apart for by: rough orientation, each eye alone")
     level = bench.level_now
     left, right = (bench.in_frame(bench.point_with(hand, points, level), level) for hand in (1, 2))
@@ -148,11 +154,6 @@ def _bring_together(
     settings = bench.elements(unknowns)
     corrections, _ = _corrections(bench, model, left * where_they_meet, parallaxes, unknowns, base)
     bench.set_elements({name: settings[name] + corrections[name] for name in unknowns})
-
-
-def _given_up(bench: Bench, text: str) -> DoesNotFit:
-    bench.remark(f"does not fit: {text}")
-    return DoesNotFit(text)
 
 
 def _corrections(
@@ -165,7 +166,7 @@ def _corrections(
     try:
         solution = element_corrections(parallaxes, places * [[1.0], [1.0], [-1.0]], left, right, hands)
     except Undetermined as undetermined:
-        raise _given_up(bench, f"{model.name}: {undetermined}") from undetermined
+        raise given_up(bench, f"{model.name}: {undetermined}") from undetermined
     factor = [1.0 if name[:2] in ("by", "bz") else 1.0 / GON for name in unknowns]
     values = {n: float(v) * f for n, v, f in zip(unknowns, solution.unknowns, factor, strict=True)}
     sigmas = {n: float(s) * f for n, s, f in zip(unknowns, solution.sigmas, factor, strict=True)}
@@ -174,7 +175,7 @@ def _corrections(
 
 def _stand(bench: Bench, projector: int, x: float) -> Stand:
     """Return how a projector stands by its counters, its centre at x of the instrument frame."""
-    names = ("omega", "phi", "kappa", "by", "bz")
-    seen = bench.elements([f"{name}{projector}" for name in names])
-    omega, phi, kappa, by, bz = (seen[f"{name}{projector}"] - COUNTER_ZEROS[name] for name in names)
+    names = [f"{name}{projector}" for name in ("omega", "phi", "kappa", "by", "bz")]
+    seen = bench.elements(names)
+    omega, phi, kappa, by, bz = (seen[name] - A7.elements[name].zero for name in names)
     return Stand(np.array([x, -by, bz]), GON * np.array([omega, phi, wrapped(kappa)]))

@@ -55,7 +55,10 @@ def work(
         bench.preset(model.standard_points["1"])
         _begin(person, model, "relative orientation", begins)
         plan = job.plan
-        orientation = relative_orientation(bench, model, plan.method, plan.case, plan.parallax_readings, plan.bx)
+        tolerated = 1e-3 * plan.tolerated_parallax_um * plan.projection_height / job.certificate.c
+        orientation = relative_orientation(
+            bench, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated
+        )
         _begin(person, model, "model coordinates", begins)
         wanted = dict.fromkeys([*model.standard_points.values(), *model.other_points])
         common = [name for name in wanted if name in sketches[1] and name in sketches[2]]
@@ -63,7 +66,7 @@ def work(
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
             _begin(person, model, f"{side} perspective centre", begins)
-            centres[hand] = observe_centre(bench, model, hand, plan.centre_levels)
+            centres[hand] = observe_centre(bench, model, hand, plan.centre_levels, plan.tolerated_centre_rms)
         yield ModelRecord(
             model,
             {name: interior[name] for name in (model.left, model.right)},
@@ -100,9 +103,9 @@ def _set_base_and_fittings(person: Person, model: ModelJob) -> None:
 def _mount(person: Person, job: Job, model: ModelJob, interior: dict[str, InteriorOrientation]) -> None:
     """Mount what is not yet in its projector; a projector with a new picture starts from its counter zeros."""
     for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
-        if person.client.ask(f"PHOT{projector}?").strip('"') == photograph:
+        if person.client.fields(f"PHOT{projector}?") == [photograph]:
             continue
-        if person.client.ask(f"PHOT{3 - projector}?").strip('"') == photograph:
+        if person.client.fields(f"PHOT{3 - projector}?") == [photograph]:
             person.set(f"PHOT{3 - projector}:UNL")
         person.set(f"PROJ{projector}:KAPP 0;PHI 100;OMEG 100;BY 0;BZ 0")
         interior[photograph] = interior_orientation(person, projector, photograph, job.certificate)
@@ -122,6 +125,6 @@ def _prints(person: Person, model: ModelJob) -> dict[int, dict[str, Array]]:
 
 
 def _print(person: Person, projector: int) -> dict[str, Array]:
-    fields = person.client.ask(f"PHOT{projector}:SKET?").split(",")
+    fields = person.client.fields(f"PHOT{projector}:SKET?")
     places = np.array([fields[1::3], fields[2::3]], dtype=float).T
-    return dict(zip((name.strip('"') for name in fields[0::3]), places, strict=False))
+    return dict(zip(fields[0::3], places, strict=False))

@@ -7,7 +7,6 @@ from a7sim.scenario.loading import (
     scenario_of,
     scenario_schema,
 )
-from a7sim.scenario.references import POSITIONS
 from a7sim.scenario.schema import (
     SCHEMA_VERSION,
     Camera,
@@ -22,7 +21,6 @@ from a7sim.scenario.schema import (
 from a7sim.scenario.schema import Model as ModelPlan
 
 __all__ = [
-    "POSITIONS",
     "SCHEMA_VERSION",
     "Camera",
     "Condition",

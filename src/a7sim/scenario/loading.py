@@ -29,8 +29,11 @@ def find_scenario(name: str | Path) -> Path:
     Raises ScenarioError when there is none.
     """
     path = Path(name)
-    if path.is_file():
-        return path
+    try:
+        if path.is_file():
+            return path
+    except OSError as error:
+        raise ScenarioError(str(name)[:200], [f"expected a readable file: {error.strerror}"]) from error
     shelves = (
         Path(__file__).parents[1] / "scenarios",
         Path(__file__).parents[3] / "scenarios",
@@ -101,15 +104,21 @@ def _override(raw: dict[str, Any], key: str, text: str) -> None:
     table: Any = raw
     for parent in parents:
         try:
-            table = table[int(parent)] if isinstance(table, list) else table.setdefault(parent, {})
+            table = table[_index(parent)] if isinstance(table, list) else table.setdefault(parent, {})
         except (ValueError, IndexError):
             table = None
         if not isinstance(table, dict | list):
             raise ScenarioError(source, [f"expected the path of a scenario value such as plan.case, got {key!r}"])
     try:
         if isinstance(table, list):
-            table[int(last)] = value
+            table[_index(last)] = value
         else:
             table[last] = value
     except (ValueError, IndexError):
         raise ScenarioError(source, [f"expected the path of a scenario value, got {key!r}"]) from None
+
+
+def _index(text: str) -> int:
+    if not text.isdecimal():
+        raise ValueError
+    return int(text)

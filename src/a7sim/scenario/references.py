@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-POSITIONS = "123456abcdefghi"
-"""The standard points of thesis fig. 4.1."""
+from a7sim.standard_points import CASES, POSITIONS
 
-LEAST_POSITIONS = "123456"
+LEAST_SEPARATION = 1.0
+"""Counter units between the two levels of a perspective centre."""
 
 
 def mistakes_of_reference(raw: Mapping[str, Any], folder: Path) -> Iterator[str]:
@@ -17,9 +17,14 @@ def mistakes_of_reference(raw: Mapping[str, Any], folder: Path) -> Iterator[str]
     yield from _mistakes_in_camera(_table(raw, "camera"))
     yield from _mistakes_in_photos(raw, folder)
     yield from _mistakes_in_models(raw)
-    levels = _table(raw, "plan").get("centre_levels")
-    if isinstance(levels, Sequence) and len(levels) == 2 and levels[0] == levels[1]:
-        yield f"plan.centre_levels: expected two different levels, got {levels[0]} twice"
+    yield from _mistakes_in_levels(_table(raw, "plan").get("centre_levels"))
+
+
+def _mistakes_in_levels(levels: object) -> Iterator[str]:
+    if isinstance(levels, Sequence) and len(levels) == 2 and all(isinstance(each, int | float) for each in levels):
+        low, high = levels
+        if abs(high - low) < LEAST_SEPARATION:
+            yield f"plan.centre_levels: expected levels {LEAST_SEPARATION:g} or more apart, got {low:g} and {high:g}"
 
 
 def _table(raw: Mapping[str, Any], key: str) -> Mapping[str, Any]:
@@ -32,6 +37,10 @@ def _tables(raw: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
     if not isinstance(value, Sequence) or isinstance(value, str):
         return []
     return [each if isinstance(each, Mapping) else {} for each in value]
+
+
+def _number(value: object, otherwise: float = 0.0) -> float:
+    return float(value) if isinstance(value, int | float) else otherwise
 
 
 def _mistakes_in_names(raw: Mapping[str, Any]) -> Iterator[str]:
@@ -63,6 +72,14 @@ def _mistakes_in_photos(raw: Mapping[str, Any], folder: Path) -> Iterator[str]:
             got = "both" if "position" in photo else "neither"
             yield f"{path}: expected either a position it was flown from or a measured file, got {got}"
         measured = _table(photo, "measured")
+        if "side" in measured and "photo" in measured:
+            yield f"{path}.measured: expected either a side of a pair file or a photo of a photo file, got both"
+        if "count_mm" in measured and measured.get("units") != "counts":
+            yield f"{path}.measured.count_mm: expected units = 'counts' beside it, got {measured.get('units', 'mm')!r}"
+        position, terrain = photo.get("position"), _table(raw, "terrain")
+        summit = _number(terrain.get("mean_height")) + _number(terrain.get("relief"))
+        if isinstance(position, Sequence) and len(position) == 3 and _number(position[2], summit + 1.0) <= summit:
+            yield f"{path}.position[2]: expected a station above the terrain ({summit:g} m), got {position[2]:g}"
         file = measured.get("file")
         if isinstance(file, str) and not (folder / file).is_file():
             yield f"{path}.measured.file: expected a file beside the scenario, got {file!r}, which is not there"
@@ -79,6 +96,15 @@ def _mistakes_in_models(raw: Mapping[str, Any]) -> Iterator[str]:
                 yield f"{path}.{side}: expected a photograph of this scenario ({known}), got {name!r}"
         if isinstance(sides[0], str) and sides[0] == sides[1]:
             yield f"{path}: expected two photographs, got {sides[0]!r} on both sides"
+        both = [photos.get(name, {}) for name in sides if isinstance(name, str)]
+        if len({str(photo.get("polarity", "positive")) for photo in both}) > 1:
+            yield f"{path}: expected two positives or two negatives, got one of each"
+        stations = [photo.get("position") for photo in both]
+        if len(stations) == 2 and stations[0] is not None and stations[0] == stations[1]:
+            yield f"{path}: expected two stations apart, got both photographs from {stations[0]}"
+        base = _table(model, "published").get("base")
+        if isinstance(base, Sequence) and not any(base):
+            yield f"{path}.published.base: expected a vector, got zero"
         positions = model.get("standard_points")
         if isinstance(positions, Mapping):
             yield from _mistakes_in_positions(positions, f"{path}.standard_points")
@@ -90,6 +116,10 @@ def _mistakes_in_positions(positions: Mapping[str, Any], path: str) -> Iterator[
     for label in positions:
         if label not in POSITIONS or len(label) != 1:
             yield f"{path}.{label}: expected a position 1 to 6 or a to i, got {label!r}"
-    missing = [label for label in LEAST_POSITIONS if label not in positions]
+    count = Counter(str(name) for name in positions.values())
+    for label, name in positions.items():
+        if count[str(name)] > 1:
+            yield f"{path}.{label}: expected a point of its own, got {name!r} at {count[str(name)]} positions"
+    missing = [label for label in CASES["A"] if label not in positions]
     if missing:
         yield f"{path}: expected all of the positions 1 to 6, got none for {', '.join(missing)}"

@@ -10,6 +10,20 @@ from msgspec import Meta, Struct
 SCHEMA_VERSION = 1
 
 Text = Annotated[str, Meta(min_length=1, max_length=64, description="a text of 1 to 64 characters")]
+FORMAT_MM = 230.0
+"""Side of the picture."""
+
+Name = Annotated[
+    str,
+    Meta(
+        min_length=1,
+        max_length=64,
+        pattern=r"^[ !#-~]+$",
+        description="a name of 1 to 64 ASCII characters without double quotes",
+    ),
+]
+"""What goes over the link as a name."""
+
 PictureMm = Annotated[float, Meta(ge=-115, le=115, description="mm within the 230 mm format")]
 OffsetMm = Annotated[float, Meta(ge=-5, le=5, description="mm from -5 to 5")]
 Metres = Annotated[float, Meta(ge=-1e8, le=1e8, description="metres")]
@@ -18,6 +32,7 @@ SmallUm = Annotated[float, Meta(ge=-1000, le=1000, description="micrometres from
 Sigma = Annotated[float, Meta(ge=0, le=1000, description="a standard deviation, zero or more")]
 Share = Annotated[float, Meta(ge=0, le=1, description="a share from 0 to 1")]
 Seconds = Annotated[float, Meta(ge=0, le=86400, description="seconds, zero or more")]
+Reading = Annotated[float, Meta(ge=-999999, le=999999, description="a counter reading of at most six digits")]
 Ppm = Annotated[float, Meta(ge=-5000, le=5000, description="parts per million from -5000 to 5000")]
 
 
@@ -28,7 +43,7 @@ class _Data(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class Fiducial(_Data, frozen=True, kw_only=True):
     """A fiducial mark by its calibrated place."""
 
-    name: Text
+    name: Name
     x: PictureMm
     y: PictureMm
 
@@ -36,8 +51,8 @@ class Fiducial(_Data, frozen=True, kw_only=True):
 class Camera(_Data, frozen=True, kw_only=True):
     """A calibrated taking camera."""
 
-    name: Text = "RC5"
-    c: Annotated[float, Meta(ge=30, le=400, description="a principal distance of 30 to 400 mm")]
+    name: Name = "RC5"
+    c: Annotated[float, Meta(ge=98, le=215, description="a principal distance of 98 to 215 mm")]
     principal_point: tuple[OffsetMm, OffsetMm] = (0.0, 0.0)
     """mm, the calibrated principal point from the fiducial centre."""
     fiducials: Annotated[list[Fiducial], Meta(min_length=4, max_length=8, description="four or eight fiducials")]
@@ -63,8 +78,8 @@ class Film(_Data, frozen=True, kw_only=True):
 class Measured(_Data, frozen=True, kw_only=True):
     """Image coordinates that somebody measured: the photograph comes from a file."""
 
-    file: Text
-    photo: Text | None = None
+    file: Annotated[str, Meta(min_length=1, max_length=255, description="a file name of 1 to 255 characters")]
+    photo: Name | None = None
     """Its name in the file's `photo` column; by default the photograph's own."""
     side: Literal["left", "right"] | None = None
     """Which half of a pair file (`point,xl,yl,xr,yr`) it is."""
@@ -77,7 +92,7 @@ class Measured(_Data, frozen=True, kw_only=True):
 class Photo(_Data, frozen=True, kw_only=True):
     """A photograph: where it was taken from, or the file of its measured image coordinates."""
 
-    name: Text
+    name: Name
     position: tuple[Metres, Metres, Metres] | None = None
     """East, north, height of the projection centre in m."""
     omega: Gon = 0.0
@@ -109,7 +124,7 @@ class Air(_Data, frozen=True, kw_only=True):
 class GroundPoint(_Data, frozen=True, kw_only=True):
     """A signalised ground point; without Z it stands on the terrain."""
 
-    point: Text
+    point: Name
     X: Metres
     Y: Metres
     Z: Metres | None = None
@@ -137,11 +152,11 @@ class Published(_Data, frozen=True, kw_only=True):
 class Model(_Data, frozen=True, kw_only=True):
     """Two photographs to be set up as a model."""
 
-    name: Text
-    left: Text
-    right: Text
+    name: Name
+    left: Name
+    right: Name
     base: Literal["inside", "outside"] = "inside"
-    standard_points: dict[str, Text] | None = None
+    standard_points: dict[str, Name] | None = None
     """Position (1-6, a-i) to point name; generated on the terrain when absent."""
     published: Published | None = None
 
@@ -184,7 +199,7 @@ class Instrument(_Data, frozen=True, kw_only=True):
     """Which plotter stands in the room, and in what state."""
 
     variant: Literal["A7"] = "A7"
-    serial: Text = "3268"
+    serial: Name = "3268"
     condition: Condition = Condition()
     laying_sigma_mm: Sigma = 0.3
     laying_sigma_gon: Sigma = 0.2
@@ -196,8 +211,8 @@ class Observer(_Data, frozen=True, kw_only=True):
 
     parallax_um: Sigma = 4.0
     """One setting of by on vanishing y-parallax (surveys: 2.2 to 5.7)."""
-    monocular_um: Sigma = 3.5
-    """One monocular pointing, each coordinate (about 4; the thesis's twenty centres ask for 2.8)."""
+    monocular_um: Sigma = 4.0
+    """One monocular pointing, each coordinate (geometry.md; the thesis's twenty centres ask for 2.8)."""
     stereo_um: Sigma = 4.0
     """One stereoscopic pointing in plan, each coordinate."""
     height_um: Sigma = 3.0
@@ -246,12 +261,16 @@ class Plan(_Data, frozen=True, kw_only=True):
         | Literal["Bd", "Dc", "Cd"]
     ) = 8.0
     """Units of the Z counter a mm; 8 is this project's assumption (geometry.md, Gears)."""
-    plan_gear: Text = "1-2-1"
-    preset: tuple[float, float, float] = (5000.0, 5000.0, 5000.0)
+    plan_gear: Name = "1-2-1"
+    preset: tuple[Reading, Reading, Reading] = (5000.0, 5000.0, 5000.0)
     """What X, Y and Z shall show at point 1."""
-    centre_levels: tuple[float, float] = (4900.0, 5100.0)
+    centre_levels: tuple[Reading, Reading] = (4900.0, 5100.0)
     """Z-counter readings for the perspective centres."""
     parallax_readings: Annotated[int, Meta(ge=1, le=20, description="1 to 20 readings")] = 3
+    tolerated_parallax_um: Sigma = 40.0
+    """Rms of the residual y-parallaxes at photo scale beyond which a model does not fit (17 answers: 10 to 40)."""
+    tolerated_centre_rms: Sigma = 0.5
+    """Rms of a perspective centre beyond which its pointings do not meet (the thesis's largest is 0.187)."""
     half_width: Annotated[float, Meta(ge=5, le=115, description="5 to 115 mm")] = 85.0
     """Distance of the outer rows of standard points from the base, mm in the photograph."""
 

@@ -1,6 +1,7 @@
 """Naming every mistake of a scenario at once, each with its path."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
@@ -105,10 +106,11 @@ def _fits(raw: Raw, constraint: inspect.Type) -> bool:
             return raw is None
         case inspect.StrType():
             low, high = constraint.min_length or 0, constraint.max_length
-            return isinstance(raw, str) and low <= len(raw) and (high is None or len(raw) <= high)
+            fits = isinstance(raw, str) and low <= len(raw) and (high is None or len(raw) <= high)
+            return fits and (constraint.pattern is None or re.search(constraint.pattern, raw) is not None)
         case inspect.IntType() | inspect.FloatType():
             kinds = int if isinstance(constraint, inspect.IntType) else int | float
-            if not isinstance(raw, kinds) or isinstance(raw, bool) or math.isnan(raw):
+            if not isinstance(raw, kinds) or isinstance(raw, bool) or not math.isfinite(raw):
                 return False
             bounds = (
                 constraint.ge is None or raw >= constraint.ge,

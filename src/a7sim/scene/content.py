@@ -59,17 +59,35 @@ def signals(points: Marks) -> Callable[[Array], Array]:
 
 
 def picture_of_ground(
-    ground: Ground, centre: Array, rotation: Array, c: float, to_film: Array, points: Marks
+    ground: Ground,
+    centre: Array,
+    rotation: Array,
+    c: float,
+    to_film: Array,
+    points: Marks,
+    imaging: Callable[[Array], Array],
 ) -> Callable[[Array], Array]:
-    """Return the picture of the ground from a station; `to_film` is the film's affine deformation ``(2, 2)``."""
+    """Return the picture of the ground from a station.
+
+    `to_film` is the film's affine deformation ``(2, 2)``, `imaging` what air and lens make of perspective images.
+    """
     from_film = np.linalg.inv(to_film)
     covered = signals(points)
 
     def content(xy: Array) -> Array:
-        met = ground.met_by(centre, ray_of(np.einsum("ij,j...->i...", from_film, xy), rotation, c))
+        perspective = _undone(imaging, np.einsum("ij,j...->i...", from_film, xy))
+        met = ground.met_by(centre, ray_of(perspective, rotation, c))
         return np.maximum(ground_texture(met[0], met[1]), covered(xy))
 
     return content
+
+
+def _undone(imaging: Callable[[Array], Array], imaged: Array) -> Array:
+    """Return the images that `imaging` brings to the given places, by repeated substitution."""
+    image = imaged
+    for _ in range(4):
+        image = image + (imaged - imaging(image))
+    return image
 
 
 def picture_of_marks(points: Marks) -> Callable[[Array], Array]:

@@ -1,5 +1,7 @@
 """Photographs known only by image coordinates that somebody measured."""
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -7,11 +9,14 @@ import numpy as np
 from a7sim.files import read_rows, unique
 from a7sim.geometry import Array
 from a7sim.mistakes import Mistake
-from a7sim.scenario.schema import Camera, Measured
+from a7sim.scenario.schema import FORMAT_MM, Camera, Measured
 from a7sim.scene.camera import fiducial_places
 from a7sim.scene.photograph import Marks
 
 FEWEST_FIDUCIALS = 3
+
+WORST_FIDUCIAL_MM = 5.0
+"""Film and a badly known count do not displace a fiducial by more; a confused one stands further off."""
 
 
 def measured_marks(measured: Measured, name: str, camera: Camera) -> tuple[Marks, Marks]:
@@ -32,11 +37,16 @@ def measured_marks(measured: Measured, name: str, camera: Camera) -> tuple[Marks
         found = {key[1]: (row.numbers["x"], row.numbers["y"]) for key, row in by_photo.items() if key[0] == wanted}
         if not found:
             raise Mistake(f"{path}, column photo: expected rows of photograph {wanted!r}, got none")
+    for point in found:
+        if not re.fullmatch(r"[ !#-~]{1,64}", point):
+            raise Mistake(f"{path}, column point: expected 1 to 64 ASCII characters without quotes, got {point[:80]!r}")
     names, calibrated = fiducial_places(camera)
     if measured.units == "counts":
         return _from_counts(path, found, names, calibrated, measured.count_mm)
-    points = {key: value for key, value in found.items() if key not in names}
-    return Marks(names, calibrated), Marks(tuple(points), np.array(list(points.values())).reshape(-1, 2).T)
+    for point, place in found.items():
+        if max(map(abs, place)) > FORMAT_MM / 2.0:
+            raise Mistake(f"{path}: expected mm within the {FORMAT_MM:.0f} mm format, got {place} for point {point}")
+    return Marks(names, calibrated), Marks(tuple(found), np.array(list(found.values())).T)
 
 
 def _from_counts(
@@ -55,25 +65,29 @@ def _from_counts(
     counts = np.array([found[name] for name in seen]).T
     places = calibrated[:, [names.index(name) for name in seen]]
     to_film = _laid_over(counts, places, count_mm)
+    off = np.abs(to_film(counts) - places).max(axis=0)
+    if not (off < WORST_FIDUCIAL_MM).all():
+        worst = seen[int(np.nanargmax(np.nan_to_num(off, nan=np.inf)))]
+        raise Mistake(
+            f"{path}, column point: expected counts of the fiducials that lie as in the camera, "
+            f"got {worst} more than {WORST_FIDUCIAL_MM:.0f} mm from its place"
+        )
     others = [name for name in found if name not in names]
     all_points = np.array([found[name] for name in others]).reshape(-1, 2).T
     return Marks(tuple(seen), to_film(counts)), Marks(tuple(others), to_film(all_points))
 
 
-class _laid_over:  # noqa: N801 - used as a function
-    """The similarity, mirrored where the comparator counts so, that lays counts over the fiducials."""
-
-    def __init__(self, counts: Array, places: Array, count_mm: float | None) -> None:
-        self.from_mean = counts.mean(axis=1, keepdims=True)
-        self.to_mean = places.mean(axis=1, keepdims=True)
-        u, v = counts - self.from_mean, places - self.to_mean
-        self.flip = np.diag([1.0, np.sign(np.linalg.det(v @ u.T))])
-        u = self.flip @ u
-        along = float((u * v).sum())
-        across = float((u[0] * v[1] - u[1] * v[0]).sum())
-        angle = np.arctan2(across, along)
-        self.scale = count_mm or float(np.hypot(along, across) / (u * u).sum())
-        self.turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-    def __call__(self, counts: Array) -> Array:
-        return np.asarray(self.scale * self.turn @ self.flip @ (counts - self.from_mean) + self.to_mean)
+def _laid_over(counts: Array, places: Array, count_mm: float | None) -> Callable[[Array], Array]:
+    """Return the similarity, mirrored where the comparator counts so, that lays counts over the fiducials."""
+    from_mean = counts.mean(axis=1, keepdims=True)
+    to_mean = places.mean(axis=1, keepdims=True)
+    u, v = counts - from_mean, places - to_mean
+    flip = np.diag([1.0, 1.0 if np.linalg.det(v @ u.T) >= 0.0 else -1.0])
+    u = flip @ u
+    along = float((u * v).sum())
+    across = float((u[0] * v[1] - u[1] * v[0]).sum())
+    angle = np.arctan2(across, along)
+    spread = float((u * u).sum())
+    scale = count_mm or (float(np.hypot(along, across)) / spread if spread else 0.0)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return lambda each: np.asarray(scale * turn @ flip @ (each - from_mean) + to_mean)

@@ -9,9 +9,6 @@ import numpy as np
 from a7sim.geometry import Array
 from a7sim.scenario.schema import Camera, Film
 
-FORMAT_MM = 230.0
-"""Side of the picture."""
-
 SKETCH_SIGMA_MM = 0.3
 """Points are pricked on the paper print to about half a millimetre (protocol.md)."""
 

@@ -1,24 +1,22 @@
 """The scene of a scenario: the ground, the stations, the photographs, and the truth about them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from a7sim.geometry import GON, Array, image_of, length_of, mxm, mxv, rotation, transposed
-from a7sim.scenario.references import POSITIONS
+from a7sim.mistakes import Mistake
 from a7sim.scenario.schema import Model, Photo, Published, Scenario
 from a7sim.scene.camera import distorted, fiducial_places, lowered_by_curvature, refracted
 from a7sim.scene.content import picture_of_ground, picture_of_marks
 from a7sim.scene.measured import measured_marks
 from a7sim.scene.photograph import Deformation, Marks, Photograph, chosen, sketched, within_format
 from a7sim.scene.terrain import Ground
+from a7sim.standard_points import PLACES
 
 FILM_STREAM, SKETCH_STREAM = 1, 2
 """Spawn keys of the scene's random numbers; the instrument's and the operator's follow."""
-
-_COLUMNS = {"1": 0.0, "3": 0.0, "5": 0.0, "2": 1.0, "4": 1.0, "6": 1.0}
-_COLUMNS |= {"a": 0.25, "b": 0.25, "c": 0.25, "d": 0.5, "e": 0.5, "f": 0.5, "g": 0.75, "h": 0.75, "i": 0.75}
-_ROWS = dict.fromkeys("3adg4", 1.0) | dict.fromkeys("1beh2", 0.0) | dict.fromkeys("5cfi6", -1.0)
 
 
 @dataclass(frozen=True)
@@ -90,9 +88,23 @@ def build_scene(scenario: Scenario, seed: int) -> Scene:
         for index, photo in enumerate(scenario.photos)
     }
     published = {model.name: _as_truth(model.published) for model in scenario.models if model.published is not None}
+    _see_that_positions_are_measured(scenario, photographs)
     measured = [photographs[photo.name].points.names for photo in scenario.photos if photo.measured is not None]
     listed = dict.fromkeys([point.point for point in scenario.ground] + [name for names in measured for name in names])
     return Scene(photographs, stations, signalised, standard, tuple(listed), published)
+
+
+def _see_that_positions_are_measured(scenario: Scenario, photographs: dict[str, Photograph]) -> None:
+    measured = {photo.name for photo in scenario.photos if photo.measured is not None}
+    mistakes = [
+        f"models[{index}].standard_points.{label}: expected a point measured in {side}, got {name!r}"
+        for index, model in enumerate(scenario.models)
+        for label, name in (model.standard_points or {}).items()
+        for side in (model.left, model.right)
+        if side in measured and photographs[side].points.get(name) is None
+    ]
+    if mistakes:
+        raise Mistake("\n".join(mistakes))
 
 
 def _height_of(ground: Ground, east: float, north: float) -> float:
@@ -120,8 +132,8 @@ def _lay_out_standard_points(
     flying_height = (left[2] + right[2]) / 2.0 - ground.mean_height
     half_width = scenario.plan.half_width * flying_height / scenario.camera.c
     names = {}
-    for label in POSITIONS:
-        east, north = left[:2] + _COLUMNS[label] * along + _ROWS[label] * half_width * across
+    for label, (share, row) in PLACES.items():
+        east, north = left[:2] + share * along + row * half_width * across
         names[label] = _standard_name(model, label)
         signalised.setdefault(names[label], np.array([east, north, _height_of(ground, east, north)]))
     return names
@@ -161,7 +173,9 @@ def _photograph(
         imaged = Marks(imaged.names, deformation.of_points(imaged.xy, filming))
         points = chosen(imaged, within_format(imaged.xy) & before)
         to_film = deformation.matrix
-        content = picture_of_ground(ground, station.centre, station.rotation, camera.c, to_film, points)
+        content = picture_of_ground(
+            ground, station.centre, station.rotation, camera.c, to_film, points, _imaging(scenario, station, ground)
+        )
     return Photograph(
         photo.name,
         camera,
@@ -178,7 +192,17 @@ def _imaged(scenario: Scenario, station: Station, ground: Ground, points: Array)
     if scenario.air.earth_curvature:
         points = lowered_by_curvature(points, station.centre)
     image = image_of(points, station.centre[:, None], station.rotation, scenario.camera.c)
-    if scenario.air.refraction:
-        image = refracted(image, scenario.camera.c, float(station.centre[2]), ground.mean_height)
-    image = distorted(scenario.camera, image)
-    return np.asarray(image + np.array(scenario.camera.principal_point)[:, None])
+    return _imaging(scenario, station, ground)(image)
+
+
+def _imaging(scenario: Scenario, station: Station, ground: Ground) -> Callable[[Array], Array]:
+    """Return what air and lens make of perspective images ``(2, ...)``, in mm from the fiducial centre."""
+
+    def imaged(image: Array) -> Array:
+        if scenario.air.refraction:
+            image = refracted(image, scenario.camera.c, float(station.centre[2]), ground.mean_height)
+        image = distorted(scenario.camera, image)
+        shift = np.array(scenario.camera.principal_point).reshape((2,) + (1,) * (image.ndim - 1))
+        return np.asarray(image + shift)
+
+    return imaged

@@ -12,6 +12,7 @@ from a7sim.instrument import Autograph
 from a7sim.operator import ModelRecord
 from a7sim.reduction import PerspectiveCentre
 from a7sim.scenario import Scenario
+from a7sim.scenario.schema import Published
 from a7sim.scene import RelativeTruth
 from a7sim.session.truth import Relative, true_centre, true_elements
 
@@ -36,7 +37,9 @@ def header(scenario: Scenario, seed: int) -> dict[str, Any]:
     }
 
 
-def of_model(record: ModelRecord, autograph: Autograph, truth: RelativeTruth | None) -> dict[str, Any]:
+def of_model(
+    record: ModelRecord, autograph: Autograph, truth: RelativeTruth | None, published: Published | None = None
+) -> dict[str, Any]:
     """Return the results of a model beside the truth; the instrument must stand as the operator left it."""
     orientation = record.orientation
     model = record.model
@@ -82,7 +85,7 @@ def of_model(record: ModelRecord, autograph: Autograph, truth: RelativeTruth | N
             for point, place in record.points.items()
         },
         "standard_points": dict(model.standard_points),
-        "truth": _beside_truth(record, autograph, truth, found),
+        "truth": _beside_truth(record, autograph, truth, found) | _published_sigmas(published),
     }
 
 
@@ -127,6 +130,13 @@ def _beside_truth(
             },
         }
     return beside
+
+
+def _published_sigmas(published: Published | None) -> dict[str, Any]:
+    if published is None:
+        return {}
+    names = ("sigma_omega", "sigma_phi", "sigma_kappa", "sigma_by", "sigma_bz")
+    return {"published_sigmas": {name: getattr(published, name) for name in names}}
 
 
 def _vector(values: Any) -> list[float]:

@@ -67,21 +67,34 @@ class Watcher:
     tick: Callable[[], None] = lambda: None
 
 
-def run(scenario: Scenario, seed: int, out: Path | None = None, watcher: Watcher | None = None) -> dict[str, Any]:
+def run(
+    scenario: Scenario,
+    seed: int,
+    out: Path | None = None,
+    watcher: Watcher | None = None,
+    force: bool = False,
+) -> dict[str, Any]:
     """Work through a scenario and return its document of results; with `out`, leave the four files there.
 
     `status` in the document is 'complete', or 'does not fit' with the operator's `message`. An interrupted
-    session (KeyboardInterrupt) leaves whole files and goes on up.
+    session (KeyboardInterrupt) leaves whole files and goes on up. Raises Mistake for a bad file of
+    measurements or a folder that cannot be used, before anything is written.
     """
     watcher = watcher or Watcher()
-    document = results.header(scenario, seed) | {"status": "complete", "message": ""}
+    heard: list[Listener] = []
+    session = open_session(scenario, seed, lambda event: heard[0](event))  # noqa: PLW0108 - the journal is opened after the session
+    if out is not None:
+        _prepare_folder(out, force)
+    document = results.header(scenario, seed) | {"status": "failed", "message": ""}
     done: list[dict[str, Any]] = []
     with Journal(out / JOURNAL if out else None, _journal_header(scenario, seed)) as journal:
-        session = open_session(scenario, seed, journal.heard)
+        heard.append(journal.heard)
         try:
             for record in work(session.person, session.job, watcher.tick, watcher.begins):
                 plan = next(model for model in scenario.models if model.name == record.model.name)
-                done.append(results.of_model(record, session.autograph, session.scene.relative_truth(plan)))
+                truth = session.scene.relative_truth(plan)
+                done.append(results.of_model(record, session.autograph, truth, plan.published))
+            document["status"] = "complete"
         except DoesNotFit as trouble:
             document |= {"status": "does not fit", "message": str(trouble)}
         except KeyboardInterrupt:
@@ -110,18 +123,20 @@ def _journal_header(scenario: Scenario, seed: int) -> dict[str, Any]:
     return {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
 
 
-def prepare_folder(out: Path, force: bool) -> None:
-    """Make a folder for a session's files. Raises Mistake when it exists, unless forced; then its files go."""
-    if out.exists() and not out.is_dir():
-        raise Mistake(f"{out}: expected a folder, got a file")
-    if out.exists() and not force:
-        raise Mistake(f"{out}: expected a folder that does not exist yet, got one that does (--force writes into it)")
+def _prepare_folder(out: Path, force: bool) -> None:
+    """Make a folder for a session's files. Raises Mistake when it exists, unless forced."""
     try:
+        if out.exists() and not out.is_dir():
+            raise Mistake(f"{out}: expected a folder, got a file")
+        if out.exists() and not force:
+            raise Mistake(
+                f"{out}: expected a folder that does not exist yet, got one that does (--force writes into it)"
+            )
         out.mkdir(parents=True, exist_ok=True)
         for name in (JOURNAL, BOOK, MODELS, RESULTS):
             (out / name).unlink(missing_ok=True)
     except OSError as error:
-        raise Mistake(f"{out}: expected a folder that can be written: {error.strerror}") from error
+        raise Mistake(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
 
 
 def _write_whole(path: Path, text: str) -> None:

@@ -8,8 +8,7 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
-FIGURE_4_1 = ("3adg4", "1beh2", "5cfi6")
-"""Standard points as they lie in the model."""
+from a7sim.standard_points import FIGURE_4_1
 
 _ELEMENTS = (
     ("κ", "kappa", "gon"),
@@ -40,7 +39,8 @@ def of_session(document: dict[str, Any]) -> RenderableType:
 
 def _of_model(model: dict[str, Any]) -> Iterator[RenderableType]:
     orientation = model["relative_orientation"]
-    yield Rule(f"Model {model['model']}: {model['left']} and {model['right']}, base {model['base']}", align="left")
+    title = f"Model {model['model']}: {model['left']} and {model['right']}, base {model['base']}"
+    yield Rule(Text(title), align="left")
     yield _rounds(orientation)
     yield _elements(orientation["elements"], model["truth"].get("elements", {}))
     yield _residuals(orientation)
@@ -111,5 +111,13 @@ def _truth(truth: dict[str, Any]) -> Text:
         return Text("\nNo true relative orientation is known.")
     return Text(
         f"\nAgainst {truth['source']}: relative rotation off by {truth['rotation_difference_gon']:.4f} gon, "
-        f"base direction by {truth['base_difference_gon']:.4f} gon"
+        f"base direction by {truth['base_difference_gon']:.4f} gon" + _beside_sigmas(truth)
     )
+
+
+def _beside_sigmas(truth: dict[str, Any]) -> str:
+    if "published_sigmas" not in truth:
+        return ""
+    sigmas = truth["published_sigmas"]
+    angles = ", ".join(f"{name} {sigmas[f'sigma_{name}']:.4f}" for name in ("omega", "phi", "kappa"))
+    return f" (its own standard deviations: {angles} gon, by {sigmas['sigma_by']:.4f}, bz {sigmas['sigma_bz']:.4f} mm)"

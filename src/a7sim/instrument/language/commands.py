@@ -22,17 +22,19 @@ from a7sim.instrument.language.table import (
     QuotedOrNumber,
     short_form,
 )
+from a7sim.manual import NOT_VISIBLE
 
 if TYPE_CHECKING:
     from a7sim.instrument.autograph import Autograph
     from a7sim.instrument.language.engine import Engine
 
-NOT_VISIBLE = "9.91E37"
-
 SCPI_VERSION = "1999.0"
 
 LARGEST_PICTURE = 1024
 """Columns or rows of an eyepiece picture."""
+
+LARGEST_READING = 999999.99
+"""Of a counter's drums."""
 
 LONGEST_TEXT = 1000
 """Characters of a remark or of a point's name."""
@@ -268,7 +270,20 @@ def _axis(axis: str) -> list[Command]:
         low, high = autograph.counter_limits(axis)
         return low, high, autograph.counter_at_rest(axis)
 
+    def to_the_ends(engine: "Engine", suffix: int) -> Limits:
+        autograph = _autograph(engine)
+        low, high = autograph.counter_limits(axis)
+        here = autograph.counter(axis)
+        return low - here, high - here, 0.0
+
+    def preset_limits(engine: "Engine", suffix: int) -> Limits:
+        return -LARGEST_READING, LARGEST_READING, 0.0
+
     def preset(engine: "Engine", call: Call) -> None:
+        if abs(call.arguments[0]) > LARGEST_READING:
+            raise LanguageError(
+                ErrorNumber.DATA_OUT_OF_RANGE, f"expected at most {LARGEST_READING}, got {call.arguments[0]:.10g}"
+            )
         _autograph(engine).preset(axis, call.arguments[0])
 
     def drive(engine: "Engine", call: Call) -> None:
@@ -282,7 +297,7 @@ def _axis(axis: str) -> list[Command]:
         Command(
             f"COUNter:{axis}:PRESet",
             preset,
-            (Quantity(unit, name="reading"),),
+            (Quantity(unit, preset_limits, name="reading"),),
             turns=True,
             about="what the counter shall show here",
         ),
@@ -296,7 +311,7 @@ def _axis(axis: str) -> list[Command]:
         Command(
             f"WHEel:{axis}",
             wheel,
-            (Quantity(unit, name="amount"),),
+            (Quantity(unit, to_the_ends, name="amount"),),
             turns=True,
             about="turn by so much counter, signed",
         ),
@@ -325,6 +340,14 @@ def _catalogue(engine: "Engine", call: Call) -> str:
 
 def _centre(engine: "Engine", call: Call) -> None:
     _autograph(engine).centre_picture(call.suffix, *call.arguments)
+
+
+def _centring_limits(name: str) -> Callable[["Engine", int], Limits]:
+    def limits(engine: "Engine", suffix: int) -> Limits:
+        limit = getattr(_autograph(engine).variant, name)
+        return -limit, limit, 0.0
+
+    return limits
 
 
 def _centring(engine: "Engine", call: Call) -> str:
@@ -375,7 +398,11 @@ _PICTURES = [
     Command(
         "PHOTo<n>:CENTring",
         _centre,
-        (Quantity("mm", name="dx"), Quantity("mm", name="dy"), Quantity("gon", name="dkappa")),
+        (
+            Quantity("mm", _centring_limits("centring_mm"), name="dx"),
+            Quantity("mm", _centring_limits("centring_mm"), name="dy"),
+            Quantity("gon", _centring_limits("centring_gon"), name="dkappa"),
+        ),
         turns=True,
         about="shift and turn the picture from where it was laid",
     ),

@@ -1,0 +1,24 @@
+"""The standard points of a model (thesis fig. 4.1) and the cases of numerical relative orientation (thesis 3.4.2)."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+FIGURE_4_1 = ("3adg4", "1beh2", "5cfi6")
+"""Rows from the top, columns from the left-hand nadir line (1) to the right-hand one (2)."""
+
+POSITIONS = "123456abcdefghi"
+
+PLACES: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {label: (column / 4.0, 1.0 - row) for row, labels in enumerate(FIGURE_4_1) for column, label in enumerate(labels)}
+)
+"""Position to its share of the base along it, and its row: 1 away from the operator, 0 on the base, -1 towards."""
+
+CASES: Mapping[str, str] = MappingProxyType(
+    {
+        "A": "123456",
+        "B": "123456abc",
+        "C": "123456ghi",
+        "D": "123456def",
+        "E": POSITIONS,
+    }
+)
