@@ -13,6 +13,7 @@ EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_INTERRUPTED = 1, 2, 130
 
 _VERBS = {
     "run": "a7sim.cli.run",
+    "reduce": "a7sim.cli.reduce",
     "scenario": "a7sim.cli.scenario",
 }
 

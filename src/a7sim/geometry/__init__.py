@@ -6,6 +6,13 @@ z = -c of its camera. Angles are radians here and gon everywhere else. An array 
 sessions are the same call.
 """
 
+from a7sim.geometry._atmosphere import (
+    EARTH_RADIUS_M,
+    lowered_by_curvature,
+    radially_displaced,
+    refracted,
+    refraction_constant,
+)
 from a7sim.geometry._parallax import (
     PARALLAX_ELEMENTS,
     near_vertical_parallax_coefficients,
@@ -34,6 +41,7 @@ from a7sim.geometry._rotation import (
 )
 
 __all__ = [
+    "EARTH_RADIUS_M",
     "GON",
     "PARALLAX_ELEMENTS",
     "Array",
@@ -43,12 +51,16 @@ __all__ = [
     "dots",
     "image_of",
     "length_of",
+    "lowered_by_curvature",
     "mxm",
     "mxv",
     "near_vertical_parallax_coefficients",
     "parallax_coefficients",
     "plane_rotation",
+    "radially_displaced",
     "ray_of",
+    "refracted",
+    "refraction_constant",
     "rotation",
     "stereoscopic_intersection",
     "transposed",

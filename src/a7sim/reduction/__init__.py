@@ -1,18 +1,80 @@
-"""The computing room: books in, orientations and centres out. It knows neither instrument nor operator."""
+"""The computing room: observations in, orientations, centres, models and strips out.
 
-from a7sim.reduction.centres import PerspectiveCentre, perspective_centre
-from a7sim.reduction.interior import PictureLie, picture_lie
+It knows neither instrument nor operator. Functions work on component-first arrays, a batch being one more axis at the
+end; what observations leave open is `Undetermined`, never nonsense.
+"""
+
+from a7sim.reduction.absolute import AbsoluteOrientation, Ground, GroundFit, absolute_orientation
+from a7sim.reduction.block import BlockAdjustment, block_adjustment
+from a7sim.reduction.cards import Deck, deck_lines, free_format_lines, output_lines, read_cards, write_cards
+from a7sim.reduction.centres import (
+    PerspectiveCentre,
+    a8_centres,
+    grid_plate_centre,
+    perspective_centre,
+    perspective_centre_of_levels,
+)
+from a7sim.reduction.coplanarity import RelativeOrientation, relative_orientation, relative_poses
+from a7sim.reduction.corrections import corrected_image
+from a7sim.reduction.interior import (
+    PictureLie,
+    PlaneFit,
+    picture_lie,
+    plane_fit,
+    principal_distance_for_film,
+)
 from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
+from a7sim.reduction.modelling import a8_model_coordinates, model_coordinates
 from a7sim.reduction.parallax import Stand, element_corrections
+from a7sim.reduction.polynomials import StripAdjustment, StripDeformation, strip_adjustment
+from a7sim.reduction.resection import Resection
+from a7sim.reduction.similarity import Similarity, similarity_by_iteration, similarity_by_quaternion
+from a7sim.reduction.strips import Join, Model, Strip, formed_strip, joined
 
 __all__ = [
+    "AbsoluteOrientation",
     "Adjustment",
+    "BlockAdjustment",
+    "Deck",
+    "Ground",
+    "GroundFit",
+    "Join",
+    "Model",
     "PerspectiveCentre",
     "PictureLie",
+    "PlaneFit",
+    "RelativeOrientation",
+    "Resection",
+    "Similarity",
     "Stand",
+    "Strip",
+    "StripAdjustment",
+    "StripDeformation",
     "Undetermined",
+    "a8_centres",
+    "a8_model_coordinates",
+    "absolute_orientation",
     "adjusted",
+    "block_adjustment",
+    "corrected_image",
+    "deck_lines",
     "element_corrections",
+    "formed_strip",
+    "free_format_lines",
+    "grid_plate_centre",
+    "joined",
+    "model_coordinates",
+    "output_lines",
     "perspective_centre",
+    "perspective_centre_of_levels",
     "picture_lie",
+    "plane_fit",
+    "principal_distance_for_film",
+    "read_cards",
+    "relative_orientation",
+    "relative_poses",
+    "similarity_by_iteration",
+    "similarity_by_quaternion",
+    "strip_adjustment",
+    "write_cards",
 ]

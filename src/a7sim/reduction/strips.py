@@ -1,0 +1,233 @@
+"""Strips of independent models: joined one to the next on common points and the common projection centre."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from a7sim.geometry import Array, length_of, mxv
+from a7sim.mistakes import Mistake
+from a7sim.reduction.least_squares import Undetermined
+from a7sim.reduction.similarity import Similarity, similarity_by_quaternion
+
+CENTRE = ":centre"
+"""Ending of the name of a projection centre: ``<photo>:centre``."""
+
+FEWEST_COMMON = 3
+"""Points in common, the centre counted, that join two models."""
+
+JoinMethod = Literal["points", "centre", "heights"]
+"""How a model is joined to the strip: see `formed_strip`."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """An independent model or a strip: names of points and their coordinates ``(3, n, ...)``.
+
+    Projection centres are points named ``<photo>:centre``.
+    """
+
+    name: str
+    points: tuple[str, ...]
+    coordinates: Array
+
+    def __post_init__(self) -> None:
+        if len(self.points) != self.coordinates.shape[1]:
+            raise ValueError(f"expected coordinates of {len(self.points)} points, got {self.coordinates.shape[1]}")
+        if len(set(self.points)) != len(self.points):
+            twice = next(name for name in self.points if self.points.count(name) > 1)
+            raise Mistake(f"model {self.name}: expected every point once, got {twice} twice")
+
+    @property
+    def centres(self) -> tuple[str, ...]:
+        """Names of the projection centres among the points."""
+        return tuple(name for name in self.points if is_centre(name))
+
+    def at(self, names: Sequence[str]) -> Array:
+        """Return the coordinates ``(3, len(names), ...)`` of named points."""
+        place = {name: i for i, name in enumerate(self.points)}
+        return self.coordinates[:, [place[name] for name in names]]
+
+
+@dataclass(frozen=True)
+class Join:
+    """The connection of a model to the one before it.
+
+    `differences` ``(3, n, ...)`` are the closing differences at the common points, the new model's coordinates
+    in the strip minus those of the model before, in the unit of the strip.
+    """
+
+    before: str
+    after: str
+    points: tuple[str, ...]
+    similarity: Similarity
+    differences: Array
+
+    @property
+    def scale(self) -> Array:
+        """Scale ``(...)`` of the new model against the strip."""
+        return self.similarity.scale
+
+    @property
+    def max_residual(self) -> Array:
+        """Largest closing difference ``(...)`` in any coordinate."""
+        return np.asarray(np.abs(self.differences).max(axis=(0, 1)))
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square ``(3, ...)`` of the closing differences in X, Y and Z."""
+        return np.asarray(np.sqrt((self.differences**2).mean(axis=1)))
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A strip: its models carried into the system of the first, and the connections that did it."""
+
+    models: tuple[Model, ...]
+    joins: tuple[Join, ...]
+
+    @cached_property
+    def as_model(self) -> Model:
+        """The strip as one model, points of several models averaged."""
+        names: dict[str, list[Array]] = {}
+        for model in self.models:
+            for i, name in enumerate(model.points):
+                names.setdefault(name, []).append(model.coordinates[:, i])
+        means = [sum(found[1:], found[0]) / len(found) for found in names.values()]
+        return Model("strip", tuple(names), np.stack(means, axis=1))
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the points in the order in which they first come."""
+        return self.as_model.points
+
+    @property
+    def coordinates(self) -> Array:
+        """Strip coordinates ``(3, n, ...)``, averaged at tie points."""
+        return self.as_model.coordinates
+
+    def deviations(self, model: Model) -> Array:
+        """Return how far a model's points ``(3, n, ...)`` lie from the means."""
+        return np.asarray(model.coordinates - self.as_model.at(model.points))
+
+    def transformed(self, similarity: Similarity) -> "Strip":
+        """Return the strip carried into another system; joins stay as they were computed."""
+        moved = (Model(m.name, m.points, similarity.applied_to(m.coordinates)) for m in self.models)
+        return Strip(tuple(moved), self.joins)
+
+
+def is_centre(name: str) -> bool:
+    """Tell whether a point's name is that of a projection centre."""
+    return name.endswith(CENTRE)
+
+
+def formed_strip(models: Sequence[Model], method: JoinMethod = "points") -> Strip:
+    """Return the strip of independent models, in the system of the model at the end that was given first.
+
+    Models may come in any order: they are chained by the centres they share. Methods: ``points``, a similarity
+    on all common points and the common centre alike (P 2.1-2.7); ``centre``, the origins set on the common
+    centre, rotation and scale from the vectors to the common points (T 2.35-2.39); ``heights``, the same with
+    the mean ratio of the common points' heights below the centre for the scale (S). Batch axes of the
+    coordinates are carried along. Raises Mistake for models that make no chain, Undetermined for common points
+    that do not determine a join.
+    """
+    chain = in_order(models)
+    placed = [chain[0]]
+    joins: list[Join] = []
+    for new in chain[1:]:
+        join = joined(placed[-1], new, method)
+        joins.append(join)
+        placed.append(Model(new.name, new.points, join.similarity.applied_to(new.coordinates)))
+    return Strip(tuple(placed), tuple(joins))
+
+
+def joined(before: Model, new: Model, method: JoinMethod = "points") -> Join:
+    """Return the connection of a model to one that already lies in the strip (see `formed_strip`).
+
+    Raises Mistake for fewer than three common points, or without a common centre where the method needs it;
+    Undetermined for common points in a line.
+    """
+    there = set(before.points)
+    common = tuple(sorted(name for name in new.points if name in there))
+    if len(common) < FEWEST_COMMON:
+        raise Mistake(
+            f"models {before.name} and {new.name}: expected at least {FEWEST_COMMON} common points with the centre, "
+            f"got {len(common)} ({', '.join(common) or 'none'})"
+        )
+    source, target = new.at(common), before.at(common)
+    try:
+        found = _on_points(source, target) if method == "points" else _on_centre(before, new, common, method)
+    except Undetermined as error:
+        raise Undetermined(f"models {before.name} and {new.name}: {error}") from error
+    return Join(before.name, new.name, common, found, found.residuals)
+
+
+def _on_points(source: Array, target: Array) -> Similarity:
+    return similarity_by_quaternion(source, target)
+
+
+def _on_centre(before: Model, new: Model, common: tuple[str, ...], method: JoinMethod) -> Similarity:
+    centres = [name for name in common if is_centre(name)]
+    if len(centres) != 1:
+        raise Mistake(
+            f"models {before.name} and {new.name}: expected one common projection centre (<photo>{CENTRE}), "
+            f"got {', '.join(centres) or 'none'}"
+        )
+    others = [name for name in common if not is_centre(name)]
+    origin, target_origin = new.at(centres)[:, 0], before.at(centres)[:, 0]
+    vectors, targets = new.at(others) - origin[:, None], before.at(others) - target_origin[:, None]
+    # A vector and its opposite have their centroid in the centre: the rotation and scale are then about it.
+    both = similarity_by_quaternion(
+        np.concatenate([vectors, -vectors], axis=1), np.concatenate([targets, -targets], axis=1)
+    )
+    scale = both.scale
+    if method == "heights":
+        turned = np.einsum("ij...,jn...->in...", both.rotation, vectors)
+        if not (np.abs(turned[2]) > 0.01 * length_of(turned)).all():
+            raise Undetermined("expected common points below the centre, got one at its height")
+        scale = (targets[2] / turned[2]).mean(axis=0)
+    translation = target_origin - scale * mxv(both.rotation, origin)
+    return Similarity(np.asarray(scale), both.rotation, translation, new.at(common), before.at(common))
+
+
+def in_order(models: Sequence[Model]) -> tuple[Model, ...]:
+    """Return the models as they follow each other in the strip.
+
+    Neighbours share a projection centre; the strip begins at the end that was given first. Models of which none
+    shares a centre are taken in the order given. Raises Mistake for names given twice, branches, rings and gaps.
+    """
+    if not models:
+        raise Mistake("expected the models of a strip, got none")
+    names = [model.name for model in models]
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise Mistake(f"expected every model once, got model {twice} twice")
+    having: dict[str, list[int]] = {}
+    for i, model in enumerate(models):
+        for centre in model.centres:
+            having.setdefault(centre, []).append(i)
+    neighbours: dict[int, set[int]] = {i: set() for i in range(len(models))}
+    for centre, members in having.items():
+        if len(members) > 2:
+            shown = ", ".join(names[i] for i in members)
+            raise Mistake(f"centre {centre}: expected at most two models of a strip to share it, got {shown}")
+        if len(members) == 2:
+            neighbours[members[0]].add(members[1])
+            neighbours[members[1]].add(members[0])
+    if not any(neighbours.values()):
+        return tuple(models)
+    ends = [i for i in range(len(models)) if len(neighbours[i]) <= 1]
+    if not ends:
+        raise Mistake("expected a strip with two ends, got models in a ring")
+    order, seen = [ends[0]], {ends[0]}
+    while following := neighbours[order[-1]] - seen:
+        order.append(min(following))
+        seen.add(order[-1])
+    if len(order) < len(models):
+        left = next(names[i] for i in range(len(models)) if i not in seen)
+        raise Mistake(
+            f"model {left}: expected a projection centre in common with the strip of model {names[order[0]]}, got none"
+        )
+    return tuple(models[i] for i in order)
