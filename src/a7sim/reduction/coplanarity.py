@@ -24,8 +24,9 @@ Unknowns = Literal["independent", "dependent"]
 
 FEWEST_POINTS = 5
 MOST_ITERATIONS = 30
-TOLERANCE = 1e-10
-"""Radians: iterations end when the next correction, at the rate at which they shrink, would be below it."""
+TOLERANCE = 2e-11
+"""Radians: iterations end when the next correction, at the rate at which they shrink, would be below it. What is then
+left is below 1e-10."""
 
 LARGEST_CONDITION = 3e5
 """Of the scaled normal equations for turns about the axes of the base. Six standard points have some 3e2, the weak pair
@@ -41,13 +42,13 @@ LARGEST_S0 = 0.005
 FAR = 3e-4
 """Radians: after a larger correction the same normal equations are solved for what is left, too."""
 
-LARGEST_TURN = 0.5
+LARGEST_TURN = 0.4
 """Radians, in one step: farther away the linear equations say nothing."""
 
-DAMPING = 0.3
+DAMPING = 0.5
 """Share of the mean square discrepancy, in radians squared, that stiffens the normal equations far from the end."""
 
-CHORDS = 4
+CHORDS = 6
 WEAKNESS = 10.0
 """By how much the discrepancies are multiplied in the unknowns, for a guess at what is left to correct."""
 
@@ -162,7 +163,7 @@ def relative_orientation(
     `unknowns` are kappa1, kappa2, phi1, phi2 and the omega of camera `omega` ("independent"; P has omega2, the thesis
     omega1), or omega2, phi2, kappa2 and the base components by2, bz2 in mm beside the given bx ("dependent"). Those
     are components of the base, so that by2 counts with Y and not as a by spindle does. An iteration is one set of
-    normal equations, formed and reduced; far from the end it is solved for up to four more right-hand sides.
+    normal equations, formed and reduced; far from the end it is solved for up to six more right-hand sides.
 
     Raises Undetermined, with the condition number, for fewer than five points, for points on a line or a critical
     surface and for pairs whose rays do not meet before both cameras; in a batch for any of its pairs. Use

@@ -1,0 +1,188 @@
+"""Time reductions, on one thread and with their accuracy beside them, against programs that do the same.
+
+The peers are in benchmarks/requirements-peers.txt; one that is not installed is said so and left out. Every
+benchmark is a function in `BENCHMARKS`; name some on the command line to run those alone.
+"""
+
+import importlib
+import os
+import resource
+import sys
+import time
+
+import numpy as np
+
+from a7sim.geometry import image_of, rotation, transposed
+from a7sim.reduction.coplanarity import coplanarity, rays_of, relative_orientation, relative_poses
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+C = 152.0
+BASE = 92.0
+NOISE = 0.005
+TILT = np.radians(1.5)
+POINTS = (6, 9, 15, 100)
+BLOCK = 20_000
+MANY = 1_000_000
+ROUNDS = 5
+AIR_TO_VISION = np.diag([1.0, -1.0, -1.0])
+"""Photogrammetry's camera looks along -z with y up, computer vision's along +z with y down."""
+
+
+def peer(module):
+    """The module, or None with a line that says so."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        print(f"  {module}: not installed here ({error}); see benchmarks/requirements-peers.txt")
+        return None
+
+
+def best_time(call, rounds=ROUNDS):
+    """The shortest of some rounds, in seconds: what the machine can do when nobody disturbs it."""
+    took = []
+    for _ in range(rounds):
+        began = time.perf_counter()
+        call()
+        took.append(time.perf_counter() - began)
+    return min(took)
+
+
+def plan_of(n, rng):
+    """Points of the model in bases: Gruber's six, rows of three and five, or scattered; 60 % overlap."""
+    columns = {6: 2, 9: 3, 15: 5}.get(n)
+    if columns is None:
+        return rng.uniform((0.0, -1.0), (1.0, 1.0), (n, 2)).T
+    return np.array([(x, y) for y in (0.0, 1.0, -1.0) for x in np.linspace(0.0, 1.0, columns)]).T
+
+
+def pairs(rng, n, count):
+    """Images ``(2, n, count)`` of both photographs of near-vertical pairs, with errors of measurement."""
+    plan = plan_of(n, rng)[:, :, None] * BASE
+    points = np.concatenate([np.broadcast_to(plan, (2, n, count)), -C * rng.uniform(0.95, 1.05, (1, n, count))])
+    images = []
+    for centre in ((0.0, 0.0, 0.0), (BASE, 0.0, 0.0)):
+        turn = rotation(*rng.uniform(-TILT, TILT, (3, count)))
+        image = image_of(points, np.reshape(centre, (3, 1, 1)), turn[:, :, None], C)
+        images.append(image + NOISE * rng.standard_normal(image.shape))
+    return images
+
+
+def rms_parallax_um(image1, image2, turns, bases):
+    """Rms of the residual y-parallaxes at picture scale that poses leave, the same for every program."""
+    level = np.broadcast_to(np.eye(3)[:, :, None], turns.shape)
+    condition = coplanarity(rays_of(image1, C), rays_of(image2, C), level, turns, bases)
+    return 1000.0 * np.sqrt(2.0 * np.mean((condition.discrepancies / condition.steepness) ** 2))
+
+
+def relative():
+    """Relative orientation from zero: batched against one call a pair."""
+    poselib, pycolmap = peer("poselib"), peer("pycolmap")
+    print("relative orientation, 5 um image noise, c = 152 mm, 60 % overlap, tilts to 1.5 deg, from zero")
+    print("points  program             us/pair   pairs/s  iterations  rms parallax um  theory um  times poselib")
+    for n in POINTS:
+        rng = np.random.default_rng(n)
+        theory = 1000.0 * NOISE * np.sqrt(2.0 * (n - 5) / n)
+        count = BLOCK if n < 50 else BLOCK // 10
+        image1, image2 = pairs(rng, n, count)
+        rows = []
+        poses = relative_poses(image1, image2, C, C)
+        took = best_time(lambda a=image1, b=image2: relative_poses(a, b, C, C)) / count
+        rms = rms_parallax_um(image1, image2, poses.rotation, poses.base)
+        rows.append(("a7sim batch", took, poses.iterations.mean(), rms))
+        a, b = image1[..., 0].copy(), image2[..., 0].copy()
+        for label, call in (("a7sim one pair", relative_poses), ("  with statistics", relative_orientation)):
+            took = best_time(lambda a=a, b=b, call=call: [call(a, b, C, C) for _ in range(100)], 10) / 100.0
+            rows.append((label, took, np.nan, np.nan))
+        if poselib:
+            rows.append(("poselib", *_by_poselib(poselib, image1, image2)))
+        if pycolmap:
+            rows.append(("pycolmap", *_by_pycolmap(pycolmap, image1[..., :300], image2[..., :300])))
+        base_line = next((took for label, took, *_ in rows if label == "poselib"), np.nan)
+        for label, took, iterations, rms in rows:
+            speed = f"{1e6 * took:9.2f}{1.0 / took:10.0f}{iterations:12.2f}"
+            ours = f"{base_line / took:15.1f}" if label == "a7sim batch" else ""
+            print(f"{n:6}  {label:18}{speed}{rms:17.3f}{theory:11.3f}{ours}")
+    _many()
+
+
+def _many():
+    """A million pairs in blocks: what memory it takes."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    rng = np.random.default_rng(1)
+    took, oriented, squares = 0.0, 0, 0.0
+    for _ in range(MANY // BLOCK):
+        image1, image2 = pairs(rng, 6, BLOCK)
+        began = time.perf_counter()
+        poses = relative_poses(image1, image2, C, C)
+        took += time.perf_counter() - began
+        oriented += int(poses.converged.sum())
+        squares += float((poses.s0**2).sum())
+    whole = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(
+        f"{MANY} pairs of 6 points in blocks of {BLOCK}: {took:.1f} s, {oriented} oriented, "
+        f"s0 {1000.0 * np.sqrt(squares / MANY):.3f} um, peak memory {whole / 1024.0:.0f} MB "
+        f"({(whole - before) / 1024.0:.0f} MB more than before)"
+    )
+
+
+def _by_poselib(poselib, image1, image2):
+    lefts, rights = (_seen(image) for image in (image1, image2))
+    camera = poselib.Camera("SIMPLE_PINHOLE", [C, 0.0, 0.0], 230, 230)
+    start = poselib.CameraPose()
+    start.t = np.array([-1.0, 0.0, 0.0])
+    found = []
+
+    def orient():
+        found[:] = [
+            poselib.refine_relative_pose(a, b, start, camera, camera) for a, b in zip(lefts, rights, strict=True)
+        ]
+
+    took = best_time(orient) / len(lefts)
+    turns = np.stack([pose.R for pose, _ in found], axis=-1)
+    shifts = np.stack([pose.t for pose, _ in found], axis=-1)
+    iterations = np.mean([report["iterations"] for _, report in found])
+    return took, iterations, rms_parallax_um(image1, image2, *_from_vision(turns, shifts))
+
+
+def _by_pycolmap(pycolmap, image1, image2):
+    lefts, rights = (_seen(image) for image in (image1, image2))
+    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=230, height=230, params=[C, 0.0, 0.0])
+    all_points = np.ones(image1.shape[1], dtype=bool)
+    found = []
+
+    def orient():
+        found.clear()
+        for a, b in zip(lefts, rights, strict=True):
+            start = pycolmap.Rigid3d(pycolmap.Rotation3d(np.eye(3)), np.array([-1.0, 0.0, 0.0]))
+            found.append(pycolmap.refine_relative_pose(start, camera, a, camera, b, all_points)["cam2_from_cam1"])
+
+    took = best_time(orient, 3) / len(lefts)
+    turns = np.stack([pose.rotation.matrix() for pose in found], axis=-1)
+    shifts = np.stack([pose.translation for pose in found], axis=-1)
+    return took, np.nan, rms_parallax_um(image1, image2, *_from_vision(turns, shifts))
+
+
+def _seen(image):
+    """Image points as computer vision has them, a list of arrays ``(n, 2)``."""
+    return [np.ascontiguousarray((image[..., i] * [[1.0], [-1.0]]).T) for i in range(image.shape[-1])]
+
+
+def _from_vision(turns, shifts):
+    """Rotation right to left and base, in the left photograph's frame, from x2 = R x1 + t of computer vision."""
+    back = transposed(turns)
+    turned = np.einsum("ij,jk...,kl->il...", AIR_TO_VISION, back, AIR_TO_VISION)
+    return turned, np.einsum("ij,jk...,k...->i...", AIR_TO_VISION, back, -shifts)
+
+
+BENCHMARKS = {"relative": relative}
+
+
+def main():
+    if any(os.environ.get(name) != "1" for name in THREADS):  # libraries read it when they are loaded
+        os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **dict.fromkeys(THREADS, "1")})
+    for each in sys.argv[1:] or BENCHMARKS:
+        BENCHMARKS[each]()
+
+
+if __name__ == "__main__":
+    main()
