@@ -260,10 +260,7 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float) -> Relativ
     turned = np.array([rotation(0.0, 0.0, 0.5 * np.pi * swing) for swing in swings])
     R = np.empty((2, 3, 3, *batch))
     R[:] = turned.reshape((2, 3, 3, *(1,) * len(batch)))
-    done = RelativePoses(
-        R.copy(), np.full(batch, np.nan), np.full(batch, np.inf), np.zeros(batch, dtype=np.int64), np.zeros(batch, bool)
-    )
-    places = np.arange(rays.shape[3]) if batch else np.array(0)
+    places = None
     state = _Iteration(R, np.ones(batch, dtype=bool), np.ones(batch), np.zeros(batch, dtype=np.int64))
     for i in range(MOST_ITERATIONS):
         state, equations = _iterated(state, rays, tolerance, level=i == 0 and swings == (0, 0))
@@ -273,17 +270,18 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float) -> Relativ
         last = rest == 0 or i == MOST_ITERATIONS - 1
         if last or 2 * rest < state.active.size:
             poses = _assessed(state, equations)
-            if not batch:
+            if places is None:
                 done = poses
-                break
-            ended = np.ones_like(state.active) if last else ~state.active
-            for name in _SHAPES:
-                getattr(done, name)[..., places[ended]] = getattr(poses, name)[..., ended]
+            else:
+                for name in _SHAPES:
+                    getattr(done, name)[..., places] = getattr(poses, name)
             if last:
                 break
-            going = state.active
-            places, rays = places[going], rays[..., going]
-            state = _Iteration(state.rotations[..., going], going[going], state.before[going], state.iterations[going])
+            going = np.flatnonzero(state.active)
+            places, rays = going if places is None else places[going], rays[..., going]
+            state = _Iteration(
+                state.rotations[..., going], state.active[going], state.before[going], state.iterations[going]
+            )
     hopeless = first >= HOPELESS * LARGEST_CONDITION
     return replace(
         done, condition=np.where(hopeless, first, done.condition), converged=np.asarray(done.converged & ~hopeless)
@@ -319,45 +317,57 @@ def _iterated(state: _Iteration, rays: Array, tolerance: float, level: bool) -> 
     for i in range(5):
         stiff[i, i] *= 1.0 + DAMPING * mean_square
     inverse = _inverse(stiff)
-    corrections = -mxv(inverse, normal[:5, 5]) * active
+    corrections = -_times(inverse, normal[:5, 5]) * active
     size = np.abs(corrections).max(axis=0)
     if (size > LARGEST_TURN).any():
         corrections *= np.minimum(1.0, LARGEST_TURN / np.maximum(size, LARGEST_TURN))
     R = _turned(state.rotations, corrections)
     left = size * size / state.before
     far = active & (size > FAR)
-    if far.all():
-        R, left = _chords(R, rays, rows[:5] * per_mm, inverse, size, left)
-    elif far.any():
-        weighted = rows[:5, :, far] * per_mm[..., far]
-        R[..., far], left[far] = _chords(R[..., far], rays[..., far], weighted, inverse[..., far], size[far], left[far])
+    if far.any():
+        tried = _Chord(rays, rows[:5] * per_mm, inverse, size)
+        R, left = _chords(R, left, np.minimum(size, LARGEST_TURN), far, tried, CHORDS)
     goes_on = active & ~(left < tolerance) & np.isfinite(size)
     before = np.where(active, np.maximum(size, tolerance), state.before)
     return _Iteration(R, goes_on, before, state.iterations + active), _Equations(normal, inverse, a)
 
 
-def _chords(R: Array, rays: Array, weighted: Array, inverse: Array, size: Array, left: Array) -> tuple[Array, Array]:
-    """Go on from a step of Gauss-Newton with the same normal equations, as long as that leads on.
+@dataclass(frozen=True)
+class _Chord:
+    """Rays ``(2, 3, n, ...)``, weighted coefficients, inverse and first correction of normal equations used again."""
 
-    Returns the rotations and what is left to correct, in radians. Equations that are not formed anew also leave the
+    rays: Array
+    weighted: Array
+    inverse: Array
+    size: Array
+
+    def of(self, pairs: npt.NDArray[np.int64]) -> "_Chord":
+        """Return those of some pairs."""
+        return _Chord(self.rays[..., pairs], self.weighted[..., pairs], self.inverse[..., pairs], self.size[pairs])
+
+
+def _chords(
+    R: Array, left: Array, last: Array, far: npt.NDArray[np.bool_], equations: _Chord, most: int
+) -> tuple[Array, Array]:
+    """Go on from a step of Gauss-Newton with the same normal equations, in the pairs where that leads on.
+
+    Returns the rotations and what is left to correct, in radians. Equations that are not formed anew leave the
     discrepancies' share of the first step.
     """
-    scale = -rays[0, 2, 0] * -rays[1, 2, 0]
-    last = np.minimum(size, LARGEST_TURN)
-    far: npt.NDArray[np.bool_] = last > 0.0
-    for _ in range(CHORDS):
-        discrepancies = _discrepancies(_in_base_frame(R[:, 1:], rays))
-        corrections = -mxv(inverse, np.einsum("vn...,n...->v...", weighted, discrepancies))
-        shrunk = np.abs(corrections).max(axis=0)
-        far = far & (shrunk < STEADY * last)
-        R = _turned(R, np.where(far, corrections, 0.0))
-        rms = np.sqrt((discrepancies * discrepancies).mean(axis=0)) / scale
-        left = np.where(far, np.minimum(left, np.maximum(shrunk * shrunk / last, WEAKNESS * size * rms)), left)
-        far = far & (shrunk > FAR)
-        last = shrunk
-        if not far.any():
-            break
-    return R, left
+    if 2 * np.count_nonzero(far) < far.size:
+        some = np.flatnonzero(far)
+        R[..., some], left[some] = _chords(R[..., some], left[some], last[some], far[some], equations.of(some), most)
+        return R, left
+    rays = equations.rays
+    discrepancies = _discrepancies(_in_base_frame(R[:, 1:], rays))
+    corrections = -_times(equations.inverse, _times(equations.weighted, discrepancies))
+    size = np.abs(corrections).max(axis=0)
+    far = far & (size < STEADY * last)
+    R = _turned(R, np.where(far, corrections, 0.0))
+    rms = np.sqrt(dots(discrepancies, discrepancies) / rays.shape[2]) / (rays[0, 2, 0] * rays[1, 2, 0])
+    left = np.where(far, np.minimum(left, np.maximum(size * size / last, WEAKNESS * equations.size * rms)), left)
+    far = far & (size > FAR)
+    return _chords(R, left, size, far, equations, most - 1) if most > 1 and far.any() else (R, left)
 
 
 def _assessed(state: _Iteration, equations: _Equations) -> RelativePoses:
@@ -366,7 +376,7 @@ def _assessed(state: _Iteration, equations: _Equations) -> RelativePoses:
     n, right = a.shape[2], equations.normal[5, :5]
     condition = _condition(equations)
     if n > FEWEST_POINTS:
-        squares = equations.normal[5, 5] - dots(right, mxv(inverse, right))
+        squares = equations.normal[5, 5] - dots(right, _times(inverse, right))
         s0 = np.sqrt(np.maximum(squares, 0.0) / (n - FEWEST_POINTS))
     else:
         s0 = np.zeros_like(condition)
@@ -378,11 +388,17 @@ def _assessed(state: _Iteration, equations: _Equations) -> RelativePoses:
 
 def _condition(equations: _Equations) -> Array:
     """Return the condition numbers ``(...)`` of the scaled normal equations, in the 1-norm."""
-    normal, inverse = equations.normal[:5, :5], equations.inverse
-    scale = np.sqrt(np.einsum("uu...->u...", normal))
-    largest = (np.einsum("uv...,u...->v...", np.abs(normal), 1.0 / scale) / scale).max(axis=0)
-    condition = largest * (np.einsum("uv...,u...->v...", np.abs(inverse), scale) * scale).max(axis=0)
+    normal = equations.normal[:5, :5]
+    squares = np.einsum("uu...->u...", normal)
+    scale = np.sqrt(squares[:, None] * squares)
+    largest = (np.abs(normal) / scale).sum(axis=0).max(axis=0)
+    condition = largest * (np.abs(equations.inverse) * scale).sum(axis=0).max(axis=0)
     return np.where(np.isfinite(condition), condition, np.inf)
+
+
+def _times(matrix: Array, vector: Array) -> Array:
+    """Multiply as `mxv` does, in less time for a single matrix."""
+    return np.asarray(matrix @ vector) if matrix.ndim == 2 else mxv(matrix, vector)
 
 
 def _in_base_frame(R: Array, rays: Array) -> Array:
@@ -448,14 +464,14 @@ def _inverse(matrix: Array) -> Array:
             return np.asarray(np.linalg.inv(matrix))
         except np.linalg.LinAlgError:
             return np.full_like(matrix, np.nan)
-    inverse = matrix.copy()
+    inverse, product = matrix.copy(), np.empty_like(matrix)
     for j in range(len(matrix)):
         reciprocal = 1.0 / inverse[j, j]
-        column = inverse[:, j] * reciprocal
-        row = inverse[j].copy()
-        inverse -= column[:, None] * row
-        inverse[j] = row * reciprocal
-        inverse[:, j] = -column
+        column, row = inverse[:, j] * reciprocal, inverse[j].copy()
+        np.multiply(column[:, None], row, out=product)
+        inverse -= product
+        np.multiply(row, reciprocal, out=inverse[j])
+        np.negative(column, out=inverse[:, j])
         inverse[j, j] = reciprocal
     return inverse
 
@@ -496,14 +512,17 @@ def turn_about(turns: Array) -> Array:
 
     For a small turn that is the angle in radians.
     """
-    x, y, z = 0.5 * turns
-    xx, yy, zz = x * x, y * y, z * z
-    turn = 2.0 * np.array(
-        [[0.5 * (1.0 + xx - yy - zz), x * y - z, x * z + y],
-         [x * y + z, 0.5 * (1.0 - xx + yy - zz), y * z - x],
-         [x * z - y, y * z + x, 0.5 * (1.0 - xx - yy + zz)]]
-    )  # fmt: skip
-    return np.asarray(turn / (1.0 + xx + yy + zz))
+    half = 0.5 * turns
+    xx, yy, zz = half * half
+    share = 2.0 / (1.0 + xx + yy + zz)
+    turn = np.empty((3, 3, *turns.shape[1:]))
+    for i, others in enumerate((yy + zz, zz + xx, xx + yy)):
+        turn[i, i] = 1.0 - share * others
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        product, along = half[i] * half[j] * share, half[k] * share
+        turn[i, j] = product - along
+        turn[j, i] = product + along
+    return turn
 
 
 def _facing(R: Array, a: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
