@@ -65,7 +65,8 @@ def near_vertical_parallax_coefficients(
 ) -> Array:
     """Return the coefficients of thesis 2.32, shape ``(10, ...)``, in mm a radian or mm a mm.
 
-    x and y are counted from the left-hand centre in mm, z is the distance below the centres, b the base.
+    x and y are counted from the left-hand centre in mm, z is the distance below the centres, b the base. This is the
+    equation as the thesis prints it, which `parallax_coefficients` is held against; the plotter's own tilts need that.
     """
     x, y, z, b = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (x, y, z, b)))
     across = z * (1.0 + y**2 / z**2)

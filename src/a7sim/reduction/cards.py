@@ -33,7 +33,6 @@ FIELDS = (
 )
 """Name, first and last column of every field."""
 
-INPUT_COLUMNS = 36
 OUTPUT_COLUMNS = 63
 GROUND, TIES = "-1", "-2"
 """Control cards: -1 ends the ground control, -2 stands before each set of tie points."""
