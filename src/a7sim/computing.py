@@ -1,30 +1,26 @@
 """Reductions of people's files: CSV in, documents out (files.md). The sums themselves are in `a7sim.reduction`."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from a7sim.documents import Document, by_point, head, of_absolute, of_adjustment, of_elements, of_joins, of_similarity
 from a7sim.files import Row, read_rows, unique
 from a7sim.geometry import GON, Array, ray_of, stereoscopic_intersection
 from a7sim.mistakes import Mistake
-from a7sim.reduction.absolute import AbsoluteOrientation, Ground, GroundFit, absolute_orientation
+from a7sim.reduction.absolute import Ground, absolute_orientation
 from a7sim.reduction.centres import perspective_centre
 from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, relative_orientation
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.modelling import model_coordinates
-from a7sim.reduction.polynomials import Degree, StripAdjustment, strip_adjustment
+from a7sim.reduction.polynomials import Degree, strip_adjustment
 from a7sim.reduction.similarity import similarity_by_iteration
-from a7sim.reduction.strips import Model, Strip, formed_strip
-
-SCHEMA_VERSION = 1
+from a7sim.reduction.strips import Model, formed_strip
 
 PAIR_COLUMNS = ("xl", "yl", "xr", "yr")
-
-Document = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -52,7 +48,7 @@ def relative(path: Path, c: float, principal_point: tuple[float, float], unknown
     pair = _pair(path.stem, rows, principal_point)
     with blamed_on(path):
         orientation = relative_orientation(pair.left, pair.right, c, c, unknowns, bx=bx)
-    return _head("reduce relative") | _of_pair(pair, orientation, c, bx)
+    return head("reduce relative") | _of_pair(pair, orientation, c, bx)
 
 
 def strip(
@@ -85,8 +81,8 @@ def strip(
     with blamed_on(ground_path):
         oriented = absolute_orientation(formed, ground)
         adjusted = strip_adjustment(oriented.model, ground, degree) if degree else None
-    document = _head("reduce strip") | {"models": documents} | _of_strip(formed, oriented)
-    return document | ({"polynomial": _of_adjustment(adjusted)} if adjusted else {})
+    document = head("reduce strip") | {"models": documents, "joins": of_joins(formed)} | of_absolute(oriented)
+    return document | ({"polynomial": of_adjustment(adjusted)} if adjusted else {})
 
 
 def centres(path: Path, z1: float, z2: float) -> Document:
@@ -99,9 +95,9 @@ def centres(path: Path, z1: float, z2: float) -> Document:
     with blamed_on(path):
         found = perspective_centre(np.array([X1, Y1]), np.array([X2, Y2]), z1, z2)
     names = ("X0", "Y0", "Z0", "T0")
-    document = _head("reduce centres") | {name: float(getattr(found, name)) for name in names}
+    document = head("reduce centres") | {name: float(getattr(found, name)) for name in names}
     document |= {f"sigma_{name}": float(getattr(found, f"sigma_{name}")) for name in names}
-    return document | {"rms": float(found.rms), "residuals": _by_point(_names(rows), found.residuals[:2])}
+    return document | {"rms": float(found.rms), "residuals": by_point(_names(rows), found.residuals[:2])}
 
 
 def similarity(path: Path) -> Document:
@@ -116,19 +112,16 @@ def similarity(path: Path) -> Document:
             **dict(zip(("omega", "phi", "kappa"), (found.sigma_angles / GON).tolist(), strict=True)),
             **dict(zip(("Tx", "Ty", "Tz"), found.sigma_translation.tolist(), strict=True)),
         }
-    return _head("reduce similarity") | {
-        "scale": float(found.scale),
-        "rotation": found.rotation.tolist(),
-        "angles": dict(zip(("omega", "phi", "kappa"), (found.angles / GON).tolist(), strict=True)),
-        "translation": found.translation.tolist(),
-        "sigma": sigma,
-        "s0": float(found.s0),
-        "residuals": _by_point(_names(rows), found.residuals),
-    }
-
-
-def _head(command: str) -> Document:
-    return {"schema_version": SCHEMA_VERSION, "command": command}
+    return (
+        head("reduce similarity")
+        | of_similarity(found)
+        | {
+            "angles": dict(zip(("omega", "phi", "kappa"), (found.angles / GON).tolist(), strict=True)),
+            "sigma": sigma,
+            "s0": float(found.s0),
+            "residuals": by_point(_names(rows), found.residuals),
+        }
+    )
 
 
 def _names(rows: Sequence[Row]) -> list[str]:
@@ -137,10 +130,6 @@ def _names(rows: Sequence[Row]) -> list[str]:
 
 def _column(rows: Sequence[Row], name: str) -> Array:
     return np.array([row.numbers[name] for row in rows])
-
-
-def _by_point(points: Sequence[str], values: Array) -> dict[str, list[float]]:
-    return dict(zip(points, values.T.tolist(), strict=True))
 
 
 def _pair(name: str, rows: Sequence[Row], principal_point: tuple[float, float]) -> Pair:
@@ -155,20 +144,12 @@ def _of_pair(pair: Pair, orientation: RelativeOrientation, c: float, bx: float) 
         "unknowns": list(orientation.unknowns),
         "rotation": orientation.rotation.tolist(),
         "base": orientation.base.tolist(),
-        "elements": _elements(orientation.elements, orientation.sigmas),
+        "elements": of_elements(orientation.elements, orientation.sigmas),
         "iterations": int(orientation.iterations),
         "condition": float(orientation.condition),
         "s0_mm": float(orientation.s0),
         "residual_y_parallax_mm": dict(zip(pair.points, orientation.picture_parallaxes.tolist(), strict=True)),
-        "points": _by_point(pair.points, points),
-    }
-
-
-def _elements(values: Mapping[str, Array], sigmas: Mapping[str, Array]) -> Document:
-    units = {name: 1.0 if name.startswith("b") else GON for name in values}
-    return {
-        name: {"value": float(value) / units[name], "sigma": float(sigmas[name]) / units[name]}
-        for name, value in values.items()
+        "points": by_point(pair.points, points),
     }
 
 
@@ -211,40 +192,3 @@ def _ground(path: Path) -> Ground:
             )
     coordinates = np.array([_column(rows, axis) for axis in "XYZ"])
     return Ground(tuple(_names(rows)), coordinates, tuple(row.texts["role"] for row in rows))
-
-
-def _of_strip(formed: Strip, oriented: AbsoluteOrientation) -> Document:
-    return {
-        "joins": [
-            {
-                "models": [join.before, join.after],
-                "scale": float(join.scale),
-                "rotation": join.similarity.rotation.tolist(),
-                "max_residual_mm": float(join.max_residual),
-            }
-            for join in formed.joins
-        ],
-        "absolute": {
-            "scale": float(oriented.similarity.scale),
-            "rotation": oriented.similarity.rotation.tolist(),
-            "translation": oriented.similarity.translation.tolist(),
-        },
-        "residuals_m": _residuals(oriented.fit),
-        "warnings": list(oriented.warnings),
-    }
-
-
-def _residuals(fit: GroundFit) -> Document:
-    return {
-        point: {"role": role, "X": x, "Y": y, "Z": z}
-        for point, role, (x, y, z) in zip(fit.ground.points, fit.ground.roles, fit.residuals.T.tolist(), strict=True)
-    }
-
-
-def _of_adjustment(adjusted: StripAdjustment) -> Document:
-    return {
-        "degree": adjusted.degree,
-        "s0_plan": float(adjusted.plan.s0),
-        "s0_height": float(adjusted.height.s0),
-        "residuals_m": _residuals(adjusted.fit),
-    }

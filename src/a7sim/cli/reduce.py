@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.table import Table
 
 from a7sim import computing
+from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
-from a7sim.session.results import as_json
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -129,7 +129,7 @@ def similarity(common: Path, out: Path | None, as_document: bool) -> None:
     _deliver(document, as_document, out, shown)
 
 
-def _of_relative(document: computing.Document) -> list[Any]:
+def _of_relative(document: Document) -> list[Any]:
     elements = [(name, each["value"], each["sigma"]) for name, each in document["elements"].items()]
     parallaxes = document["residual_y_parallax_mm"]
     points = [(name, *place, parallaxes[name]) for name, place in document["points"].items()]
@@ -140,7 +140,7 @@ def _of_relative(document: computing.Document) -> list[Any]:
     ]
 
 
-def _of_strip(document: computing.Document) -> list[Any]:
+def _of_strip(document: Document) -> list[Any]:
     joins = [(" - ".join(j["models"]), j["scale"], j["max_residual_mm"]) for j in document["joins"]]
     shown: list[Any] = [
         _table(("join", "scale", "largest residual, mm"), joins, 5),
@@ -155,7 +155,7 @@ def _of_strip(document: computing.Document) -> list[Any]:
     return shown + [f"warning: {warning}" for warning in document["warnings"]]
 
 
-def _residual_table(title: str, residuals: computing.Document) -> Table:
+def _residual_table(title: str, residuals: Document) -> Table:
     rows = [(point, each["role"], each["X"], each["Y"], each["Z"]) for point, each in residuals.items()]
     return _table((title, "role", "X", "Y", "Z"), rows, 3)
 
@@ -169,7 +169,7 @@ def _table(header: tuple[str, ...], rows: list[tuple[Any, ...]], decimals: int =
     return table
 
 
-def _deliver(document: computing.Document, as_document: bool, out: Path | None, shown: list[Any]) -> None:
+def _deliver(document: Document, as_document: bool, out: Path | None, shown: list[Any]) -> None:
     if out is not None:
         try:
             out.mkdir(parents=True, exist_ok=True)

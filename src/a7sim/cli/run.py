@@ -10,10 +10,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from a7sim.cli import EXIT_DOES_NOT_FIT
+from a7sim.documents import as_json
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Observer, Scenario, load_scenario
 from a7sim.session import Watcher, run
-from a7sim.session.results import as_json
 from a7sim.session.tables import of_session
 
 _POINTS_A_MODEL = 130

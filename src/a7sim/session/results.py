@@ -5,9 +5,8 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-import msgspec
-
 import a7sim
+from a7sim.documents import head
 from a7sim.instrument import Autograph
 from a7sim.operator import ModelRecord
 from a7sim.reduction import PerspectiveCentre
@@ -16,8 +15,6 @@ from a7sim.scenario.schema import Published
 from a7sim.scene import RelativeTruth
 from a7sim.session.truth import Relative, true_centre, true_elements
 
-SCHEMA_VERSION = 1
-
 SIDES = {1: "left", 2: "right"}
 
 _CENTRE_FIELDS = ("X0", "Y0", "Z0", "T0", "sigma_X0", "sigma_Y0", "sigma_Z0", "sigma_T0", "rms")
@@ -25,9 +22,7 @@ _CENTRE_FIELDS = ("X0", "Y0", "Z0", "T0", "sigma_X0", "sigma_Y0", "sigma_Z0", "s
 
 def header(scenario: Scenario, seed: int) -> dict[str, Any]:
     """Return what a document of results says first."""
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "command": "run",
+    return head("run") | {
         "software": f"a7sim {a7sim.__version__}",
         "scenario": scenario.title,
         "seed": seed,
@@ -145,11 +140,6 @@ def _vector(values: Any) -> list[float]:
 
 def _matrix(values: Any) -> list[list[float]]:
     return [_vector(row) for row in values]
-
-
-def as_json(document: dict[str, Any]) -> str:
-    """Return a document as indented JSON with a line end."""
-    return msgspec.json.format(msgspec.json.encode(document), indent=2).decode() + "\n"
 
 
 def models_csv(models: Sequence[dict[str, Any]]) -> str:

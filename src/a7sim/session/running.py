@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from a7sim.documents import as_json
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Desk, Listener
 from a7sim.link.client import Client
@@ -115,7 +116,7 @@ def run(
             if out is not None:
                 _write_whole(out / BOOK, book.as_csv())
                 _write_whole(out / MODELS, results.models_csv(done))
-                _write_whole(out / RESULTS, results.as_json(document))
+                _write_whole(out / RESULTS, as_json(document))
     return document
 
 

@@ -1,0 +1,123 @@
+"""Documents of results: what `--json` prints and `results.json` holds (files.md), the same for every command."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from a7sim.geometry import GON, Array
+from a7sim.reduction.absolute import AbsoluteOrientation, GroundFit, largest, root_mean_square
+from a7sim.reduction.polynomials import StripAdjustment
+from a7sim.reduction.similarity import Similarity
+from a7sim.reduction.strips import Strip
+
+SCHEMA_VERSION = 1
+
+Document = dict[str, Any]
+
+
+def head(command: str) -> Document:
+    """Return what every document says first."""
+    return {"schema_version": SCHEMA_VERSION, "command": command}
+
+
+def as_json(document: Document) -> str:
+    """Return a document as indented JSON with a line end."""
+    return msgspec.json.format(msgspec.json.encode(document), indent=2).decode() + "\n"
+
+
+def by_point(points: Sequence[str], values: Array) -> dict[str, list[float]]:
+    """Return values ``(k, n)`` as a list of k for each of n points."""
+    return dict(zip(points, values.T.tolist(), strict=True))
+
+
+def of_elements(values: Mapping[str, Array], sigmas: Mapping[str, Array]) -> Document:
+    """Return elements with their standard deviations, angles in gon."""
+    units = {name: 1.0 if name.startswith("b") else GON for name in values}
+    return {
+        name: {"value": float(value) / units[name], "sigma": float(sigmas[name]) / units[name]}
+        for name, value in values.items()
+    }
+
+
+def of_similarity(found: Similarity) -> Document:
+    """Return scale, rotation and translation."""
+    return {
+        "scale": float(found.scale),
+        "rotation": found.rotation.tolist(),
+        "translation": found.translation.tolist(),
+    }
+
+
+def of_joins(strip: Strip) -> list[Document]:
+    """Return the connections of a strip's models."""
+    return [
+        {
+            "models": [join.before, join.after],
+            "scale": float(join.scale),
+            "rotation": join.similarity.rotation.tolist(),
+            "max_residual_mm": float(join.max_residual),
+        }
+        for join in strip.joins
+    ]
+
+
+def of_absolute(oriented: AbsoluteOrientation) -> Document:
+    """Return an absolute orientation with its residuals, how accurate it is, and its warnings."""
+    return {
+        "absolute": of_similarity(oriented.similarity),
+        "residuals_m": of_residuals(oriented.fit),
+        "accuracy_m": of_accuracy(oriented.fit),
+        "warnings": list(oriented.warnings),
+    }
+
+
+def of_adjustment(adjusted: StripAdjustment) -> Document:
+    """Return a polynomial adjustment: its residuals and what it found the strip to be."""
+    found = adjusted.deformation
+    return {
+        "degree": adjusted.degree,
+        "s0_plan": float(adjusted.plan.s0),
+        "s0_height": float(adjusted.height.s0),
+        "deformation": {
+            "scale_drift_ppm_per_km": 1e9 * float(found.scale_drift),
+            "horizontal_sag_m": float(found.horizontal_sag),
+            "vertical_sag_m": float(found.vertical_sag),
+            "twist_gon_per_km": 1e3 * float(found.twist) / GON,
+        },
+        "residuals_m": of_residuals(adjusted.fit),
+        "accuracy_m": of_accuracy(adjusted.fit),
+    }
+
+
+def of_residuals(fit: GroundFit) -> Document:
+    """Return computed minus given at every ground point, with its role; null where nothing is given."""
+    return {
+        point: {"role": role} | {axis: _known(value) for axis, value in zip("XYZ", residual, strict=True)}
+        for point, role, residual in zip(fit.ground.points, fit.ground.roles, fit.residuals.T.tolist(), strict=True)
+    }
+
+
+def of_accuracy(fit: GroundFit) -> Document:
+    """Return rms and largest residuals at control and at checks; `plan` is the root of the mean of X² and Y²."""
+    return {
+        which: _of_residual_set(residuals)
+        for which, residuals in (("control", fit.at_control), ("checks", fit.at_checks))
+        if np.isfinite(residuals).any()
+    }
+
+
+def _of_residual_set(residuals: Array) -> Document:
+    rms, most = root_mean_square(residuals), largest(residuals)
+    return {
+        "points": int(np.isfinite(residuals).any(axis=0).sum()),
+        "rms": {axis: _known(float(value)) for axis, value in zip("XYZ", rms, strict=True)},
+        "plan": _known(float(np.sqrt((rms[0] ** 2 + rms[1] ** 2) / 2.0))),
+        "height": _known(float(rms[2])),
+        "largest": {axis: _known(float(value)) for axis, value in zip("XYZ", most, strict=True)},
+    }
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None
