@@ -12,8 +12,9 @@ import time
 
 import numpy as np
 
-from a7sim.geometry import image_of, rotation, transposed
+from a7sim.geometry import image_of, mxm, rotation, transposed, turn_of
 from a7sim.reduction.coplanarity import coplanarity, rays_of, relative_orientation, relative_poses
+from a7sim.reduction.similarity import similarity_by_iteration, similarity_by_quaternion
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 C = 152.0
@@ -23,7 +24,9 @@ TILT = np.radians(1.5)
 POINTS = (6, 9, 15, 100)
 BLOCK = 20_000
 MANY = 1_000_000
-ROUNDS = 5
+ROUNDS = 9
+TIMES_POSELIB = 10
+ONE_PAIR_US = 300
 AIR_TO_VISION = np.diag([1.0, -1.0, -1.0])
 """Photogrammetry's camera looks along -z with y up, computer vision's along +z with y down."""
 
@@ -78,7 +81,12 @@ def relative():
     """Relative orientation from zero: batched against one call a pair."""
     poselib, pycolmap = peer("poselib"), peer("pycolmap")
     print("relative orientation, 5 um image noise, c = 152 mm, 60 % overlap, tilts to 1.5 deg, from zero")
-    print("points  program             us/pair   pairs/s  iterations  rms parallax um  theory um  times poselib")
+    print(
+        f"targets: {TIMES_POSELIB} times poselib batched at 6 to 15 points, {ONE_PAIR_US} us for one pair called alone"
+    )
+    print(
+        "points  program             us/pair   pairs/s  iterations  rms parallax um  theory um  times poselib  goal us"
+    )
     for n in POINTS:
         rng = np.random.default_rng(n)
         theory = 1000.0 * NOISE * np.sqrt(2.0 * (n - 5) / n)
@@ -100,7 +108,10 @@ def relative():
         base_line = next((took for label, took, *_ in rows if label == "poselib"), np.nan)
         for label, took, iterations, rms in rows:
             speed = f"{1e6 * took:9.2f}{1.0 / took:10.0f}{iterations:12.2f}"
-            ours = f"{base_line / took:15.1f}" if label == "a7sim batch" else ""
+            if label == "a7sim batch":
+                ours = f"{base_line / took:15.1f}{1e6 * base_line / TIMES_POSELIB:11.2f}"
+            else:
+                ours = f"{ONE_PAIR_US:26}" if label == "a7sim one pair" else ""
             print(f"{n:6}  {label:18}{speed}{rms:17.3f}{theory:11.3f}{ours}")
     _many()
 
@@ -174,7 +185,54 @@ def _from_vision(turns, shifts):
     return turned, np.einsum("ij,jk...,k...->i...", AIR_TO_VISION, back, -shifts)
 
 
-BENCHMARKS = {"relative": relative}
+def similarity():
+    """The similarity of models of six points to the ground: batched against one call a model."""
+    pycolmap = peer("pycolmap")
+    rng = np.random.default_rng(6)
+    sigma, count = 0.02, BLOCK
+    models = BASE * rng.uniform(-1.0, 1.0, (3, 6, count))
+    scales, turns = rng.uniform(0.5, 2.0, count), rotation(*rng.uniform(-0.5, 0.5, (3, count)))
+    shifts = rng.uniform(-1000.0, 1000.0, (3, count))
+    targets = scales * np.einsum("ij...,jn...->in...", turns, models) + shifts[:, None]
+    targets = targets + sigma * rng.standard_normal(targets.shape)
+    rows = []
+    for label, call in (("a7sim closed form", similarity_by_quaternion), ("a7sim iterated", similarity_by_iteration)):
+        found = call(models, targets)
+        took = best_time(lambda call=call: call(models, targets), 3) / count
+        rows.append((label, took, found.scale, found.rotation, found.translation))
+        a, b = models[..., 0].copy(), targets[..., 0].copy()
+        took = best_time(lambda a=a, b=b, call=call: [call(a, b) for _ in range(100)]) / 100.0
+        rows.append(("  one model", took, None, None, None))
+    if pycolmap:
+        rows.append(("pycolmap", *_similarity_by_pycolmap(pycolmap, models, targets)))
+    peers = next((took for label, took, *_ in rows if label == "pycolmap"), np.nan)
+    print(f"similarity, 6 points, errors of {sigma} in each coordinate; the closed form is to be 4 times pycolmap")
+    print("program             us/model  models/s  rms residual  theory  rms turn from truth mgon  times pycolmap")
+    for label, took, scale, turn, shift in rows:
+        speed = f"{label:18}{1e6 * took:10.2f}{1.0 / took:10.0f}"
+        if scale is None:
+            print(speed)
+            continue
+        residuals = scale * np.einsum("ij...,jn...->in...", turn, models) + shift[:, None] - targets
+        off = np.sqrt(np.mean(turn_of(mxm(transposed(turn), turns)) ** 2)) * 200_000.0 / np.pi
+        accuracy = f"{np.sqrt(np.mean(residuals**2)):14.5f}{sigma * np.sqrt(11.0 / 18.0):8.5f}{off:26.3f}"
+        print(f"{speed}{accuracy}{peers / took:16.1f}")
+
+
+def _similarity_by_pycolmap(pycolmap, models, targets):
+    sources, sinks = (np.ascontiguousarray(np.moveaxis(each, -1, 0).swapaxes(1, 2)) for each in (models, targets))
+    found = []
+
+    def fit():
+        found[:] = [pycolmap.estimate_sim3d(a, b) for a, b in zip(sources, sinks, strict=True)]
+
+    took = best_time(fit, 3) / len(sources)
+    turns = np.stack([each.rotation.matrix() for each in found], axis=-1)
+    shifts = np.stack([each.translation for each in found], axis=-1)
+    return took, np.array([each.scale for each in found]), turns, shifts
+
+
+BENCHMARKS = {"relative": relative, "similarity": similarity}
 
 
 def main():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from a7sim.mistakes import Mistake
 from a7sim.reduction.absolute import Ground, absolute_orientation
-from a7sim.reduction.cards import deck_lines, free_format_lines, output_lines, read_cards, write_cards
+from a7sim.reduction.cards import deck_lines, free_format_lines, is_deck, output_lines, read_cards, write_cards
 from a7sim.reduction.strips import Model, formed_strip, is_centre
 
 DECK = """\
@@ -42,6 +42,23 @@ def test_a_deck_is_read_as_its_columns_say(tmp_path):
     assert [model.name for model in found.models] == ["1", "2"]
     assert found.models[0].points == ("101", "28:centre", "102", "7")
     np.testing.assert_array_equal(found.models[1].at(["28:centre"])[:, 0], [0.0, 0.0, 30.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("aba.txt", DECK, True),
+        ("aba", "\n" + DECK, True),
+        ("aba.crd", "model,point,X,Y,Z\n", True),
+        ("ABA.CARDS", "", True),
+        ("aba.csv", DECK, False),
+        ("aba.txt", "# one\nmodel,point,X,Y,Z\n1,2,3,4,5\n", False),
+        ("aba.txt", "[[rows]]\nX = 1\n", False),
+        ("aba.txt", "", False),
+    ],
+)
+def test_cards_are_told_by_their_ending_or_their_look(name, text, expected):
+    assert is_deck(name, text) is expected
 
 
 def test_what_is_written_is_what_was_read(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 
 from a7sim.geometry import GON
 from a7sim.operator import DoesNotFit, work
-from a7sim.operator.bench import wrapped
+from a7sim.operator.seat import wrapped
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session, run
 from tests.sessions import element_errors, tampered_session, tilted_flight, without_errors

@@ -89,7 +89,7 @@ def test_the_published_pair_comes_out_to_its_digits(reference):
 def test_another_published_pair_comes_out_to_its_digits(reference, tmp_path):
     expected = toml(reference / "02_calgary_lab_pair_27_28.toml")
     path = pair_file(tmp_path / "pair.csv", expected["relative_a"]["points"])
-    document = computing.relative(path, expected["c_mm"], (0.0, 0.0), "dependent", expected["bx_mm"])
+    document = computing.relative(path, expected["c_mm"], (0.0, 0.0), "dependent", expected["bx_mm"]).document
     values = [document["elements"][name]["value"] for name in ("omega2", "phi2", "kappa2")]
     degrees = expected["relative_a"]["expected_omega_phi_kappa_deg"]
     np.testing.assert_allclose(np.degrees(np.array(values) * GON), degrees, atol=2e-4)

@@ -281,6 +281,23 @@ def test_a_batch_is_its_members(method):
     np.testing.assert_allclose(parallaxes[..., 1, 1], one[1], atol=1e-12)
 
 
+def test_pairs_from_near_and_from_far_in_one_batch_are_its_members():
+    """Those from near are worked together, the others after them, in sets; nobody can tell from what comes out."""
+    near, far = (
+        pairs_of(np.random.default_rng(seed), tilt, SIX, noise=0.005, batch=(3000,))
+        for seed, tilt in ((11, 1.0), (12, 15.0))
+    )
+    image1, image2 = (np.concatenate([near[i], far[i]], axis=-1) for i in (0, 1))
+    shuffled = np.random.default_rng(13).permutation(6000)
+    found = relative_poses(image1[..., shuffled], image2[..., shuffled], C, C)
+    assert found.converged.all()
+    for at in range(0, 6000, 300):
+        one = relative_poses(image1[..., shuffled[at]], image2[..., shuffled[at]], C, C)
+        np.testing.assert_allclose(found.rotations[..., at], one.rotations, atol=1e-9)
+        np.testing.assert_allclose(found.s0[at], one.s0, rtol=1e-6)
+        assert found.iterations[at] == one.iterations
+
+
 def test_photographs_turned_in_their_plane_are_oriented_too():
     image1, image2, expected, *_ = pairs_of(np.random.default_rng(4), 3.0, NINE)
     for quarters in range(4):

@@ -7,14 +7,19 @@ import msgspec
 import pytest
 
 from a7sim.files import read_rows
+from a7sim.mistakes import Mistake
 from a7sim.scenario import ScenarioError, load_scenario, scenario_of, scenario_schema
-from a7sim.session import run
+from a7sim.session.ways import run_all_ways
 
 SCENARIOS = sorted((Path(__file__).parents[1] / "scenarios").glob("*.toml"))
 
 
 def akwanga():
     return tomllib.loads(next(p for p in SCENARIOS if p.stem == "akwanga").read_text(encoding="utf-8"))
+
+
+def a8_strip():
+    return tomllib.loads(next(p for p in SCENARIOS if p.stem == "a8-strip").read_text(encoding="utf-8"))
 
 
 def mistakes_of(raw):
@@ -24,10 +29,14 @@ def mistakes_of(raw):
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-def test_every_scenario_runs_to_its_end(path):
-    document = run(load_scenario(path), 1)
+def test_every_scenario_is_worked_to_its_end(path):
+    scenario = load_scenario(path)
+    document = run_all_ways(scenario, 1)
     assert document["status"] == "complete", document["message"]
-    assert len(document["models"]) == len(load_scenario(path).models)
+    assert len(document.get("models", scenario.models)) == len(scenario.models)
+    for strip in document.get("ways", {}).values():
+        assert len(strip["joins"]) == len(scenario.models) - 1
+        assert not strip["warnings"]
 
 
 def test_every_mistake_is_named_at_once_with_its_path():
@@ -92,8 +101,90 @@ def test_a_mistake_of_each_kind_is_one_sentence(change, mistake):
     assert all("\n" not in each for each in found)
 
 
+@pytest.mark.parametrize(
+    ("change", "mistakes"),
+    [
+        (
+            lambda raw: raw.update(work=["plotter", "theodolite", "plotter"]),
+            [
+                "work[1]: expected 'comparator' or 'plotter', got \"theodolite\"",
+                "work[2]: expected every way once, got 'plotter' twice",
+            ],
+        ),
+        (lambda raw: raw.update(work=[]), ["work: expected 'plotter' or 'comparator' or both, got 0"]),
+        (
+            lambda raw: raw.pop("plan"),
+            ["plan: expected the settings of the plotter, got nothing (work = ['comparator'] needs none)"],
+        ),
+        (
+            lambda raw: raw["comparator"].update(kind="quadro", pointings=0, least_count_um=-1),
+            [
+                "comparator.kind: expected 'mono' or 'stereo', got \"quadro\"",
+                "comparator.pointings: expected 1 to 20 pointings, got 0",
+                "comparator.least_count_um: expected micrometres, 0 (not rounded) to 100, got -1",
+            ],
+        ),
+        (
+            lambda raw: raw["strip"].update(polynomial=4, join="glue"),
+            [
+                "strip.join: expected 'centre' or 'heights' or 'points', got \"glue\"",
+                "strip.polynomial: expected 2 or 3, got 4",
+            ],
+        ),
+        (
+            lambda raw: raw.update(ground=raw["ground"][:4]),
+            ["strip.polynomial: expected 3 points of ground control in plan and 5 in height for degree 2, got 4 and 4"],
+        ),
+        (
+            lambda raw: raw.update(ground=[], strip={}),
+            ["ground: expected 2 points of control in plan and 3 in height for a strip by comparator, got 0 and 0"],
+        ),
+        (
+            lambda raw: (raw["plan"].update(method="dependent"), raw["instrument"].update(condition={})),
+            [
+                "instrument.condition: expected grid_test in its place for an A8, got the faults of an A7",
+                "plan.method: expected 'independent' on an A8, which has neither by nor bz, got 'dependent'",
+            ],
+        ),
+        (
+            lambda raw: raw.update(models=[{"name": "1", "left": "201", "right": "202", "base": "outside"}]),
+            ["models[0].base: expected 'inside', all that an A8 has, got 'outside'"],
+        ),
+        (
+            lambda raw: raw["instrument"].update(variant="A7", grid_test={"local": "rough"}),
+            [
+                "instrument.grid_test.local: expected 'scattered' or 'smooth', got \"rough\"",
+                "instrument.grid_test: expected variant = 'A8' beside it; the faults of an A7 stand in condition",
+            ],
+        ),
+    ],
+)
+def test_mistakes_about_who_measures_a_strip_are_named(change, mistakes):
+    raw = a8_strip()
+    change(raw)
+    assert mistakes_of(raw) == mistakes
+
+
+def test_without_models_every_photograph_is_paired_with_the_next():
+    scenario = load_scenario("schut-1956")
+    assert [(model.name, model.left, model.right) for model in scenario.models][::9] == [
+        ("1", "1", "2"),
+        ("10", "10", "11"),
+    ]
+
+
+def test_a_scenario_for_the_comparator_alone_needs_no_plan_and_has_none():
+    scenario = load_scenario("schut-1956")
+    assert scenario.work == ["comparator"]
+    assert scenario.half_width == 85.0
+    with pytest.raises(Mistake, match="the scenario is not for one"):
+        _ = scenario.plan
+
+
 def test_a_file_that_is_not_there_is_named_with_what_there_is():
-    with pytest.raises(ScenarioError, match=r"nowhere\.toml: expected a scenario file or one of akwanga, dewitt-pair"):
+    with pytest.raises(
+        ScenarioError, match=r"nowhere\.toml: expected a scenario file or one of a8-strip, akwanga, dewitt-pair"
+    ):
         load_scenario("nowhere.toml")
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from a7sim.geometry import GON, Array
 from a7sim.reduction.absolute import AbsoluteOrientation, GroundFit, largest, root_mean_square
+from a7sim.reduction.least_squares import Adjustment
 from a7sim.reduction.polynomials import StripAdjustment
 from a7sim.reduction.similarity import Similarity
 from a7sim.reduction.strips import Strip
@@ -38,6 +39,17 @@ def of_elements(values: Mapping[str, Array], sigmas: Mapping[str, Array]) -> Doc
     return {
         name: {"value": float(value) / units[name], "sigma": float(sigmas[name]) / units[name]}
         for name, value in values.items()
+    }
+
+
+def of_statistics(adjustment: Adjustment, names: Sequence[str], observations: Sequence[str]) -> Document:
+    """Return the statistics of an adjustment whose unknowns and observations are named; correlations row by row."""
+    return {
+        "unknowns": list(names),
+        "correlations": adjustment.correlations.tolist(),
+        "redundancy": int(adjustment.redundancy),
+        "redundancy_numbers": dict(zip(observations, adjustment.redundancy_numbers.tolist(), strict=True)),
+        "condition": float(adjustment.condition),
     }
 
 
@@ -100,20 +112,21 @@ def of_residuals(fit: GroundFit) -> Document:
 
 
 def of_accuracy(fit: GroundFit) -> Document:
-    """Return rms and largest residuals at control and at checks; `plan` is the root of the mean of X² and Y²."""
+    """Return rms and largest residuals at control and at checks; `plan` is the rms distance in plan."""
     return {
-        which: _of_residual_set(residuals)
+        which: of_differences(residuals)
         for which, residuals in (("control", fit.at_control), ("checks", fit.at_checks))
         if np.isfinite(residuals).any()
     }
 
 
-def _of_residual_set(residuals: Array) -> Document:
+def of_differences(residuals: Array) -> Document:
+    """Return rms and largest of differences ``(3, n)`` in X, Y and Z, nan left out."""
     rms, most = root_mean_square(residuals), largest(residuals)
     return {
         "points": int(np.isfinite(residuals).any(axis=0).sum()),
         "rms": {axis: _known(float(value)) for axis, value in zip("XYZ", rms, strict=True)},
-        "plan": _known(float(np.sqrt((rms[0] ** 2 + rms[1] ** 2) / 2.0))),
+        "plan": _known(float(np.hypot(rms[0], rms[1]))),
         "height": _known(float(rms[2])),
         "largest": {axis: _known(float(value)) for axis, value in zip("XYZ", most, strict=True)},
     }

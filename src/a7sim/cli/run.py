@@ -1,20 +1,25 @@
 """`a7sim run`: the operator works through a scenario."""
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 import msgspec
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from a7sim.cli import EXIT_DOES_NOT_FIT
 from a7sim.documents import as_json
 from a7sim.mistakes import Mistake
-from a7sim.scenario import Observer, Scenario, load_scenario
-from a7sim.session import Watcher, run
-from a7sim.session.tables import of_session
+from a7sim.scenario import Observer, load_scenario
+from a7sim.session import Watcher
+from a7sim.session.combinations import run_combinations
+from a7sim.session.tables import of_session, of_strips
+from a7sim.session.ways import run_all_ways
+from a7sim.standard_points import CASES
 
 _POINTS_A_MODEL = 130
 """About how many points an operator works on in a model; the bar only needs the order of it."""
@@ -24,6 +29,13 @@ _POINTS_A_MODEL = 130
 @click.argument("scenario")
 @click.option("--case", type=click.Choice(list("ABCDE"), case_sensitive=False), help="Standard points used (thesis).")
 @click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one.")
+@click.option(
+    "--strips",
+    type=click.Choice(["one", "all"]),
+    default="one",
+    show_default=True,
+    help="all: every case of one model with every case of the next, 25 strips of two models.",
+)
 @click.option("--seed", type=click.IntRange(min=0), help="Draws film, instrument and operator.")
 @click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario.")
 @click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error.")
@@ -35,6 +47,7 @@ def command(
     scenario: str,
     case: str | None,
     method: str | None,
+    strips: str,
     seed: int | None,
     settings: tuple[str, ...],
     perfect_observer: bool,
@@ -52,8 +65,13 @@ def command(
     if perfect_observer:
         loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
     chosen = loaded.seed if seed is None else seed
-    document = _run_watched(loaded, chosen, out, force, quiet or as_document or not sys.stderr.isatty())
-    _show(document, as_document, quiet)
+    if strips == "all" and case is not None:
+        raise Mistake("--strips all: expected no --case beside it, since every case is worked")
+    unwatched = quiet or as_document or not sys.stderr.isatty()
+    sessions = len(CASES) if strips == "all" else 1
+    with _watched(sessions * len(loaded.models), unwatched) as watcher:
+        document = (run_combinations if strips == "all" else run_all_ways)(loaded, chosen, out, watcher, force)
+    _show(document, as_document, quiet, of_strips if strips == "all" else of_session)
     if document["status"] != "complete":
         click.echo(f"a7sim: the operator gave up: {document['message']}", err=True)
         raise click.exceptions.Exit(EXIT_DOES_NOT_FIT)
@@ -69,19 +87,21 @@ def _overrides(settings: tuple[str, ...], options: dict[str, str | None]) -> dic
     return overrides | {key: f'"{value}"' for key, value in options.items() if value is not None}
 
 
-def _run_watched(scenario: Scenario, seed: int, out: Path | None, force: bool, unwatched: bool) -> dict[str, Any]:
+@contextmanager
+def _watched(models: int, unwatched: bool) -> Iterator[Watcher]:
     columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
-        task = progress.add_task("sitting down", total=_POINTS_A_MODEL * len(scenario.models))
-        watcher = Watcher(
+        task = progress.add_task("sitting down", total=_POINTS_A_MODEL * models)
+        yield Watcher(
             lambda activity: progress.update(task, description=activity),
             lambda: progress.advance(task),
         )
-        return run(scenario, seed, out, watcher, force)
 
 
-def _show(document: dict[str, Any], as_document: bool, quiet: bool) -> None:
+def _show(
+    document: dict[str, Any], as_document: bool, quiet: bool, tables: Callable[[dict[str, Any]], RenderableType]
+) -> None:
     if as_document:
         click.echo(as_json(document), nl=False)
     elif not quiet:
-        Console().print(of_session(document))
+        Console().print(tables(document))

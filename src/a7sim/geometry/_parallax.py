@@ -53,7 +53,7 @@ def _changes_of_y(r: Array, angles: Array) -> Array:
     about_omega = np.array([1.0, 0.0, 0.0])
 
     def turn(axis: Array) -> Array:
-        axis = axis.reshape((*axis.shape, *(1,) * (r.ndim - axis.ndim)))
+        axis = axis.reshape((3, *(1,) * (r.ndim - axis.ndim), *axis.shape[1:]))
         moved = np.cross(np.broadcast_to(axis, r.shape), r, axis=0)
         return np.asarray(moved[1] - slope * moved[2])
 

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.manual import NOT_VISIBLE
+from a7sim.operator.crew import Who
+from a7sim.operator.hands import Truths
 from a7sim.operator.seat import Seat, side
 
 MOST_LOOKS = 40
@@ -22,110 +23,124 @@ RUNNING_AWAY_UM = 150.0
 RUNNING_AWAY_LOOKS = 3
 """What grows in so many looks in a row, though it is turned down, runs away."""
 
-Errors = tuple[float, float]
-
 
 class Eyes:
-    """The eyes of a person in a seat, each looking at its own photograph."""
+    """The eyes of a crew, each looking at its own photograph."""
 
     def __init__(self, seat: Seat) -> None:
         self.seat = seat
-        self._prints: dict[int, dict[str, Array]] = {}
-        self._strayed = {1: np.zeros(2), 2: np.zeros(2)}
-        self._seen_from = np.zeros(2)
+        self.crew = seat.crew
+        self._prints: Mapping[int, Mapping[str, Array]] = {}
+        self._strayed = np.zeros((3, 2, seat.crew.sessions))
+        self._seen_from = np.zeros((2, seat.crew.sessions))
 
     def take_prints(self, prints: Mapping[int, Mapping[str, Array]]) -> None:
-        """Take up the paper prints by hand (1 left, 2 right): places ``(2,)`` of points in mm."""
-        self._prints = {hand: dict(each) for hand, each in prints.items()}
-        self._strayed = {1: np.zeros(2), 2: np.zeros(2)}
+        """Take up the paper prints by hand (1 left, 2 right): places ``(2, sessions)`` of points in mm."""
+        self._prints = prints
+        self._strayed[:] = 0.0
 
-    def bring_into_view(self, hand: int, point: str) -> None:
+    def bring_into_view(self, who: Who, hand: int, point: str) -> None:
         """Drive to where the print shows a point and look around until it is in the field of view."""
         seat = self.seat
-        print_place = self._prints[hand].get(point)
-        if print_place is None:
-            raise seat.person.give_up(f"point {point} is not pricked on the print of the {side(hand)} photograph")
-        seat.counters()
-        expected = seat.on_carrier(hand, print_place)
-        origin = seat.below(hand)
+        printed = self._prints[hand].get(point)
+        if printed is None:
+            self.crew.give_up(who, f"point {point} is not pricked on the print of the {side(hand)} photograph")
+            return
+        seat.counters(who)
+        from_below = seat.on_carrier(who, hand, printed[:, who]) + self._strayed[hand][:, who]
+        origin = seat.below(who, hand)
+        looking = np.arange(who.size)
         for around in _outward():
-            place = origin + (expected + self._strayed[hand] + around) * seat.z / seat.c
-            if seat.drive("DRIV:X {:.2f};Y {:.2f}".format(*place)) and self.seen(hand, point) is not None:
-                self._seen_from = place
+            places = origin + (from_below + around[:, None]) * seat.z[who] / seat.c
+            x, y = places[:, looking]
+            went = looking[seat.drive(who[looking], {"X": x, "Y": y})]
+            found = went[~np.isnan(self.seen(who[went], hand, point)[0])] if went.size else went
+            self._seen_from[:, who[found]] = places[:, found]
+            looking = np.setdiff1d(looking, found)
+            if not looking.size:
                 return
-        seat.see_that_nothing_was_refused(f"looking for point {point}")
-        raise seat.person.give_up(
+        seat.see_that_it_obeyed(who[looking], f"{seat.model.name}: looking for point {point}")
+        self.crew.give_up(
+            self.crew.still(who[looking]),
             f"{seat.model.name}: point {point} is nowhere near where the print shows it in the {side(hand)} eye, "
             f"not within {SEARCH_RINGS * SEARCH_STEP_MM:.0f} mm: wrong picture in the projector, or the base "
-            "setting does not belong to this model"
+            "setting does not belong to this model",
         )
 
-    def learn_straying(self, hand: int, point: str, readings: Array) -> None:
-        """Bear in mind how far from where the print showed it a point was found."""
+    def learn_straying(self, who: Who, hand: int, point: str, readings: Array) -> None:
+        """Bear in mind how far from where the print showed it a point was found, by its readings ``(2 or 3, m)``."""
         seat = self.seat
-        expected = seat.on_carrier(hand, self._prints[hand][point])
-        self._strayed[hand] = (readings[:2] - seat.below(hand)) * seat.c / seat.z - expected
+        expected = seat.on_carrier(who, hand, self._prints[hand][point][:, who])
+        self._strayed[hand][:, who] = (readings[:2] - seat.below(who, hand)) * seat.c / seat.z[who] - expected
 
-    def seen(self, hand: int, point: str) -> Array | None:
-        """Look: where the image stands from the mark ``(2,)`` in um, None when it is not in the field of view."""
-        person = self.seat.person
-        person.look()
-        seen = np.array(person.client.numbers(f'EYEP{hand}? "{point}"'))
-        return None if seen[0] == float(NOT_VISIBLE) else seen
+    def seen(self, who: Who, hand: int, point: str) -> Array:
+        """Look: where the image stands from the mark ``(2, m)`` in um, nan where it is not in the field of view."""
+        self.crew.spend(who, self.crew.observer.seconds_to_look)
+        return self.seat.hands.seen(who, hand, point)
 
-    def bisect(self, hand: int, point: str, error: Errors) -> None:
-        """Turn X and Y until the image seems to lie at the mark."""
+    def bisect(self, who: Who, hand: int, point: str, errors: Array) -> None:
+        """Turn X and Y until the image seems to lie at the mark; errors ``(2, sessions)`` in um."""
         seat = self.seat
-        scale = 1e-3 * seat.z / seat.c
-        watch = Watch()
+        watch = Watch(2, self.crew.sessions)
         for _ in range(MOST_LOOKS):
-            seen = self.seen(hand, point)
-            if seen is None or watch.running_away(seen).any():
-                raise self._ran_away(hand, point)
-            steps = (seen + error) * scale
-            if (np.abs(steps) < AT_REST_MM).all():
+            seen = self.seen(who, hand, point)
+            lost = np.isnan(seen[0]) | watch.running_away(who, seen).any(axis=0)
+            if lost.any():
+                self._ran_away(who[lost], hand, point)
+                who, seen = who[~lost], seen[:, ~lost]
+            steps = (seen + errors[:, who]) * (1e-3 * seat.z[who] / seat.c)
+            moving = ~(np.abs(steps) < AT_REST_MM).all(axis=0)
+            who = who[moving]
+            if not who.size:
                 return
-            seat.person.turn("WHE:X {:.3f};Y {:.3f}".format(*steps))
-        seat.see_that_nothing_was_refused(f"pointing at {point}")
-        raise seat.person.give_up(f"{seat.model.name}: point {point}: the mark cannot be brought to rest on the image")
+            seat.turn(who, steps[:, moving])
+        seat.see_that_it_obeyed(who, f"{seat.model.name}: pointing at {point}")
+        self.crew.give_up(
+            self.crew.still(who), f"{seat.model.name}: point {point}: the mark cannot be brought to rest on the image"
+        )
 
-    def _ran_away(self, hand: int, point: str) -> Exception:
-        """Go back to where the point was seen, try each wheel to find out what is wrong, and give up."""
+    def _ran_away(self, who: Who, hand: int, point: str) -> None:
+        for session in who:
+            one = np.array([session])
+            self.crew.give_up(
+                one,
+                f"{self.seat.model.name}: point {point} runs away from the mark in the {side(hand)} eye: "
+                f"{self._why_it_ran_away(one, hand, point)}",
+            )
+
+    def _why_it_ran_away(self, one: Who, hand: int, point: str) -> str:
+        """Go back to where the point was seen and try each wheel to find out what is wrong."""
         seat = self.seat
         reasons = []
         for axis, mirror, fitting in (
             (0, "left to right", "diapositive lever"),
             (1, "top to bottom", "Dove prisms"),
         ):
-            seat.drive("DRIV:X {:.2f};Y {:.2f}".format(*self._seen_from))
-            counters, seen = seat.counters(), self.seen(hand, point)
-            seat.person.turn(f"WHE:{'XY'[axis]} 1.00")
-            counters_then, seen_then = seat.counters(), self.seen(hand, point)
-            if counters_then[axis] < counters[axis]:
+            seat.drive(one, {"X": self._seen_from[0, one], "Y": self._seen_from[1, one]})
+            counters, seen = seat.counters(one), self.seen(one, hand, point)
+            seat.turn(one, np.eye(2)[:, [axis]])
+            counters_then, seen_then = seat.counters(one), self.seen(one, hand, point)
+            if counters_then[axis, 0] < counters[axis, 0]:
                 reasons.append(f"the {'XY'[axis]} wheel turns the wrong way (its collar)")
-            elif seen is not None and seen_then is not None and seen_then[axis] > seen[axis]:
+            elif seen_then[axis, 0] > seen[axis, 0]:
                 reasons.append(f"the picture is mirrored {mirror} (the {fitting})")
-        reason = " and ".join(reasons) or "it left the field of view"
-        return seat.person.give_up(
-            f"{seat.model.name}: point {point} runs away from the mark in the {side(hand)} eye: {reason}"
-        )
+        return " and ".join(reasons) or "it left the field of view"
 
 
 class Watch:
     """Watches whether displacements grow though they are being turned down."""
 
-    def __init__(self) -> None:
-        self._before: Array | None = None
-        self._times: Array | int = 0
+    def __init__(self, displacements: int, sessions: int) -> None:
+        self._before = np.full((displacements, sessions), np.inf)
+        self._times = np.zeros((displacements, sessions), dtype=int)
 
-    def running_away(self, seen: Array) -> Array:
-        """Return which of the displacements in um have grown in look after look."""
-        before, self._before = self._before, np.abs(seen)
-        if before is None:
-            return np.zeros(seen.shape, dtype=bool)
-        grown = (self._before > 1.4 * before) & (self._before > RUNNING_AWAY_UM)
-        self._times = np.where(grown, self._times + 1, 0)
-        return np.asarray(self._times >= RUNNING_AWAY_LOOKS)
+    def running_away(self, who: Who, seen: Array) -> Truths:
+        """Return which of the displacements ``(k, m)`` in um have grown in look after look."""
+        now = np.abs(seen)
+        grown = (now > 1.4 * self._before[:, who]) & (now > RUNNING_AWAY_UM)
+        self._before[:, who] = now
+        self._times[:, who] = np.where(grown, self._times[:, who] + 1, 0)
+        return np.asarray(self._times[:, who] >= RUNNING_AWAY_LOOKS)
 
 
 def _outward() -> Iterator[Array]:

@@ -1,16 +1,15 @@
 """Both eyes: setting the floating mark on a point, and clearing its y-parallax with an element."""
 
-import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.manual import LEAST_COUNT, NOT_VISIBLE
-from a7sim.operator.bench import CannotFuse
-from a7sim.operator.eyes import AT_REST_MM, MOST_LOOKS, Errors, Eyes, Watch
-from a7sim.operator.seat import header
+from a7sim.manual import LEAST_COUNT
+from a7sim.operator.crew import Who
+from a7sim.operator.eyes import AT_REST_MM, MOST_LOOKS, Eyes, Watch
+from a7sim.operator.hands import Truths
 
 CONTENT = 0.45
 """With this many counts of the element left, just below a half, no other count can be nearer; beyond it the next is
@@ -24,13 +23,22 @@ RISES_TO_FUSE_MM = (0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0)
 
 
 @dataclass(frozen=True)
+class Judgement:
+    """By how much a crew misjudges where the mark stands: in plan ``(2, sessions)`` and in x-parallax, um."""
+
+    plan: Array
+    height: Array
+
+
+@dataclass(frozen=True)
 class Clearing:
-    """An element that is turned on vanishing y-parallax, and what one unit of its counter adds to the parallax, mm."""
+    """An element that is turned on vanishing y-parallax."""
 
     element: str
-    gain: float
-    error: float = 0.0
-    """um at photo scale: by how much the person misjudges the parallax."""
+    gain: Array
+    """What one unit of its counter adds to the parallax ``(sessions,)``, mm."""
+    error: Array
+    """By how much the parallax is misjudged ``(sessions,)``, um at photo scale."""
 
 
 class FloatingMark:
@@ -39,90 +47,139 @@ class FloatingMark:
     def __init__(self, eyes: Eyes) -> None:
         self.eyes = eyes
         self.seat = eyes.seat
+        self.crew = eyes.crew
 
-    def fuse(self, point: str, plan_error: Errors, height_error: float) -> None:
-        """Set the mark on a point, first with the left eye, then with both. Raises CannotFuse."""
-        seat, eyes = self.seat, self.eyes
-        eyes.bring_into_view(1, point)
-        height = -seat.z
+    def fuse(self, who: Who, point: str, judgement: Judgement) -> Who:
+        """Set the mark on a point, first with the left eye, then with both; return those who could fuse it."""
+        seat, eyes, crew = self.seat, self.eyes, self.crew
+        eyes.bring_into_view(who, 1, point)
+        who = crew.still(who)
+        height = np.zeros(crew.sessions)
+        height[who] = -seat.z[who]
+        exactly = np.zeros((2, crew.sessions))
+        fused: list[Who] = []
         for rise in RISES_TO_FUSE_MM:
+            there = who
             if rise:
-                if not seat.drive_z_to(height + rise):
-                    seat.person.client.errors()
+                there = who[seat.drive_z_to(who, height[who] + rise)]
+                seat.hands.refused(who)
+                if not there.size:
                     continue
-                eyes.bring_into_view(1, point)
-            eyes.bisect(1, point, (0.0, 0.0))
-            if eyes.seen(2, point) is not None:
-                self.settle(point, plan_error, height_error)
-                return
-        seat.drive_z_to(height)
-        raise CannotFuse(point)
+                eyes.bring_into_view(there, 1, point)
+                there = crew.still(there)
+            eyes.bisect(there, 1, point, exactly)
+            there = crew.still(there)
+            seen = there[~np.isnan(eyes.seen(there, 2, point)[0])]
+            if seen.size:
+                fused.append(self.settle(seen, point, judgement))
+            who = np.setdiff1d(crew.still(who), seen)
+            if not who.size:
+                return _together(fused)
+        seat.drive_z_to(who, height[who])
+        return _together(fused)
 
-    def settle(self, point: str, plan_error: Errors, height_error: float, clearing: Clearing | None = None) -> None:
-        """Turn X, Y, Z, and an element where one is to clear the y-parallax, until the mark seems to stand there."""
-        seat = self.seat
-        now = seat.elements([clearing.element])[clearing.element] if clearing else 0.0
-        watch = Watch()
-        tried: dict[float, float] = {}
+    def settle(self, who: Who, point: str, judgement: Judgement, clearing: Clearing | None = None) -> Who:
+        """Turn X, Y, Z, and an element where one is to clear the y-parallax, until the mark seems to stand there.
+
+        Return those for whom it does; the others have given up, lost the point or come to the element's end.
+        """
+        seat, crew = self.seat, self.crew
+        counts = _Counts(self, who, clearing) if clearing is not None else None
+        watch = Watch(4, crew.sessions)
+        settled: list[Who] = []
         for _ in range(MOST_LOOKS):
-            seen = self.looked(point)
-            self._see_that_it_fuses(point, watch.running_away(seen), clearing)
-            x, y, _ = seat.place(seat.counters())
-            scale = 1e-3 * seat.z / seat.c
-            rise = float(seen[2] + height_error) * scale * seat.z / abs(seat.bx)
-            rise = min(max(rise, -LONGEST_RISE_MM), LONGEST_RISE_MM)
-            along_the_rays = -rise / seat.z * np.array([x - seat.bx / 2.0, y])
-            dx, dy = (seen[:2] + plan_error) * scale + along_the_rays
-            at_rest = max(abs(dx), abs(dy), abs(rise)) < AT_REST_MM
-            line = f"WHE:X {dx:.3f};Y {dy:.3f};Z {rise * seat.units_per_mm:.3f}"
-            if clearing is not None:
-                step = -float(seen[3] + clearing.error) * scale / clearing.gain
-                tried[now] = abs(step)
-                following = self._next_count(clearing.element, now, step, tried)
-                if following != now:
-                    at_rest = False
-                    line += f";:{header(clearing.element)} {following:.2f}"
-                    now = following
-            if at_rest:
-                return
-            seat.person.turn(line)
-        seat.see_that_nothing_was_refused(f"setting the mark on {point}")
-        raise seat.person.give_up(
-            f"{seat.model.name}: point {point} cannot be brought to rest under the mark stereoscopically"
+            seen = self.looked(who, point)
+            lost = np.isnan(seen).any(axis=0)
+            self._see_that_it_fuses(who, point, watch.running_away(who, np.nan_to_num(seen)), clearing)
+            keep = ~lost & crew.goes_on(who)
+            who, seen = who[keep], seen[:, keep]
+            if not who.size:
+                return _together(settled)
+            x, y, _ = seat.place(who, seat.counters(who))
+            scale = 1e-3 * seat.z[who] / seat.c
+            rise = (seen[2] + judgement.height[who]) * scale * seat.z[who] / np.abs(seat.bx(who))
+            rise = np.clip(rise, -LONGEST_RISE_MM, LONGEST_RISE_MM)
+            along_the_rays = -rise / seat.z[who] * np.array([x - seat.bx(who) / 2.0, y])
+            steps = (seen[:2] + judgement.plan[:, who]) * scale + along_the_rays
+            moving = np.maximum(np.abs(steps).max(axis=0), np.abs(rise)) >= AT_REST_MM
+            wheels = np.concatenate([steps, [rise * seat.units_per_mm]])
+            following: Array | None = None
+            if counts is not None:
+                following, at_end = counts.after(who, seen[3] * scale, scale)
+                moving |= ~np.isnan(following)
+                on = ~at_end
+                who, wheels, following, moving = who[on], wheels[:, on], following[on], moving[on]
+            settled.append(who[~moving])
+            who = who[moving]
+            if not who.size:
+                return _together(settled)
+            seat.turn(
+                who,
+                wheels[:, moving],
+                clearing.element if clearing else None,
+                following[moving] if following is not None else None,
+            )
+        seat.see_that_it_obeyed(who, f"{seat.model.name}: setting the mark on {point}")
+        crew.give_up(
+            crew.still(who),
+            f"{seat.model.name}: point {point} cannot be brought to rest under the mark stereoscopically",
         )
+        return _together(settled)
 
-    def looked(self, point: str) -> Array:
-        """Return what both eyes see: x and y from the mark (mean of both), px, py, in um. Raises CannotFuse."""
-        person = self.seat.person
-        person.look()
-        lx, ly, rx, ry = person.client.numbers(f'EYEP1? "{point}";:EYEP2? "{point}"')
-        if float(NOT_VISIBLE) in (lx, rx):
-            raise CannotFuse(point)
+    def looked(self, who: Who, point: str) -> Array:
+        """Return what both eyes see ``(4, m)``: x and y from the mark (mean of both), px, py, um; nan if lost."""
+        self.crew.spend(who, self.crew.observer.seconds_to_look)
+        lx, ly, rx, ry = self.seat.hands.seen_by_both(who, point)
         return np.array([(lx + rx) / 2.0, (ly + ry) / 2.0, lx - rx, ly - ry])
 
-    def _next_count(self, name: str, now: float, step: float, tried: Mapping[float, float]) -> float:
-        """Return the count of an element to go to: here if content, else the nearest not tried, else the best tried."""
-        if abs(step) < CONTENT * LEAST_COUNT:
-            return now
-        wanted = round(now + math.copysign(max(abs(step), LEAST_COUNT), step), 2)
-        element = self.seat.manual.elements[name]
-        if element.endless:
-            wanted = round(wanted % element.high, 2)
-        elif not element.low <= wanted <= element.high:
-            raise CannotFuse(name)
-        if wanted in tried and abs(step) < 1.5 * LEAST_COUNT:
-            return now if tried[now] <= tried[wanted] else wanted
-        return wanted
+    def _see_that_it_fuses(self, who: Who, point: str, running_away: Truths, clearing: Clearing | None) -> None:
+        model = self.seat.model.name
+        self.crew.give_up(
+            who[running_away[2]],
+            f"{model}: point {point}: the x-parallax grows when the mark is moved to clear it, the "
+            "relief is inside out: the eyes see each other's pictures (triangulation lever, base)",
+        )
+        if clearing is not None:
+            self.crew.give_up(
+                self.crew.still(who[running_away[3]]),
+                f"{model}: point {point}: the y-parallax grows when {clearing.element} is turned to clear "
+                "it: the picture is mirrored or the base is set for the other arrangement",
+            )
 
-    def _see_that_it_fuses(self, point: str, running_away: Array, clearing: Clearing | None) -> None:
-        seat = self.seat
-        if running_away[2]:
-            raise seat.person.give_up(
-                f"{seat.model.name}: point {point}: the x-parallax grows when the mark is moved to clear it, the "
-                "relief is inside out: the eyes see each other's pictures (triangulation lever, base)"
-            )
-        if clearing and running_away[3]:
-            raise seat.person.give_up(
-                f"{seat.model.name}: point {point}: the y-parallax grows when {clearing.element} is turned to clear "
-                "it: the picture is mirrored or the base is set for the other arrangement"
-            )
+
+def _together(parts: Sequence[Who]) -> Who:
+    return np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *parts]))
+
+
+class _Counts:
+    """The counts of an element that is being turned: where it stands, and what was left where it stood before."""
+
+    def __init__(self, mark: FloatingMark, who: Who, clearing: Clearing) -> None:
+        sessions = mark.crew.sessions
+        self._clearing = clearing
+        self._element = mark.seat.manual.elements[clearing.element]
+        self._now = np.zeros(sessions)
+        self._now[who] = mark.seat.elements(who, [clearing.element])[clearing.element]
+        self._before = np.full(sessions, np.nan)
+        self._left_before = np.full(sessions, np.nan)
+
+    def after(self, who: Who, parallax: Array, scale: Array) -> tuple[Array, Truths]:
+        """Return the counts ``(m,)`` to go to, nan where content with the present, and where these are out of range.
+
+        One goes to the nearest count; where that is the one just left, the better of the two stands.
+        """
+        step = -(parallax + self._clearing.error[who] * scale) / self._clearing.gain[who]
+        now, left = self._now[who], np.abs(step)
+        wanted = np.round(now + np.copysign(np.maximum(left, LEAST_COUNT), step), 2)
+        if self._element.endless:
+            wanted = np.round(wanted % self._element.high, 2)
+            at_end = np.zeros(who.size, dtype=bool)
+        else:
+            at_end = (wanted < self._element.low) | (wanted > self._element.high)
+        content = left < CONTENT * LEAST_COUNT
+        just_left = (wanted == self._before[who]) & (left < 1.5 * LEAST_COUNT)
+        content |= just_left & (left <= self._left_before[who])
+        moving = ~content & ~at_end
+        self._before[who[moving]], self._left_before[who[moving]] = now[moving], left[moving]
+        self._now[who[moving]] = wanted[moving]
+        return np.where(content, np.nan, wanted), at_end & ~content

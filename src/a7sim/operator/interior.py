@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from a7sim.geometry import GON, Array
-from a7sim.operator.person import Person
+from a7sim.operator.bench import Bench
+from a7sim.operator.crew import Who
 from a7sim.reduction import PictureLie, Undetermined, picture_lie
 from a7sim.scenario import Camera
 
@@ -30,74 +32,117 @@ class InteriorOrientation:
     principal_distance: float
 
 
-def interior_orientation(person: Person, projector: int, photograph: str, certificate: Camera) -> InteriorOrientation:
+@dataclass(frozen=True)
+class InteriorOrientations:
+    """The interior orientations ``(sessions,)`` of a photograph in every session."""
+
+    photograph: str
+    rounds: npt.NDArray[np.intp]
+    residual_mm: Array
+    film_scale: Array
+    principal_distance: Array
+
+    def of(self, session: int) -> InteriorOrientation:
+        """Return one session's interior orientation."""
+        return InteriorOrientation(
+            self.photograph,
+            int(self.rounds[session]),
+            float(self.residual_mm[session]),
+            float(self.film_scale[session]),
+            float(self.principal_distance[session]),
+        )
+
+
+def interior_orientation(
+    bench: Bench, who: Who, projector: int, photograph: str, certificate: Camera
+) -> InteriorOrientations:
     """Mount a photograph in a projector and centre it on the calibrated principal point.
 
-    Uniform film shrinkage, seen as a change of scale at the fiducials, goes into the principal distance.
-    Raises DoesNotFit when the picture cannot be centred.
+    Uniform film shrinkage, seen as a change of scale at the fiducials, goes into the principal distance. Those who
+    cannot centre the picture give up.
     """
-    client = person.client
-    person.clock.spend(person.observer.seconds_to_mount)
-    person.set(f'PHOT{projector}:LOAD "{photograph}"')
-    (lies_there,) = client.fields(f"PHOT{projector}?")
-    if lies_there != photograph:
-        raise person.give_up(
-            f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it"
-        )
+    crew, hands = bench.crew, bench.hands
+    _mount(bench, who, projector, photograph)
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
+    wanted = -np.array(certificate.principal_point)[:, None]
+    found = InteriorOrientations(photograph, np.zeros(crew.sessions, dtype=np.intp), *np.zeros((3, crew.sessions)))
+    centring = crew.still(who)
     for round_ in range(1, MOST_ROUNDS + 1):
-        names, displacements = _fiducials_seen(person, projector)
+        names, displacements = _fiducials_seen(bench, centring, projector)
         places = np.array([marks[name] for name in names]).T
-        if np.abs(displacements).max() > MISPLACED_MM:
-            how = "upside down" if np.abs(displacements + 2.0 * places).max() < MISPLACED_MM else "beside its marks"
-            raise person.give_up(
-                f"picture {photograph} lies {how} in projector {projector}: its fiducials stand up to "
-                f"{np.abs(displacements).max():.0f} mm from the collimating marks of their names"
-            )
+        right = _rightly_laid(bench, centring, projector, photograph, displacements, places)
+        centring, displacements = centring[right], displacements[:, :, right]
         try:
             lie = picture_lie(displacements, places)
         except Undetermined as undetermined:
-            raise person.give_up(f"the fiducials of {photograph} do not tell how it lies: {undetermined}") from None
-        wanted = -np.array(certificate.principal_point)
-        off = np.array([lie.dx - wanted[0], lie.dy - wanted[1]])
-        if np.abs(off).max() <= CENTRED_MM and abs(lie.turn) * np.abs(places).max() <= CENTRED_MM:
-            return _set_principal_distance(
-                person, projector, photograph, certificate, round_, lie, displacements, places
-            )
-        now = client.numbers(f"PHOT{projector}:CENT?")
-        turn = lie.turn / GON
-        person.set(
-            f"PHOT{projector}:CENT {now[0] - off[0]:.3f},{now[1] - off[1]:.3f},{now[2] - turn:.3f}",
+            crew.give_up(centring, f"the fiducials of {photograph} do not tell how it lies: {undetermined}")
+            return found
+        off = np.array([lie.dx, lie.dy]) - wanted
+        there = (np.abs(off).max(axis=0) <= CENTRED_MM) & (np.abs(lie.turn) * np.abs(places).max() <= CENTRED_MM)
+        centred = centring[there]
+        found.rounds[centred] = round_
+        found.film_scale[centred] = lie.scale[there]
+        found.residual_mm[centred] = _unexplained(displacements, places, lie)[there]
+        off, turn, centring = off[:, ~there], lie.turn[~there] / GON, centring[~there]
+        if not centring.size:
+            break
+        now = hands.centring(centring, projector)
+        bench.seat.spend_setting(centring)
+        hands.centre(centring, projector, np.round(now - [*off, turn], 3))
+        bench.seat.see_that_it_obeyed(centring, f"centring {photograph}")
+        centring = crew.still(centring)
+    crew.give_up(centring, f"picture {photograph} cannot be centred in projector {projector}")
+    _set_principal_distance(bench, crew.still(who), projector, photograph, certificate, found)
+    return found
+
+
+def _mount(bench: Bench, who: Who, projector: int, photograph: str) -> None:
+    crew = bench.crew
+    crew.spend(who, crew.observer.seconds_to_mount)
+    bench.seat.spend_setting(who)
+    bench.hands.load(who, projector, photograph)
+    bench.seat.see_that_it_obeyed(who, f"mounting {photograph}")
+    lies_there = bench.hands.loaded(who, projector)
+    if lies_there != photograph:
+        crew.give_up(who, f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it")
+
+
+def _fiducials_seen(bench: Bench, who: Who, projector: int) -> tuple[list[str], Array]:
+    names, exact = bench.hands.fiducials(who, projector)
+    crew = bench.crew
+    crew.spend(who, len(names) * crew.observer.seconds_to_read)
+    return names, exact + 1e-3 * crew.errors(who, crew.observer.fiducial_um, exact.shape[:2])[:, :, who]
+
+
+def _rightly_laid(
+    bench: Bench, who: Who, projector: int, photograph: str, displacements: Array, places: Array
+) -> npt.NDArray[np.bool_]:
+    """Return whose fiducials stand near the collimating marks of their names ``(m,)``; the others give up."""
+    furthest = np.abs(displacements).max(axis=(0, 1))
+    upside_down = np.abs(displacements + 2.0 * places[:, :, None]).max(axis=(0, 1)) < MISPLACED_MM
+    misplaced = furthest > MISPLACED_MM
+    for session, distance, turned in zip(who[misplaced], furthest[misplaced], upside_down[misplaced], strict=True):
+        how = "upside down" if turned else "beside its marks"
+        bench.crew.give_up(
+            np.array([session]),
+            f"picture {photograph} lies {how} in projector {projector}: its fiducials stand up to "
+            f"{distance:.0f} mm from the collimating marks of their names",
         )
-    raise person.give_up(f"picture {photograph} cannot be centred in projector {projector}")
+    return np.asarray(~misplaced)
 
 
-def _fiducials_seen(person: Person, projector: int) -> tuple[list[str], Array]:
-    fields = person.client.fields(f"PHOT{projector}:FID?")
-    person.clock.spend(len(fields) / 3 * person.observer.seconds_to_read)
-    names = fields[0::3]
-    exact = np.array([fields[1::3], fields[2::3]], dtype=float)
-    return names, exact + 1e-3 * person.errors(person.observer.fiducial_um, exact.shape)
+def _unexplained(displacements: Array, places: Array, lie: PictureLie) -> Array:
+    x, y = places[:, :, None]
+    explained = np.array([lie.dx - lie.turn * y + lie.scale * x, lie.dy + lie.turn * x + lie.scale * y])
+    return np.asarray(np.sqrt(((displacements - explained) ** 2).mean(axis=(0, 1))))
 
 
 def _set_principal_distance(
-    person: Person,
-    projector: int,
-    photograph: str,
-    certificate: Camera,
-    rounds: int,
-    lie: PictureLie,
-    displacements: Array,
-    places: Array,
-) -> InteriorOrientation:
-    explained = np.array(
-        [
-            lie.dx - lie.turn * places[1] + lie.scale * places[0],
-            lie.dy + lie.turn * places[0] + lie.scale * places[1],
-        ]
-    )
-    residual = float(np.sqrt(((displacements - explained) ** 2).mean()))
-    c = round(certificate.c * (1.0 + lie.scale), 2)
-    person.set(f"PROJ{projector}:PDIS {c:.2f}")
-    person.book.enter(person.clock.now, "", f"{photograph} centred, c{projector}", f"{c:.2f}")
-    return InteriorOrientation(photograph, rounds, residual, lie.scale, c)
+    bench: Bench, who: Who, projector: int, photograph: str, certificate: Camera, found: InteriorOrientations
+) -> None:
+    c = np.round(certificate.c * (1.0 + found.film_scale[who]), 2)
+    found.principal_distance[who] = c
+    bench.seat.spend_setting(who)
+    bench.hands.set_element(who, f"c{projector}", c)
+    bench.seat.see_that_it_obeyed(who, f"setting c{projector}")
+    bench.crew.enter(who, "", f"{photograph} centred, c{projector}", c)

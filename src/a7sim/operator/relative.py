@@ -4,11 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from a7sim.geometry import GON, Array
-from a7sim.manual import A7
-from a7sim.operator.bench import Bench, CannotFuse, given_up, wrapped
+from a7sim.operator.bench import Bench
+from a7sim.operator.crew import Who
 from a7sim.operator.job import ModelJob
+from a7sim.operator.seat import wrapped
 from a7sim.reduction import Stand, Undetermined, element_corrections
 
 MOST_ROUNDS = 12
@@ -24,7 +26,7 @@ ALL_ELEMENTS = (*(f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz",
 
 @dataclass(frozen=True)
 class Round:
-    """One round: the parallaxes at the points of the case, their mean, and their rms about it, mm."""
+    """One round of a session: the parallaxes at the points of the case, their mean, and their rms about it, mm."""
 
     settings: Mapping[str, float]
     parallaxes: Mapping[str, float]
@@ -36,7 +38,7 @@ class Round:
 
 @dataclass(frozen=True)
 class RelativeOrientation:
-    """The orientation as set: method, case, rounds, elements as the counters show them, residuals by position."""
+    """The orientation of a session as set: rounds, elements as the counters show them, residuals by position."""
 
     method: str
     case: str
@@ -52,6 +54,63 @@ class RelativeOrientation:
         return float(np.sqrt(np.mean(np.square(list(self.residuals.values())))))
 
 
+@dataclass(frozen=True)
+class Rounds:
+    """A round of those sessions that measured in it; arrays have all sessions as their last axis."""
+
+    who: Who
+    settings: Mapping[str, Array]
+    parallaxes: Mapping[str, Array]
+    mean: Array
+    rms: Array
+    corrected: Who
+    sigmas: Mapping[str, Array]
+
+    def of(self, session: int) -> Round:
+        """Return one session's round."""
+        return Round(
+            _picked(self.settings, session),
+            _picked(self.parallaxes, session),
+            float(self.mean[session]),
+            float(self.rms[session]),
+            _picked(self.sigmas, session) if session in self.corrected else {},
+        )
+
+
+@dataclass(frozen=True)
+class RelativeOrientations:
+    """The orientations of a crew; arrays have all sessions as their last axis."""
+
+    method: str
+    case: str
+    rounds: Sequence[Rounds]
+    rough_rounds: npt.NDArray[np.intp]
+    elements: Mapping[str, Array]
+    residuals: Mapping[str, Array]
+    places: Mapping[str, Array]
+
+    @property
+    def rms(self) -> Array:
+        """Rms ``(sessions,)`` in mm of the residual parallaxes at all standard points."""
+        return np.asarray(np.sqrt(np.mean(np.square(list(self.residuals.values())), axis=0)))
+
+    def of(self, session: int) -> RelativeOrientation:
+        """Return one session's orientation."""
+        return RelativeOrientation(
+            self.method,
+            self.case,
+            [each.of(session) for each in self.rounds if session in each.who],
+            int(self.rough_rounds[session]),
+            _picked(self.elements, session),
+            _picked(self.residuals, session),
+            {label: tuple(place[:, session].tolist()) for label, place in self.places.items()},
+        )
+
+
+def _picked(values: Mapping[str, Array], session: int) -> dict[str, float]:
+    return {name: float(each[session]) for name, each in values.items()}
+
+
 def unknowns_of(method: str, model: ModelJob) -> tuple[str, ...]:
     """Return the elements that a method turns.
 
@@ -65,117 +124,202 @@ def unknowns_of(method: str, model: ModelJob) -> tuple[str, ...]:
 
 
 def relative_orientation(
-    bench: Bench, model: ModelJob, method: str, case: str, readings: int, base: float, tolerated_rms: float
-) -> RelativeOrientation:
+    bench: Bench, who: Who, model: ModelJob, method: str, case: str, readings: int, base: float, tolerated_rms: float
+) -> RelativeOrientations:
     """Clear the y-parallaxes of a model in rounds of measuring, computing and setting.
 
     Once the parallaxes of a round are no longer gross their mean is taken off; in the dependent method, where by is
     itself unknown, only to see whether they fall. When they no longer do, the best settings stand and their
-    mean goes on by' (dependent: on the by that was turned). Raises DoesNotFit when the residual parallaxes at all
-    standard points then have a larger rms than tolerated, in mm.
+    mean goes on by' (dependent: on the by that was turned). Those whose residual parallaxes at all standard points
+    then have a larger rms than tolerated, in mm, give up.
     """
+    crew, seat = bench.crew, bench.seat
     labels = model.points_of_case(case)
     unknowns = unknowns_of(method, model)
     points = [model.standard_points[label] for label in labels]
-    rounds: list[Round] = []
-    rough_rounds = best = 0
-    while len(rounds) < MOST_ROUNDS:
-        settings = bench.elements(unknowns)
-        bench.begin_round(len(rounds) + 1)
-        try:
-            seen = bench.parallaxes(points, readings)
-        except CannotFuse as apart:
-            rough_rounds += 1
-            _bring_together(bench, model, points, unknowns, base, str(apart), rough_rounds)
-            continue
-        gross = float(np.sqrt(np.mean(seen.p**2))) > GROSS_MM
-        mean = 0.0 if gross else float(seen.p.mean())
-        rms = float(np.sqrt(np.mean((seen.p - mean) ** 2)))
-        rounds.append(Round(settings, dict(zip(labels, seen.p.tolist(), strict=True)), mean, rms, {}))
-        falling = len(rounds) == 1 or rms < STILL_FALLING * rounds[best].rms
-        if len(rounds) == 1 or rms < rounds[best].rms:
-            best = len(rounds) - 1
-        if not falling:
-            break
+    rounds: list[Rounds] = []
+    done, rough_rounds = np.zeros((2, crew.sessions), dtype=np.intp)
+    best = _Best(unknowns, crew.sessions)
+    measuring = who
+    while measuring.size:
+        settings = _spread(seat.elements(measuring, unknowns), measuring, crew.sessions)
+        bench.begin_round(measuring, int(done[measuring].max()) + 1)
+        seen = bench.parallaxes(measuring, points, readings)
+        measuring = crew.still(measuring)
+        apart = measuring[seen.apart[measuring] != None]  # noqa: E711 - elementwise
+        together = np.setdiff1d(measuring, apart)
+        rough_rounds[apart] += 1
+        _bring_together(bench, apart, model, points, unknowns, base, seen.apart, rough_rounds)
+        done[together] += 1
+        mean, rms = _mean_and_rms(seen.p, together)
+        falling = together[rms[together] < STILL_FALLING * best.rms[together]]
+        best.see(together, settings, mean, rms)
         to_clear = seen.p - mean if method == "independent" else seen.p
-        corrections, sigmas = _corrections(bench, model, seen.places, to_clear, unknowns, base)
-        rounds[-1] = Round(settings, rounds[-1].parallaxes, mean, rms, sigmas)
-        bench.set_elements({name: settings[name] + corrections[name] for name in unknowns})
-    _restore(bench, rounds[best].settings)
-    _set_mean_on_by(bench, model, "by1" if method == "independent" else unknowns[3], rounds[best].mean)
-    bench.begin_round(len(rounds) + 1)
+        corrections, sigmas = _corrections(bench, falling, model, seen.places, to_clear, unknowns, base)
+        falling = crew.still(falling)
+        rounds.append(Rounds(together, settings, dict(zip(labels, seen.p, strict=True)), mean, rms, falling, sigmas))
+        if falling.size:
+            seat.set_elements(falling, {n: (settings[n] + corrections[n])[falling] for n in unknowns})
+        measuring = crew.still(np.sort(np.concatenate([falling, apart])))
+        measuring = measuring[done[measuring] < MOST_ROUNDS]
+    who = crew.still(who)
+    _restore(bench, who, best)
+    _set_mean_on_by(bench, who, model, "by1" if method == "independent" else unknowns[3], best.mean)
+    bench.begin_round(who, int(done[who].max(initial=0)) + 1)
+    return _assessed(bench, who, model, method, case, readings, tolerated_rms, rounds, rough_rounds)
+
+
+class _Best:
+    """The best settings so far of every session."""
+
+    def __init__(self, unknowns: Sequence[str], sessions: int) -> None:
+        self.settings = {name: np.zeros(sessions) for name in unknowns}
+        self.mean = np.zeros(sessions)
+        self.rms = np.full(sessions, np.inf)
+
+    def see(self, who: Who, settings: Mapping[str, Array], mean: Array, rms: Array) -> None:
+        """Keep the settings where the rms is smaller than any before."""
+        better = who[rms[who] < self.rms[who]]
+        self.mean[better], self.rms[better] = mean[better], rms[better]
+        for name, kept in self.settings.items():
+            kept[better] = settings[name][better]
+
+
+def _mean_and_rms(p: Array, who: Who) -> tuple[Array, Array]:
+    """Return the mean parallax, none while they are gross, and the rms about it ``(sessions,)``."""
+    gross = np.sqrt(np.mean(p**2, axis=0)) > GROSS_MM
+    mean = np.where(gross, 0.0, p.mean(axis=0))
+    rms = np.full(p.shape[-1], np.nan)
+    rms[who] = np.sqrt(np.mean((p - mean) ** 2, axis=0))[who]
+    return mean, rms
+
+
+def _assessed(
+    bench: Bench,
+    who: Who,
+    model: ModelJob,
+    method: str,
+    case: str,
+    readings: int,
+    tolerated_rms: float,
+    rounds: Sequence[Rounds],
+    rough_rounds: npt.NDArray[np.intp],
+) -> RelativeOrientations:
+    """Measure what is left at all standard points; those for whom it is too much give up."""
+    crew = bench.crew
     everywhere = model.all_positions()
-    left = bench.parallaxes([model.standard_points[label] for label in everywhere], readings)
-    places = dict(zip(everywhere, zip(*left.places.tolist(), strict=True), strict=True))
-    residuals = dict(zip(everywhere, left.p.tolist(), strict=True))
-    orientation = RelativeOrientation(
-        method, case, rounds, rough_rounds, bench.elements(ALL_ELEMENTS), residuals, places
+    names = [model.standard_points[label] for label in everywhere]
+    left = bench.parallaxes(who, names, readings)
+    who = crew.still(who)
+    apart = who[left.apart[who] != None]  # noqa: E711 - elementwise
+    crew.give_up(apart, lambda session: f"{model.name}: the images of {left.apart[session]} cannot be fused any more")
+    who = crew.still(who)
+    orientations = RelativeOrientations(
+        method,
+        case,
+        rounds,
+        rough_rounds,
+        _spread(bench.seat.elements(who, ALL_ELEMENTS), who, crew.sessions),
+        dict(zip(everywhere, left.p, strict=True)),
+        dict(zip(everywhere, np.moveaxis(left.places, 1, 0), strict=True)),
     )
-    if orientation.rms > tolerated_rms:
-        worst = max(residuals, key=lambda label: abs(residuals[label]))
-        raise given_up(
-            bench,
-            f"{model.name}: y-parallaxes of {orientation.rms:.3f} mm rms remain, {tolerated_rms:.3f} tolerated; the "
-            f"largest is {residuals[worst]:+.3f} at point {model.standard_points[worst]}: a point is mistaken, or the "
-            "photographs do not belong together",
-        )
-    return orientation
+    rms, worst = orientations.rms, np.abs(left.p).argmax(axis=0)
+    crew.give_up(
+        who[rms[who] > tolerated_rms],
+        lambda session: (
+            f"{model.name}: y-parallaxes of {rms[session]:.3f} mm rms remain, {tolerated_rms:.3f} tolerated; the "
+            f"largest is {left.p[worst[session], session]:+.3f} at point {names[worst[session]]}: a point is mistaken, "
+            "or the photographs do not belong together"
+        ),
+    )
+    return orientations
 
 
-def _set_mean_on_by(bench: Bench, model: ModelJob, by: str, mean: float) -> None:
-    sense = 1.0 if model.hand_of(int(by[-1])) == 1 else -1.0
-    bench.set_elements({by: bench.elements([by])[by] + sense * mean})
+def _spread(values: Mapping[str, Array], who: Who, sessions: int) -> dict[str, Array]:
+    """Return values ``(m,)`` of those who act among all sessions."""
+    spread = {name: np.zeros(sessions) for name in values}
+    for name, each in values.items():
+        spread[name][who] = each
+    return spread
 
 
-def _restore(bench: Bench, settings: Mapping[str, float]) -> None:
-    now = bench.elements(list(settings))
-    changed = {name: value for name, value in settings.items() if now[name] != value}
-    if changed:
-        bench.set_elements(changed)
+def _set_mean_on_by(bench: Bench, who: Who, model: ModelJob, by: str, mean: Array) -> None:
+    if who.size:
+        sense = 1.0 if model.hand_of(int(by[-1])) == 1 else -1.0
+        bench.seat.set_elements(who, {by: bench.seat.elements(who, [by])[by] + sense * mean[who]})
+
+
+def _restore(bench: Bench, who: Who, best: _Best) -> None:
+    for name, wanted in best.settings.items():
+        changed = who[bench.seat.elements(who, [name])[name] != wanted[who]] if who.size else who
+        if changed.size:
+            bench.seat.set_elements(changed, {name: wanted[changed]})
 
 
 def _bring_together(
     bench: Bench,
+    who: Who,
     model: ModelJob,
     points: Sequence[str],
     unknowns: Sequence[str],
     base: float,
-    apart: str,
-    rough_round: int,
+    apart: npt.NDArray[np.object_],
+    rough_rounds: npt.NDArray[np.intp],
 ) -> None:
     """Orient roughly, where images are too far apart for by, from the Y readings of each eye alone."""
-    if rough_round > MOST_ROUGH_ROUNDS:
-        raise given_up(bench, f"{model.name}: the images of {apart} stay too far apart to be fused")
-    bench.remark(f"{model.name}: the images of {apart} are too far apart for by: rough orientation, each eye alone")
-    level = bench.level_now
-    left, right = (bench.in_frame(bench.point_with(hand, points, level), level) for hand in (1, 2))
-    where_they_meet = base / (left[0] - right[0] + base)
-    parallaxes = (left[1] - right[1]) * where_they_meet
-    settings = bench.elements(unknowns)
-    corrections, _ = _corrections(bench, model, left * where_they_meet, parallaxes, unknowns, base)
-    bench.set_elements({name: settings[name] + corrections[name] for name in unknowns})
+    crew, seat = bench.crew, bench.seat
+    crew.give_up(
+        who[rough_rounds[who] > MOST_ROUGH_ROUNDS],
+        lambda session: f"{model.name}: the images of {apart[session]} stay too far apart to be fused",
+    )
+    for session in crew.still(who):
+        one = np.array([session])
+        crew.remark(
+            one,
+            f"{model.name}: the images of {apart[session]} are too far apart for by: rough orientation, each eye alone",
+        )
+        level = float(seat.counters(one)[2, 0])
+        readings = [bench.point_with(one, hand, points, level) for hand in (1, 2)]
+        if not crew.still(one).size:
+            continue
+        left, right = (seat.in_frame(one, each[:, :, one], np.array([level])) for each in readings)
+        where_they_meet = base / (left[0] - right[0] + base)
+        places, parallaxes = np.zeros((3, *left.shape[1:-1], crew.sessions)), np.zeros((len(points), crew.sessions))
+        parallaxes[:, one] = (left[1] - right[1]) * where_they_meet
+        places[:, :, one] = left * where_they_meet
+        settings = seat.elements(one, unknowns)
+        corrections, _ = _corrections(bench, one, model, places, parallaxes, unknowns, base)
+        if crew.still(one).size:
+            seat.set_elements(one, {name: settings[name] + corrections[name][one] for name in unknowns})
 
 
 def _corrections(
-    bench: Bench, model: ModelJob, places: Array, parallaxes: Array, unknowns: Sequence[str], base: float
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Return corrections and their standard deviations by element, gon and mm."""
+    bench: Bench, who: Who, model: ModelJob, places: Array, parallaxes: Array, unknowns: Sequence[str], base: float
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return corrections and their standard deviations ``(sessions,)`` by element, gon and mm."""
+    nothing = {name: np.zeros(bench.crew.sessions) for name in unknowns}
+    if not who.size:
+        return nothing, nothing
     hands = [f"{name[:-1]}{model.hand_of(int(name[-1]))}" for name in unknowns]
-    left, right = (_stand(bench, n, x) for n, x in ((model.left_projector, 0.0), (model.right_projector, base)))
-    bench.compute()
+    left, right = (_stand(bench, who, n, x) for n, x in ((model.left_projector, 0.0), (model.right_projector, base)))
+    bench.compute(who)
+    in_frame = places[:, :, who] * np.array([1.0, 1.0, -1.0])[:, None, None]
     try:
-        solution = element_corrections(parallaxes, places * [[1.0], [1.0], [-1.0]], left, right, hands)
+        solution = element_corrections(parallaxes[:, who], in_frame, left, right, hands)
     except Undetermined as undetermined:
-        raise given_up(bench, f"{model.name}: {undetermined}") from undetermined
-    factor = [1.0 if name[:2] in ("by", "bz") else 1.0 / GON for name in unknowns]
-    values = {n: float(v) * f for n, v, f in zip(unknowns, solution.unknowns, factor, strict=True)}
-    sigmas = {n: float(s) * f for n, s, f in zip(unknowns, solution.sigmas, factor, strict=True)}
+        bench.crew.give_up(who, f"{model.name}: {undetermined}")
+        return nothing, nothing
+    factors = np.array([1.0 if name[:2] in ("by", "bz") else 1.0 / GON for name in unknowns])[:, None]
+    values, sigmas = (
+        _spread(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.sessions)
+        for each in (solution.unknowns, solution.sigmas)
+    )
     return values, sigmas
 
 
-def _stand(bench: Bench, projector: int, x: float) -> Stand:
-    """Return how a projector stands by its counters, its centre at x of the instrument frame."""
+def _stand(bench: Bench, who: Who, projector: int, x: float) -> Stand:
+    """Return how projectors stand by their counters ``(m,)``, the centre at x of the instrument frame."""
     names = [f"{name}{projector}" for name in ("omega", "phi", "kappa", "by", "bz")]
-    seen = bench.elements(names)
-    omega, phi, kappa, by, bz = (seen[name] - A7.elements[name].zero for name in names)
-    return Stand(np.array([x, -by, bz]), GON * np.array([omega, phi, wrapped(kappa)]))
+    seen = bench.seat.elements(who, names)
+    omega, phi, kappa, by, bz = (seen[name] - bench.seat.manual.elements[name].zero for name in names)
+    return Stand(np.array([np.full(who.size, x), -by, bz]), GON * np.array([omega, phi, wrapped(kappa)]))

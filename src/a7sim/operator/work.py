@@ -8,18 +8,20 @@ import numpy as np
 
 from a7sim.geometry import Array
 from a7sim.manual import RIGHT_FITTINGS
-from a7sim.operator.centres import observe_centre
-from a7sim.operator.interior import InteriorOrientation, interior_orientation
+from a7sim.operator.bench import Bench
+from a7sim.operator.centres import centre_of, observe_centre
+from a7sim.operator.crew import Crew, Who
+from a7sim.operator.interior import InteriorOrientation, InteriorOrientations, interior_orientation
 from a7sim.operator.job import Job, ModelJob
-from a7sim.operator.linkbench import LinkBench
+from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
-from a7sim.operator.relative import RelativeOrientation, relative_orientation
+from a7sim.operator.relative import RelativeOrientation, RelativeOrientations, relative_orientation
 from a7sim.reduction import PerspectiveCentre
 
 
 @dataclass(frozen=True)
 class ModelRecord:
-    """What the operator found of a model, in counter readings."""
+    """What an operator found of a model, in counter readings."""
 
     model: ModelJob
     interior: Mapping[str, InteriorOrientation]
@@ -32,99 +34,148 @@ class ModelRecord:
     """Simulated seconds."""
 
 
+@dataclass(frozen=True)
+class ModelRecords:
+    """What a crew found of a model; arrays have all sessions as their last axis."""
+
+    model: ModelJob
+    who: Who
+    """Those who came to the end of it."""
+    interior: Mapping[str, InteriorOrientations]
+    orientation: RelativeOrientations
+    points: Mapping[str, Array]
+    """X, Y, Z ``(3, sessions)``, nan where a point was not measured."""
+    centres: Mapping[int, PerspectiveCentre]
+    z_units_per_mm: float
+    finished_at: Array
+
+    def of(self, session: int) -> ModelRecord:
+        """Return one session's record."""
+        places = {point: tuple(each[:, session].tolist()) for point, each in self.points.items()}
+        return ModelRecord(
+            self.model,
+            {name: each.of(session) for name, each in self.interior.items()},
+            self.orientation.of(session),
+            {point: (x, y, z) for point, (x, y, z) in places.items() if not math.isnan(x)},
+            {hand: centre_of(each, session) for hand, each in self.centres.items()},
+            self.z_units_per_mm,
+            float(self.finished_at[session]),
+        )
+
+
 def work(
     person: Person,
     job: Job,
     tick: Callable[[], None] = lambda: None,
     begins: Callable[[str], None] = lambda _: None,
 ) -> Iterator[ModelRecord]:
-    """Yield the models of a job as they are done. Raises DoesNotFit when one cannot be set up.
+    """Yield the models of a job as a person does them. Raises DoesNotFit when one cannot be set up.
 
     `begins` is told of every activity, `tick` comes after every point.
     """
-    bench = LinkBench(person, job, tick)
-    interior: dict[str, InteriorOrientation] = {}
     person.book.head("", "preparation")
-    bench.prepare()
+    for records in worked(Bench(Crew.of_one(person), LineHands(person), job, tick), begins):
+        yield records.of(0)
+
+
+def worked(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[ModelRecords]:
+    """Yield the models of a job as a crew does them, each session at its own instrument."""
+    job, crew = bench.job, bench.crew
+    interior: dict[str, InteriorOrientations] = {}
+    bench.seat.prepare(crew.everybody)
     for model in job.models:
-        _begin(person, model, "interior orientation", begins)
-        _set_base_and_fittings(person, model)
-        _mount(person, job, model, interior)
-        sketches = _prints(person, model)
-        bench.begin(model, sketches)
-        bench.preset(model.standard_points["1"])
-        _begin(person, model, "relative orientation", begins)
+        _begin(bench, model, "interior orientation", begins)
+        _set_base_and_fittings(bench, model)
+        _mount(bench, model, interior)
+        prints = _prints(bench, model)
+        bench.begin(crew.everybody, model, prints)
+        bench.preset(crew.everybody, model.standard_points["1"])
+        _begin(bench, model, "relative orientation", begins)
         plan = job.plan
         tolerated = 1e-3 * plan.tolerated_parallax_um * plan.projection_height / job.certificate.c
         orientation = relative_orientation(
-            bench, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated
+            bench, crew.everybody, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated
         )
-        _begin(person, model, "model coordinates", begins)
+        _begin(bench, model, "model coordinates", begins)
         wanted = dict.fromkeys([*model.standard_points.values(), *model.other_points])
-        common = [name for name in wanted if name in sketches[1] and name in sketches[2]]
-        measured = bench.measure(common)
+        common = [name for name in wanted if name in prints[1] and name in prints[2]]
+        measured = bench.measure(crew.everybody, common)
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
-            _begin(person, model, f"{side} perspective centre", begins)
-            centres[hand] = observe_centre(bench, model, hand, plan.centre_levels, plan.tolerated_centre_rms)
-        yield ModelRecord(
+            _begin(bench, model, f"{side} perspective centre", begins)
+            centres[hand] = observe_centre(
+                bench, crew.everybody, model, hand, plan.centre_levels, plan.tolerated_centre_rms
+            )
+        yield ModelRecords(
             model,
+            crew.everybody,
             {name: interior[name] for name in (model.left, model.right)},
             orientation,
-            {point: (x, y, z) for point, x, y, z in zip(common, *measured.tolist(), strict=True) if not math.isnan(x)},
+            dict(zip(common, np.moveaxis(measured, 1, 0), strict=True)),
             centres,
-            bench.z_units_per_mm,
-            person.clock.now,
+            bench.seat.units_per_mm,
+            crew.seconds.copy(),
         )
 
 
-def _begin(person: Person, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
+def _begin(bench: Bench, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
     begins(f"model {model.name}: {form}")
-    person.book.head(model.name, form)
-    person.note(f"{model.name}: {form}")
+    if bench.crew.person is not None:
+        bench.crew.person.book.head(model.name, form)
+    bench.hands.note(bench.crew.everybody, f"{model.name}: {form}")
 
 
-def _set_base_and_fittings(person: Person, model: ModelJob) -> None:
+def _set_base_and_fittings(bench: Bench, model: ModelJob) -> None:
+    who, hands = bench.crew.everybody, bench.hands
     right = RIGHT_FITTINGS[model.polarity, model.base].as_words()
-    short = {"inside": "IN", "outside": "OUT", "front": "FRON", "right": "RIGH"}
-    nodes = {
-        "dove": "DOVE",
-        "triangulation": "TRI",
-        "diapositive": "DIAP",
-        "xcollar": "XCOL",
-        "ycollar": "YCOL",
-    }
-    person.set(
-        f"BASE:MODE {short[model.base]}",
-        *(f"FITT:{nodes[name]} {short.get(word, word.upper())}" for name, word in right.items()),
-    )
+    bench.seat.spend_setting(who, 1 + len(right))
+    hands.set_base_mode(who, model.base)
+    for name, position in right.items():
+        hands.set_fitting(who, name, position)
+    bench.seat.see_that_it_obeyed(who, f"{model.name}: setting base {model.base} and its fittings")
 
 
-def _mount(person: Person, job: Job, model: ModelJob, interior: dict[str, InteriorOrientation]) -> None:
+def _mount(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientations]) -> None:
     """Mount what is not yet in its projector; a projector with a new picture starts from its counter zeros."""
+    seat, hands = bench.seat, bench.hands
     for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
-        if person.client.fields(f"PHOT{projector}?") == [photograph]:
+        who = bench.crew.everybody
+        if hands.loaded(who, projector) == photograph:
             continue
-        if person.client.fields(f"PHOT{3 - projector}?") == [photograph]:
-            person.set(f"PHOT{3 - projector}:UNL")
-        person.set(f"PROJ{projector}:KAPP 0;PHI 100;OMEG 100;BY 0;BZ 0")
-        interior[photograph] = interior_orientation(person, projector, photograph, job.certificate)
-
-
-def _prints(person: Person, model: ModelJob) -> dict[int, dict[str, Array]]:
-    """Take up the paper prints of both photographs and see that they overlap the right way round."""
-    prints = {1: _print(person, model.left_projector), 2: _print(person, model.right_projector)}
-    common = [name for name in prints[1] if name in prints[2]]
-    shift = np.mean([prints[1][name][0] - prints[2][name][0] for name in common]) if common else 0.0
-    if shift <= 0.0:
-        raise person.give_up(
-            f"{model.name}: the prints of {model.left} and {model.right} do not overlap towards each other: the "
-            "photographs have changed places, or one lies upside down"
+        if hands.loaded(who, 3 - projector) == photograph:
+            seat.spend_setting(who)
+            hands.unload(who, 3 - projector)
+        seat.spend_setting(who)
+        for name, element in seat.manual.elements.items():
+            if name.endswith(str(projector)) and not name.startswith("c"):
+                hands.set_element(who, name, np.full(who.size, element.zero))
+        seat.see_that_it_obeyed(who, f"setting projector {projector} to its zeros")
+        interior[photograph] = interior_orientation(
+            bench, bench.crew.everybody, projector, photograph, bench.job.certificate
         )
+
+
+def _prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]:
+    """Take up the paper prints of both photographs and see that they overlap the right way round."""
+    crew = bench.crew
+    who = crew.everybody
+    prints = {}
+    for hand, projector in ((1, model.left_projector), (2, model.right_projector)):
+        prints[hand] = {
+            name: _spread(place, who, crew.sessions) for name, place in bench.hands.prints(who, projector).items()
+        }
+    common = [name for name in prints[1] if name in prints[2]]
+    shifts = np.array([prints[1][name][0] - prints[2][name][0] for name in common]).reshape(-1, crew.sessions)
+    shift = np.nanmean(shifts[:, who], axis=0) if common else np.zeros(who.size)
+    crew.give_up(
+        who[shift <= 0.0],
+        f"{model.name}: the prints of {model.left} and {model.right} do not overlap towards each other: the "
+        "photographs have changed places, or one lies upside down",
+    )
     return prints
 
 
-def _print(person: Person, projector: int) -> dict[str, Array]:
-    fields = person.client.fields(f"PHOT{projector}:SKET?")
-    places = np.array([fields[1::3], fields[2::3]], dtype=float).T
-    return dict(zip(fields[0::3], places, strict=False))
+def _spread(place: Array, who: Who, sessions: int) -> Array:
+    every = np.full((2, sessions), np.nan)
+    every[:, who] = place
+    return every

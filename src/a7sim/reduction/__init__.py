@@ -6,7 +6,7 @@ end; what observations leave open is `Undetermined`, never nonsense.
 
 from a7sim.reduction.absolute import AbsoluteOrientation, Ground, GroundFit, absolute_orientation
 from a7sim.reduction.block import BlockAdjustment, block_adjustment
-from a7sim.reduction.cards import Deck, deck_lines, free_format_lines, output_lines, read_cards, write_cards
+from a7sim.reduction.cards import Deck, deck_lines, free_format_lines, is_deck, output_lines, read_cards, write_cards
 from a7sim.reduction.centres import (
     PerspectiveCentre,
     a8_centres,
@@ -16,6 +16,7 @@ from a7sim.reduction.centres import (
 )
 from a7sim.reduction.coplanarity import RelativeOrientation, relative_orientation, relative_poses
 from a7sim.reduction.corrections import corrected_image
+from a7sim.reduction.hallert import orientation_by_parallaxes
 from a7sim.reduction.interior import (
     PictureLie,
     PlaneFit,
@@ -28,7 +29,9 @@ from a7sim.reduction.modelling import a8_model_coordinates, model_coordinates
 from a7sim.reduction.parallax import Stand, element_corrections
 from a7sim.reduction.polynomials import StripAdjustment, StripDeformation, strip_adjustment
 from a7sim.reduction.resection import Resection
+from a7sim.reduction.schut import orientation_by_schut
 from a7sim.reduction.similarity import Similarity, similarity_by_iteration, similarity_by_quaternion
+from a7sim.reduction.snooping import SnoopedOrientation, snooped_orientation
 from a7sim.reduction.strips import Join, Model, Strip, formed_strip, joined
 
 __all__ = [
@@ -46,6 +49,7 @@ __all__ = [
     "RelativeOrientation",
     "Resection",
     "Similarity",
+    "SnoopedOrientation",
     "Stand",
     "Strip",
     "StripAdjustment",
@@ -62,8 +66,11 @@ __all__ = [
     "formed_strip",
     "free_format_lines",
     "grid_plate_centre",
+    "is_deck",
     "joined",
     "model_coordinates",
+    "orientation_by_parallaxes",
+    "orientation_by_schut",
     "output_lines",
     "perspective_centre",
     "perspective_centre_of_levels",
@@ -75,6 +82,7 @@ __all__ = [
     "relative_poses",
     "similarity_by_iteration",
     "similarity_by_quaternion",
+    "snooped_orientation",
     "strip_adjustment",
     "write_cards",
 ]

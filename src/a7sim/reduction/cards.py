@@ -8,6 +8,7 @@ photograph's, and it is named ``<photo>:centre`` here.
 """
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from a7sim.files import LONGEST_FILE
+from a7sim.files import first_line, read_text
 from a7sim.geometry import Array
 from a7sim.mistakes import Mistake
 from a7sim.reduction.absolute import Ground
@@ -34,6 +35,9 @@ FIELDS = (
 """Name, first and last column of every field."""
 
 OUTPUT_COLUMNS = 63
+ENDINGS = (".crd", ".cards")
+_LIKE_A_CARD = re.compile(r"[ 0-9.+-]+")
+
 GROUND, TIES = "-1", "-2"
 """Control cards: -1 ends the ground control, -2 stands before each set of tie points."""
 
@@ -57,13 +61,21 @@ class Deck:
     models: tuple[Model, ...]
 
 
-def read_cards(path: str | Path) -> Deck:
-    """Return the ground control and the models of a deck of cards.
+def is_deck(path: str | Path, text: str) -> bool:
+    """Tell whether a file is a deck of cards: by its ending, else by a first line of blanks and numbers alone."""
+    ending = Path(path).suffix.lower()
+    if ending in ENDINGS:
+        return True
+    return ending not in (".csv", ".toml") and bool(_LIKE_A_CARD.fullmatch(first_line(text)))
+
+
+def read_cards(path: str | Path, text: str | None = None) -> Deck:
+    """Return the ground control and the models of a deck of cards, of its text where that has been read already.
 
     Raises Mistake with file, line and column for a card that is no card, one column off, twice there or out of order.
     """
     path = Path(path)
-    sections = _sections(path)
+    sections = _sections(path, read_text(path) if text is None else text)
     ground = sections[0][1]
     seen: dict[tuple[str, str], Card] = {}
     for card in ground:
@@ -158,11 +170,11 @@ def free_format_lines(models: Sequence[Model], decimals: int = 4) -> list[str]:
     return lines
 
 
-def _sections(path: Path) -> list[tuple[str, list[Card]]]:
+def _sections(path: Path, text: str) -> list[tuple[str, list[Card]]]:
     """Return the cards between control cards, with the control card before them (none before the first)."""
     sections: list[tuple[str, list[Card]]] = [("", [])]
-    for number, text in enumerate(_text(path).splitlines(), start=1):
-        line = text.rstrip()
+    for number, card in enumerate(_checked(path, text), start=1):
+        line = card.rstrip()
         if not line:
             continue
         fields = _fields(path, number, line)
@@ -187,28 +199,18 @@ def _check_order(path: Path, number: int, control: str, sections: Sequence[tuple
         raise Mistake(f"{path}, line {number}: expected a centre and tie points after the card {TIES}, got {control}")
 
 
-def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > LONGEST_FILE:
-            raise Mistake(f"{path}: expected a file of at most {LONGEST_FILE} bytes, got {path.stat().st_size}")
-        content = path.read_bytes()
-    except OSError as error:
-        raise Mistake(f"{path}: expected a readable file: {error.strerror}") from error
-    if not content.strip():
+def _checked(path: Path, text: str) -> list[str]:
+    """Return the lines of a deck, found to be printable ASCII."""
+    cards = text.splitlines()
+    if not text.strip():
         raise Mistake(f"{path}: expected cards, got an empty file")
-    try:
-        text = content.decode("ascii")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        column = error.start - content.rfind(b"\n", 0, error.start)
-        raise Mistake(f"{path}, line {line}, column {column}: expected a card in ASCII, got another byte") from error
-    for number, card in enumerate(text.splitlines(), start=1):
-        if not card.isprintable():
-            column = next(i for i, character in enumerate(card, start=1) if not character.isprintable())
+    for number, card in enumerate(cards, start=1):
+        odd = next((i for i, each in enumerate(card, start=1) if not (each.isascii() and each.isprintable())), None)
+        if odd:
             raise Mistake(
-                f"{path}, line {number}, column {column}: expected blanks, digits and points, got a control byte"
+                f"{path}, line {number}, column {odd}: expected blanks, digits and points, got {card[odd - 1]!r}"
             )
-    return text
+    return cards
 
 
 def _fields(path: Path, number: int, line: str) -> list[str]:

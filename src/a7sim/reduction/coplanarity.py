@@ -12,7 +12,9 @@ is divided by what it changes by with the four image coordinates, so that s0 is 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import cached_property
+from math import prod
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -24,14 +26,21 @@ Unknowns = Literal["independent", "dependent"]
 
 FEWEST_POINTS = 5
 MOST_ITERATIONS = 30
-TOLERANCE = 2e-11
-"""Radians: iterations end when the next correction, at the rate at which they shrink, would be below it. What is then
-left is below 1e-10."""
+TOLERANCE = 1e-10
+"""Radians: iterations end when the next correction would be below it: the product of the last one with itself and with
+the rms discrepancy. What is then left of perfect images is below 1e-10, of measured ones below 1e-9."""
 
 LARGEST_CONDITION = 3e5
 """Of the scaled normal equations for turns about the axes of the base. Six standard points have some 3e2, the weak pair
 of reference 07 has 8e3; points on a line or on a critical surface, measured to 5 um, have 2e6 and more. Beyond 3e5 such
 errors turn a camera by half a degree."""
+
+CONDITION_BY_DETERMINANT = 5.0 * 5.0**0.5 * 1.25**4
+"""Of five scaled equations: the 1-norm is at most 5 and root 5 times the spectral norm of the inverse, whose
+eigenvalues add up to 5 before they are inverted."""
+
+NEAR_ITERATIONS = 3
+"""So many are enough for pairs from near; those that need more begin again with the others."""
 
 HOPELESS = 10.0
 """Pairs whose first equations are worse than that by as much are refused whatever they come to."""
@@ -39,8 +48,11 @@ HOPELESS = 10.0
 LARGEST_S0 = 0.005
 """Of c: a solution found from quarter turns that leaves more is none."""
 
-FAR = 3e-4
-"""Radians: after a larger correction the same normal equations are solved for what is left, too."""
+FAR = 0.055
+FAR_LATER = 0.002
+NEAR = 3e-4
+"""Radians: in pairs whose first correction is larger than FAR, or a later one than FAR_LATER, the same normal equations
+are solved for what is left, too, until corrections are smaller than NEAR."""
 
 LARGEST_TURN = 0.4
 """Radians, in one step: farther away the linear equations say nothing."""
@@ -55,7 +67,7 @@ WEAKNESS = 10.0
 STEADY = 0.8
 """A chord step that is not below this share of the step before it is not taken."""
 
-WORKING_SET = 8000
+WORKING_SET = 16000
 """Points worked at a time, so that what is computed of them stays in the cache."""
 
 QUARTER_TURNS = ((0, 0), (2, 2), (1, 1), (3, 3), (0, 2), (2, 0), (0, 1), (0, 3), (1, 0), (3, 0))
@@ -76,6 +88,8 @@ class RelativePoses:
     """Standard deviation of one image coordinate in the unit of the images; zero for five points."""
 
     condition: Array
+    """Condition number of the scaled normal equations; an upper bound of it where that is below `LARGEST_CONDITION`."""
+
     iterations: npt.NDArray[np.int64]
     converged: npt.NDArray[np.bool_]
     """Iterations ended by themselves, the condition is sound and all points lie before both cameras."""
@@ -199,41 +213,125 @@ def relative_poses(image1: Array, image2: Array, c1: float, c2: float, tolerance
         raise Undetermined(f"expected at least {FEWEST_POINTS} points to orient a pair of photographs, got {n}")
     batch = image1.shape[2:]
     if not batch:
-        return _resolved(np.array([image1, image2]), c1, c2, tolerance)
-    images = image1.reshape((2, n, -1)), image2.reshape((2, n, -1))
-    step = max(1, WORKING_SET // n)
-    parts = [
-        _resolved(np.array([each[..., i : i + step] for each in images]), c1, c2, tolerance)
-        for i in range(0, images[0].shape[-1], step)
-    ]
-    return RelativePoses(
-        *(
-            np.concatenate([getattr(part, name) for part in parts], axis=-1).reshape((*shape, *batch))
-            for name, shape in _SHAPES.items()
-        )
-    )
+        return _resolved((image1, image2), c1, c2, tolerance, _Work(n, ()))
+    flat1, flat2 = image1.reshape((2, n, -1)), image2.reshape((2, n, -1))
+    pairs, step = flat1.shape[-1], 8 * max(1, WORKING_SET // (8 * n))
+    found: dict[str, npt.NDArray[Any]] = {
+        name: np.empty((*shape, pairs), dtype) for name, (shape, dtype) in _SHAPES.items()
+    }
+    work = _Work(n, (min(step, pairs),))
+    for i in range(0, pairs, step):
+        some = slice(i, min(i + step, pairs))
+        if work.shape[1] != some.stop - i:
+            work = _Work(n, (some.stop - i,))
+        poses = _oriented_from_near((flat1[..., some], flat2[..., some]), c1, c2, tolerance, work)
+        for name, values in found.items():
+            values[..., some] = getattr(poses, name)
+    others = np.flatnonzero(~found["converged"])
+    for i in range(0, others.size, step):
+        rest = others[i : i + step]
+        poses = _resolved((flat1[..., rest], flat2[..., rest]), c1, c2, tolerance, _Work(n, rest.shape))
+        for name, values in found.items():
+            values[..., rest] = getattr(poses, name)
+    return RelativePoses(**{name: values.reshape((*values.shape[:-1], *batch)) for name, values in found.items()})
 
 
-_SHAPES = {"rotations": (2, 3, 3), "s0": (), "condition": (), "iterations": (), "converged": ()}
+_SHAPES: Mapping[str, tuple[tuple[int, ...], type]] = {
+    "rotations": ((2, 3, 3), float),
+    "s0": ((), float),
+    "condition": ((), float),
+    "iterations": ((), np.int64),
+    "converged": ((), bool),
+}
 
 
-def _resolved(images: Array, c1: float, c2: float, tolerance: float) -> RelativePoses:
-    """Orient pairs ``(2, 2, n, ...)`` from zero, and those that refuse from swings of quarter turns."""
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # singular pairs of a batch
-        return _tried(images, c1, c2, tolerance)
+class _TurningWork:
+    """Arrays of pairs ``(...)`` that are filled anew when cameras are turned."""
+
+    def __init__(self, batch: tuple[int, ...]) -> None:
+        empty = _aligned if batch else np.empty
+        self.halves = empty((2, 3, *batch))
+        self.turn = empty((2, 3, 3, *batch))
+        self.rotations = empty((2, 2, 3, 3, *batch))
+        self.turning = empty((2, 3, 3, *batch))
 
 
-def _tried(images: Array, c1: float, c2: float, tolerance: float) -> RelativePoses:
-    rays = np.empty((2, 3, *images.shape[2:]))
-    rays[:, :2] = images
+class _Work(_TurningWork):
+    """Arrays that the steps of an iteration fill anew, of pairs ``(...)`` with n points.
+
+    They begin at lines of the cache: numpy takes half the time for them that it takes for arrays where malloc puts
+    them.
+    """
+
+    def __init__(self, n: int, batch: tuple[int, ...]) -> None:
+        super().__init__(batch)
+        self.shape = (n, *batch)
+        empty = _aligned if batch else np.empty
+        self.rays = empty((2, 3, n, *batch))
+        self.turned = empty((2, 3, n, *batch))
+        self.spare = empty((6, n, *batch))
+        self.rows = empty((6, n, *batch))
+        self.steepness = empty((n, *batch))
+        self.normal = empty((6, 6, *batch))
+        self.reduced = empty((6, 6, *batch))
+        self.product = empty((5, 5, *batch))
+        self.shares = empty((5, *batch))
+
+
+def _aligned(shape: tuple[int, ...]) -> Array:
+    """Return an array that begins at a line of 64 bytes."""
+    size = prod(shape)
+    room = np.empty(size + 8)
+    first = -room.ctypes.data % 64 // 8
+    return room[first : first + size].reshape(shape)
+
+
+def _oriented_from_near(
+    images: tuple[Array, Array], c1: float, c2: float, tolerance: float, work: _Work
+) -> RelativePoses:
+    """Orient those of many pairs ``(2, n, ...)`` that are near zero; the others are not `converged`.
+
+    They are worked together to the end: with few iterations, that is faster than to put aside those that are done.
+    """
+    rays, state = _loaded(images, c1, c2, work), _start((0, 0), images[0].shape[2:])
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for i in range(NEAR_ITERATIONS):
+            state = _iterated(state, rays, tolerance, work, level=i == 0, chords=False)
+            if i == 0:
+                sound = _conditions(work) < HOPELESS * LARGEST_CONDITION
+            if not (state.active & ~state.far).any():
+                break
+        poses = _assessed(state, work)
+    return replace(poses, converged=poses.converged & sound & ~state.far)
+
+
+def _loaded(images: tuple[Array, Array], c1: float, c2: float, work: _Work) -> Array:
+    """Return the rays ``(2, 3, n, ...)`` of image points ``(2, n, ...)``, in their cameras' frames."""
+    rays = work.rays
+    rays[0, :2], rays[1, :2] = images
     rays[0, 2], rays[1, 2] = -c1, -c2
-    found = _oriented(rays, (0, 0), tolerance)
+    return rays
+
+
+def _resolved(images: tuple[Array, Array], c1: float, c2: float, tolerance: float, work: _Work) -> RelativePoses:
+    """Orient pairs ``(2, n, ...)`` from zero, and those that refuse from swings of quarter turns."""
+    rays = _loaded(images, c1, c2, work)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # singular pairs of a batch
+        found = _oriented(rays, (0, 0), tolerance, work)
+        if found.converged.all():
+            return found
+        return _tried_again(found, rays, tolerance)
+
+
+def _tried_again(found: RelativePoses, rays: Array, tolerance: float) -> RelativePoses:
+    """Try pairs that refused from swings of quarter turns."""
     for swings in QUARTER_TURNS[1:]:
         open_ = ~found.converged & ~(found.condition >= LARGEST_CONDITION)
         if not open_.any():
             break
-        again = _oriented(rays[..., open_] if rays.ndim > 3 else rays, swings, tolerance)
-        again = replace(again, converged=again.converged & (again.s0 < LARGEST_S0 * c1))
+        some = rays[..., open_] if rays.ndim > 3 else rays
+        again = _oriented(some, swings, tolerance, _Work(some.shape[2], some.shape[3:]))
+        again = replace(again, converged=again.converged & (again.s0 < LARGEST_S0 * -rays[0, 2].flat[0]))
         found = _replaced(found, open_, again)
     return found
 
@@ -251,25 +349,23 @@ def _replaced(found: RelativePoses, where: npt.NDArray[np.bool_], again: Relativ
     return RelativePoses(**values)
 
 
-def _oriented(rays: Array, swings: tuple[int, int], tolerance: float) -> RelativePoses:
+def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: _Work) -> RelativePoses:
     """Orient pairs of rays ``(2, 3, n, ...)`` in camera frames, from the given quarter turns.
 
     Of a batch, the pairs that are done are put aside once they are more than half.
     """
     batch = rays.shape[3:]
-    turned = np.array([rotation(0.0, 0.0, 0.5 * np.pi * swing) for swing in swings])
-    R = np.empty((2, 3, 3, *batch))
-    R[:] = turned.reshape((2, 3, 3, *(1,) * len(batch)))
+    level = swings == (0, 0)
+    state = _start(swings, batch)
     places = None
-    state = _Iteration(R, np.ones(batch, dtype=bool), np.ones(batch), np.zeros(batch, dtype=np.int64))
     for i in range(MOST_ITERATIONS):
-        state, equations = _iterated(state, rays, tolerance, level=i == 0 and swings == (0, 0))
+        state = _iterated(state, rays, tolerance, work, level=level and i == 0)
         if i == 0:
-            first = _condition(equations)
+            first = _conditions(work)
         rest = np.count_nonzero(state.active)
         last = rest == 0 or i == MOST_ITERATIONS - 1
         if last or 2 * rest < state.active.size:
-            poses = _assessed(state, equations)
+            poses = _assessed(state, work)
             if places is None:
                 done = poses
             else:
@@ -279,57 +375,79 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float) -> Relativ
                 break
             going = np.flatnonzero(state.active)
             places, rays = going if places is None else places[going], rays[..., going]
-            state = _Iteration(
-                state.rotations[..., going], state.active[going], state.before[going], state.iterations[going]
-            )
+            state, work = state.of(going), _Work(rays.shape[2], going.shape)
     hopeless = first >= HOPELESS * LARGEST_CONDITION
-    return replace(
-        done, condition=np.where(hopeless, first, done.condition), converged=np.asarray(done.converged & ~hopeless)
-    )
+    if not hopeless.any():
+        return done
+    condition = np.where(hopeless, first, done.condition)
+    return replace(done, condition=condition, converged=np.asarray(done.converged & ~hopeless))
+
+
+def _swung(swings: tuple[int, int], batch: tuple[int, ...]) -> Array:
+    """Return rotations ``(2, 3, 3, ...)`` of cameras that are level but swung by quarter turns."""
+    turned = np.eye(3)[None].repeat(2, axis=0)
+    for camera, swing in enumerate(swings):
+        if swing:
+            turned[camera] = rotation(0.0, 0.0, 0.5 * np.pi * swing)
+    if not batch:
+        return turned
+    R = _aligned((2, 3, 3, *batch))
+    R[:] = turned.reshape((2, 3, 3, *(1,) * len(batch)))
+    return R
 
 
 @dataclass(frozen=True)
 class _Iteration:
-    """Where iterations of pairs ``(...)`` stand: rotations, which go on, their last correction, how many there were."""
+    """Where iterations of pairs ``(...)`` stand: rotations, which go on or have come from far, last correction."""
 
     rotations: Array
     active: npt.NDArray[np.bool_]
+    far: npt.NDArray[np.bool_]
     before: Array
     iterations: npt.NDArray[np.int64]
 
+    def of(self, pairs: npt.NDArray[np.int64]) -> "_Iteration":
+        """Return those of some pairs."""
+        return _Iteration(
+            self.rotations[..., pairs],
+            self.active[pairs],
+            self.far[pairs],
+            self.before[pairs],
+            self.iterations[pairs],
+        )
 
-@dataclass(frozen=True)
-class _Equations:
-    """Sums of products ``(6, 6, ...)`` of coefficients and discrepancies, the inverse of the normal equations, rays."""
 
-    normal: Array
-    inverse: Array
-    rays: Array
+def _start(swings: tuple[int, int], batch: tuple[int, ...]) -> _Iteration:
+    """Return where iterations begin: cameras level but swung by quarter turns."""
+    zero = np.zeros(batch)
+    return _Iteration(_swung(swings, batch), zero == 0.0, zero > 0.0, zero, zero.astype(np.int64))
 
 
-def _iterated(state: _Iteration, rays: Array, tolerance: float, level: bool) -> tuple[_Iteration, _Equations]:
-    """Do one iteration of Gauss-Newton; return also the equations that it solved."""
+def _iterated(
+    state: _Iteration, rays: Array, tolerance: float, work: _Work, level: bool, chords: bool = True
+) -> _Iteration:
+    """Do one iteration of Gauss-Newton, leaving in `work` the equations that it solved."""
     active = state.active
-    rows, per_mm, a = _level_equations(rays) if level else _equations(state.rotations, rays)
-    normal = _products(rows)
-    mean_square = normal[5, 5] / (rays.shape[2] * rays[0, 2, 0] * rays[1, 2, 0])
-    stiff = normal[:5, :5].copy()
-    for i in range(5):
-        stiff[i, i] *= 1.0 + DAMPING * mean_square
-    inverse = _inverse(stiff)
-    corrections = -_times(inverse, normal[:5, 5]) * active
+    if level:
+        _level_equations(rays, work)
+    else:
+        _equations(state.rotations, rays, work)
+    _form_products(work)
+    per_square = 1.0 / (rays.shape[2] * rays[0, 2].flat[0] * rays[1, 2].flat[0])
+    corrections = _solved(work, (DAMPING * per_square) * work.normal[5, 5])
     size = np.abs(corrections).max(axis=0)
-    if (size > LARGEST_TURN).any():
+    if active.ndim and not active.all():
+        corrections *= active
+    if size.max() > LARGEST_TURN:
         corrections *= np.minimum(1.0, LARGEST_TURN / np.maximum(size, LARGEST_TURN))
-    R = _turned(state.rotations, corrections)
-    left = size * size / state.before
-    far = active & (size > FAR)
-    if far.any():
-        tried = _Chord(rays, rows[:5] * per_mm, inverse, size)
-        R, left = _chords(R, left, np.minimum(size, LARGEST_TURN), far, tried, CHORDS)
+    R = _turned(state.rotations, corrections, work, level)
+    left = size * (2.0 * size + np.sqrt(per_square * np.abs(work.reduced[5, 5])))
+    from_far = state.far | (size > (FAR if level else FAR_LATER))
+    far = active & from_far & (size > NEAR)
+    if chords and far.any():
+        R, left = _chords(R, left, np.minimum(size, LARGEST_TURN), far, _Chord.of_all(rays, work, size), CHORDS)
     goes_on = active & ~(left < tolerance) & np.isfinite(size)
-    before = np.where(active, np.maximum(size, tolerance), state.before)
-    return _Iteration(R, goes_on, before, state.iterations + active), _Equations(normal, inverse, a)
+    return _Iteration(R, goes_on, from_far, np.where(active, size, state.before), state.iterations + active)
 
 
 @dataclass(frozen=True)
@@ -337,13 +455,35 @@ class _Chord:
     """Rays ``(2, 3, n, ...)``, weighted coefficients, inverse and first correction of normal equations used again."""
 
     rays: Array
-    weighted: Array
-    inverse: Array
+    rows: Array
+    steepness: Array
+    normal: Array
     size: Array
+
+    @classmethod
+    def of_all(cls, rays: Array, work: _Work, size: Array) -> "_Chord":
+        """Return those of all pairs."""
+        return cls(rays, work.rows[:5], work.steepness, work.normal[:5, :5], size)
 
     def of(self, pairs: npt.NDArray[np.int64]) -> "_Chord":
         """Return those of some pairs."""
-        return _Chord(self.rays[..., pairs], self.weighted[..., pairs], self.inverse[..., pairs], self.size[pairs])
+        return _Chord(
+            self.rays[..., pairs],
+            self.rows[..., pairs],
+            self.steepness[..., pairs],
+            self.normal[..., pairs],
+            self.size[pairs],
+        )
+
+    @cached_property
+    def weighted(self) -> Array:
+        """Coefficients ``(5, n, ...)`` by which unweighted discrepancies are multiplied."""
+        return np.asarray(self.rows / self.steepness)
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Inverse ``(5, 5, ...)`` of the normal equations."""
+        return _inverse(_symmetric(self.normal))
 
 
 def _chords(
@@ -366,33 +506,49 @@ def _chords(
     R = _turned(R, np.where(far, corrections, 0.0))
     rms = np.sqrt(dots(discrepancies, discrepancies) / rays.shape[2]) / (rays[0, 2, 0] * rays[1, 2, 0])
     left = np.where(far, np.minimum(left, np.maximum(size * size / last, WEAKNESS * equations.size * rms)), left)
-    far = far & (size > FAR)
+    far = far & (size > NEAR)
     return _chords(R, left, size, far, equations, most - 1) if most > 1 and far.any() else (R, left)
 
 
-def _assessed(state: _Iteration, equations: _Equations) -> RelativePoses:
+def _assessed(state: _Iteration, work: _Work) -> RelativePoses:
     """Judge where iterations ended, by the equations of the last one."""
-    inverse, a = equations.inverse, equations.rays
-    n, right = a.shape[2], equations.normal[5, :5]
-    condition = _condition(equations)
-    if n > FEWEST_POINTS:
-        squares = equations.normal[5, 5] - dots(right, _times(inverse, right))
-        s0 = np.sqrt(np.maximum(squares, 0.0) / (n - FEWEST_POINTS))
-    else:
-        s0 = np.zeros_like(condition)
-    R, before_both = _facing(state.rotations, a)
+    n = work.shape[0]
+    condition = _conditions(work)
+    squares = work.reduced[5, 5]
+    s0 = np.sqrt(np.maximum(squares, 0.0) / (n - FEWEST_POINTS)) if n > FEWEST_POINTS else np.zeros_like(condition)
+    R, before_both = (state.rotations, True) if _all_ahead(work) else _facing(state.rotations, work.turned)
     sound = (condition < LARGEST_CONDITION) & np.isfinite(state.before)
     converged = ~state.active & sound & before_both
     return RelativePoses(R, np.asarray(s0), np.asarray(condition), state.iterations, np.asarray(converged))
 
 
-def _condition(equations: _Equations) -> Array:
-    """Return the condition numbers ``(...)`` of the scaled normal equations, in the 1-norm."""
-    normal = equations.normal[:5, :5]
-    squares = np.einsum("uu...->u...", normal)
-    scale = np.sqrt(squares[:, None] * squares)
-    largest = (np.abs(normal) / scale).sum(axis=0).max(axis=0)
-    condition = largest * (np.abs(equations.inverse) * scale).sum(axis=0).max(axis=0)
+def _conditions(work: _Work) -> Array:
+    """Return the condition numbers ``(...)`` of the scaled normal equations, in the 1-norm, or small bounds of them.
+
+    Their determinant bounds them, so that hardly any inverse is needed.
+    """
+    normal, pivots = work.normal[:5, :5], work.reduced[:5, :5].diagonal().T
+    shares = np.divide(pivots, normal.diagonal().T, out=work.shares)
+    bound = np.array(CONDITION_BY_DETERMINANT / shares.prod(axis=0))
+    doubtful = ~((bound > 0.0) & (bound < LARGEST_CONDITION))
+    if doubtful.any():
+        bound[doubtful] = _condition(normal[..., doubtful]) if normal.ndim > 2 else _condition(normal)
+    return bound
+
+
+def _symmetric(normal: Array) -> Array:
+    """Return normal equations that stand above the diagonal in full."""
+    full = normal.copy()
+    for i in range(len(full) - 1):
+        full[i + 1 :, i] = full[i, i + 1 :]
+    return full
+
+
+def _condition(normal: Array) -> Array:
+    """Return the condition numbers ``(...)`` of normal equations ``(5, 5, ...)`` when scaled, in the 1-norm."""
+    spread = np.sqrt(normal.diagonal().T)
+    scaled = _symmetric(normal) / (spread[:, None] * spread)
+    condition = np.abs(scaled).sum(axis=0).max(axis=0) * np.abs(_inverse(scaled)).sum(axis=0).max(axis=0)
     return np.where(np.isfinite(condition), condition, np.inf)
 
 
@@ -411,47 +567,119 @@ def _discrepancies(across: Array) -> Array:
     return np.asarray(across[0, 0] * across[1, 1] - across[0, 1] * across[1, 0])
 
 
-def _equations(R: Array, rays: Array) -> tuple[Array, Array, Array]:
-    """Return coefficients and discrepancies ``(6, n, ...)`` in mm of one image coordinate, and the turned rays.
+def _equations(R: Array, rays: Array, work: _Work) -> None:
+    """Form the equations in mm of one image coordinate, in `work.rows`, of turned rays.
 
-    In the middle stands what they were multiplied by: one upon what the four image coordinates change them by.
+    The left rays are divided by what the four image coordinates change the condition by: that is the whole of
+    ``(0, -z, y)`` of the other ray but for its component along the axis of the camera.
     """
-    a = _in_base_frame(R, rays)
-    slopes = np.array([[-R[:, 2, 0], R[:, 1, 0]], [-R[:, 2, 1], R[:, 1, 1]]])
-    by_image = np.einsum("jik...,kin...->jkn...", slopes, a[::-1, 1:])
-    per_mm = 1.0 / np.sqrt(np.einsum("jkn...,jkn...->n...", by_image, by_image))
-    rows = _rows(a)
-    rows *= per_mm
-    return rows, per_mm, a
+    a, steepness = work.turned, work.steepness
+    spare = work.spare.reshape(a.shape)
+    if rays.ndim == 3:
+        np.matmul(R, rays, out=a)
+    else:
+        np.multiply(R[:, :, 0, None], rays[:, None, 0], out=a)
+        np.multiply(R[:, :, 1, None], rays[:, None, 1], out=spare)
+        a += spare
+        a += (R[:, :, 2] * rays[:, 2:, 0])[:, :, None]
+    one, other = spare.reshape((3, 2, *work.shape))[:2]
+    np.multiply(a[0, 1:], a[0, 1:], out=one)
+    np.multiply(a[1, 1:], a[1, 1:], out=other)
+    one += other
+    np.add(one[0], one[1], out=steepness)
+    np.multiply(R[::-1, 1, 2, None], a[:, 2], out=one)
+    np.multiply(R[::-1, 2, 2, None], a[:, 1], out=other)
+    one -= other
+    one *= one
+    steepness -= one[0]
+    steepness -= one[1]
+    np.sqrt(steepness, out=steepness)
+    a[0] /= steepness
+    _form_rows(a, work)
 
 
-def _level_equations(rays: Array) -> tuple[Array, Array, Array]:
-    """Return what `_equations` does for cameras that stand level."""
-    per_mm = 1.0 / np.hypot(rays[0, 2, :1], rays[1, 2, :1])
-    rows = _rows(rays)
-    rows *= per_mm
-    return rows, per_mm, rays
+def _level_equations(rays: Array, work: _Work) -> None:
+    """Form what `_equations` does for cameras that stand level."""
+    work.steepness[:] = np.hypot(rays[0, 2].flat[0], rays[1, 2].flat[0])
+    work.turned[:] = rays
+    work.turned[0] /= work.steepness
+    _form_rows(work.turned, work)
 
 
-def _rows(a: Array) -> Array:
-    """Return the five coefficients and the discrepancy ``(6, n, ...)`` from rays ``(2, 3, n, ...)``."""
-    rows = np.empty((6, *a.shape[2:]))
-    np.multiply(a[0, 0], a[1, 1:], out=rows[0:2])
-    np.multiply(-a[1, 0], a[0, 1:], out=rows[2:4])
-    np.einsum("in...,in...->n...", a[0, 1:], a[1, 1:], out=rows[4])
-    rows[5] = _discrepancies(a[:, 1:])
-    return rows
+def _form_rows(a: Array, work: _Work) -> None:
+    """Form the five coefficients and the discrepancy ``(6, n, ...)`` from rays ``(2, 3, n, ...)``.
+
+    Those of the right camera are for turns the other way.
+    """
+    rows, products = work.rows, work.spare[:2]
+    (x1, y1, z1), (x2, y2, z2) = a
+    np.multiply(x1, a[1, 1:], out=rows[0:2])
+    np.multiply(x2, a[0, 1:], out=rows[2:4])
+    np.multiply(y1, a[1, 1:], out=rows[4:6])
+    np.multiply(z1, z2, out=products[0])
+    np.multiply(z1, y2, out=products[1])
+    rows[4] += products[0]
+    rows[5] -= products[1]
 
 
-def _products(rows: Array) -> Array:
-    """Return the sums over n of products ``(u, u, ...)`` of rows ``(u, n, ...)``."""
+def _form_products(work: _Work) -> None:
+    """Form the sums over n of products ``(6, 6, ...)`` of the rows; in a batch, on the diagonal and above."""
+    rows, normal = work.rows, work.normal
     if rows.ndim == 2:
-        return np.asarray(rows @ rows.T)
-    products = np.empty((len(rows), len(rows), *rows.shape[2:]))
+        np.matmul(rows, rows.T, out=normal)
+        return
     for i, row in enumerate(rows):
-        np.einsum("n...,vn...->v...", row, rows[i:], out=products[i, i:])
-        products[i + 1 :, i] = products[i, i + 1 :]
-    return products
+        np.einsum("n...,vn...->v...", row, rows[i:], out=normal[i, i:])
+
+
+def _solved(work: _Work, stiffness: Array) -> Array:
+    """Return the corrections ``(5, ...)`` of the normal equations, stiffened by a share of their diagonal.
+
+    What elimination leaves stands in `work.reduced`: the pivots and, last of all, the sum of squared residuals.
+    """
+    if work.normal.ndim == 2:
+        return _solved_alone(work, float(stiffness))
+    reduced, shares, product = work.reduced, work.shares, work.product[0]
+    for i in range(6):
+        reduced[i, i:] = work.normal[i, i:]
+    stiffer = 1.0 + stiffness
+    for i in range(5):
+        reduced[i, i] *= stiffer
+    for i in range(5):
+        row = reduced[i]
+        np.divide(row[i + 1 :], row[i], out=shares[i:])
+        for j in range(i + 1, 6):
+            np.multiply(row[j], shares[j - 1 :], out=product[j - 1 :])
+            reduced[j, j:] -= product[j - 1 :]
+        row[i + 1 :] = shares[i:]
+    corrections = -reduced[:5, 5]
+    for i in range(4, 0, -1):
+        corrections[:i] -= reduced[:i, i] * corrections[i]
+    return corrections
+
+
+def _solved_alone(work: _Work, stiffness: float) -> Array:
+    """Do what `_solved` does for one pair, with the numbers of Python, which are quicker than arrays of one number."""
+    rows = work.normal.tolist()
+    for i in range(5):
+        rows[i][i] *= 1.0 + stiffness
+    try:
+        for i in range(5):
+            row = rows[i]
+            for j in range(i + 1, 6):
+                share = row[j] / row[i]
+                for k in range(j, 6):
+                    rows[j][k] -= share * row[k]
+            row[i + 1 :] = [value / row[i] for value in row[i + 1 :]]
+    except ZeroDivisionError:
+        work.reduced[:] = np.nan
+        return np.full(5, np.nan)
+    work.reduced[:] = rows
+    corrections = [-row[5] for row in rows[:5]]
+    for i in range(4, 0, -1):
+        for j in range(i):
+            corrections[j] -= rows[j][i] * corrections[i]
+    return np.array(corrections)
 
 
 def _inverse(matrix: Array) -> Array:
@@ -464,7 +692,8 @@ def _inverse(matrix: Array) -> Array:
             return np.asarray(np.linalg.inv(matrix))
         except np.linalg.LinAlgError:
             return np.full_like(matrix, np.nan)
-    inverse, product = matrix.copy(), np.empty_like(matrix)
+    inverse, product = _aligned(matrix.shape), _aligned(matrix.shape)
+    inverse[:] = matrix
     for j in range(len(matrix)):
         reciprocal = 1.0 / inverse[j, j]
         column, row = inverse[:, j] * reciprocal, inverse[j].copy()
@@ -476,7 +705,7 @@ def _inverse(matrix: Array) -> Array:
     return inverse
 
 
-def _turned(R: Array, turns: Array) -> Array:
+def _turned(R: Array, turns: Array, work: _TurningWork | None = None, level: bool = False) -> Array:
     """Turn both cameras ``(2, 3, 3, ...)`` about the axes of the base by the unknowns of the equations, radians.
 
     Only the difference of the omegas is determined; each camera takes half.
@@ -487,17 +716,28 @@ def _turned(R: Array, turns: Array) -> Array:
         return np.asarray(
             R + (along + half @ along) * (2.0 / (1.0 + 0.5 * (half * half).sum(axis=(1, 2), keepdims=True)))
         )
-    phi1, kappa1, phi2, kappa2, omega = turns
-    half = 0.5 * omega
-    turn = turn_about(np.array([[-half, half], [phi1, phi2], [kappa1, kappa2]]))
-    return np.asarray(np.einsum("ijk...,kjl...->kil...", turn, R))
+    work = work or _TurningWork(R.shape[3:])
+    halves = work.halves
+    np.multiply(turns[:2], 0.5, out=halves[0, 1:])
+    np.multiply(turns[2:4], -0.5, out=halves[1, 1:])
+    np.multiply(turns[4], 0.25, out=halves[1, 0])
+    np.negative(halves[1, 0], out=halves[0, 0])
+    result = work.rotations[1 if np.may_share_memory(R, work.rotations[0]) else 0]
+    if level:
+        return _turn_by_halves(halves, result)
+    turn, product = _turn_by_halves(halves, work.turn), work.turning
+    np.multiply(turn[:, :, 0, None], R[:, None, 0], out=result)
+    for j in (1, 2):
+        np.multiply(turn[:, :, j, None], R[:, None, j], out=product)
+        result += product
+    return np.asarray(result)
 
 
 def _half_turns() -> Array:
     """Return, by the five unknowns, the skew matrices of half the turns of both cameras, ``(18, 5)``."""
     half = np.zeros((2, 3, 3, 5))
     for camera, axis, unknown, share in (
-        (0, 0, 4, -0.25), (0, 1, 0, 0.5), (0, 2, 1, 0.5), (1, 0, 4, 0.25), (1, 1, 2, 0.5), (1, 2, 3, 0.5),
+        (0, 0, 4, -0.25), (0, 1, 0, 0.5), (0, 2, 1, 0.5), (1, 0, 4, 0.25), (1, 1, 2, -0.5), (1, 2, 3, -0.5),
     ):  # fmt: skip
         half[camera, (axis + 2) % 3, (axis + 1) % 3, unknown] = share
         half[camera, (axis + 1) % 3, (axis + 2) % 3, unknown] = -share
@@ -512,17 +752,38 @@ def turn_about(turns: Array) -> Array:
 
     For a small turn that is the angle in radians.
     """
-    half = 0.5 * turns
-    xx, yy, zz = half * half
-    share = 2.0 / (1.0 + xx + yy + zz)
-    turn = np.empty((3, 3, *turns.shape[1:]))
-    for i, others in enumerate((yy + zz, zz + xx, xx + yy)):
-        turn[i, i] = 1.0 - share * others
+    return np.asarray(_turn_by_halves(0.5 * turns[None], np.empty((1, 3, *turns.shape)))[0])
+
+
+def _turn_by_halves(half: Array, turn: Array) -> Array:
+    """Fill rotations ``(k, 3, 3, ...)`` about axes ``(k, 3, ...)`` as long as the tangent of half the angle."""
+    np.multiply(half[:, :, None], half[:, None], out=turn)
+    square = turn[:, 0, 0] + turn[:, 1, 1] + turn[:, 2, 2]
+    share = 2.0 / (1.0 + square)
+    turn *= share[:, None, None]
+    along = half * share[:, None]
+    rest = 1.0 - share * square
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        product, along = half[i] * half[j] * share, half[k] * share
-        turn[i, j] = product - along
-        turn[j, i] = product + along
+        turn[:, i, i] += rest
+        turn[:, i, j] -= along[:, k]
+        turn[:, j, i] += along[:, k]
     return turn
+
+
+def _all_ahead(work: _Work) -> bool:
+    """Tell whether all rays ``(2, 3, n, ...)`` of all pairs meet before both cameras.
+
+    They do where the planes with the base that hold them have one direction, and the left ray leans further along it.
+    """
+    (x1, y1, z1), (x2, _, _) = work.turned
+    together = work.rows[4]
+    left, right, square = work.spare[:3]
+    np.multiply(y1, y1, out=right)
+    np.multiply(z1, z1, out=square)
+    right += square
+    right *= x2
+    np.multiply(x1, together, out=left)
+    return bool(together.min() > 0.0 and (left > right).all())
 
 
 def _facing(R: Array, a: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
@@ -531,8 +792,7 @@ def _facing(R: Array, a: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
     The rays ``(2, 3, n, ...)`` of four poses are coplanar: the right camera may be turned over about the base, and
     the base reversed.
     """
-    ahead = _distances(a)
-    meets = ahead > 0.0
+    meets = _distances(a) > 0.0
     if meets.all():
         return R, np.ones(a.shape[3:], dtype=bool)
     over = (meets[0] != meets[1]).mean(axis=0) > 0.5

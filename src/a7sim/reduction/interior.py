@@ -29,25 +29,25 @@ SMALLEST_STEP = 1e-12
 
 @dataclass(frozen=True)
 class PictureLie:
-    """Shift in mm, turn in radians and change of scale of a picture against its collimating marks."""
+    """Shift in mm, turn in radians and change of scale ``(...)`` of a picture against its collimating marks."""
 
-    dx: float
-    dy: float
-    turn: float
-    scale: float
+    dx: Array
+    dy: Array
+    turn: Array
+    scale: Array
     """Relative: 1e-4 for a picture that is too large by as much."""
 
 
 def picture_lie(displacements: Array, marks: Array) -> PictureLie:
-    """Return how a picture lies from its fiducials' displacements ``(2, n)`` at collimating marks ``(2, n)``, mm.
+    """Return how a picture lies from its fiducials' displacements ``(2, n, ...)`` at collimating marks ``(2, n)``, mm.
 
     Small-angle similarity ``d = t + (scale, turn) x`` by least squares. Raises Undetermined for one fiducial.
     """
     x, y = marks
     one, zero = np.ones_like(x), np.zeros_like(x)
     design = np.array([np.concatenate(pair) for pair in ((one, zero), (zero, one), (-y, x), (x, y))]).T
-    dx, dy, turn, scale = adjusted(design, np.concatenate([displacements[0], displacements[1]])).unknowns
-    return PictureLie(float(dx), float(dy), float(turn), float(scale))
+    design = design.reshape((*design.shape, *(1,) * (displacements.ndim - 2)))
+    return PictureLie(*adjusted(design, np.concatenate([displacements[0], displacements[1]])).unknowns)
 
 
 @dataclass(frozen=True)

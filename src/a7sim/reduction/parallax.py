@@ -11,7 +11,7 @@ from a7sim.reduction.least_squares import Adjustment, adjusted
 
 @dataclass(frozen=True)
 class Stand:
-    """How a projector stands: centre ``(3,)`` in mm, angles omega, phi, kappa ``(3,)`` in radians."""
+    """How a projector stands: centre ``(3, ...)`` in mm, angles omega, phi, kappa ``(3, ...)`` in radians."""
 
     centre: Array
     angles: Array
@@ -27,9 +27,8 @@ def element_corrections(
     2.32, carried over to the tilts at which the projectors stand. Raises Undetermined for points that do not
     determine the unknowns.
     """
-    shape = (3, *(1,) * (points.ndim - 1))
     coefficients = parallax_coefficients(
-        points, points, left.centre.reshape(shape), right.centre.reshape(shape), left.angles, right.angles
+        points, points, left.centre[:, None], right.centre[:, None], left.angles, right.angles
     )
     rows = [PARALLAX_ELEMENTS.index(name) for name in unknowns]
     return adjusted(np.swapaxes(coefficients[rows], 0, 1), -parallaxes)

@@ -10,20 +10,25 @@ from a7sim.scenario.loading import (
 from a7sim.scenario.schema import (
     SCHEMA_VERSION,
     Camera,
+    Comparator,
     Condition,
+    GridTest,
     Instrument,
     Observer,
     Photo,
     Plan,
     ProjectorCondition,
     Scenario,
+    StripPlan,
 )
 from a7sim.scenario.schema import Model as ModelPlan
 
 __all__ = [
     "SCHEMA_VERSION",
     "Camera",
+    "Comparator",
     "Condition",
+    "GridTest",
     "Instrument",
     "ModelPlan",
     "Observer",
@@ -32,6 +37,7 @@ __all__ = [
     "ProjectorCondition",
     "Scenario",
     "ScenarioError",
+    "StripPlan",
     "find_scenario",
     "load_scenario",
     "scenario_of",

@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,7 @@ def load_scenario(name: str | Path, overrides: Mapping[str, str] | None = None) 
 
 def scenario_of(raw: Mapping[str, Any], folder: Path, source: str = "scenario") -> Scenario:
     """Return the scenario of raw tables whose files stand in `folder`. Raises ScenarioError."""
+    raw = _with_models(raw)
     mistakes = [
         *mistakes_of_form(raw, _expected()),
         *mistakes_of_reference(raw, folder),
@@ -82,6 +84,16 @@ def scenario_of(raw: Mapping[str, Any], folder: Path, source: str = "scenario") 
         for photo in scenario.photos
     ]
     return msgspec.structs.replace(scenario, photos=photos)
+
+
+def _with_models(raw: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the tables with a model of every photograph and the next where they say nothing of models."""
+    photos = raw.get("photos")
+    if "models" in raw or not isinstance(photos, list):
+        return raw
+    names = [photo.get("name") for photo in photos if isinstance(photo, Mapping)]
+    pairs = enumerate(pairwise(names), start=1)
+    return {**raw, "models": [{"name": str(i), "left": left, "right": right} for i, (left, right) in pairs]}
 
 
 def scenario_schema() -> dict[str, Any]:

@@ -10,6 +10,9 @@ from a7sim.standard_points import CASES, POSITIONS
 LEAST_SEPARATION = 1.0
 """Counter units between the two levels of a perspective centre."""
 
+FEWEST_IN_PLAN, FEWEST_IN_HEIGHT = 2, 3
+"""Points of control that place a strip on the ground (S)."""
+
 
 def mistakes_of_reference(raw: Mapping[str, Any], folder: Path) -> Iterator[str]:
     """Yield a sentence for everything in the tables that does not fit the rest."""
@@ -18,6 +21,12 @@ def mistakes_of_reference(raw: Mapping[str, Any], folder: Path) -> Iterator[str]
     yield from _mistakes_in_photos(raw, folder)
     yield from _mistakes_in_models(raw)
     yield from _mistakes_in_levels(_table(raw, "plan").get("centre_levels"))
+    yield from _mistakes_in_work(raw)
+    yield from _mistakes_in_control(raw)
+    if _table(raw, "instrument").get("variant") == "A8":
+        yield from _mistakes_with_an_a8(raw)
+    elif "grid_test" in _table(raw, "instrument"):
+        yield "instrument.grid_test: expected variant = 'A8' beside it; the faults of an A7 stand in condition"
 
 
 def _mistakes_in_levels(levels: object) -> Iterator[str]:
@@ -25,6 +34,49 @@ def _mistakes_in_levels(levels: object) -> Iterator[str]:
         low, high = levels
         if abs(high - low) < LEAST_SEPARATION:
             yield f"plan.centre_levels: expected levels {LEAST_SEPARATION:g} or more apart, got {low:g} and {high:g}"
+
+
+def _ways(raw: Mapping[str, Any]) -> list[object]:
+    work = raw.get("work", ["plotter"])
+    return list(work) if isinstance(work, list) else []
+
+
+def _mistakes_in_work(raw: Mapping[str, Any]) -> Iterator[str]:
+    ways = _ways(raw)
+    for index, way in enumerate(ways):
+        if way in ways[:index]:
+            yield f"work[{index}]: expected every way once, got {way!r} twice"
+    if "plotter" in ways and "plan" not in raw:
+        yield "plan: expected the settings of the plotter, got nothing (work = ['comparator'] needs none)"
+
+
+def _mistakes_in_control(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what a strip lacks in control: for absolute orientation by seven equations (S), for its polynomial."""
+    roles = [point.get("role") for point in _tables(raw, "ground")]
+    plan, heights = (sum(role in ("control", which) for role in roles) for which in ("plan", "height"))
+    degree = _table(raw, "strip").get("polynomial")
+    if degree in (2, 3) and (plan < degree + 1 or heights < 2 * degree + 1):
+        yield (
+            f"strip.polynomial: expected {degree + 1} points of ground control in plan and {2 * degree + 1} in height "
+            f"for degree {degree}, got {plan} and {heights}"
+        )
+    elif "comparator" in _ways(raw) and (plan < FEWEST_IN_PLAN or heights < FEWEST_IN_HEIGHT):
+        yield (
+            f"ground: expected {FEWEST_IN_PLAN} points of control in plan and {FEWEST_IN_HEIGHT} in height for a "
+            f"strip by comparator, got {plan} and {heights}"
+        )
+
+
+def _mistakes_with_an_a8(raw: Mapping[str, Any]) -> Iterator[str]:
+    if "condition" in _table(raw, "instrument"):
+        yield "instrument.condition: expected grid_test in its place for an A8, got the faults of an A7"
+    method = _table(raw, "plan").get("method", "independent")
+    if method != "independent":
+        yield f"plan.method: expected 'independent' on an A8, which has neither by nor bz, got {method!r}"
+    for index, model in enumerate(_tables(raw, "models")):
+        base = model.get("base", "inside")
+        if base != "inside":
+            yield f"models[{index}].base: expected 'inside', all that an A8 has, got {base!r}"
 
 
 def _table(raw: Mapping[str, Any], key: str) -> Mapping[str, Any]:

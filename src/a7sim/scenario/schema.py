@@ -5,13 +5,18 @@ Every description completes the sentence "expected ...": validation and the JSON
 
 from typing import Annotated, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
+
+from a7sim.mistakes import Mistake
 
 SCHEMA_VERSION = 1
 
 Text = Annotated[str, Meta(min_length=1, max_length=64, description="a text of 1 to 64 characters")]
 FORMAT_MM = 230.0
 """Side of the picture."""
+
+HALF_WIDTH_MM = 85.0
+"""Distance of the outer rows of standard points from the base where nobody says otherwise."""
 
 Name = Annotated[
     str,
@@ -195,12 +200,27 @@ class Condition(_Data, frozen=True, kw_only=True):
     """Play of the X, Y and Z spindles."""
 
 
+class GridTest(_Data, frozen=True, kw_only=True):
+    """What the last adjustment of an A8 left in it, drawn anew for every session (docs/decisions/0005-a8-strip.md)."""
+
+    local_um: Sigma = 5.5
+    """Standard error of a grid test of either projector, each coordinate at photo scale (A7, A8: 4 to 7)."""
+    local: Literal["smooth", "scattered"] = "smooth"
+    """Local errors belong to the place in the projector, the same in every model, or come anew at every point."""
+    principal_distance_mm: Sigma = 0.01
+    principal_point_mm: Sigma = 0.01
+    """Each coordinate; both known within 0.01 to 0.02 mm."""
+
+
 class Instrument(_Data, frozen=True, kw_only=True):
     """Which plotter stands in the room, and in what state."""
 
-    variant: Literal["A7"] = "A7"
+    variant: Literal["A7", "A8"] = "A7"
     serial: Name = "3268"
     condition: Condition = Condition()
+    """Of an A7."""
+    grid_test: GridTest = GridTest()
+    """Of an A8."""
     laying_sigma_mm: Sigma = 0.3
     laying_sigma_gon: Sigma = 0.2
     """How far from centred a picture lies when it is put on its carrier by hand."""
@@ -271,8 +291,40 @@ class Plan(_Data, frozen=True, kw_only=True):
     """Rms of the residual y-parallaxes at photo scale beyond which a model does not fit (17 answers: 10 to 40)."""
     tolerated_centre_rms: Sigma = 0.5
     """Rms of a perspective centre beyond which its pointings do not meet (the thesis's largest is 0.187)."""
-    half_width: Annotated[float, Meta(ge=5, le=115, description="5 to 115 mm")] = 85.0
+    half_width: Annotated[float, Meta(ge=5, le=115, description="5 to 115 mm")] = HALF_WIDTH_MM
     """Distance of the outer rows of standard points from the base, mm in the photograph."""
+
+
+class Comparator(_Data, frozen=True, kw_only=True):
+    """A comparator, and how its readings become models."""
+
+    kind: Literal["mono", "stereo"] = "mono"
+    """Every photograph by itself, with `observer.monocular_um`; or in pairs, the left image with `observer.stereo_um`
+    and the right one from it by parallaxes: px with `observer.height_um`, py with `observer.parallax_um`. Fiducials
+    are pointed at monocularly in both."""
+    pointings: Annotated[int, Meta(ge=1, le=20, description="1 to 20 pointings")] = 2
+    """Of every fiducial and point; the mean counts (thesis 3.5 points twice)."""
+    least_count_um: Annotated[float, Meta(ge=0, le=100, description="micrometres, 0 (not rounded) to 100")] = 1.0
+    """The Wild STK1 reads to 1 um."""
+    fit: Literal["conformal", "affine"] = "affine"
+    """Interior orientation on the fiducials; P eliminates film shrinkage by a linear transformation."""
+    case: Literal["A", "B", "C", "D", "E"] = "A"
+    """Standard points that are measured, beside the ground points; pairs are oriented on all they have in common."""
+    orientation: Literal["coplanarity", "schut", "parallax"] = "coplanarity"
+    """P 1.1-1.8, S equations 2 to 5, or the y-parallax equations of thesis 2.34, iterated."""
+
+
+class StripPlan(_Data, frozen=True, kw_only=True):
+    """How models become a strip on the ground, whoever measured them."""
+
+    join: Literal["points", "centre", "heights"] = "points"
+    """On all common points and the common centre (P 2.1-2.7), about the centre (T 2.35-2.39), scaled by heights (S)."""
+    polynomial: Literal[2, 3] | None = None
+    """Degree of the adjustment on the control after absolute orientation; none when absent."""
+
+
+Way = Literal["plotter", "comparator"]
+"""How a strip is measured."""
 
 
 class Scenario(_Data, frozen=True, kw_only=True):
@@ -287,8 +339,28 @@ class Scenario(_Data, frozen=True, kw_only=True):
     terrain: Terrain = Terrain()
     air: Air = Air()
     ground: list[GroundPoint] = []
-    models: Annotated[list[Model], Meta(min_length=1, description="one model or more")]
+    models: Annotated[list[Model], Meta(min_length=1, description="one model or more")] = []
+    """When absent, each photograph and the next, numbered from 1."""
+    work: Annotated[list[Way], Meta(min_length=1, description="'plotter' or 'comparator' or both")] = field(
+        default_factory=lambda: ["plotter"]
+    )
+    """Who measures the strip."""
     instrument: Instrument = Instrument()
     observer: Observer = Observer()
-    plan: Plan
+    plotting: Plan | None = field(default=None, name="plan")
+    """`plan` in the file; needed where somebody works at a plotter."""
+    comparator: Comparator = Comparator()
+    strip: StripPlan = StripPlan()
     seed: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] = 1
+
+    @property
+    def plan(self) -> Plan:
+        """The job sheet of the operator at the plotter. Raises Mistake where there is none."""
+        if self.plotting is None:
+            raise Mistake("plan: expected the settings of a plotter, got none: the scenario is not for one")
+        return self.plotting
+
+    @property
+    def half_width(self) -> float:
+        """Distance of the outer rows of standard points from the base, mm in the photograph."""
+        return HALF_WIDTH_MM if self.plotting is None else self.plotting.half_width

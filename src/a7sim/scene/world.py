@@ -130,7 +130,7 @@ def _lay_out_standard_points(
     along = (right - left)[:2]
     across = np.array([-along[1], along[0]]) / length_of(along)
     flying_height = (left[2] + right[2]) / 2.0 - ground.mean_height
-    half_width = scenario.plan.half_width * flying_height / scenario.camera.c
+    half_width = scenario.half_width * flying_height / scenario.camera.c
     names = {}
     for label, (share, row) in PLACES.items():
         east, north = left[:2] + share * along + row * half_width * across

@@ -1,15 +1,15 @@
 """What a session found, as one document for machines and as model files."""
 
-import csv
-import io
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import a7sim
-from a7sim.documents import head
+from a7sim.documents import Document, head
+from a7sim.files import csv_text
 from a7sim.instrument import Autograph
 from a7sim.operator import ModelRecord
-from a7sim.reduction import PerspectiveCentre
+from a7sim.reduction import Model, PerspectiveCentre
 from a7sim.scenario import Scenario
 from a7sim.scenario.schema import Published
 from a7sim.scene import RelativeTruth
@@ -22,14 +22,18 @@ _CENTRE_FIELDS = ("X0", "Y0", "Z0", "T0", "sigma_X0", "sigma_Y0", "sigma_Z0", "s
 
 def header(scenario: Scenario, seed: int) -> dict[str, Any]:
     """Return what a document of results says first."""
-    return head("run") | {
-        "software": f"a7sim {a7sim.__version__}",
-        "scenario": scenario.title,
-        "seed": seed,
-        "variant": scenario.instrument.variant,
-        "method": scenario.plan.method,
-        "case": scenario.plan.case,
-    }
+    plan = scenario.plotting
+    return (
+        head("run")
+        | {
+            "software": f"a7sim {a7sim.__version__}",
+            "scenario": scenario.title,
+            "seed": seed,
+            "variant": scenario.instrument.variant,
+            "work": scenario.work,
+        }
+        | ({"method": plan.method, "case": plan.case} if plan else {})
+    )
 
 
 def of_model(
@@ -142,20 +146,35 @@ def _matrix(values: Any) -> list[list[float]]:
     return [_vector(row) for row in values]
 
 
-def models_csv(models: Sequence[dict[str, Any]]) -> str:
-    """Return model coordinates and centres in mm, Z upward (the geared counter divided by its units a mm)."""
-    out = io.StringIO()
-    out.write("# mm at model scale, Z up; the Z counter is divided by its units a mm\n")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(("model", "point", "X", "Y", "Z"))
-    for model in models:
-        units = model["z_units_per_mm"]
-        for point, place in model["points"].items():
-            writer.writerow((model["model"], point, *_mm(place["X"], place["Y"], place["Z"] / units)))
-        for side, centre in model["perspective_centres"].items():
-            name = f"{model[side]}:centre"
-            writer.writerow((model["model"], name, *_mm(centre["X0"], centre["Y0"], centre["Z0"] / units)))
-    return out.getvalue()
+def models_csv(models: Sequence[Model]) -> str:
+    """Return model coordinates and centres in mm, Z upward."""
+    rows = ((model.name, name, *_mm(*at)) for model in models for name, at in _named(model))
+    return "# mm at model scale, Z up\n" + csv_text(("model", "point", "X", "Y", "Z"), rows)
+
+
+def points_csv(model: Model) -> str:
+    """Return the points of a strip in the system of the ground, m."""
+    return csv_text(("point", "X", "Y", "Z"), ((name, *_mm(*at)) for name, at in _named(model)))
+
+
+def _named(model: Model) -> Iterator[tuple[str, list[float]]]:
+    return zip(model.points, model.coordinates.T.tolist(), strict=True)
+
+
+def strips_csv(strips: Sequence[Document]) -> str:
+    """Return the accuracies of all strips in m, one a line."""
+    header = ("strip", "cases", "scale", "max_join_mm", *(f"{on}_{what}_m" for on in ON for what in WHAT))
+    return csv_text(header, (_strip_row(strip) for strip in strips))
+
+
+def _strip_row(strip: Document) -> tuple[str, ...]:
+    accuracy = strip["accuracy_m"]
+    worst = max((join["max_residual_mm"] for join in strip["joins"]), default=0.0)
+    cells = [accuracy[on][what] if on in accuracy else math.nan for on in ON for what in WHAT]
+    return str(strip["number"]), "".join(strip["cases"]), f"{strip['absolute']['scale']:.7f}", *_mm(worst, *cells)
+
+
+ON, WHAT = ("control", "checks"), ("plan", "height")
 
 
 def _mm(*values: float) -> tuple[str, ...]:

@@ -1,11 +1,12 @@
 """Running a scenario: a scene, an instrument, a line, and an operator who works it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from a7sim.documents import as_json
+from a7sim.documents import Document, as_json
+from a7sim.files import csv_text
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Desk, Listener
 from a7sim.link.client import Client
@@ -13,12 +14,24 @@ from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit, Job, ModelJob, Person, work
+from a7sim.reduction import Ground, Model, Undetermined
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene, build_scene
 from a7sim.session import results
+from a7sim.session.folder import (
+    BOOK,
+    CARD_KEY,
+    CARDS,
+    JOURNAL,
+    MODELS,
+    OUTPUT_CARDS,
+    RESULTS,
+    STRIP,
+    prepare_folder,
+    write_whole,
+)
 from a7sim.session.journal import Journal
-
-JOURNAL, BOOK, MODELS, RESULTS = "session.jsonl", "book.csv", "models.csv", "results.json"
+from a7sim.session.strips import GroundedStrip, cards_of, ground_of, grounded, models_of, of_grounded
 
 
 @dataclass
@@ -74,8 +87,8 @@ def run(
     out: Path | None = None,
     watcher: Watcher | None = None,
     force: bool = False,
-) -> dict[str, Any]:
-    """Work through a scenario and return its document of results; with `out`, leave the four files there.
+) -> Document:
+    """Work through a scenario up to its strip and return the document of results; with `out`, leave the files there.
 
     `status` in the document is 'complete', or 'does not fit' with the operator's `message`. An interrupted
     session (KeyboardInterrupt) leaves whole files and goes on up. Raises Mistake for a bad file of
@@ -85,9 +98,9 @@ def run(
     heard: list[Listener] = []
     session = open_session(scenario, seed, lambda event: heard[0](event))  # noqa: PLW0108 - the journal is opened after the session
     if out is not None:
-        _prepare_folder(out, force)
+        prepare_folder(out, force)
     document = results.header(scenario, seed) | {"status": "failed", "message": ""}
-    done: list[dict[str, Any]] = []
+    done: list[Document] = []
     with Journal(out / JOURNAL if out else None, _journal_header(scenario, seed)) as journal:
         heard.append(journal.heard)
         try:
@@ -114,33 +127,40 @@ def run(
                 },
             }
             if out is not None:
-                _write_whole(out / BOOK, book.as_csv())
-                _write_whole(out / MODELS, results.models_csv(done))
-                _write_whole(out / RESULTS, as_json(document))
+                write_whole(out / BOOK, book.as_csv())
+                write_whole(out / MODELS, results.models_csv(models_of(done)))
+                write_whole(out / RESULTS, as_json(document))
+    return _concluded(session, document, out)
+
+
+def _concluded(session: Session, document: Document, out: Path | None) -> Document:
+    """Return the document of a session, with the strip on the ground if the session did not stop early."""
+    if document["status"] != "complete":
+        return document
+    ground = ground_of(session.scenario, session.scene)
+    try:
+        if not ground.used.any():
+            raise Mistake("the scenario has no ground control")
+        plan = session.scenario.strip
+        strip = grounded(models_of(document["models"]), ground, plan.join, plan.polynomial)
+    except (Mistake, Undetermined) as reason:
+        document["strip"] = {"message": str(reason)}
+    else:
+        document["strip"] = of_grounded(strip)
+        if out is not None:
+            write_whole(out / STRIP, results.points_csv(strip.points))
+            _write_cards(out, strip, models_of(document["models"]), ground)
+    if out is not None:
+        write_whole(out / RESULTS, as_json(document))
     return document
+
+
+def _write_cards(out: Path, strip: GroundedStrip, models: Sequence[Model], ground: Ground) -> None:
+    cards = cards_of(strip, models, ground)
+    write_whole(out / CARDS, "\n".join([*cards.deck, ""]))
+    write_whole(out / OUTPUT_CARDS, "\n".join([*cards.output, ""]))
+    write_whole(out / CARD_KEY, csv_text(("point", "number"), cards.key.items()))
 
 
 def _journal_header(scenario: Scenario, seed: int) -> dict[str, Any]:
     return {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
-
-
-def _prepare_folder(out: Path, force: bool) -> None:
-    """Make a folder for a session's files. Raises Mistake when it exists, unless forced."""
-    try:
-        if out.exists() and not out.is_dir():
-            raise Mistake(f"{out}: expected a folder, got a file")
-        if out.exists() and not force:
-            raise Mistake(
-                f"{out}: expected a folder that does not exist yet, got one that does (--force writes into it)"
-            )
-        out.mkdir(parents=True, exist_ok=True)
-        for name in (JOURNAL, BOOK, MODELS, RESULTS):
-            (out / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise Mistake(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
-
-
-def _write_whole(path: Path, text: str) -> None:
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)

@@ -23,18 +23,88 @@ _ELEMENTS = (
 def of_session(document: dict[str, Any]) -> RenderableType:
     """Return the tables of a session."""
     parts: list[RenderableType] = []
-    for model in document["models"]:
+    for model in document.get("models", ()):
         parts.extend(_of_model(model))
-    operator = document["operator"]
-    parts.append(
-        Text(
-            f"{operator['hours']:.1f} hours at the instrument, {operator['lines_over_the_link']} lines over the link, "
-            f"{operator['book_entries']} readings in the book, {operator['struck_out']} struck out"
-        )
-    )
+    if "strip" in document:
+        parts += [Rule(Text("Strip"), align="left"), *_of_strip(document["strip"]), Text()]
+    for name, strip in document.get("ways", {}).items():
+        parts += [Rule(Text(f"Strip, {name}"), align="left"), *_of_strip(strip), Text()]
+    if "a8_minus_comparator_m" in document:
+        each = document["a8_minus_comparator_m"]
+        parts += [_accuracy({"points, A8 minus comparator": each}), Text()]
+    if "operator" in document:
+        parts.append(_hours(document["operator"]))
     if document["message"]:
         parts.append(Text(f"{document['status']}: {document['message']}", style="bold"))
     return Group(*parts)
+
+
+def _hours(operator: dict[str, Any]) -> Text:
+    return Text(
+        f"{operator['hours']:.1f} hours at the instrument, {operator['lines_over_the_link']} lines over the link, "
+        f"{operator['book_entries']} readings in the book, {operator['struck_out']} struck out"
+    )
+
+
+def of_strips(document: dict[str, Any]) -> RenderableType:
+    """Return the table of all strips that the cases make, with the diagram of the first in words."""
+    table = _table("strip", "cases", "join, mm", "control plan", "height", "checks plan", "height")
+    for strip in document["strips"]:
+        accuracy = strip["accuracy_m"]
+        cells = [f"{accuracy[on][what]:.3f}" if on in accuracy else "" for on in ON for what in WHAT]
+        table.add_row(str(strip["number"]), " ".join(strip["cases"]), f"{_worst_join(strip):.3f}", *cells)
+    hours = sum(session["hours"] for session in document["sessions"].values())
+    said = f"{document['status']}: {document['message']}" if document["message"] else ""
+    first = document["strips"][0]["in_words"] if document["strips"] else ""
+    return Group(
+        _titled("Strips of all cases, rms residuals in m", table),
+        Text(f"\n{first}", overflow="fold"),
+        Text(f"{hours:.1f} hours at the instrument in {len(document['sessions'])} sessions"),
+        *([Text(said, style="bold")] if said else []),
+    )
+
+
+ON, WHAT = ("control", "checks"), ("plan", "height")
+
+
+def _worst_join(strip: dict[str, Any]) -> float:
+    return max((join["max_residual_mm"] for join in strip["joins"]), default=0.0)
+
+
+def _of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
+    if "message" in strip:
+        yield Text(f"No strip on the ground: {strip['message']}")
+        return
+    for join in strip["joins"]:
+        yield Text(
+            f"Models {' and '.join(join['models'])} joined, scale {join['scale']:.5f}, "
+            f"closing within {join['max_residual_mm']:.3f} mm"
+        )
+    yield Text(f"On the ground at 1:{1e3 * strip['absolute']['scale']:.0f}")
+    residuals = _table("point", "role", "X", "Y", "Z")
+    last = strip.get("polynomial", strip)
+    for point, each in last["residuals_m"].items():
+        residuals.add_row(point, each["role"], *("" if each[axis] is None else f"{each[axis]:+.3f}" for axis in "XYZ"))
+    yield _titled("Residuals, computed minus given, m", residuals)
+    yield _titled("Accuracy", _accuracy(strip["accuracy_m"]))
+    if "polynomial" in strip:
+        adjusted = strip["polynomial"]
+        yield _titled(f"After the polynomial of degree {adjusted['degree']}", _accuracy(adjusted["accuracy_m"]))
+        found = adjusted["deformation"]
+        yield Text(
+            f"The strip was bent by {found['vertical_sag_m']:+.2f} m in height and by "
+            f"{found['horizontal_sag_m']:+.2f} m in plan, twisted by {found['twist_gon_per_km']:+.4f} gon/km, and its "
+            f"scale drifted by {found['scale_drift_ppm_per_km']:+.1f} ppm/km"
+        )
+    yield from (Text(f"warning: {warning}") for warning in strip["warnings"])
+
+
+def _accuracy(sets: dict[str, Any]) -> Table:
+    accuracy = _table("rms, m", "X", "Y", "Z", "plan", "height", "largest X", "Y", "Z")
+    for on, each in sets.items():
+        values = [*each["rms"].values(), each["plan"], each["height"], *each["largest"].values()]
+        accuracy.add_row(f"{each['points']} {on}", *("" if value is None else f"{value:.3f}" for value in values))
+    return accuracy
 
 
 def _of_model(model: dict[str, Any]) -> Iterator[RenderableType]:

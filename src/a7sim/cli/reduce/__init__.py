@@ -1,0 +1,268 @@
+"""`a7sim reduce`: the computing room on anyone's files."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+from rich.console import Console
+
+from a7sim import computing
+from a7sim.cli.reduce import options, tables
+from a7sim.computing import Outcome
+from a7sim.computing.interior import Flight
+from a7sim.computing.strips import PairCamera
+from a7sim.documents import Document, as_json
+from a7sim.reduction.strips import JoinMethod
+
+NARROWEST = 80
+"""Columns that every table fits."""
+
+
+@click.group("reduce")
+def command() -> None:
+    """Compute orientations, centres, strips and blocks from files of measurements.
+
+    Tables are CSV with a header line, or TOML with the columns as keys of an array of tables [[rows]]; decimal
+    points, UTF-8, # begins a comment. Strips are read from N.R.C. cards too (.crd, .cards, or by their look).
+    With --out DIR the results go to results.json and CSV files there.
+    """
+
+
+@command.command("interior")
+@click.argument("counts", type=options.FILE)
+@click.option(
+    "--camera",
+    type=options.FILE,
+    required=True,
+    help="TOML with c, fiducials (name, x, y in mm), principal_point and distortion; a scenario's [camera] will do.",
+)
+@click.option("--method", type=click.Choice(["conformal", "affine", "projective"]), default="affine", show_default=True)
+@click.option(
+    "--count-mm",
+    type=options.Number(min=0.0, min_open=True, max=10.0),
+    help="Size of a count, mm (1 for counts in mm): tells how the film has shrunk, and the principal distance to set.",
+)
+@click.option(
+    "--correct",
+    type=click.Choice(computing.CORRECTIONS),
+    multiple=True,
+    help="Correct the points and bring them to the principal point; may be given several times.",
+)
+@click.option("--flying-height", type=options.Number(1.0, 30000.0), help="Of the camera above the sea, m.")
+@click.option("--ground-height", type=options.Number(-500.0, 9000.0), default=0.0, help="Above the sea, m.")
+@options.documented
+def interior(
+    counts: Path,
+    camera: Path,
+    method: str,
+    count_mm: float | None,
+    correct: tuple[str, ...],
+    flying_height: float | None,
+    ground_height: float,
+    out: Path | None,
+    as_document: bool,
+) -> None:
+    """Refine comparator COUNTS (photo,point,x,y) to mm by the fiducials, named as in the camera.
+
+    Writes image.csv (photo,point,x,y) and, of photographs of neighbouring numbers, pairs.csv for `reduce strip`.
+
+    Example: a7sim reduce interior counts.csv --camera scenarios/akwanga.toml --out refined
+    """
+    if flying_height is not None and flying_height <= ground_height:
+        raise click.UsageError(f"--flying-height: expected more than the ground height of {ground_height:g} m")
+    flight = None if flying_height is None else Flight(flying_height, ground_height)
+    outcome = computing.interior(counts, camera, method, count_mm, correct, flight)
+    _deliver(outcome, as_document, out, tables.of_interior)
+
+
+@command.command("relative")
+@click.argument("pair", type=options.FILE)
+@options.principal_distance(required=True)
+@options.principal_point
+@click.option("--bx", type=options.LENGTH, default=92.0, show_default=True, help="Length of the base, mm.")
+@click.option("--unknowns", type=click.Choice(["independent", "dependent"]), default="dependent", show_default=True)
+@click.option(
+    "--method",
+    type=click.Choice(computing.RELATIVE_METHODS),
+    default="coplanarity",
+    show_default=True,
+    help="robust takes out the points with blunders and names them; all sets the methods side by side.",
+)
+@options.documented
+def relative(
+    pair: Path,
+    c: float,
+    x0: float,
+    y0: float,
+    bx: float,
+    unknowns: Literal["independent", "dependent"],
+    method: computing.RelativeMethod,
+    out: Path | None,
+    as_document: bool,
+) -> None:
+    """Orient the two photographs of PAIR (point,xl,yl,xr,yr) to each other.
+
+    Writes the model with its centres to models.csv for `reduce connect`; a column model names it, best LEFT-RIGHT.
+
+    Example: a7sim reduce relative scenarios/dewitt-pair.csv --c 152.113
+    """
+    _deliver(computing.relative(pair, c, (x0, y0), unknowns, bx, method), as_document, out, tables.of_relative)
+
+
+@command.command("centres")
+@click.argument("pointings", type=options.FILE)
+@click.option(
+    "--method", type=click.Choice(computing.CENTRE_METHODS), default="two-levels", show_default=True, help="See above."
+)
+@click.option("--z1", type=options.PLACE, default=4900.0, show_default=True, help="Z-counter reading of X1, Y1.")
+@click.option("--z2", type=options.PLACE, default=5100.0, show_default=True, help="Z-counter reading of X2, Y2.")
+@options.principal_distance(required=False, help_text="Principal distance of the projector, mm, with a grid plate.")
+@options.documented
+def centres(
+    pointings: Path,
+    method: computing.CentreMethod,
+    z1: float,
+    z2: float,
+    c: float | None,
+    out: Path | None,
+    as_document: bool,
+) -> None:
+    """Compute perspective centres from POINTINGS.
+
+    \b
+    two-levels  point,X1,Y1,X2,Y2     pointings at the levels --z1 and --z2
+    levels      point,level,X,Y       at any number of levels, every point at each
+    grid        point,x,y,X,Y,Z       crosses of a grid plate in mm, readings in mm
+    a8          model,base,column,height  from the A8's base scale and column, mm
+
+    Example: a7sim reduce centres pointings.csv --z1 4900 --z2 5100
+    """
+    _deliver(computing.centres(pointings, z1, z2, method, c), as_document, out, tables.of_centres)
+
+
+@command.command("similarity")
+@click.argument("common", type=options.FILE)
+@click.option(
+    "--method",
+    type=click.Choice(computing.SIMILARITY_METHODS),
+    default="iteration",
+    show_default=True,
+    help="both sets the methods side by side.",
+)
+@options.documented
+def similarity(common: Path, method: computing.SimilarityMethod, out: Path | None, as_document: bool) -> None:
+    """Compute the similarity of COMMON (point,x,y,z,X,Y,Z): X = scale R x + T.
+
+    Example: a7sim reduce similarity common.csv --method both
+    """
+    _deliver(computing.similarity(common, method), as_document, out, tables.of_similarity)
+
+
+@command.command("connect")
+@click.argument("models", type=options.FILE, nargs=-1, required=True)
+@options.join_method
+@options.documented
+def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_document: bool) -> None:
+    """Join two or more MODELS (model,point,X,Y,Z; or one deck of cards) in the system of the first.
+
+    Neighbours share a projection centre, a point named PHOTO:centre; without centres they follow by name.
+
+    Example: a7sim reduce connect models.csv --method centre
+    """
+    _deliver(computing.connect(models, method), as_document, out, tables.of_connection)
+
+
+@command.command("strip")
+@click.argument("file", type=options.FILE)
+@options.principal_distance(required=False, help_text="Principal distance of pairs, mm.")
+@options.principal_point
+@click.option("--bx", type=options.LENGTH, help="bx of every model of pairs, mm; else the mean x-parallax.")
+@options.ground(required=False)
+@options.join_method
+@click.option("--polynomial", type=click.Choice(["2", "3"]), help="Adjust the strip by polynomials of this degree.")
+@options.against
+@options.documented
+def strip(
+    file: Path,
+    c: float | None,
+    x0: float,
+    y0: float,
+    bx: float | None,
+    ground: Path | None,
+    method: JoinMethod,
+    polynomial: str | None,
+    against: Path | None,
+    out: Path | None,
+    as_document: bool,
+) -> None:
+    """Form a strip and orient it to the ground, from a FILE of one of three kinds.
+
+    \b
+    pairs    model,point,xl,yl,xr,yr  needs --c and --ground
+    models   model,point,X,Y,Z        needs --ground; centres are points PHOTO:centre
+    cards    of the N.R.C. program    with their own ground control
+
+    Models named LEFT-RIGHT may come in any order; other pairs are taken as they stand in the file. --out writes
+    output cards (strip.crd) and PAT-M free format (strip.pat) too, where names and numbers fit them.
+
+    Example: a7sim reduce strip pairs.csv --c 153.84 --ground ground.csv
+    """
+    degree: Literal[2, 3] | None = None if polynomial is None else 2 if polynomial == "2" else 3
+    camera = None if c is None else PairCamera(c, (x0, y0), bx)
+    outcome = computing.strip(file, ground, camera, method, degree, against)
+    _deliver(outcome, as_document, out, tables.of_strip)
+
+
+@command.command("absolute")
+@click.argument("model", type=options.FILE)
+@options.ground(required=True)
+@options.against
+@options.documented
+def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, as_document: bool) -> None:
+    """Orient one MODEL or strip (point,X,Y,Z) to the ground.
+
+    Example: a7sim reduce absolute model.csv --ground ground.csv
+    """
+    _deliver(computing.absolute(model, ground, against), as_document, out, tables.of_absolute)
+
+
+@command.command("block")
+@click.argument("models", type=options.FILE, nargs=-1, required=True)
+@options.ground(required=True)
+@click.option(
+    "--height-weight",
+    type=options.Number(min=1e-6, max=1e6),
+    default=1.0,
+    show_default=True,
+    help="Weight of equations in height against those in plan.",
+)
+@options.against
+@options.documented
+def block(
+    models: tuple[Path, ...],
+    ground: Path,
+    height_weight: float,
+    against: Path | None,
+    out: Path | None,
+    as_document: bool,
+) -> None:
+    """Adjust MODELS (model,point,X,Y,Z) of one strip or several to the ground at once, 500 at the most.
+
+    Models should be nearly level; --out writes output cards of every strip (strip-1.crd ...).
+
+    Example: a7sim reduce block strip1.csv strip2.csv --ground ground.csv
+    """
+    _deliver(computing.block(models, ground, height_weight, against), as_document, out, tables.of_block)
+
+
+def _deliver(outcome: Outcome, as_document: bool, out: Path | None, shown: Callable[[Document], list[Any]]) -> None:
+    """Write an outcome where it is wanted and print it, as JSON or as the table a surveyor files."""
+    document = outcome.document if out is None else computing.written(outcome, out)
+    if as_document:
+        click.echo(as_json(document), nl=False)
+        return
+    console = Console(markup=False, highlight=False, emoji=False)
+    console.width = max(console.width, NARROWEST)
+    for each in [*shown(document), *tables.of_warnings(document)]:
+        console.print(each)

@@ -1,0 +1,289 @@
+"""Documents of reductions as the tables a surveyor files."""
+
+from collections.abc import Iterable, Sequence
+from math import isnan
+from typing import Any
+
+from rich.table import Table
+
+from a7sim.documents import Document
+
+ANGLES = ("omega", "phi", "kappa")
+SHIFTS = ("Tx", "Ty", "Tz")
+
+Shown = list[Any]
+
+
+def of_interior(document: Document) -> Shown:
+    """Show fits, residuals, and what the film did, photograph by photograph."""
+    camera = document["camera"]
+    shown: Shown = [
+        f"Interior orientation, {document['method']}, {camera['name']}, c {camera['c_mm']:.3f} mm",
+        f"points in mm about the {document['about']}{_of_corrections(document['corrections'])}",
+    ]
+    for picture in document["photographs"]:
+        unknowns = [(name, f"{u['value']:.9g}", f"{u['sigma']:.2g}") for name, u in picture["unknowns"].items()]
+        residuals = [(name, *(1e3 * v for v in each)) for name, each in picture["residuals_mm"].items()]
+        shown += [
+            "",
+            f"Photograph {picture['photo']}: {len(picture['points'])} points, "
+            f"s0 {1e3 * picture['s0_mm']:.1f} um, redundancy {picture['statistics']['redundancy']}",
+            _table(("unknown", "value", "±"), unknowns),
+            _table(("fiducial", "vx, um", "vy, um"), residuals, 1),
+            *_of_film(picture["film"]),
+        ]
+    return shown
+
+
+def _of_corrections(corrections: Sequence[str]) -> str:
+    return f", corrected for {', '.join(corrections)}" if corrections else ""
+
+
+def _of_film(film: Document) -> list[str]:
+    x, y = film["mm_per_count"]
+    said = [f"film: {x:.9g} and {y:.9g} mm a count in x and y, axes {film['shear_gon']:.4f} gon off square"]
+    if "scale" in film:
+        x, y = film["shrinkage_ppm"]
+        said.append(
+            f"film: shrunk by {x:.0f} and {y:.0f} ppm, principal distance for the plotter "
+            f"{film['principal_distance_mm']:.3f} mm"
+        )
+    return said
+
+
+def of_relative(document: Document) -> Shown:
+    """Show elements, parallaxes and model coordinates; the blunders found; and the methods side by side."""
+    elements = [
+        (name, "mm" if name.startswith("b") else "gon", each["value"], each["sigma"])
+        for name, each in document["elements"].items()
+    ]
+    parallaxes = document["residual_y_parallax_mm"]
+    points = [
+        (name, *place, f"{1e3 * parallaxes[name]:.1f}" if name in parallaxes else "taken out")
+        for name, place in document["points"].items()
+    ]
+    shown: Shown = [
+        f"Relative orientation by {document['method']}",
+        "",
+        _table(("element", "", "value", "±"), elements),
+        "",
+        _table(("point", "X, mm", "Y, mm", "Z, mm", "p, um"), points),
+        "",
+        f"s0 {1e3 * document['s0_mm']:.2f} um in the picture, "
+        f"redundancy {document['statistics']['redundancy']}, {document['iterations']} iterations, "
+        f"condition {document['condition']:.2g}",
+    ]
+    if document["method"] == "robust":
+        shown += _of_blunders(document)
+    if "compare" in document:
+        coordinates = [row for row in document["compare"]["rows"] if row["unit"] != "mm of the model"]
+        shown += ["", "Side by side", _of_methods(coordinates), *_of_largest(document["compare"])]
+        shown += _of_blunders(document["robust"])
+    return shown
+
+
+def _of_blunders(document: Document) -> list[str]:
+    if not document["searchable"] and not document["blunders"]:
+        return ["too few points to name one with a blunder: seven are the fewest"]
+    return [
+        f"blunder at point {each['point']}: {each['parallax_mm']:.3f} mm of y-parallax, "
+        f"{abs(each['standardised']):.1f} standard deviations (critical {each['critical']:.1f})"
+        for each in document["blunders"]
+    ] or ["no blunders found"]
+
+
+def of_centres(document: Document) -> Shown:
+    """Show centres with their precision, and the residuals of the points."""
+    method = document["method"]
+    shown: Shown = [f"Perspective centres, {method}", ""]
+    if method == "a8":
+        rows = [(name, side, *each[side]) for name, each in document["models"].items() for side in ("left", "right")]
+        return [*shown, _table(("model", "centre", "X, units", "Y, units", "Z, mm"), rows, 3)]
+    rows = [(name, document[name], document[f"sigma_{name}"]) for name in ("X0", "Y0", "Z0", "T0") if name in document]
+    angles = [(f"{name}, gon", each["value"], each["sigma"]) for name, each in document.get("angles", {}).items()]
+    names = ("vx, mm", "vy, mm") if method == "grid" else ("vX", "vY")
+    shown += [
+        _table(("", "value", "±"), rows + angles),
+        "",
+        _table(("point", *names), [(point, *v) for point, v in document["residuals"].items()]),
+        "",
+    ]
+    if method == "grid":
+        return [*shown, f"s0 {1e3 * document['s0_mm']:.2f} um on the plate, {document['iterations']} iterations"]
+    of_pointing = f", a pointing {document['pointing_rms']:.4f}" if "pointing_rms" in document else ""
+    return [*shown, f"rms {document['rms']:.4f}{of_pointing}, redundancy {document['redundancy']}"]
+
+
+def of_similarity(document: Document) -> Shown:
+    """Show the seven unknowns, the residuals, and the methods side by side."""
+    sigma = document["sigma"]
+    values = {"scale": document["scale"]} | {f"{name}, gon": value for name, value in document["angles"].items()}
+    values |= dict(zip(SHIFTS, document["translation"], strict=True))
+    shown: Shown = [
+        f"Similarity by {document['method']}",
+        "",
+        _table(("", "value", "±"), [(name, v, sigma[name.split(",")[0]]) for name, v in values.items()], 6),
+        "",
+        _table(("point", "vX", "vY", "vZ"), [(point, *v) for point, v in document["residuals"].items()]),
+        "",
+        f"s0 {document['s0']:.5f}, redundancy {document['statistics']['redundancy']}",
+    ]
+    if "compare" in document:
+        compared = document["compare"]
+        shown += ["", "Side by side", _of_methods(compared["rows"]), *_of_largest(compared)]
+    return shown
+
+
+def of_connection(document: Document) -> Shown:
+    """Show the joins with their closing differences, and the points of the whole."""
+    points = [(point, *place) for point, place in document["points"].items()]
+    return [
+        f"Models {', '.join(document['models'])} joined on {document['method']}",
+        f"in the system and unit of {document['system']}",
+        "",
+        *_of_joins(document["joins"], differences=True),
+        "",
+        _table(("point", "X", "Y", "Z"), points),
+    ]
+
+
+def of_strip(document: Document) -> Shown:
+    """Show joins, absolute orientation, residuals, and what the polynomials found the strip to be."""
+    shown: Shown = [
+        f"Strip of {len(document['models'])} models from {document['input']}, joined on {document['method']}",
+        f"joins in the unit of model {document['models'][0]['model']}{', mm' if document['input'] == 'pairs' else ''}",
+        "",
+        *_of_joins(document["joins"]),
+        "",
+        *of_absolute(document, "Absolute orientation of the strip"),
+    ]
+    if "polynomial" in document:
+        shown += ["", *_of_polynomial(document["polynomial"])]
+    return shown
+
+
+def of_absolute(document: Document, title: str = "Absolute orientation") -> Shown:
+    """Show the scale, the residuals at the ground points and the accuracies, and differences to given coordinates."""
+    precision = f", s0 {document['s0_m']:.4f} m" if "s0_m" in document else ""
+    return [
+        f"{title}: scale {document['absolute']['scale']:.9f}{precision}",
+        *_of_ground(document),
+        *_of_comparison(document),
+    ]
+
+
+def of_block(document: Document) -> Shown:
+    """Show the models' scales, the tie residuals, and the residuals and accuracies at the ground points."""
+    models = [
+        (each["model"], f"{each['scale']:.6f}", *_rms_of(each["residuals_m"].values()), len(each["residuals_m"]))
+        for each in document["models"]
+    ]
+    return [
+        f"Block of {len(models)} models: s0 {document['s0_m']:.4f} m, in plan {document['s0_plan_m']:.4f}, "
+        f"in height {document['s0_height_m']:.4f}, redundancy {document['redundancy']}",
+        "",
+        _table(("model", "scale", "rms vX, m", "vY", "vZ", "points"), models, 3),
+        *_of_ground(document),
+        *_of_comparison(document),
+    ]
+
+
+def of_warnings(document: Document) -> list[str]:
+    """Return what the surveyor should be told."""
+    said = [f"warning: {warning}" for warning in document.get("warnings", [])]
+    return said + [f"{name} is not written: {why}" for name, why in document.get("not_written", {}).items()]
+
+
+def _of_joins(joins: Sequence[Document], differences: bool = False) -> Shown:
+    rows = [
+        (" - ".join(join["models"]), len(join["points"]), join["scale"], *join["rms_mm"], join["max_residual_mm"])
+        for join in joins
+    ]
+    shown: Shown = [_table(("join", "points", "scale", "rms dX", "dY", "dZ", "largest"), rows)]
+    if differences:
+        closing = [
+            (" - ".join(join["models"]), point, *each)
+            for join in joins
+            for point, each in join["differences_mm"].items()
+        ]
+        shown += ["", _table(("closing differences", "point", "dX", "dY", "dZ"), closing)]
+    return shown
+
+
+def _of_ground(document: Document) -> Shown:
+    residuals = document["residuals_m"]
+    rows = [(point, each["role"], each["X"], each["Y"], each["Z"]) for point, each in residuals.items()]
+    return ["", _table(("ground point", "role", "vX, m", "vY", "vZ"), rows, 3), *_of_accuracy(document["accuracy_m"])]
+
+
+def _of_accuracy(accuracy: Document) -> list[str]:
+    return [
+        f"{which}, {each['points']} points: rms X {_metres(each['rms']['X'])}, Y {_metres(each['rms']['Y'])}, "
+        f"Z {_metres(each['rms']['Z'])} m; plan {_metres(each['plan'])}, height {_metres(each['height'])} m"
+        for which, each in accuracy.items()
+    ]
+
+
+def _of_polynomial(document: Document) -> Shown:
+    found = document["deformation"]
+    return [
+        f"Polynomials of degree {document['degree']}: "
+        f"s0 in plan {document['s0_plan']:.4f} m, in height {document['s0_height']:.4f} m",
+        f"the strip's bow: {found['horizontal_sag_m']:.3f} m in plan, {found['vertical_sag_m']:.3f} m in height",
+        f"its twist: {found['twist_gon_per_km']:.5f} gon/km, scale drift {found['scale_drift_ppm_per_km']:.2f} ppm/km",
+        *_of_ground(document),
+    ]
+
+
+def _of_comparison(document: Document) -> Shown:
+    if "compare" not in document:
+        return []
+    compared = document["compare"]
+    rows: list[tuple[Any, ...]] = [(point, *each) for point, each in compared["differences"].items()]
+    rows += [(name, *compared[key].values()) for name, key in (("mean square", "rms"), ("largest", "largest"))]
+    return ["", f"Computed minus given, {compared['points']} points", _table(("point", "dX", "dY", "dZ"), rows, 3)]
+
+
+def _of_methods(rows: Sequence[Document]) -> Table:
+    methods = list(rows[0]["values"])
+    return _table(
+        ("", *methods, "difference"),
+        [
+            (
+                f"{row['quantity']}, {row['unit']}" if row["unit"] else row["quantity"],
+                *(f"{row['values'][method]:.7f}" for method in methods),
+                f"{row['difference']:.1e}",
+            )
+            for row in rows
+        ],
+    )
+
+
+def _of_largest(compared: Document) -> list[str]:
+    each = (f"{value:.1e} {unit}".rstrip() for unit, value in compared["largest_difference"].items())
+    return [f"largest difference: {', '.join(each)}"]
+
+
+def _rms_of(residuals: Iterable[Sequence[float]]) -> list[float]:
+    columns = list(zip(*residuals, strict=True))
+    return [float((sum(v * v for v in column) / len(column)) ** 0.5) for column in columns] or [0.0] * 3
+
+
+def _metres(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[Any]], decimals: int = 4) -> Table:
+    """Return a table, its first column to the left, numbers to the right, a dash where nothing is known."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    for i, name in enumerate(header):
+        table.add_column(name, justify="right" if i else "left", no_wrap=bool(i), overflow="fold")
+    for row in rows:
+        table.add_row(*(_cell(value, decimals) for value in row))
+    return table
+
+
+def _cell(value: Any, decimals: int) -> str:
+    if value is None or (isinstance(value, float) and isnan(value)):
+        return "-"
+    return f"{value:.{decimals}f}" if isinstance(value, float) else str(value)

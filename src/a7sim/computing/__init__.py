@@ -1,0 +1,32 @@
+"""Reductions of people's files: tables and cards in, documents and files out (files.md).
+
+The sums themselves are in `a7sim.reduction`.
+"""
+
+from a7sim.computing.blocks import block
+from a7sim.computing.centres import CENTRE_METHODS, CentreMethod, centres
+from a7sim.computing.interior import CORRECTIONS, interior
+from a7sim.computing.outcome import Outcome, written
+from a7sim.computing.pairs import RELATIVE_METHODS, RelativeMethod, relative
+from a7sim.computing.similarities import SIMILARITY_METHODS, SimilarityMethod, similarity
+from a7sim.computing.strips import absolute, connect, strip
+
+__all__ = [
+    "CENTRE_METHODS",
+    "CORRECTIONS",
+    "RELATIVE_METHODS",
+    "SIMILARITY_METHODS",
+    "CentreMethod",
+    "Outcome",
+    "RelativeMethod",
+    "SimilarityMethod",
+    "absolute",
+    "block",
+    "centres",
+    "connect",
+    "interior",
+    "relative",
+    "similarity",
+    "strip",
+    "written",
+]

@@ -1,0 +1,93 @@
+"""What a reduction of people's files comes to: a document, and the files that go with it."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from a7sim.documents import Document, as_json
+from a7sim.files import csv_text, write_files
+from a7sim.geometry import Array
+from a7sim.mistakes import Mistake
+from a7sim.reduction.absolute import GroundFit
+from a7sim.reduction.cards import free_format_lines, output_lines
+from a7sim.reduction.least_squares import Undetermined
+from a7sim.reduction.strips import Model, Strip
+
+MODEL_COLUMNS = ("model", "point", "X", "Y", "Z")
+POINT_COLUMNS = ("point", "X", "Y", "Z")
+RESIDUAL_COLUMNS = ("point", "role", "X", "Y", "Z")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A document, and the texts of files by name, each made when it is written."""
+
+    document: Document
+    files: Mapping[str, Callable[[], str]] = field(default_factory=dict)
+
+
+@contextmanager
+def blamed_on(path: Path | str, what: str = "") -> Iterator[None]:
+    """Turn what the sums refuse or cannot determine into a mistake of the file; they say so themselves, not numpy."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except (Undetermined, Mistake) as refusal:
+        raise Mistake(f"{path}{f', {what}' if what else ''}: {refusal}") from refusal
+
+
+def written(outcome: Outcome, folder: Path) -> Document:
+    """Write `results.json` and the files of an outcome into a folder and return the document as written.
+
+    What does not fit the form of a file (a name of letters on a card) keeps that file from being written, and the
+    document says so under `not_written`. Raises Mistake for a folder that cannot be written.
+    """
+    texts, refused = {}, {}
+    for name, text in outcome.files.items():
+        try:
+            texts[name] = text()
+        except Mistake as mistake:
+            refused[name] = str(mistake)
+    document = outcome.document | ({"not_written": refused} if refused else {})
+    write_files(folder, texts | {"results.json": as_json(document)})
+    return document
+
+
+def models_csv(models: Sequence[Model]) -> str:
+    """Return models as CSV, centres as points `<photo>:centre`."""
+    return csv_text(
+        MODEL_COLUMNS,
+        ([model.name, name, *xyz] for model in models for name, xyz in _places(model.points, model.coordinates)),
+    )
+
+
+def points_csv(points: Sequence[str], coordinates: Array) -> str:
+    """Return points with coordinates ``(3, n)`` as CSV."""
+    return csv_text(POINT_COLUMNS, ([name, *xyz] for name, xyz in _places(points, coordinates)))
+
+
+def residuals_csv(fit: GroundFit) -> str:
+    """Return computed minus given at the ground points as CSV."""
+    rows = zip(fit.ground.points, fit.ground.roles, fit.residuals.T.tolist(), strict=True)
+    return csv_text(RESIDUAL_COLUMNS, ([name, role, *residual] for name, role, residual in rows))
+
+
+def free_format(models: Sequence[Model]) -> str:
+    """Return models as PAT-M reads them (see `reduction.cards`)."""
+    return _lines(free_format_lines(models))
+
+
+def output_cards(fit: GroundFit, models: Sequence[Model]) -> str:
+    """Return the output cards of a strip's models that lie in the ground system, with their residuals."""
+    return _lines(output_lines(fit.ground, Strip(tuple(models), ())))
+
+
+def _lines(lines: Sequence[str]) -> str:
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _places(points: Sequence[str], coordinates: Array) -> Iterator[tuple[str, list[float]]]:
+    return zip(points, coordinates.T.tolist(), strict=True)

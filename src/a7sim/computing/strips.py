@@ -1,0 +1,272 @@
+"""Models joined to strips and brought to the ground, from people's pairs, models or cards."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from a7sim.computing.comparing import against as compared_with
+from a7sim.computing.comparing import against_csv
+from a7sim.computing.outcome import (
+    Outcome,
+    blamed_on,
+    free_format,
+    models_csv,
+    output_cards,
+    points_csv,
+    residuals_csv,
+)
+from a7sim.computing.pairs import of_pair, photographs_of_pairs, with_centres
+from a7sim.computing.reading import (
+    along_the_strip,
+    is_of_pairs,
+    listed,
+    models_of,
+    pairs_of,
+    read_ground,
+    read_models,
+)
+from a7sim.documents import Document, by_point, head, of_absolute, of_adjustment, of_joins, of_statistics
+from a7sim.files import Table, read_table, read_text
+from a7sim.mistakes import Mistake
+from a7sim.reduction.absolute import AbsoluteOrientation, Ground, GroundFit, absolute_orientation
+from a7sim.reduction.cards import Deck, is_deck, read_cards
+from a7sim.reduction.coplanarity import relative_orientation
+from a7sim.reduction.least_squares import Undetermined
+from a7sim.reduction.polynomials import Degree, StripAdjustment, strip_adjustment
+from a7sim.reduction.similarity import SIMILARITY_UNKNOWNS
+from a7sim.reduction.strips import JoinMethod, Model, Strip, formed_strip
+
+
+@dataclass(frozen=True)
+class PairCamera:
+    """The camera of pairs: principal distance and principal point in mm, and the bx of every model, if it is given."""
+
+    c: float
+    principal_point: tuple[float, float] = (0.0, 0.0)
+    bx: float | None = None
+
+
+@dataclass(frozen=True)
+class _Input:
+    """What a strip is formed of: models along the strip, what is said of each, ground if it came with them."""
+
+    kind: str
+    models: tuple[Model, ...]
+    documents: list[Document]
+    ground: Ground | None = None
+
+
+def connect(paths: Sequence[Path], method: JoinMethod = "points") -> Outcome:
+    """Return the models of all files joined into one, in the system of the first along the strip. Raises Mistake."""
+    models = read_models(paths)
+    with blamed_on(listed(paths)):
+        if len(models) < 2:
+            raise Mistake(f"expected two models or more, got {len(models)}")
+        formed = formed_strip(along_the_strip(models), method)
+    document = head("reduce connect") | {
+        "method": method,
+        "system": formed.models[0].name,
+        "models": [model.name for model in formed.models],
+        "joins": _of_closed_joins(formed),
+        "points": by_point(formed.points, formed.coordinates),
+    }
+    return Outcome(document, _model_files(formed.models, formed.as_model))
+
+
+def absolute(path: Path, ground_path: Path, against: Path | None = None) -> Outcome:
+    """Return one model or strip oriented to the ground. Raises Mistake."""
+    models = read_models([path], may_be_one=True)
+    if len(models) > 1:
+        raise Mistake(f"{path}, column model: expected one model, got {len(models)}; `reduce strip` joins them")
+    ground = read_ground(ground_path)
+    with blamed_on(path, f"ground {ground_path}"):
+        oriented = absolute_orientation(models[0], ground)
+    document = head("reduce absolute") | of_oriented(oriented)
+    document["points"] = by_point(oriented.model.points, oriented.model.coordinates)
+    files = _model_files([oriented.model], oriented.model)
+    files["residuals.csv"] = lambda: residuals_csv(oriented.fit)
+    return _with_comparison(Outcome(document, files), oriented.model, against)
+
+
+def strip(
+    path: Path,
+    ground_path: Path | None = None,
+    camera: PairCamera | None = None,
+    method: JoinMethod = "points",
+    degree: Degree | None = None,
+    against: Path | None = None,
+) -> Outcome:
+    """Return the strip of a file of pairs, models or cards with its absolute orientation and adjustment.
+
+    Pairs need the camera; their models have the photo base without a bx. Only cards bring ground with them, which
+    the ground file takes the place of. Raises Mistake.
+    """
+    own_ground = read_ground(ground_path) if ground_path else None
+    given = _strip_input(path, camera)
+    ground = own_ground or given.ground
+    if ground is None:
+        raise Mistake(f"{path}: expected ground points (--ground), which only cards bring with them, got none")
+    with blamed_on(path):
+        formed = formed_strip(given.models, method)
+    with blamed_on(path, f"ground {ground_path}" if ground_path else ""):
+        oriented = absolute_orientation(formed, ground)
+        adjusted = strip_adjustment(oriented.model, ground, degree) if degree else None
+    document = head("reduce strip") | {
+        "input": given.kind,
+        "method": method,
+        "models": given.documents,
+        "joins": _of_closed_joins(formed),
+    }
+    document |= of_oriented(oriented)
+    if adjusted:
+        document["polynomial"] = of_adjustment(adjusted) | _of_polynomials(adjusted)
+    final = adjusted.model if adjusted else oriented.model
+    document["points"] = by_point(final.points, final.coordinates)
+    models = _in_ground(formed, oriented, adjusted)
+    fit = adjusted.fit if adjusted else oriented.fit
+    return _with_comparison(Outcome(document, _model_files(models, final) | ground_files(models, fit)), final, against)
+
+
+def of_oriented(oriented: AbsoluteOrientation) -> Document:
+    """Return an absolute orientation with the statistics of its seven unknowns where these are all determined."""
+    similarity = oriented.similarity
+    try:
+        adjustment = similarity.adjustment
+    except Undetermined:  # omega and kappa turn about one axis
+        return of_absolute(oriented)
+    used = oriented.fit.ground.used > 0.0
+    names = oriented.fit.ground.points
+    observations = [
+        f"{name} {axis}" for k, axis in enumerate("XYZ") for name, each in zip(names, used[k], strict=True) if each
+    ]
+    return of_absolute(oriented) | {
+        "iterations": similarity.iterations,
+        "s0_m": float(adjustment.s0),
+        "statistics": of_statistics(adjustment, SIMILARITY_UNKNOWNS, observations),
+    }
+
+
+def ground_files(models: Sequence[Model], fit: GroundFit) -> dict[str, Callable[[], str]]:
+    """Return the files of a strip in the ground system: residuals, output cards and free format."""
+    return {
+        "residuals.csv": lambda: residuals_csv(fit),
+        "strip.crd": lambda: output_cards(fit, numbered(models)),
+        "strip.pat": lambda: free_format(numbered(models)),
+    }
+
+
+def numbered(models: Sequence[Model]) -> list[Model]:
+    """Return models with numbers for names, as cards want them: their own, else their place in the strip."""
+    if all(model.name.isascii() and model.name.isdigit() for model in models):
+        return list(models)
+    return [Model(str(place), model.points, model.coordinates) for place, model in enumerate(models, start=1)]
+
+
+def _strip_input(path: Path, camera: PairCamera | None) -> _Input:
+    text = read_text(path)
+    if is_deck(path, text):
+        return _of_deck(path, read_cards(path, text))
+    table = read_table(path, text)
+    if not is_of_pairs(table):
+        return _of_models(path, "models", models_of(table))
+    if camera is None:
+        raise Mistake(f"{path}: expected the principal distance (--c) of the pairs, got none")
+    return _of_pairs(path, table, camera)
+
+
+def _of_deck(path: Path, deck: Deck) -> _Input:
+    found = _of_models(path, "cards", deck.models)
+    return _Input(found.kind, found.models, found.documents, deck.ground)
+
+
+def _of_models(path: Path, kind: str, models: Sequence[Model]) -> _Input:
+    with blamed_on(path):
+        chain = along_the_strip(models)
+    documents = [{"model": model.name, "points": by_point(model.points, model.coordinates)} for model in chain]
+    return _Input(kind, chain, documents)
+
+
+def _of_pairs(path: Path, table: Table, camera: PairCamera) -> _Input:
+    pairs = pairs_of(table, camera.principal_point)
+    models: list[Model] = []
+    documents: dict[str, Document] = {}
+    for pair, photos in zip(pairs, photographs_of_pairs(pairs), strict=True):
+        base = float((pair.left[0] - pair.right[0]).mean()) if camera.bx is None else camera.bx
+        with blamed_on(path, f"model {pair.name}"):
+            if not base > 0.0:
+                raise Mistake(
+                    f"expected the points of the left photograph further right than in the other, "
+                    f"got a mean x-parallax of {base:.3f} mm (is the pair given right to left?)"
+                )
+            orientation = relative_orientation(pair.left, pair.right, camera.c, camera.c, "dependent", bx=base)
+        length = base / abs(float(orientation.base[0]))
+        documents[pair.name] = {"model": pair.name} | of_pair(pair, orientation, camera.c, length)
+        models.append(with_centres(pair, orientation, camera.c, length, photos))
+    with blamed_on(path):
+        chain = along_the_strip(models)
+    return _Input("pairs", chain, [documents[model.name] for model in chain])
+
+
+def _of_closed_joins(formed: Strip) -> list[Document]:
+    return [
+        document
+        | {
+            "points": list(join.points),
+            "translation": join.similarity.translation.tolist(),
+            "rms_mm": join.rms.tolist(),
+            "differences_mm": by_point(join.points, join.differences),
+        }
+        for document, join in zip(of_joins(formed), formed.joins, strict=True)
+    ]
+
+
+def _of_polynomials(adjusted: StripAdjustment) -> Document:
+    """Return the coefficients in half lengths along the strip, and their statistics."""
+    ground = adjusted.fit.ground
+    plan = [name for name, used in zip(ground.points, ground.used[0], strict=True) if used]
+    height = [name for name, used in zip(ground.points, ground.used[2], strict=True) if used]
+    degree = adjusted.degree
+    in_plan = [f"{part} a{k}" for k in range(degree + 1) for part in ("Re", "Im")]
+    in_height = [f"b{k}" for k in range(2 * degree + 1)]
+    axis = adjusted.axis
+    return {
+        "axis": {
+            "middle_m": axis.middle.tolist(),
+            "along": axis.along.tolist(),
+            "half_length_m": float(axis.half_length),
+        },
+        "coefficients": {
+            name: {"value": float(value), "sigma": float(sigma)}
+            for names, part in ((in_plan, adjusted.plan), (in_height, adjusted.height))
+            for name, value, sigma in zip(names, part.unknowns, part.sigmas, strict=True)
+        },
+        "statistics": {
+            "plan": of_statistics(
+                adjusted.plan, in_plan, [f"{name} {where}" for where in ("along", "across") for name in plan]
+            ),
+            "height": of_statistics(adjusted.height, in_height, height),
+        },
+    }
+
+
+def _in_ground(formed: Strip, oriented: AbsoluteOrientation, adjusted: StripAdjustment | None) -> tuple[Model, ...]:
+    models = formed.transformed(oriented.similarity).models
+    if adjusted is None:
+        return models
+    return tuple(Model(each.name, each.points, adjusted.corrected(each.coordinates)) for each in models)
+
+
+def _model_files(models: Sequence[Model], whole: Model) -> dict[str, Callable[[], str]]:
+    return {
+        "models.csv": lambda: models_csv(models),
+        "points.csv": lambda: points_csv(whole.points, whole.coordinates),
+    }
+
+
+def _with_comparison(outcome: Outcome, final: Model, path: Path | None) -> Outcome:
+    if path is None:
+        return outcome
+    compared = compared_with(path, final.points, final.coordinates)
+    return Outcome(
+        outcome.document | {"compare": compared}, {**outcome.files, "compare.csv": lambda: against_csv(compared)}
+    )

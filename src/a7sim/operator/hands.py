@@ -1,0 +1,94 @@
+"""What hands and eyes do at the instruments of a crew, one instrument a session."""
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from a7sim.geometry import Array
+from a7sim.operator.crew import Who
+
+Truths = npt.NDArray[np.bool_]
+
+
+class Hands(Protocol):
+    """Handles, counters and eyepieces. `who` are the m sessions that act; their axis comes last.
+
+    What an instrument cannot do it does not do, and says so when asked by `refused`.
+    """
+
+    def variant(self) -> str:
+        """Return the type of the instruments."""
+
+    def reset(self, who: Who) -> None:
+        """Run all elements to their zeros, base inside, fittings for a positive, presets off."""
+
+    def engage(self, who: Who, height_gear: str | float, plan_gear: str) -> None:
+        """Engage the gears."""
+
+    def set_base_mode(self, who: Who, mode: str) -> None:
+        """Set base inside or outside."""
+
+    def set_fitting(self, who: Who, name: str, position: str) -> None:
+        """Put a fitting into a position."""
+
+    def set_element(self, who: Who, name: str, values: Array) -> None:
+        """Set an element through its counter to values ``(m,)``, gon or mm, two decimals."""
+
+    def preset(self, who: Who, readings: tuple[float, float, float]) -> None:
+        """Make the X, Y and Z counters show these readings."""
+
+    def load(self, who: Who, projector: int, photograph: str) -> None:
+        """Put a photograph into a projector."""
+
+    def unload(self, who: Who, projector: int) -> None:
+        """Take the photograph out of a projector."""
+
+    def loaded(self, who: Who, projector: int) -> str:
+        """Return the name of the photograph in a projector, empty for none."""
+
+    def fiducials(self, who: Who, projector: int) -> tuple[list[str], Array]:
+        """Return names of n fiducials and their displacements ``(2, n, m)`` from the collimating marks, mm."""
+
+    def centring(self, who: Who, projector: int) -> Array:
+        """Return how pictures were shifted and turned on their carrier ``(3, m)``, mm and gon."""
+
+    def centre(self, who: Who, projector: int, values: Array) -> None:
+        """Shift and turn pictures on their carrier ``(3, m)``, three decimals."""
+
+    def prints(self, who: Who, projector: int) -> dict[str, Array]:
+        """Return the places ``(2, m)`` mm of points on the paper prints, nan where a print has it not."""
+
+    def elements(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
+        """Return what the counters of elements show ``(m,)``."""
+
+    def counters(self, who: Who) -> Array:
+        """Return what the X, Y and Z counters show ``(3, m)``."""
+
+    def counter(self, who: Who, axis: str) -> Array:
+        """Return what one of them shows ``(m,)``."""
+
+    def drive(self, who: Who, readings: Mapping[str, Array]) -> Truths:
+        """Run carriages to readings ``(m,)`` by axis, two decimals; return which went ``(m,)``."""
+
+    def turn(self, who: Who, wheels: Array, element: str | None = None, counts: Array | None = None) -> None:
+        """Turn the handwheels of X, Y and perhaps Z by ``(2 or 3, m)``, three decimals, and with them an element.
+
+        The element is set to its counts ``(m,)`` where these are no nan.
+        """
+
+    def seen(self, who: Who, eye: int, point: str) -> Array:
+        """Return where an eye sees a point from the mark ``(2, m)``, um at photo scale, nan where it does not."""
+
+    def seen_by_both(self, who: Who, point: str) -> Array:
+        """Return the same for the left and the right eye together ``(4, m)``."""
+
+    def record(self, who: Who, point: str) -> None:
+        """Register the counters under a point."""
+
+    def note(self, who: Who, text: str) -> None:
+        """Write a note into the journals of the instruments."""
+
+    def refused(self, who: Who) -> dict[int, list[str]]:
+        """Return what was refused since the last asking, by session."""

@@ -1,0 +1,140 @@
+"""Hands at the end of a line: one person's, in lines of text over the link."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from a7sim.geometry import Array
+from a7sim.manual import NOT_VISIBLE
+from a7sim.operator.crew import Who
+from a7sim.operator.hands import Truths
+from a7sim.operator.person import Person
+
+ELEMENT_NODES: Mapping[str, str] = {
+    "kappa": "KAPP",
+    "phi": "PHI",
+    "omega": "OMEG",
+    "by": "BY",
+    "bz": "BZ",
+    "c": "PDIS",
+}
+
+_FITTING_NODES: Mapping[str, str] = {
+    "dove": "DOVE",
+    "triangulation": "TRI",
+    "diapositive": "DIAP",
+    "xcollar": "XCOL",
+    "ycollar": "YCOL",
+}
+_SHORT = {"inside": "IN", "outside": "OUT", "front": "FRON", "right": "RIGH"}
+
+
+class LineHands:
+    """`Hands` of one person, by lines of text over the link."""
+
+    def __init__(self, person: Person) -> None:
+        self._person = person
+
+    def _send(self, line: str) -> None:
+        self._person.client.send(line)
+
+    def _numbers(self, line: str) -> list[float]:
+        return self._person.client.numbers(line)
+
+    def variant(self) -> str:
+        return self._person.client.ask("*IDN?").split(",")[1]
+
+    def reset(self, who: Who) -> None:
+        self._send("*RST")
+
+    def engage(self, who: Who, height_gear: str | float, plan_gear: str) -> None:
+        self._send(f'GEAR:HEIG "{height_gear}"' if isinstance(height_gear, str) else f"GEAR:HEIG {height_gear}")
+        self._send(f'GEAR:PLAN "{plan_gear}"')
+
+    def set_base_mode(self, who: Who, mode: str) -> None:
+        self._send(f"BASE:MODE {_SHORT[mode]}")
+
+    def set_fitting(self, who: Who, name: str, position: str) -> None:
+        self._send(f"FITT:{_FITTING_NODES[name]} {_SHORT.get(position, position.upper())}")
+
+    def set_element(self, who: Who, name: str, values: Array) -> None:
+        self._send(f"{header(name)} {values[0]:.2f}")
+
+    def preset(self, who: Who, readings: tuple[float, float, float]) -> None:
+        self._send("COUN:X:PRES {:.2f};:COUN:Y:PRES {:.2f};:COUN:Z:PRES {:.2f}".format(*readings))
+
+    def load(self, who: Who, projector: int, photograph: str) -> None:
+        self._send(f'PHOT{projector}:LOAD "{photograph}"')
+
+    def unload(self, who: Who, projector: int) -> None:
+        self._send(f"PHOT{projector}:UNL")
+
+    def loaded(self, who: Who, projector: int) -> str:
+        return self._person.client.fields(f"PHOT{projector}?")[0]
+
+    def fiducials(self, who: Who, projector: int) -> tuple[list[str], Array]:
+        fields = self._person.client.fields(f"PHOT{projector}:FID?")
+        return fields[0::3], np.array([fields[1::3], fields[2::3]], dtype=float)[:, :, None]
+
+    def centring(self, who: Who, projector: int) -> Array:
+        return np.array(self._numbers(f"PHOT{projector}:CENT?"))[:, None]
+
+    def centre(self, who: Who, projector: int, values: Array) -> None:
+        self._send("PHOT{}:CENT {:.3f},{:.3f},{:.3f}".format(projector, *values[:, 0]))
+
+    def prints(self, who: Who, projector: int) -> dict[str, Array]:
+        fields = self._person.client.fields(f"PHOT{projector}:SKET?")
+        places = np.array([fields[1::3], fields[2::3]], dtype=float).T[:, :, None]
+        return dict(zip(fields[0::3], places, strict=False))
+
+    def elements(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
+        answer = np.array(self._numbers(";:".join(f"{header(name)}?" for name in names)))[:, None]
+        return dict(zip(names, answer, strict=True))
+
+    def counters(self, who: Who) -> Array:
+        return np.array(self._numbers("COUN?"))[:, None]
+
+    def counter(self, who: Who, axis: str) -> Array:
+        return np.array(self._numbers(f"COUN:{axis}?"))
+
+    def drive(self, who: Who, readings: Mapping[str, Array]) -> Truths:
+        line = ";".join(f"{axis} {reading[0]:.2f}" for axis, reading in readings.items())
+        before, after = self._numbers(f"SYST:ERR:COUN?;:DRIV:{line};:SYST:ERR:COUN?")
+        return np.array([before == after])
+
+    def turn(self, who: Who, wheels: Array, element: str | None = None, counts: Array | None = None) -> None:
+        turned = ";".join(f"{axis} {amount:.3f}" for axis, amount in zip("XYZ", wheels[:, 0], strict=False))
+        line = f"WHE:{turned}"
+        if element is not None and counts is not None and not np.isnan(counts[0]):
+            line += f";:{header(element)} {counts[0]:.2f}"
+        self._send(line)
+
+    def seen(self, who: Who, eye: int, point: str) -> Array:
+        return self._looked(f'EYEP{eye}? "{point}"')
+
+    def seen_by_both(self, who: Who, point: str) -> Array:
+        return self._looked(f'EYEP1? "{point}";:EYEP2? "{point}"')
+
+    def _looked(self, question: str) -> Array:
+        seen = np.array(self._numbers(question))[:, None]
+        seen[seen == float(NOT_VISIBLE)] = np.nan
+        return seen
+
+    def record(self, who: Who, point: str) -> None:
+        self._send(f'REC "{point}"')
+
+    def note(self, who: Who, text: str) -> None:
+        self._person.note(text)
+
+    def refused(self, who: Who) -> dict[int, list[str]]:
+        errors = self._person.client.errors()
+        return {0: errors} if errors else {}
+
+
+def header(element: str) -> str:
+    """Return the header of an element such as kappa1 or bx."""
+    if element == "bx":
+        return "BASE:BX"
+    if element == "common_phi":
+        return "COMM:PHI"
+    return f"PROJ{element[-1]}:{ELEMENT_NODES[element[:-1]]}"

@@ -1,0 +1,33 @@
+"""The folder that a session leaves."""
+
+from pathlib import Path
+
+from a7sim.mistakes import Mistake
+
+JOURNAL, BOOK, MODELS, STRIP, RESULTS = "session.jsonl", "book.csv", "models.csv", "strip.csv", "results.json"
+CARDS, OUTPUT_CARDS, CARD_KEY = "strip.crd", "strip-output.crd", "strip-numbers.csv"
+STRIPS = "strips.csv"
+FILES = (JOURNAL, BOOK, MODELS, STRIP, CARDS, OUTPUT_CARDS, CARD_KEY, STRIPS, RESULTS)
+
+
+def prepare_folder(out: Path, force: bool) -> None:
+    """Make a folder for a session's files. Raises Mistake when it exists, unless forced."""
+    try:
+        if out.exists() and not out.is_dir():
+            raise Mistake(f"{out}: expected a folder, got a file")
+        if out.exists() and not force:
+            raise Mistake(
+                f"{out}: expected a folder that does not exist yet, got one that does (--force writes into it)"
+            )
+        out.mkdir(parents=True, exist_ok=True)
+        for name in FILES:
+            (out / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise Mistake(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file so that it is there whole or not at all."""
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(text, encoding="utf-8")
+    temporary.replace(path)

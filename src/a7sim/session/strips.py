@@ -1,0 +1,132 @@
+"""The strip that a session's models make, on the ground (thesis 4.3): one, or all combinations of cases."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.documents import Document, of_absolute, of_adjustment, of_joins
+from a7sim.mistakes import Mistake
+from a7sim.reduction import (
+    AbsoluteOrientation,
+    Ground,
+    Model,
+    Strip,
+    StripAdjustment,
+    absolute_orientation,
+    deck_lines,
+    formed_strip,
+    output_lines,
+    strip_adjustment,
+)
+from a7sim.reduction.polynomials import Degree
+from a7sim.reduction.strips import CENTRE, JoinMethod, is_centre
+from a7sim.scenario import Scenario
+from a7sim.scene import Scene
+
+FIRST_FREE_NUMBER = 9001
+LONGEST_CARD_NUMBER = 5
+
+
+@dataclass(frozen=True)
+class Cards:
+    """A strip on cards: the deck, the output, and which number stands for which point."""
+
+    deck: list[str]
+    output: list[str]
+    key: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class GroundedStrip:
+    """A strip, its absolute orientation and, where asked for, its adjustment by polynomials."""
+
+    formed: Strip
+    oriented: AbsoluteOrientation
+    adjusted: StripAdjustment | None = None
+
+    @property
+    def points(self) -> Model:
+        """All points on the ground, as adjusted last."""
+        return (self.adjusted or self.oriented).model
+
+    @property
+    def on_ground(self) -> Strip:
+        """The strip in the system of the ground, each model with its own coordinates."""
+        return self.formed.transformed(self.oriented.similarity)
+
+
+def ground_of(scenario: Scenario, scene: Scene) -> Ground:
+    """Return the list of ground control and checks that the computing room has."""
+    names = tuple(point.point for point in scenario.ground)
+    coordinates = np.array([scene.ground_points[name] for name in names]).reshape(-1, 3).T
+    return Ground(names, coordinates, tuple(point.role for point in scenario.ground))
+
+
+def grounded(
+    models: Sequence[Model], ground: Ground, method: JoinMethod = "points", degree: Degree | None = None
+) -> GroundedStrip:
+    """Return the strip of models on its control. Raises Undetermined or Mistake for models or control too few."""
+    formed = formed_strip(models, method)
+    oriented = absolute_orientation(formed, ground)
+    return GroundedStrip(formed, oriented, strip_adjustment(oriented.model, ground, degree) if degree else None)
+
+
+def of_grounded(strip: GroundedStrip) -> Document:
+    """Return a strip on the ground as a document."""
+    document: Document = {"joins": of_joins(strip.formed)} | of_absolute(strip.oriented)
+    return document | ({"polynomial": of_adjustment(strip.adjusted)} if strip.adjusted else {})
+
+
+def models_of(documents: Sequence[Document]) -> list[Model]:
+    """Return the models of a document of results in mm, Z upward, with their centres."""
+    return [_model(each) for each in documents]
+
+
+def _model(document: Document) -> Model:
+    units = document["z_units_per_mm"]
+    places = {point: (each["X"], each["Y"], each["Z"]) for point, each in document["points"].items()}
+    for side, centre in document["perspective_centres"].items():
+        places[f"{document[side]}:centre"] = (centre["X0"], centre["Y0"], centre["Z0"])
+    coordinates = np.array(list(places.values())).T / [[1.0], [1.0], [units]]
+    return Model(document["model"], tuple(places), coordinates)
+
+
+def cards_of(strip: GroundedStrip, models: Sequence[Model], ground: Ground) -> Cards:
+    """Return the N.R.C. cards of a strip: the deck that goes in, and the output with residuals and deviations.
+
+    Names that are no numbers of five digits get one. Raises Mistake for coordinates that do not fit nine columns.
+    """
+    key = card_numbers([*ground.points, *(name for model in models for name in model.points)])
+    numbered_ground = Ground(tuple(key[name] for name in ground.points), ground.coordinates, ground.roles)
+    on_ground = strip.on_ground
+    numbered_strip = Strip(tuple(_numbered(model, key) for model in on_ground.models), on_ground.joins)
+    deck = _fitting(lambda decimals: deck_lines(numbered_ground, [_numbered(model, key) for model in models], decimals))
+    return Cards(deck, _fitting(lambda decimals: output_lines(numbered_ground, numbered_strip, decimals)), key)
+
+
+def card_numbers(names: Iterable[str]) -> dict[str, str]:
+    """Return the names of points as cards can hold them; `<photo>:centre` keeps its photograph."""
+    unique = dict.fromkeys(names)
+    taken = {name.removesuffix(CENTRE) for name in unique}
+    free = (str(number) for number in range(FIRST_FREE_NUMBER, 100_000) if str(number) not in taken)
+    return {name: name if _is_card_number(name) else next(free) + CENTRE * is_centre(name) for name in unique}
+
+
+def _is_card_number(name: str) -> bool:
+    name = name.removesuffix(CENTRE)
+    return name.isascii() and name.isdigit() and len(name) <= LONGEST_CARD_NUMBER and int(name) > 0
+
+
+def _numbered(model: Model, key: Mapping[str, str]) -> Model:
+    return Model(model.name, tuple(key[name] for name in model.points), model.coordinates)
+
+
+def _fitting(lines_of: Callable[[int], list[str]]) -> list[str]:
+    """Return cards with as many decimals as nine columns hold, three at most."""
+    for decimals in (3, 2):
+        try:
+            return lines_of(decimals)
+        except Mistake:
+            continue
+    return lines_of(1)

@@ -1,0 +1,55 @@
+"""Every way in which a scenario asks for its strip: an operator at the plotter, the comparator, or both (P)."""
+
+from pathlib import Path
+
+from a7sim.documents import Document, as_json, of_differences
+from a7sim.mistakes import Mistake
+from a7sim.reduction import Undetermined
+from a7sim.scenario import Scenario
+from a7sim.scene import Scene, build_scene
+from a7sim.session import results
+from a7sim.session.a8_strip import strip_on_a8
+from a7sim.session.analytical import StripResult, strip_by_comparator
+from a7sim.session.folder import RESULTS, prepare_folder, write_whole
+from a7sim.session.running import Watcher, run
+from a7sim.session.strips import of_grounded
+from a7sim.session.two_ways import differences
+
+
+def run_all_ways(
+    scenario: Scenario, seed: int, out: Path | None = None, watcher: Watcher | None = None, force: bool = False
+) -> Document:
+    """Measure the strip of a scenario in every way it asks for and return the document of results.
+
+    An A7 is worked by an operator over the link (`run`); what the comparator gives, and the A8 as it is held today, as
+    arrays of readings, stands under `ways`. Raises Mistake for what does not make a strip.
+    """
+    if "plotter" in scenario.work and scenario.instrument.variant == "A7":
+        document = run(scenario, seed, out, watcher, force)
+    else:
+        document = results.header(scenario, seed) | {"status": "complete", "message": ""}
+        if out is not None:
+            prepare_folder(out, force)
+    strips = _computed(scenario, build_scene(scenario, seed), seed)
+    if strips:
+        document["ways"] = {name: of_grounded(each.strip) for name, each in strips.items()}
+    if len(strips) > 1:
+        document["a8_minus_comparator_m"] = of_differences(differences(strips["comparator"], strips["A8"]))
+    if out is not None and strips:
+        for name, each in strips.items():
+            write_whole(out / f"{name.lower()}-models.csv", results.models_csv(each.models))
+            write_whole(out / f"{name.lower()}-strip.csv", results.points_csv(each.strip.points))
+        write_whole(out / RESULTS, as_json(document))
+    return document
+
+
+def _computed(scenario: Scenario, scene: Scene, seed: int) -> dict[str, StripResult]:
+    ways = {}
+    try:
+        if "comparator" in scenario.work:
+            ways["comparator"] = strip_by_comparator(scenario, scene, seed)
+        if "plotter" in scenario.work and scenario.instrument.variant == "A8":
+            ways["A8"] = strip_on_a8(scenario, scene, seed)
+    except Undetermined as undetermined:
+        raise Mistake(f"{scenario.title}: {undetermined}") from undetermined
+    return ways
