@@ -14,6 +14,7 @@ from a7sim.operator import DoesNotFit, work
 from a7sim.operator.seat import wrapped
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session, run
+from a7sim.session.crowd import open_crowd
 from tests.sessions import element_errors, tampered_session, tilted_flight, without_errors
 
 CASES = "ABCDE"
@@ -21,16 +22,15 @@ SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SEEDS = range(10)
 
 
-def _run_case(case_and_seed):
-    case, seed = case_and_seed
-    return run(load_scenario("akwanga", {"plan.case": f'"{case}"'}), seed)
+def _run_case(case):
+    return open_crowd(load_scenario("akwanga", {"plan.case": f'"{case}"'}), SEEDS).documents()
 
 
 @cache
 def sweep():
     """Akwanga with its default operator, cases A to E, ten seeds each."""
     with ProcessPoolExecutor(2) as pool:
-        return list(pool.map(_run_case, [(case, seed) for case in CASES for seed in SEEDS]))
+        return [document for documents in pool.map(_run_case, CASES) for document in documents]
 
 
 def models_of_sweep():

@@ -42,9 +42,11 @@ class Eyes:
     def bring_into_view(self, who: Who, hand: int, point: str) -> None:
         """Drive to where the print shows a point and look around until it is in the field of view."""
         seat = self.seat
-        printed = self._prints[hand].get(point)
-        if printed is None:
-            self.crew.give_up(who, f"point {point} is not pricked on the print of the {side(hand)} photograph")
+        printed = self._prints[hand].get(point, np.full((2, self.crew.sessions), np.nan))
+        nowhere = np.isnan(printed[0, who])
+        self.crew.give_up(who[nowhere], f"point {point} is not pricked on the print of the {side(hand)} photograph")
+        who = who[~nowhere]
+        if not who.size:
             return
         seat.counters(who)
         from_below = seat.on_carrier(who, hand, printed[:, who]) + self._strayed[hand][:, who]

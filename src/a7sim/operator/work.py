@@ -80,6 +80,17 @@ def work(
 
 def worked(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[ModelRecords]:
     """Yield the models of a job as a crew does them, each session at its own instrument."""
+    try:
+        yield from _worked(bench, begins)
+    except NobodyGoesOn:
+        return
+
+
+class NobodyGoesOn(Exception):
+    """All of a crew have given up."""
+
+
+def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecords]:
     job, crew = bench.job, bench.crew
     interior: dict[str, InteriorOrientations] = {}
     bench.seat.prepare(crew.everybody)
@@ -88,6 +99,7 @@ def worked(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iter
         _set_base_and_fittings(bench, model)
         _mount(bench, model, interior)
         prints = _prints(bench, model)
+        _see_that_somebody_goes_on(bench)
         bench.begin(crew.everybody, model, prints)
         bench.preset(crew.everybody, model.standard_points["1"])
         _begin(bench, model, "relative orientation", begins)
@@ -97,28 +109,48 @@ def worked(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iter
             bench, crew.everybody, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated
         )
         _begin(bench, model, "model coordinates", begins)
-        wanted = dict.fromkeys([*model.standard_points.values(), *model.other_points])
-        common = [name for name in wanted if name in prints[1] and name in prints[2]]
-        measured = bench.measure(crew.everybody, common)
+        points = _model_coordinates(bench, model, prints)
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
             _begin(bench, model, f"{side} perspective centre", begins)
             centres[hand] = observe_centre(
                 bench, crew.everybody, model, hand, plan.centre_levels, plan.tolerated_centre_rms
             )
+        _see_that_somebody_goes_on(bench)
         yield ModelRecords(
             model,
             crew.everybody,
             {name: interior[name] for name in (model.left, model.right)},
             orientation,
-            dict(zip(common, np.moveaxis(measured, 1, 0), strict=True)),
+            points,
             centres,
             bench.seat.units_per_mm,
             crew.seconds.copy(),
         )
 
 
+def _see_that_somebody_goes_on(bench: Bench) -> None:
+    if not bench.crew.everybody.size:
+        raise NobodyGoesOn
+
+
+def _model_coordinates(bench: Bench, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> dict[str, Array]:
+    """Measure all points that both prints show; sessions whose prints show the same do it together."""
+    crew = bench.crew
+    wanted = dict.fromkeys([*model.standard_points.values(), *model.other_points])
+    on_both = [name for name in wanted if name in prints[1] and name in prints[2]]
+    shown = np.array([~np.isnan(prints[1][name] + prints[2][name])[0] for name in on_both])
+    points = {name: np.full((3, crew.sessions), np.nan) for name in on_both}
+    for pattern in np.unique(shown[:, crew.everybody], axis=1).T:
+        alike = crew.everybody[(shown[:, crew.everybody] == pattern[:, None]).all(axis=0)]
+        names = [name for name, is_shown in zip(on_both, pattern, strict=True) if is_shown]
+        for name, measured in zip(names, np.moveaxis(bench.measure(alike, names), 1, 0), strict=True):
+            points[name][:, alike] = measured[:, alike]
+    return {name: points[name] for name in on_both}
+
+
 def _begin(bench: Bench, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
+    _see_that_somebody_goes_on(bench)
     begins(f"model {model.name}: {form}")
     if bench.crew.person is not None:
         bench.crew.person.book.head(model.name, form)

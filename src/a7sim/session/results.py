@@ -7,13 +7,12 @@ from typing import Any
 import a7sim
 from a7sim.documents import Document, head
 from a7sim.files import csv_text
-from a7sim.instrument import Autograph
 from a7sim.operator import ModelRecord
 from a7sim.reduction import Model, PerspectiveCentre
 from a7sim.scenario import Scenario
 from a7sim.scenario.schema import Published
 from a7sim.scene import RelativeTruth
-from a7sim.session.truth import Relative, true_centre, true_elements
+from a7sim.session.truth import Relative, Standing, true_centre, true_elements
 
 SIDES = {1: "left", 2: "right"}
 
@@ -37,7 +36,7 @@ def header(scenario: Scenario, seed: int) -> dict[str, Any]:
 
 
 def of_model(
-    record: ModelRecord, autograph: Autograph, truth: RelativeTruth | None, published: Published | None = None
+    record: ModelRecord, autograph: Standing, truth: RelativeTruth | None, published: Published | None = None
 ) -> dict[str, Any]:
     """Return the results of a model beside the truth; the instrument must stand as the operator left it."""
     orientation = record.orientation
@@ -97,7 +96,7 @@ def _rounded(values: Any) -> dict[str, float]:
 
 
 def _beside_truth(
-    record: ModelRecord, autograph: Autograph, truth: RelativeTruth | None, found: dict[int, dict[str, float]]
+    record: ModelRecord, autograph: Standing, truth: RelativeTruth | None, found: dict[int, dict[str, float]]
 ) -> dict[str, Any]:
     model = record.model
     projectors = {1: model.left_projector, 2: model.right_projector}

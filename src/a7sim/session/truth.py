@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from a7sim.geometry import GON, Array, angle_between, angles_of, length_of, mxm, mxv, rotation, transposed, turn_of
-from a7sim.instrument import Autograph
 from a7sim.manual import Variant
 from a7sim.operator import ModelJob
 from a7sim.scene import RelativeTruth
@@ -110,7 +110,19 @@ def _laid_onto(vector: Array, other: Array) -> Array:
     return _about(np.cross(vector, other), float(angle_between(vector, other)))
 
 
-def true_centre(autograph: Autograph, projector: int) -> dict[str, float]:
+class Standing(Protocol):
+    """An instrument as the truth sees it: where its projectors and its mark really stand."""
+
+    variant: Variant
+
+    def pose(self, projector: int) -> tuple[Array, Array]:
+        """Return centre ``(3,)`` in mm and rotation ``(3, 3)`` of a projector."""
+
+    def readings_at(self, place: Array) -> dict[str, float]:
+        """Return what the counters would show, unrounded, with the mark at a place ``(3,)``."""
+
+
+def true_centre(autograph: Standing, projector: int) -> dict[str, float]:
     """Return where a projection centre really stands, in counter units."""
     centre, _ = autograph.pose(projector)
     readings = autograph.readings_at(centre)

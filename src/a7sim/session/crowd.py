@@ -1,0 +1,62 @@
+"""Many sessions of a scenario at once: the operator's procedures on a fleet of instruments held as arrays."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from a7sim.documents import Document
+from a7sim.instrument.fleet import Fleet, build_fleet
+from a7sim.operator import Job
+from a7sim.operator.bench import Bench
+from a7sim.operator.crew import Crew
+from a7sim.operator.dice import Dice
+from a7sim.operator.work import ModelRecords, worked
+from a7sim.scenario import Scenario
+from a7sim.scene import Scene, build_scene
+from a7sim.session import results
+from a7sim.session.fleet_hands import FleetHands
+from a7sim.session.running import job_of
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """Sessions of a scenario, one a seed, ready to begin."""
+
+    scenario: Scenario
+    seeds: tuple[int, ...]
+    scenes: tuple[Scene, ...]
+    fleet: Fleet
+    bench: Bench
+    job: Job
+
+    def worked(self) -> Iterator[ModelRecords]:
+        """Yield the models as they are done; what a session gives up for stands in `bench.crew.reasons`."""
+        return worked(self.bench)
+
+    def documents(self) -> list[Document]:
+        """Work to the end and return a document a seed, as `run` gives it, without what is told of the line."""
+        found: list[list[Document]] = [[] for _ in self.seeds]
+        for records in self.worked():
+            plan = next(model for model in self.scenario.models if model.name == records.model.name)
+            for session in records.who:
+                truth = self.scenes[session].relative_truth(plan)
+                one = self.fleet.one(int(session))
+                found[session].append(results.of_model(records.of(int(session)), one, truth, plan.published))
+        reasons = self.bench.crew.reasons
+        return [
+            results.header(self.scenario, seed)
+            | {
+                "status": "does not fit" if i in reasons else "complete",
+                "message": reasons.get(i, ""),
+                "models": models,
+            }
+            for i, (seed, models) in enumerate(zip(self.seeds, found, strict=True))
+        ]
+
+
+def open_crowd(scenario: Scenario, seeds: Sequence[int]) -> Crowd:
+    """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
+    scenes = tuple(build_scene(scenario, seed) for seed in seeds)
+    fleet = build_fleet(scenario.instrument, [scene.photographs for scene in scenes], seeds)
+    crew = Crew(scenario.observer, [Dice(scenario.observer, seed) for seed in seeds])
+    job = job_of(scenario, scenes[0])
+    return Crowd(scenario, tuple(seeds), scenes, fleet, Bench(crew, FleetHands(fleet), job), job)

@@ -1,0 +1,97 @@
+"""Hands of a crowd: on instruments held as arrays, numbers crossing as the command language would print them."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from a7sim.geometry import Array
+from a7sim.instrument.fleet import Fleet
+from a7sim.operator.crew import Who
+from a7sim.operator.hands import Truths
+
+
+class FleetHands:
+    """`Hands` on a fleet: numbers cross as the command language would print them."""
+
+    def __init__(self, fleet: Fleet) -> None:
+        self._fleet = fleet
+
+    def variant(self) -> str:
+        return self._fleet.variant.name
+
+    def reset(self, who: Who) -> None:
+        self._fleet.reset(who)
+
+    def engage(self, who: Who, height_gear: str | float, plan_gear: str) -> None:
+        self._fleet.set_height_gear(who, height_gear)
+
+    def set_base_mode(self, who: Who, mode: str) -> None:
+        self._fleet.set_base_mode(who, mode)
+
+    def set_fitting(self, who: Who, name: str, position: str) -> None:
+        self._fleet.set_fitting(who, name, position)
+
+    def set_element(self, who: Who, name: str, values: Array) -> None:
+        self._fleet.set_element(who, name, np.round(values, 2))
+
+    def preset(self, who: Who, readings: tuple[float, float, float]) -> None:
+        for axis, reading in zip("XYZ", readings, strict=True):
+            self._fleet.preset(who, axis, round(reading, 2))
+
+    def load(self, who: Who, projector: int, photograph: str) -> None:
+        self._fleet.load(who, projector, photograph)
+
+    def unload(self, who: Who, projector: int) -> None:
+        self._fleet.unload(who, projector)
+
+    def loaded(self, who: Who, projector: int) -> str:
+        return self._fleet.loaded(projector)
+
+    def fiducials(self, who: Who, projector: int) -> tuple[list[str], Array]:
+        names, displacements = self._fleet.carriers(projector).fiducial_displacements(who)
+        return list(names), np.round(displacements, 3)
+
+    def centring(self, who: Who, projector: int) -> Array:
+        return np.round(self._fleet.carriers(projector).centring[:, who], 3)
+
+    def centre(self, who: Who, projector: int, values: Array) -> None:
+        self._fleet.carriers(projector).centre(who, np.round(values, 3))
+
+    def prints(self, who: Who, projector: int) -> dict[str, Array]:
+        sketch = self._fleet.carriers(projector).sketch(who)
+        return {name: np.round(places, 1) for name, places in sketch.items()}
+
+    def elements(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
+        return self._fleet.elements(who, names)
+
+    def counters(self, who: Who) -> Array:
+        return np.array([self._fleet.counter(who, axis) for axis in "XYZ"])
+
+    def counter(self, who: Who, axis: str) -> Array:
+        return self._fleet.counter(who, axis)
+
+    def drive(self, who: Who, readings: Mapping[str, Array]) -> Truths:
+        went = [self._fleet.drive(who, axis, np.round(each, 2)) for axis, each in readings.items()]
+        return np.asarray(np.all(went, axis=0))
+
+    def turn(self, who: Who, wheels: Array, element: str | None = None, counts: Array | None = None) -> None:
+        for axis, amounts in zip("XYZ", np.round(wheels, 3), strict=False):
+            self._fleet.wheel(who, axis, amounts)
+        if element is not None and counts is not None:
+            turned = ~np.isnan(counts)
+            self._fleet.set_element(who[turned], element, np.round(counts[turned], 2))
+
+    def seen(self, who: Who, eye: int, point: str) -> Array:
+        return np.round(self._fleet.eyepiece(who, eye, point), 2)
+
+    def seen_by_both(self, who: Who, point: str) -> Array:
+        return np.concatenate([self.seen(who, eye, point) for eye in (1, 2)])
+
+    def record(self, who: Who, point: str) -> None:
+        """Nobody keeps what a crowd registers."""
+
+    def note(self, who: Who, text: str) -> None:
+        """Nobody keeps what a crowd notes."""
+
+    def refused(self, who: Who) -> dict[int, list[str]]:
+        return self._fleet.refused(who)

@@ -1,0 +1,119 @@
+"""One procedure, two benches: a crowd of sessions gives to the digit what each gives over its line."""
+
+import msgspec
+import pytest
+
+from a7sim.operator import DoesNotFit, work
+from a7sim.scenario import load_scenario
+from a7sim.scenario.schema import Condition, ProjectorCondition
+from a7sim.session import open_session, run
+from a7sim.session.crowd import FleetHands, open_crowd
+from tests.sessions import tilted_flight, without_errors
+
+SEEDS = (1985, 7)
+OUT_OF_TRUE = Condition(
+    left=ProjectorCondition(phi_zero_gon=0.03, principal_point_um=(12.0, -7.0), axes_um=(20.0, -30.0, 15.0)),
+    right=ProjectorCondition(omega_zero_gon=-0.02, principal_distance_mm=0.02, by_zero_mm=0.05),
+    bx_zero_mm=0.03,
+    carriage_scale_ppm=(40.0, -30.0, 20.0),
+    carriage_skew_ppm=(15.0, 0.0, -10.0),
+)
+
+
+def same_to_the_digit(scenario, seeds=SEEDS):
+    """Whether every number that an operator read or set is the same over the line and in the crowd."""
+    crowd = open_crowd(scenario, seeds)
+    records = list(crowd.worked())
+    for session, seed in enumerate(seeds):
+        alone = open_session(scenario, seed)
+        for one, many in zip(work(alone.person, alone.job), records, strict=True):
+            other = many.of(session)
+            if read_and_set(one) != read_and_set(other) or computed(one) != pytest.approx(computed(other), abs=1e-6):
+                return False
+    return True
+
+
+def read_and_set(record):
+    """What stands on counters, and the time."""
+    set_in_rounds = [each.settings for each in record.orientation.rounds]
+    principal_distances = [each.principal_distance for each in record.interior.values()]
+    return record.orientation.elements, set_in_rounds, principal_distances, record.points, record.finished_at
+
+
+def computed(record):
+    """What was computed from readings: the same but for the last bits of a sum."""
+    centres = [getattr(record.centres[hand], name) for hand in (1, 2) for name in ("X0", "Y0", "Z0", "T0", "rms")]
+    rounds = [value for each in record.orientation.rounds for value in (each.mean, each.rms, *each.sigmas.values())]
+    residuals = list(record.orientation.residuals.values())
+    return [*map(float, centres), *rounds, *residuals, *(each.residual_mm for each in record.interior.values())]
+
+
+SCENARIOS = {
+    "as it stands": load_scenario("akwanga"),
+    "dependent, case D": load_scenario("akwanga", {"plan.method": '"dependent"', "plan.case": '"D"'}),
+    "no errors at all": without_errors(load_scenario("akwanga")),
+    "five gon of tilt": tilted_flight([(5.0, -2.0, 3.0), (1.0, 3.0, 5.0), (-3.0, -2.0, -5.0)]),
+    "many slips": load_scenario("akwanga", {"observer.blunder_rate": "0.05", "observer.last_digit_slip": "0.05"}),
+    "out of true": load_scenario("akwanga"),
+    "play and setting errors": load_scenario(
+        "akwanga",
+        {
+            "instrument.condition.backlash_gon": "0.02",
+            "instrument.condition.setting_sigma_mm": "0.01",
+            "instrument.condition.carriage_backlash_mm": "0.01",
+        },
+    ),
+    "a real pair": load_scenario("dewitt-pair"),
+}
+
+
+@pytest.mark.parametrize("name", list(SCENARIOS))
+def test_a_crowd_reads_and_sets_what_each_would_alone(name):
+    scenario = SCENARIOS[name]
+    if name == "out of true":
+        instrument = msgspec.structs.replace(scenario.instrument, condition=OUT_OF_TRUE)
+        scenario = msgspec.structs.replace(scenario, instrument=instrument)
+    assert same_to_the_digit(scenario)
+
+
+def test_a_bench_that_is_off_by_a_count_is_found_out(monkeypatch):
+    """The comparison can fail: a counter of the crowd that shows a hundredth too much gives other numbers."""
+    truly = FleetHands.elements
+
+    def a_count_too_much(self, who, names):
+        return {name: counts + 0.01 * (name == "by1") for name, counts in truly(self, who, names).items()}
+
+    monkeypatch.setattr(FleetHands, "elements", a_count_too_much)
+    assert not same_to_the_digit(SCENARIOS["as it stands"], SEEDS[:1])
+
+
+def test_documents_are_those_of_a_run_without_its_line():
+    scenario = SCENARIOS["as it stands"]
+    (document,) = open_crowd(scenario, [7]).documents()
+    alone = run(scenario, 7)
+    assert document["models"] == alone["models"]
+    assert document["status"] == "complete"
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [("photos.1.laid", '"upside down"'), ("plan.tolerated_parallax_um", "0.01"), ("models.0.base", '"outside"')],
+)
+def test_who_gives_up_says_why_and_is_left_behind(setting, value):
+    scenario = load_scenario("akwanga", {setting: value})
+    crowd = open_crowd(scenario, SEEDS)
+    list(crowd.worked())
+    for session, seed in enumerate(SEEDS):
+        alone = open_session(scenario, seed)
+        try:
+            list(work(alone.person, alone.job))
+            assert session not in crowd.bench.crew.reasons
+        except DoesNotFit as trouble:
+            assert crowd.bench.crew.reasons[session] == str(trouble)
+
+
+def test_sessions_do_not_disturb_each_other():
+    """A session gives the same numbers whoever else sits in the hall, also beside one who gives up."""
+    scenario = SCENARIOS["as it stands"]
+    among_others = open_crowd(scenario, [3, 7, 1985, 11]).documents()[1]
+    assert open_crowd(scenario, [7]).documents()[0] == among_others
