@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from a7sim.instrument.local_errors import powers_at, smooth_local_errors
 from a7sim.mistakes import Mistake
 from a7sim.reduction import Undetermined
 from a7sim.reduction.absolute import root_mean_square
@@ -16,7 +17,6 @@ from a7sim.scene import build_scene
 from a7sim.session import a8_strip
 from a7sim.session.a8_strip import strip_on_a8
 from a7sim.session.analytical import strip_by_comparator
-from a7sim.session.projectors import powers_at, smooth_local_errors
 from a7sim.session.two_ways import a8_and_comparator
 
 MILLIMETRE = 0.001

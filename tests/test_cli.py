@@ -261,7 +261,8 @@ def test_a_session_that_does_not_fit_ends_with_1_and_says_why(tmp_path):
 
 def test_ctrl_c_leaves_whole_files_and_exit_code_130(tmp_path):
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "a7sim", "run", "akwanga", "--case", "E", "--out", str(out)]
+    settings = ["--case", "E", "--set", "plan.parallax_readings=20"]
+    command = [sys.executable, "-m", "a7sim", "run", "akwanga", *settings, "--out", str(out)]
     running = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 30.0
     journal = out / "session.jsonl"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from a7sim.geometry import GON, at_level, ray_of, rotation
 from a7sim.instrument import Autograph, OutOfRange, SettingsConflict, build_autograph
 from a7sim.instrument.spindles import Counter, Spindle
-from a7sim.manual import A7, RIGHT_FITTINGS, VARIANTS, Element
+from a7sim.manual import A7, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element
 from a7sim.scenario import Condition, ProjectorCondition, load_scenario
 from a7sim.scenario.schema import Camera, Fiducial
 from a7sim.scene import Marks, Photograph, build_scene
@@ -339,7 +339,11 @@ def test_every_variant_is_whole():
     for variant in VARIANTS.values():
         for element in variant.elements.values():
             assert element.low <= element.zero <= element.high
-        assert set(variant.carriages) == set(variant.carriages_at_rest) == {"X", "Y", "Z"}
+        assert set(variant.carriages) == set(variant.carriages_at_rest) == set(variant.scales) == {"X", "Y", "Z"}
+        for axis, (low, high) in variant.carriages.items():
+            assert low <= variant.carriages_at_rest[axis] <= high
+        assert set(variant.fittings) <= set(POSITIONS_OF)
+        assert variant.centres_on_base[1] - variant.centres_on_base[0] == 1.0
 
 
 @given(st.floats(0.3, 9.0), st.floats(-9000.0, 9000.0), st.sampled_from("XYZ"), st.integers(0, 1))

@@ -140,11 +140,8 @@ def test_a_mistake_of_each_kind_is_one_sentence(change, mistake):
             ["ground: expected 2 points of control in plan and 3 in height for a strip by comparator, got 0 and 0"],
         ),
         (
-            lambda raw: (raw["plan"].update(method="dependent"), raw["instrument"].update(condition={})),
-            [
-                "instrument.condition: expected grid_test in its place for an A8, got the faults of an A7",
-                "plan.method: expected 'independent' on an A8, which has neither by nor bz, got 'dependent'",
-            ],
+            lambda raw: raw["plan"].update(method="dependent"),
+            ["plan.method: expected 'independent' on an A8, which has neither by nor bz, got 'dependent'"],
         ),
         (
             lambda raw: raw.update(models=[{"name": "1", "left": "201", "right": "202", "base": "outside"}]),
@@ -182,9 +179,7 @@ def test_a_scenario_for_the_comparator_alone_needs_no_plan_and_has_none():
 
 
 def test_a_file_that_is_not_there_is_named_with_what_there_is():
-    with pytest.raises(
-        ScenarioError, match=r"nowhere\.toml: expected a scenario file or one of a8-strip, akwanga, dewitt-pair"
-    ):
+    with pytest.raises(ScenarioError, match=r"nowhere\.toml: expected a scenario file or one of a8-strip, akwanga, "):
         load_scenario("nowhere.toml")
 
 

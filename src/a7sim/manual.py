@@ -36,9 +36,26 @@ class Gear:
     decimals: int = COUNTER_DECIMALS
 
 
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What counts a carriage: ``at_origin + units_per_mm * position`` until it is preset."""
+
+    units_per_mm: float = 1.0
+    at_origin: float = 0.0
+    """Its reading in the origin of the instrument frame."""
+    unit: str = "mm"
+    """What a reading may be given in, empty where it is no length."""
+    preset: bool = True
+    """Whether it can be made to show another reading."""
+
+
+MILLIMETRES = Scale()
+GEARED = Scale(unit="")
+
+
 @dataclass(frozen=True)
 class Variant:
-    """A type of plotter. An element that is not in `elements` is one the instrument does not have."""
+    """A type of plotter. An element or fitting that is not listed is one the instrument does not have."""
 
     name: str
     elements: Mapping[str, Element]
@@ -46,6 +63,12 @@ class Variant:
     """mm; Z as height of the mark below the base line, hence negative."""
     height_gears: Mapping[str, Gear]
     base_modes: tuple[str, ...]
+    fittings: tuple[str, ...]
+    scales: Mapping[str, Scale] = field(
+        default_factory=lambda: MappingProxyType({"X": MILLIMETRES, "Y": MILLIMETRES, "Z": GEARED})
+    )
+    centres_on_base: tuple[float, float] = (0.0, 1.0)
+    """Where the left-hand and the right-hand centre stand along X, as shares of bx from the origin."""
     carriages_at_rest: Mapping[str, float] = field(
         default_factory=lambda: MappingProxyType({"X": 0.0, "Y": 0.0, "Z": -300.0})
     )
@@ -53,37 +76,11 @@ class Variant:
     """Radius of the field of view at photo scale [assumption; no source at hand]."""
     rod_limit_gon: float = 62.0
     """Inclination from the plumb line that a space rod can take [assumption; no source at hand]."""
+    carriage_lead_mm: float = 5.0
+    """What a turn of an X, Y or Z spindle moves its carriage [assumption; mm a turn were not found in any source]."""
     centring_mm: float = 15.0
     centring_gon: float = 20.0
     """How far a picture can be shifted and turned on its carrier [assumption; no source at hand]."""
-
-
-def _both(name: str, element: Element) -> dict[str, Element]:
-    return {f"{name}1": element, f"{name}2": element}
-
-
-A7 = Variant(
-    name="A7",
-    elements=MappingProxyType(
-        {
-            **_both("c", Element(98.0, 215.0, 150.0, "mm")),
-            **_both("kappa", Element(0.0, 400.0, 0.0, "gon", endless=True)),
-            "phi1": Element(70.0, 106.0, 100.0, "gon"),
-            "phi2": Element(94.0, 130.0, 100.0, "gon"),
-            **_both("omega", Element(70.0, 109.0, 100.0, "gon")),
-            **_both("by", Element(-50.0, 50.0, 0.0, "mm")),
-            **_both("bz", Element(-27.0, 27.0, 0.0, "mm")),
-            "bx": Element(-280.0, 280.0, 0.0, "mm"),
-        }
-    ),
-    carriages=MappingProxyType({"X": (-280.0, 280.0), "Y": (-420.0, 350.0), "Z": (-490.0, -140.0)}),
-    height_gears=MappingProxyType(
-        {"Bd": Gear(3.0), "Dc": Gear(10.0 / 3.0, decimals=1), "Cd": Gear(3.75)},
-    ),
-    base_modes=("inside", "outside"),
-)
-
-VARIANTS: Mapping[str, Variant] = MappingProxyType({"A7": A7})
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,3 +118,76 @@ RIGHT_FITTINGS: Mapping[tuple[str, str], Fittings] = MappingProxyType(
     }
 )
 """The thesis's table: the fittings that belong to a picture and a base."""
+
+
+def _both(name: str, element: Element) -> dict[str, Element]:
+    return {f"{name}1": element, f"{name}2": element}
+
+
+A7 = Variant(
+    name="A7",
+    elements=MappingProxyType(
+        {
+            **_both("c", Element(98.0, 215.0, 150.0, "mm")),
+            **_both("kappa", Element(0.0, 400.0, 0.0, "gon", endless=True)),
+            "phi1": Element(70.0, 106.0, 100.0, "gon"),
+            "phi2": Element(94.0, 130.0, 100.0, "gon"),
+            **_both("omega", Element(70.0, 109.0, 100.0, "gon")),
+            **_both("by", Element(-50.0, 50.0, 0.0, "mm")),
+            **_both("bz", Element(-27.0, 27.0, 0.0, "mm")),
+            "bx": Element(-280.0, 280.0, 0.0, "mm"),
+        }
+    ),
+    carriages=MappingProxyType({"X": (-280.0, 280.0), "Y": (-420.0, 350.0), "Z": (-490.0, -140.0)}),
+    height_gears=MappingProxyType(
+        {"Bd": Gear(3.0), "Dc": Gear(10.0 / 3.0, decimals=1), "Cd": Gear(3.75)},
+    ),
+    base_modes=("inside", "outside"),
+    fittings=tuple(POSITIONS_OF),
+)
+
+A8 = Variant(
+    name="A8",
+    elements=MappingProxyType(
+        {
+            **_both("c", Element(98.0, 215.0, 150.0, "mm")),
+            **_both("kappa", Element(0.0, 400.0, 0.0, "gon", endless=True)),
+            **_both("phi", Element(90.0, 110.0, 100.0, "gon")),
+            **_both("omega", Element(90.0, 110.0, 100.0, "gon")),
+            "bx": Element(0.0, 280.0, 0.0, "mm"),
+            "common_phi": Element(90.0, 110.0, 100.0, "gon"),
+        }
+    ),
+    carriages=MappingProxyType({"X": (-280.0, 280.0), "Y": (-280.0, 280.0), "Z": (-350.0, -175.0)}),
+    height_gears=MappingProxyType(
+        {
+            "1:10000": Gear(1.0),
+            "1:1000": Gear(1.0),
+            "1:2000": Gear(2.0),
+            "1:2500": Gear(2.5),
+            "1:4000": Gear(4.0),
+            "1:5000": Gear(5.0),
+            "1:8000": Gear(8.0),
+            "1:20000": Gear(20.0, decimals=1),
+            "1:25000": Gear(25.0, decimals=1),
+        }
+    ),
+    base_modes=("inside",),
+    fittings=("diapositive", "xcollar", "ycollar"),
+    scales=MappingProxyType(
+        {
+            "X": Scale(units_per_mm=0.5, at_origin=200.0, unit="", preset=False),
+            "Y": Scale(units_per_mm=0.5, at_origin=200.0, unit="", preset=False),
+            "Z": GEARED,
+        }
+    ),
+    centres_on_base=(-0.5, 0.5),
+)
+"""The Autograph A8: P 3.1 and 3.2, and docs/decisions/0007-a8.md, which says what of this is assumed.
+
+X and Y are read in units of 2 mm about 200.00, the middle of the base; the glass scale 1:10 000 reads mm, the others
+metres of the ground, and a glass scale can be shifted in its holder, which is how Z is preset. Common Phi turns the
+main frame, with both projectors and the base, about the Y axis.
+"""
+
+VARIANTS: Mapping[str, Variant] = MappingProxyType({"A7": A7, "A8": A8})

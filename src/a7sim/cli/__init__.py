@@ -13,8 +13,12 @@ EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_INTERRUPTED = 1, 2, 130
 
 _VERBS = {
     "run": "a7sim.cli.run",
+    "compile": "a7sim.cli.compile",
+    "calibrate": "a7sim.cli.calibrate",
     "reduce": "a7sim.cli.reduce",
     "scenario": "a7sim.cli.scenario",
+    "prepare": "a7sim.cli.prepare",
+    "bridge": "a7sim.cli.bridge",
 }
 
 

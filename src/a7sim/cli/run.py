@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from a7sim.cli import EXIT_DOES_NOT_FIT
 from a7sim.documents import as_json
 from a7sim.mistakes import Mistake
-from a7sim.scenario import Observer, load_scenario
+from a7sim.scenario import PROFILES, Observer, load_scenario
 from a7sim.session import Watcher
 from a7sim.session.combinations import run_combinations
 from a7sim.session.tables import of_session, of_strips
@@ -38,6 +38,7 @@ _POINTS_A_MODEL = 130
 )
 @click.option("--seed", type=click.IntRange(min=0), help="Draws film, instrument and operator.")
 @click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario.")
+@click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is.")
 @click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for journal, book, models and results.")
 @click.option("--force", is_flag=True, help="Write into a folder that exists.")
@@ -50,6 +51,7 @@ def command(
     strips: str,
     seed: int | None,
     settings: tuple[str, ...],
+    skill: str | None,
     perfect_observer: bool,
     out: Path | None,
     force: bool,
@@ -60,24 +62,25 @@ def command(
 
     Example: a7sim run akwanga --case E --seed 7 --out runs/akwanga-e
     """
-    overrides = _overrides(settings, {"plan.case": case, "plan.method": method})
+    overrides = overrides_of(settings, {"plan.case": case, "plan.method": method, "observer.skill": skill})
     loaded = load_scenario(scenario, overrides)
     if perfect_observer:
         loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
     chosen = loaded.seed if seed is None else seed
     if strips == "all" and case is not None:
         raise Mistake("--strips all: expected no --case beside it, since every case is worked")
-    unwatched = quiet or as_document or not sys.stderr.isatty()
+    unwatched = quiet or as_document
     sessions = len(CASES) if strips == "all" else 1
-    with _watched(sessions * len(loaded.models), unwatched) as watcher:
+    with watched(_POINTS_A_MODEL * sessions * len(loaded.models), unwatched) as watcher:
         document = (run_combinations if strips == "all" else run_all_ways)(loaded, chosen, out, watcher, force)
-    _show(document, as_document, quiet, of_strips if strips == "all" else of_session)
+    show(document, as_document, quiet, of_strips if strips == "all" else of_session)
     if document["status"] != "complete":
         click.echo(f"a7sim: the operator gave up: {document['message']}", err=True)
         raise click.exceptions.Exit(EXIT_DOES_NOT_FIT)
 
 
-def _overrides(settings: tuple[str, ...], options: dict[str, str | None]) -> dict[str, str]:
+def overrides_of(settings: tuple[str, ...], options: dict[str, str | None]) -> dict[str, str]:
+    """Return what --set and other options say, by path. Raises Mistake for a setting that is none."""
     overrides = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
@@ -88,19 +91,22 @@ def _overrides(settings: tuple[str, ...], options: dict[str, str | None]) -> dic
 
 
 @contextmanager
-def _watched(models: int, unwatched: bool) -> Iterator[Watcher]:
+def watched(points: int, unwatched: bool) -> Iterator[Watcher]:
+    """Show on a terminal how work on about so many points goes on, and give the watcher that is told."""
+    unwatched = unwatched or not sys.stderr.isatty()
     columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
-        task = progress.add_task("sitting down", total=_POINTS_A_MODEL * models)
+        task = progress.add_task("sitting down", total=points)
         yield Watcher(
             lambda activity: progress.update(task, description=activity),
             lambda: progress.advance(task),
         )
 
 
-def _show(
+def show(
     document: dict[str, Any], as_document: bool, quiet: bool, tables: Callable[[dict[str, Any]], RenderableType]
 ) -> None:
+    """Print a document, or its tables, or nothing."""
     if as_document:
         click.echo(as_json(document), nl=False)
     elif not quiet:

@@ -2,27 +2,29 @@
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from a7sim.geometry import GON, Array, length_of, mxv, rotation, transposed
+from a7sim.geometry import GON, Array, length_of, mxv, transposed
 from a7sim.instrument.carriers import Carrier
-from a7sim.instrument.optics import projector_seen, view, wheel_senses
+from a7sim.instrument.condition import INSTRUMENT_STREAM, condition_of, local_coefficients, zero_error
+from a7sim.instrument.optics import as_they_act, projector_seen, view, wheel_senses
+from a7sim.instrument.projection import place_of_centre, place_on_carrier, pose
 from a7sim.instrument.recorder import Recorder
 from a7sim.instrument.refusals import OutOfRange, SettingsConflict, UnknownName
-from a7sim.instrument.spindles import Counter, Spindle
-from a7sim.manual import LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element, Variant
+from a7sim.instrument.spindles import Counter, Runout, Spindle
+from a7sim.manual import LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element, Fittings, Variant
 from a7sim.scenario.schema import FORMAT_MM, Condition, Instrument, ProjectorCondition
 from a7sim.scene.photograph import Photograph
-
-INSTRUMENT_STREAM = 3
-"""Spawn key of the instrument's random numbers; the scene's come before, the operator's after."""
 
 MARK_RADIUS_MM = 0.02
 """The floating mark, 40 um across at photo scale."""
 
-_CENTRES_AND_BASE = ("bx", "by1", "by2", "bz1", "bz2")
+MOVE_CENTRES = ("bx", "by1", "by2", "bz1", "bz2", "common_phi")
+COUNTED_FROM_ZERO = ("phi1", "phi2", "omega1", "omega2", "common_phi")
+"""Tilts, whose counters do not read zero where they are none."""
 
 
 class Autograph:
@@ -51,15 +53,28 @@ class Autograph:
         self._rng = rng or np.random.default_rng(0)
         self._spindles = {name: self._element_spindle(name, e) for name, e in variant.elements.items()}
         self._carriages = {
-            axis: Spindle(low, high, variant.carriages_at_rest[axis], play=self._condition.carriage_backlash_mm)
+            axis: Spindle(
+                low,
+                high,
+                variant.carriages_at_rest[axis],
+                play=self._condition.carriage_backlash_mm,
+                runout=_runout_of(self._condition, axis, variant.carriage_lead_mm),
+            )
             for axis, (low, high) in variant.carriages.items()
         }
-        self._counters = {axis: Counter() for axis in variant.carriages}
-        self._guides = _guides_of(self._condition)
+        self._counters = {
+            axis: Counter(scale.units_per_mm, offset=scale.at_origin, slip_share=self._condition.counter_slip_share)
+            for axis, scale in variant.scales.items()
+        }
+        self._guides = guides_of(self._condition)
         self._carriers: dict[int, Carrier] = {}
         self.base_mode = variant.base_modes[0]
         self.fittings = RIGHT_FITTINGS["positive", self.base_mode]
         self._poses: dict[int, tuple[Array, Array]] = {}
+        projectors = {n: self._projector_condition(n) for n in (1, 2)}
+        self._principal_points = {n: 1e-3 * np.array(each.principal_point_um) for n, each in projectors.items()}
+        self._local = {n: local_coefficients(each) for n, each in projectors.items()}
+        self._rods = {n: 1e-3 * np.array(each.rod_um) if any(each.rod_um) else None for n, each in projectors.items()}
 
     def _element_spindle(self, name: str, element: Element) -> Spindle:
         condition = self._condition
@@ -68,21 +83,8 @@ class Autograph:
             element,
             condition.backlash_gon if angular else condition.backlash_mm,
             condition.setting_sigma_gon if angular else condition.setting_sigma_mm,
-            self._zero_error(name),
+            zero_error(condition, name),
         )
-
-    def _zero_error(self, name: str) -> float:
-        if name == "bx":
-            return self._condition.bx_zero_mm
-        projector = self._projector_condition(int(name[-1]))
-        return {
-            "c": projector.principal_distance_mm,
-            "kappa": projector.kappa_zero_gon,
-            "phi": projector.phi_zero_gon,
-            "omega": projector.omega_zero_gon,
-            "by": projector.by_zero_mm,
-            "bz": projector.bz_zero_mm,
-        }[name[:-1]]
 
     def _projector_condition(self, projector: int) -> ProjectorCondition:
         return self._condition.left if projector == 1 else self._condition.right
@@ -97,7 +99,7 @@ class Autograph:
         """Set an element through its counter, to the least count."""
         spindle = self._spindle(name)
         target = round(value / LEAST_COUNT) * LEAST_COUNT
-        if name in _CENTRES_AND_BASE and spindle.allows(target):
+        if name in MOVE_CENTRES and spindle.allows(target):
             self._refuse_if_rods_cannot(elements={name: target})
         spindle.turn_to(target, self._rng)
         self._poses.clear()
@@ -120,8 +122,15 @@ class Autograph:
         self.base_mode = mode
         self._poses.clear()
 
+    def fitting(self, name: str) -> str:
+        """Return the position of a fitting. Raises SettingsConflict if the variant has none such."""
+        if name not in self.variant.fittings:
+            raise SettingsConflict(f"an {self.variant.name} has no fitting {name}")
+        return self.fittings.as_words()[name]
+
     def set_fitting(self, name: str, position: str) -> None:
         """Put a fitting into one of its two positions."""
+        self.fitting(name)
         if position not in POSITIONS_OF[name]:
             raise UnknownName(f"expected {' or '.join(POSITIONS_OF[name])}, got {position}")
         self.fittings = replace(self.fittings, **{name: position})
@@ -157,16 +166,26 @@ class Autograph:
         return self._counters[axis].reading(self.variant.carriages_at_rest[axis])
 
     def preset(self, axis: str, reading: float) -> None:
-        """Make a counter show a reading where its carriage stands."""
+        """Make a counter show a reading where its carriage stands.
+
+        Raises SettingsConflict if the variant reads a scale there that is not to be shifted.
+        """
+        if not self.variant.scales[axis].preset:
+            raise SettingsConflict(f"an {self.variant.name} reads {axis} on a fixed scale")
         self._counters[axis].preset(reading, self._carriages[axis].at)
 
     def drive(self, axis: str, reading: float) -> None:
-        """Run a carriage until its counter shows a reading."""
-        self._move(axis, self._counters[axis].position(reading))
+        """Run a carriage until its counter shows a reading, and on if the counter slipped on the way."""
+        counter = self._counters[axis]
+        self._move(axis, counter.position(reading))
+        if counter.slip_share and abs(counter.position(reading) - self._carriages[axis].at) > counter.half_a_count:
+            with suppress(OutOfRange):
+                self._move(axis, counter.position(reading))
 
     def wheel(self, axis: str, amount: float) -> None:
         """Turn a handwheel by so many counter units; its collar decides which way the carriage goes."""
-        sense = wheel_senses(self.fittings, self._polarity())[axis]
+        polarity = self._polarity()
+        sense = wheel_senses(self._acting_fittings(polarity), polarity)[axis]
         step = sense * amount / self._counters[axis].units_per_mm
         self._move(axis, self._carriages[axis].at + step)
 
@@ -180,7 +199,9 @@ class Autograph:
             got = self._counters[axis].reading(position)
             raise OutOfRange(f"{axis} expected {low:.2f} to {high:.2f} on its counter, got {got:.10g}")
         self._refuse_if_rods_cannot(carriages={axis: position})
+        before = spindle.at
         spindle.turn_to(position, self._rng)
+        self._counters[axis].passed(before, position, self._rng)
 
     def set_height_gear(self, gear: str | float) -> None:
         """Engage a height gear by its combination or by its counter units a mm."""
@@ -205,7 +226,9 @@ class Autograph:
         """Refuse what brings a rod beyond its limit, or further beyond it where `reset` has left it so."""
         for projector in (1, 2):
             inclination = self._rod_inclination(projector, carriages or {}, elements or {}, base_mode or self.base_mode)
-            if inclination > max(self.variant.rod_limit_gon, self._rod_inclination(projector, {}, {}, self.base_mode)):
+            if inclination <= self.variant.rod_limit_gon:
+                continue
+            if inclination > self._rod_inclination(projector, {}, {}, self.base_mode):
                 raise OutOfRange(
                     f"expected space rods within {self.variant.rod_limit_gon:.0f} gon of the plumb line, "
                     f"got {inclination:.0f} gon at projector {projector}"
@@ -225,9 +248,17 @@ class Autograph:
             spindle = self._spindles.get(name)
             return changed.get(name, spindle.at if spindle else 0.0)
 
-        at_origin = 1 if base_mode == "inside" else 2
-        x = 0.0 if projector == at_origin else drum("bx")
-        return x, -drum(f"by{projector}"), drum(f"bz{projector}")
+        x = self._share_of_base(projector, base_mode) * drum("bx")
+        y, z = -drum(f"by{projector}"), drum(f"bz{projector}")
+        if "common_phi" not in self._spindles:
+            return x, y, z
+        tilt = (drum("common_phi") - self.variant.elements["common_phi"].zero) * GON
+        return x * math.cos(tilt) + z * math.sin(tilt), y, z * math.cos(tilt) - x * math.sin(tilt)
+
+    def _share_of_base(self, projector: int, base_mode: str) -> float:
+        """Return where a projector stands along X, as a share of bx; base out exchanges the two (geometry.md)."""
+        on_the_left = (projector == 1) == (base_mode == "inside")
+        return self.variant.centres_on_base[0 if on_the_left else 1]
 
     # --- pictures -------------------------------------------------------------------------------------
 
@@ -281,18 +312,14 @@ class Autograph:
     # --- the space rods and the view ------------------------------------------------------------------
 
     def pose(self, projector: int) -> tuple[Array, Array]:
-        """Return where a projector really stands: centre ``(3,)`` in mm and rotation ``(3, 3)``.
-
-        Base in: O' = (0, -by', bz'), O" = (bx, -by", bz"); base out exchanges the X (geometry.md).
-        """
+        """Return where a projector really stands: centre ``(3,)`` in mm and rotation ``(3, 3)``."""
         if projector not in self._poses:
-            angles = (self._really(f"{name}{projector}") for name in ("omega", "phi", "kappa"))
-            turned = rotation(*(angle * GON for angle in angles))
-            at_origin = 1 if self.base_mode == "inside" else 2
-            x = 0.0 if projector == at_origin else self._really("bx")
+            omega, phi, kappa = (self._really(f"{name}{projector}") * GON for name in ("omega", "phi", "kappa"))
+            share = self._share_of_base(projector, self.base_mode)
+            base = (self._really(name) for name in ("bx", f"by{projector}", f"bz{projector}"))
             missed = 1e-3 * np.array(self._projector_condition(projector).axes_um)
-            centre = np.array([x, -self._really(f"by{projector}"), self._really(f"bz{projector}")])
-            self._poses[projector] = (centre + mxv(turned, missed) - missed, turned)
+            common_phi = self._really("common_phi") * GON if "common_phi" in self._spindles else None
+            self._poses[projector] = pose(omega, phi, kappa, place_of_centre(share, *base), missed, common_phi)
         return self._poses[projector]
 
     def _really(self, name: str) -> float:
@@ -300,7 +327,7 @@ class Autograph:
         if name not in self._spindles:
             return 0.0
         position = self._spindles[name].position
-        return position - self.variant.elements[name].zero if name[:3] in ("phi", "ome") else position
+        return position - self.variant.elements[name].zero if name in COUNTED_FROM_ZERO else position
 
     def mark_in_model(self) -> Array:
         """Return where the floating mark really stands in the instrument frame, ``(3,)`` in mm."""
@@ -312,19 +339,23 @@ class Autograph:
 
         Part of the truth: no command of the language asks it.
         """
-        carriage = np.linalg.solve(self._guides, place)
+        on_the_guides = dict(zip("XYZ", np.linalg.solve(self._guides, place).tolist(), strict=True))
         return {
-            axis: counter.offset + counter.units_per_mm * float(position)
-            for (axis, counter), position in zip(self._counters.items(), carriage, strict=True)
+            axis: counter.offset
+            + counter.units_per_mm * self._carriages[axis].position_free_of_runout(on_the_guides[axis])
+            for axis, counter in self._counters.items()
         }
 
     def mark_on_carrier(self, projector: int) -> Array:
         """Return the place ``(2,)`` in mm on a carrier where the space rod brings the floating mark."""
-        centre, turned = self.pose(projector)
-        x, y, z = transposed(turned) @ (self.mark_in_model() - centre)
-        scale = -self._spindles[f"c{projector}"].position / z
-        fault = self._projector_condition(projector).principal_point_um
-        return np.array([scale * x + 1e-3 * fault[0], scale * y + 1e-3 * fault[1]])
+        return place_on_carrier(
+            self.mark_in_model(),
+            *self.pose(projector),
+            self._spindles[f"c{projector}"].position,
+            self._principal_points[projector],
+            self._local[projector],
+            self._rods[projector],
+        )
 
     def eyepiece(self, eyepiece: int, name: str) -> tuple[float, float] | None:
         """Return dx, dy in um at photo scale of an image point from the mark, None outside the field of view."""
@@ -376,15 +407,27 @@ class Autograph:
         return np.asarray(np.where(distance <= max(MARK_RADIUS_MM, 0.75 * pitch), 1.0, grey))
 
     def _view(self, projector: int, carrier: Carrier) -> Array:
+        polarity = carrier.photograph.polarity
         return view(
-            self.fittings,
-            carrier.photograph.polarity,
+            self._acting_fittings(polarity),
+            polarity,
             self.base_mode,
             self._really(f"kappa{projector}"),
         )
 
+    def _acting_fittings(self, polarity: str) -> Fittings:
+        if len(self.variant.fittings) == len(POSITIONS_OF):
+            return self.fittings
+        return as_they_act(self.fittings, polarity, self.base_mode, self.variant.fittings)
 
-def _guides_of(condition: Condition) -> Array:
+
+def _runout_of(condition: Condition, axis: str, lead: float) -> Runout | None:
+    place = "XYZ".index(axis)
+    amplitude = condition.carriage_periodic_um[place]
+    return Runout(1e-3 * amplitude, lead, condition.carriage_periodic_phase_gon[place] * GON) if amplitude else None
+
+
+def guides_of(condition: Condition) -> Array:
     """Return the matrix ``(3, 3)`` from positions on the spindles to places in the frame."""
     x, y, z = condition.carriage_scale_ppm
     xy, xz, yz = condition.carriage_skew_ppm
@@ -395,7 +438,7 @@ def build_autograph(instrument: Instrument, photographs: Mapping[str, Photograph
     """Return the instrument of a scenario with its photographs in the drawer."""
     return Autograph(
         VARIANTS[instrument.variant],
-        instrument.condition,
+        condition_of(instrument, seed),
         photographs,
         instrument.serial,
         (instrument.laying_sigma_mm, instrument.laying_sigma_gon),

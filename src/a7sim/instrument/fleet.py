@@ -4,13 +4,18 @@
 An instrument that cannot do something does not do it, and says why when asked by `refused`.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.geometry import GON, Array, length_of, mxv, plane_rotation, rotation, transposed
-from a7sim.instrument.autograph import INSTRUMENT_STREAM, _guides_of
+from a7sim.geometry import GON, Array, length_of, mxv, plane_rotation
+from a7sim.instrument.autograph import COUNTED_FROM_ZERO, MOVE_CENTRES, guides_of
+from a7sim.instrument.condition import INSTRUMENT_STREAM, condition_of, local_coefficients, zero_error
+from a7sim.instrument.projection import place_of_centre, place_on_carrier, pose
+from a7sim.instrument.spindles import APPROXIMATIONS, UNITS_A_DRUM
 from a7sim.manual import COUNTER_DECIMALS, LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Variant
 from a7sim.scenario.schema import Condition, Instrument, ProjectorCondition
 from a7sim.scene.camera import fiducial_places
@@ -23,29 +28,12 @@ _AXES = "XYZ"
 NEAR_A_TIE = 1e-6
 """Of the last decimal."""
 
-MOVE_CENTRES = ("bx", "by1", "by2", "bz1", "bz2")
-
 
 _RIGHT = {
     arrangement: {name: POSITIONS_OF[name].index(position) for name, position in fittings.as_words().items()}
     for arrangement, fittings in RIGHT_FITTINGS.items()
 }
 """Which of its two positions each fitting has by rights, by polarity and base."""
-
-
-def zero_error(condition: Condition, name: str) -> float:
-    """Return by how much the shaft of an element stands further than its drum says, mm or gon."""
-    if name == "bx":
-        return condition.bx_zero_mm
-    projector = condition.left if name.endswith("1") else condition.right
-    return {
-        "c": projector.principal_distance_mm,
-        "kappa": projector.kappa_zero_gon,
-        "phi": projector.phi_zero_gon,
-        "omega": projector.omega_zero_gon,
-        "by": projector.by_zero_mm,
-        "bz": projector.bz_zero_mm,
-    }[name[:-1]]
 
 
 def rounded(values: Array, decimals: int) -> Array:
@@ -61,21 +49,52 @@ def rounded(values: Array, decimals: int) -> Array:
     return np.asarray(nearest + 0.0)
 
 
+@dataclass(frozen=True)
+class Runouts:
+    """The errors of screws that repeat with every turn: amplitudes in mm and phases ``(instruments,)``, lead in mm."""
+
+    amplitude: Array
+    lead: float
+    phase: Array
+
+    def at(self, who: Who, position: Array) -> Array:
+        """Return by how much the nuts have gone further ``(m,)`` than the turns say, mm."""
+        return np.asarray(self.amplitude[who] * np.sin(2.0 * math.pi * position / self.lead + self.phase[who]))
+
+
 class Drums:
     """A spindle of every instrument: what the drum shows, where the shaft follows it with play and setting error."""
 
     def __init__(
-        self, at: float, low: float, high: float, endless: bool, play: Array, sigma: Array, fault: Array
+        self,
+        at: float,
+        low: float,
+        high: float,
+        endless: bool,
+        play: Array,
+        sigma: Array,
+        fault: Array,
+        runouts: Runouts | None = None,
     ) -> None:
         self.low, self.high, self.endless = low, high, endless
         self.at = np.full(fault.shape, at)
         self._shaft = self.at.copy()
         self._error = np.zeros(fault.shape)
         self._half_play, self._sigma, self._fault = play / 2.0, sigma, fault
+        self._runouts = runouts
 
     def position(self, who: Who) -> Array:
         """Return where the shafts really stand ``(m,)``."""
-        return np.asarray(self._shaft[who] + self._error[who] + self._fault[who])
+        position = self._shaft[who] + self._error[who] + self._fault[who]
+        return np.asarray(position if self._runouts is None else position + self._runouts.at(who, position))
+
+    def position_free_of_runout(self, who: Who, place: Array) -> Array:
+        """Return where the shafts would stand ``(m,)`` without the errors that their turns repeat."""
+        position = place
+        if self._runouts is not None:
+            for _ in range(APPROXIMATIONS):
+                position = place - self._runouts.at(who, position)
+        return position
 
     def shown(self, who: Who) -> Array:
         """Return what the counters show ``(m,)``."""
@@ -170,16 +189,29 @@ class Fleet:
         carriage_play = self._of_conditions(lambda condition: condition.carriage_backlash_mm)
         nothing = np.zeros(self.instruments)
         self._carriages = {
-            axis: Drums(variant.carriages_at_rest[axis], low, high, False, carriage_play, nothing, nothing)
+            axis: Drums(
+                variant.carriages_at_rest[axis],
+                low,
+                high,
+                False,
+                carriage_play,
+                nothing,
+                nothing,
+                self._carriage_runouts(axis),
+            )
             for axis, (low, high) in variant.carriages.items()
+            for at in (variant.carriages_at_rest[axis],)
         }
-        self._units = dict.fromkeys(_AXES, 1.0)
+        self._slip_shares = self._of_conditions(lambda condition: condition.counter_slip_share)
+        self._units = {axis: scale.units_per_mm for axis, scale in variant.scales.items()}
         self._decimals = dict.fromkeys(_AXES, COUNTER_DECIMALS)
-        self._offsets = {axis: np.zeros(self.instruments) for axis in _AXES}
-        self._guides = np.stack([_guides_of(condition) for condition in conditions], axis=-1)
+        self._offsets = {axis: np.full(self.instruments, scale.at_origin) for axis, scale in variant.scales.items()}
+        self._guides = np.stack([guides_of(condition) for condition in conditions], axis=-1)
         self._principal_points = {
             n: 1e-3 * self._of_projectors(n, lambda projector: projector.principal_point_um) for n in (1, 2)
         }
+        self._rods = {n: self._where_any(1e-3 * self._of_projectors(n, lambda each: each.rod_um)) for n in (1, 2)}
+        self._local = {n: self._local_errors(n) for n in (1, 2)}
         self._axes = {n: 1e-3 * self._of_projectors(n, lambda projector: projector.axes_um) for n in (1, 2)}
         self._carriers: dict[int, Carriers] = {}
         self._base_inside = np.ones(self.instruments, dtype=bool)
@@ -196,6 +228,22 @@ class Fleet:
     def _of_projectors(self, n: int, values: Callable[[ProjectorCondition], Sequence[float]]) -> Array:
         return np.array([values(each.left if n == 1 else each.right) for each in self._conditions]).T
 
+    def _local_errors(self, n: int) -> Array | None:
+        found = [local_coefficients(each.left if n == 1 else each.right) for each in self._conditions]
+        shape = next((each.shape for each in found if each is not None), None)
+        if shape is None:
+            return None
+        return np.stack([np.zeros(shape) if each is None else each for each in found], axis=-1)
+
+    def _where_any(self, values: Array) -> Array | None:
+        return values if values.any() else None
+
+    def _carriage_runouts(self, axis: str) -> Runouts | None:
+        place = _AXES.index(axis)
+        amplitude = 1e-3 * self._of_conditions(lambda condition: condition.carriage_periodic_um[place])
+        phase = GON * self._of_conditions(lambda condition: condition.carriage_periodic_phase_gon[place])
+        return Runouts(amplitude, self.variant.carriage_lead_mm, phase) if amplitude.any() else None
+
     def _element_drums(self, name: str) -> Drums:
         element = self.variant.elements[name]
         angular = element.unit == "gon"
@@ -210,9 +258,9 @@ class Fleet:
         """Return what was refused since the last asking, by instrument."""
         return {int(each): self._refusals.pop(int(each)) for each in who if int(each) in self._refusals}
 
-    def _refuse(self, who: Who, why: str) -> None:
+    def _refuse(self, who: Who, why: str, number: int = -222) -> None:
         for each in who:
-            self._refusals.setdefault(int(each), []).append(f'-222,"{why}"')
+            self._refusals.setdefault(int(each), []).append(f'{number},"{why}"')
 
     # --- elements -------------------------------------------------------------------------------------
 
@@ -222,6 +270,9 @@ class Fleet:
 
     def set_element(self, who: Who, name: str, values: Array) -> None:
         """Set an element through its counters to values ``(m,)``, to the least count."""
+        if name not in self._drums:
+            self._refuse(who, f"an {self.variant.name} has no {name}", -221)
+            return
         drums = self._drums[name]
         targets = np.round(values / LEAST_COUNT) * LEAST_COUNT
         allowed = drums.allows(targets)
@@ -231,7 +282,7 @@ class Fleet:
         who, targets = who[allowed], targets[allowed]
         drums.turn_to(who, targets, self._rngs)
         for n in (1, 2):
-            if name == "bx" or name.endswith(str(n)):
+            if name in ("bx", "common_phi") or name.endswith(str(n)):
                 self._stand(who, n)
 
     def set_base_mode(self, who: Who, mode: str) -> None:
@@ -254,8 +305,8 @@ class Fleet:
                 drums.turn_to(who, np.full(who.size, self.variant.elements[name].zero), self._rngs)
         self._base_inside[who] = True
         self._put_right_fittings(who)
-        for offset in self._offsets.values():
-            offset[who] = 0.0
+        for axis, scale in self.variant.scales.items():
+            self._offsets[axis][who] = scale.at_origin
         for n in (1, 2):
             self._stand(who, n)
 
@@ -290,7 +341,16 @@ class Fleet:
     def drive(self, who: Who, axis: str, readings: Array) -> Truths:
         """Run carriages until their counters show readings ``(m,)``; return which went."""
         wanted = rounded(readings, self._decimals[axis])
-        return self._move(who, axis, (wanted - self._offsets[axis][who]) / self._units[axis])
+        went = self._move(who, axis, (wanted - self._offsets[axis][who]) / self._units[axis])
+        slipping = went & (self._slip_shares[who] > 0.0)
+        if slipping.any():
+            again = (wanted[slipping] - self._offsets[axis][who[slipping]]) / self._units[axis]
+            off = np.abs(again - self._carriages[axis].at[who[slipping]]) > self._half_a_count(axis)
+            self._move(who[slipping][off], axis, again[off], silently=True)
+        return went
+
+    def _half_a_count(self, axis: str) -> float:
+        return float(0.5000001 * 10.0 ** -self._decimals[axis] / self._units[axis])
 
     def wheel(self, who: Who, axis: str, amounts: Array) -> Truths:
         """Turn handwheels by so many counter units ``(m,)``; their collars decide which way the carriages go."""
@@ -299,20 +359,34 @@ class Fleet:
 
     def _wheel_senses(self, who: Who, axis: str) -> Array:
         collar = f"{axis.lower()}collar"
-        if collar not in self._fittings:
+        if collar not in self.variant.fittings:
             return np.ones(who.size)
         polarity = next((carriers.polarity for carriers in self._carriers.values()), "positive")
         return np.where(self._fittings[collar][who] == _RIGHT[polarity, "inside"][collar], 1.0, -1.0)
 
-    def _move(self, who: Who, axis: str, positions: Array) -> Truths:
+    def _move(self, who: Who, axis: str, positions: Array, silently: bool = False) -> Truths:
         drums = self._carriages[axis]
         at_end = np.clip(positions, drums.low, drums.high)
-        half_a_count = 0.5000001 * 10.0 ** -self._decimals[axis] / self._units[axis]
-        positions = np.where(np.abs(at_end - positions) <= half_a_count, at_end, positions)
+        positions = np.where(np.abs(at_end - positions) <= self._half_a_count(axis), at_end, positions)
         allowed = drums.allows(positions) & self._rods_can(who, carriages={axis: positions})
-        self._refuse(who[~allowed], f"Data out of range;{axis}: beyond its range or that of the rods")
-        drums.turn_to(who[allowed], positions[allowed], self._rngs)
+        if not silently:
+            self._refuse(who[~allowed], f"Data out of range;{axis}: beyond its range or that of the rods")
+        who, positions = who[allowed], positions[allowed]
+        self._slip(who, axis, drums.at[who], positions)
+        drums.turn_to(who, positions, self._rngs)
         return np.asarray(allowed)
+
+    def _slip(self, who: Who, axis: str, before: Array, after: Array) -> None:
+        """Let counters miss carries on the way from one position ``(m,)`` to another (see `Counter.passed`)."""
+        for i in np.flatnonzero(self._slip_shares[who] > 0.0):
+            each = who[i]
+            first, last = (
+                math.floor((self._offsets[axis][each] + self._units[axis] * position[i]) / UNITS_A_DRUM)
+                for position in (before, after)
+            )
+            if first != last:
+                missed = self._rngs[each].binomial(abs(last - first), self._slip_shares[each])
+                self._offsets[axis][each] -= math.copysign(missed * UNITS_A_DRUM, last - first)
 
     def _rods_can(
         self,
@@ -342,11 +416,20 @@ class Fleet:
         inside = self._base_inside[who] if base_inside is None else np.full(who.size, base_inside)
 
         def drum(name: str) -> Array:
-            return elements[name] if name in elements else self._drums[name].at[who]
+            if name in elements:
+                return elements[name]
+            return self._drums[name].at[who] if name in self._drums else np.zeros(who.size)
 
-        x = np.where(inside == (n == 1), 0.0, drum("bx"))
-        across = np.hypot(at["X"] - x, at["Y"] + drum(f"by{n}"))
-        return np.asarray(np.arctan2(across, drum(f"bz{n}") - at["Z"]) / GON)
+        x, y, z = self._shares(n, inside) * drum("bx"), -drum(f"by{n}"), drum(f"bz{n}")
+        if "common_phi" in self._drums:
+            tilt = (drum("common_phi") - self.variant.elements["common_phi"].zero) * GON
+            x, z = x * np.cos(tilt) + z * np.sin(tilt), z * np.cos(tilt) - x * np.sin(tilt)
+        return np.asarray(np.arctan2(np.hypot(at["X"] - x, at["Y"] - y), z - at["Z"]) / GON)
+
+    def _shares(self, n: int, inside: Truths) -> Array:
+        """Return where projectors stand along X ``(m,)``, as shares of bx."""
+        left, right = self.variant.centres_on_base
+        return np.where(inside == (n == 1), left, right)
 
     # --- pictures -------------------------------------------------------------------------------------
 
@@ -377,18 +460,18 @@ class Fleet:
 
     def _stand(self, who: Who, n: int) -> None:
         """Put the projectors where their elements, the base and their faults bring them."""
-        angles = [self._tilts(who, f"{name}{n}") * GON for name in ("omega", "phi", "kappa")]
-        turned = rotation(*angles)
-        at_origin = self._base_inside[who] == (n == 1)
-        x = np.where(at_origin, 0.0, self._drums["bx"].position(who))
-        missed = self._axes[n][:, who]
-        centre = np.array([x, -self._drums[f"by{n}"].position(who), self._drums[f"bz{n}"].position(who)])
-        self._centres[n][:, who] = centre + mxv(turned, missed) - missed
-        self._turned[n][:, :, who] = turned
+        omega, phi, kappa = (self._really(who, f"{name}{n}") * GON for name in ("omega", "phi", "kappa"))
+        base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
+        place = place_of_centre(self._shares(n, self._base_inside[who]), *base)
+        common_phi = self._really(who, "common_phi") * GON if "common_phi" in self._drums else None
+        centre, turned = pose(omega, phi, kappa, place, self._axes[n][:, who], common_phi)
+        self._centres[n][:, who], self._turned[n][:, :, who] = centre, turned
 
-    def _tilts(self, who: Who, name: str) -> Array:
+    def _really(self, who: Who, name: str) -> Array:
+        if name not in self._drums:
+            return np.zeros(who.size)
         position = self._drums[name].position(who)
-        return position - self.variant.elements[name].zero if name[:3] in ("phi", "ome") else position
+        return position - self.variant.elements[name].zero if name in COUNTED_FROM_ZERO else position
 
     def pose(self, who: Who, projector: int) -> tuple[Array, Array]:
         """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
@@ -403,21 +486,29 @@ class Fleet:
         guides = np.moveaxis(self._guides[:, :, who], -1, 0)
         carriage = np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T
         return {
-            axis: self._offsets[axis][who] + self._units[axis] * position
+            axis: self._offsets[axis][who]
+            + self._units[axis] * self._carriages[axis].position_free_of_runout(who, position)
             for axis, position in zip(_AXES, carriage, strict=True)
         }
 
     def mark_on_carrier(self, who: Who, projector: int) -> Array:
         """Return the places ``(2, m)`` in mm on carriers where the space rods bring the floating marks."""
-        centre, turned = self.pose(who, projector)
         carriage = np.array([self._carriages[axis].position(who) for axis in _AXES])
-        x, y, z = mxv(transposed(turned), mxv(self._guides[:, :, who], carriage) - centre)
-        scale = -self._drums[f"c{projector}"].position(who) / z
-        return np.array([scale * x, scale * y]) + self._principal_points[projector][:, who]
+        local, rods = self._local[projector], self._rods[projector]
+        return place_on_carrier(
+            mxv(self._guides[:, :, who], carriage),
+            *self.pose(who, projector),
+            self._drums[f"c{projector}"].position(who),
+            self._principal_points[projector][:, who],
+            None if local is None else local[:, :, who],
+            None if rods is None else rods[:, who],
+        )
 
     def eyepiece(self, who: Who, eye: int, name: str) -> Array:
         """Return dx, dy ``(2, m)`` in um at photo scale of an image point from the mark, nan outside the field."""
-        straight = self._fittings["triangulation"][who] == POSITIONS_OF["triangulation"].index("back")
+        straight = self._base_inside[who]
+        if "triangulation" in self.variant.fittings:
+            straight = self._fittings["triangulation"][who] == POSITIONS_OF["triangulation"].index("back")
         seen = np.full((2, who.size), np.nan)
         for projector in (1, 2):
             looking = straight == (projector == eye)
@@ -436,6 +527,8 @@ class Fleet:
         signs = np.ones((2, who.size))
         inside = self._base_inside[who]
         for row, name in enumerate(("diapositive", "dove")):
+            if name not in self.variant.fittings:
+                continue
             right = np.where(inside, _RIGHT[polarity, "inside"][name], _RIGHT[polarity, "outside"][name])
             signs[row, self._fittings[name][who] != right] = -1.0
         return signs
@@ -463,7 +556,7 @@ def build_fleet(instrument: Instrument, photographs: Sequence[Mapping[str, Photo
     rngs = [np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM,))) for seed in seeds]
     return Fleet(
         VARIANTS[instrument.variant],
-        [instrument.condition] * len(seeds),
+        [condition_of(instrument, seed) for seed in seeds],
         photographs,
         (instrument.laying_sigma_mm, instrument.laying_sigma_gon),
         rngs,

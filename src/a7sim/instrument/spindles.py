@@ -1,11 +1,34 @@
 """Spindles with their drums: what is set, what is read, and what really moves."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from a7sim.instrument.refusals import OutOfRange
 from a7sim.manual import COUNTER_DECIMALS, Element
+
+APPROXIMATIONS = 20
+"""Each is better than the last by the slope of the error, some hundredths."""
+
+UNITS_A_DRUM = 1.0
+"""Counter units that a turn of the last drum counts, which it carries to the next one as it passes zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class Runout:
+    """The error of a screw that repeats with every turn."""
+
+    amplitude: float
+    """mm."""
+    lead: float
+    """mm a turn."""
+    phase: float = 0.0
+    """Radians."""
+
+    def at(self, position: float) -> float:
+        """Return by how much the nut has gone further than the turns say, in mm."""
+        return self.amplitude * math.sin(2.0 * math.pi * position / self.lead + self.phase)
 
 
 @dataclass
@@ -21,6 +44,7 @@ class Spindle:
     setting_sigma: float = 0.0
     fault: float = 0.0
     """Zero error: the shaft stands that much further than the drum says."""
+    runout: Runout | None = None
 
     def __post_init__(self) -> None:
         self._shaft = self.at
@@ -34,7 +58,16 @@ class Spindle:
     @property
     def position(self) -> float:
         """Where the shaft really stands, in mm or gon."""
-        return self._shaft + self._error + self.fault
+        position = self._shaft + self._error + self.fault
+        return position if self.runout is None else position + self.runout.at(position)
+
+    def position_free_of_runout(self, place: float) -> float:
+        """Return where the shaft would stand without the error that its turns repeat, the inverse of it."""
+        position = place
+        if self.runout is not None:
+            for _ in range(APPROXIMATIONS):
+                position = place - self.runout.at(position)
+        return position
 
     @property
     def shown(self) -> float:
@@ -66,6 +99,23 @@ class Counter:
     units_per_mm: float = 1.0
     decimals: int = COUNTER_DECIMALS
     offset: float = 0.0
+    slip_share: float = 0.0
+    """Of the passes of the last drum over zero, those at which it does not carry the next."""
+
+    def __post_init__(self) -> None:
+        self._at_rest = self.offset
+
+    def passed(self, before: float, after: float, rng: np.random.Generator) -> None:
+        """Follow the carriage from one position to another, and slip where a carry fails.
+
+        What is missed once is missing until the counter is preset or cleared.
+        """
+        if not self.slip_share:
+            return
+        first, last = (math.floor((self.offset + self.units_per_mm * each) / UNITS_A_DRUM) for each in (before, after))
+        if first != last:
+            missed = int(rng.binomial(abs(last - first), self.slip_share))
+            self.offset -= math.copysign(missed * UNITS_A_DRUM, last - first)
 
     def reading(self, position: float) -> float:
         """Return what the counter shows at a carriage position in mm."""
@@ -91,5 +141,6 @@ class Counter:
         self.preset(reading, position)
 
     def clear(self) -> None:
-        """Take off the preset: the counter shows mm of the instrument frame times its gear."""
-        self.offset = 0.0
+        """Take off the preset: the counter shows mm of the instrument frame times its gear, and where it has one the
+        reading that stands at the frame's origin."""
+        self.offset = self._at_rest

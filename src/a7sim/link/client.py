@@ -56,6 +56,26 @@ class Client:
         """Send a line and return all numbers of its reply; 9.91E37 stands for what cannot be seen."""
         return [float(each) for each in self.ask(line).replace(";", ",").split(",")]
 
+    def block(self, line: str) -> bytes:
+        """Send a line and return the bytes of its reply, an IEEE 488.2 block of definite length.
+
+        Raises InstrumentRefused when none comes.
+        """
+        self.send(line)
+        reply = self._port.readline()
+        if reply[:1] != b"#":
+            raise InstrumentRefused(line, self.errors())
+        while len(reply) < 2 + int(reply[1:2]):
+            reply += self._port.readline()
+        begins = 2 + int(reply[1:2])
+        ends = begins + int(reply[2:begins])
+        while len(reply) <= ends:
+            more = self._port.readline()
+            if not more:
+                raise InstrumentRefused(line, self.errors())
+            reply += more
+        return reply[begins:ends]
+
     def errors(self) -> list[str]:
         """Take all entries off the instrument's error queue, oldest first."""
         entries: list[str] = []

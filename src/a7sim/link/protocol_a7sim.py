@@ -39,10 +39,10 @@ def _described_by(url: str) -> Desk:
     try:
         scenario = load_scenario(scenario_name)
         chosen = scenario.seed if seed is None else seed
-        photographs = build_scene(scenario, chosen).photographs
+        drawer = build_scene(scenario, chosen).drawer
     except (Mistake, OSError) as mistake:
         raise SerialException("; ".join(str(mistake).splitlines())) from mistake
-    return Desk(build_autograph(scenario.instrument, photographs, chosen))
+    return Desk(build_autograph(scenario.instrument, drawer, chosen))
 
 
 def _taken_apart(url: str) -> tuple[str, int | None]:

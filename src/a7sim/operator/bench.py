@@ -14,9 +14,10 @@ from a7sim.geometry import Array
 from a7sim.operator.crew import Crew, Who
 from a7sim.operator.eyes import Eyes
 from a7sim.operator.floating_mark import Clearing, FloatingMark, Judgement
-from a7sim.operator.hands import Hands
+from a7sim.operator.hands import Hands, Truths
 from a7sim.operator.job import Job, ModelJob
-from a7sim.operator.seat import Seat, side
+from a7sim.operator.seat import Seat, side, wrapped
+from a7sim.operator.slips import neighbours
 
 MOST_POINTINGS = 12
 AGREEMENT_MM = 0.01
@@ -41,6 +42,26 @@ class Parallaxes:
     apart: npt.NDArray[np.object_]
 
 
+@dataclass(frozen=True)
+class Cleared:
+    """What clearing a y-parallax with an element came to; arrays ``(sessions,)``, zero for those not in `who`."""
+
+    who: Who
+    """Those who found it clear, or cleared it."""
+    apart: Who
+    """Those to whom the two images did not come together."""
+    found: Array
+    """The y-parallax in mm as it seemed on arriving."""
+    place: Array
+    """Where ``(3, sessions)``: x from the left-hand centre, y from the base line, z below the centres, mm."""
+    gain: Array
+    """What one unit of the element's counter adds to the parallax there, mm."""
+    before: Array
+    """What the element showed on arriving, gon or mm."""
+    turn: Array
+    """The turn that just clears the point: counts turned, and the part of one that the eye says is missing."""
+
+
 class Bench:
     """A crew at work."""
 
@@ -52,6 +73,7 @@ class Bench:
         self.eyes = Eyes(self.seat)
         self.mark = FloatingMark(self.eyes)
         self._tick = tick
+        self._prints: Mapping[int, Mapping[str, Array]] = {}
         self._entries: dict[tuple[int, str, float], tuple[Numbers, Numbers]] = {}
 
     # --- setting up -----------------------------------------------------------------------------------
@@ -59,6 +81,7 @@ class Bench:
     def begin(self, who: Who, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> None:
         """Take up a model whose pictures are mounted; `prints` by hand (1 left, 2 right), places ``(2, sessions)``."""
         self.eyes.take_prints(prints)
+        self._prints = prints
         self._entries.clear()
         self.seat.begin(who, model)
 
@@ -73,14 +96,25 @@ class Bench:
 
     def begin_round(self, who: Who, number: int) -> None:
         """Begin a round of a procedure: what is read now is entered under its number."""
+        self.crew.begin_round(who, number)
         if self.crew.person is not None:
-            book = self.crew.person.book
-            book.round = number
-            self.hands.note(who, f"{self.seat.model.name}: {book.form}, round {number}")
+            self.hands.note(who, f"{self.seat.model.name}: {self.crew.person.book.form}, round {number}")
 
     def compute(self, who: Who) -> None:
         """Spend the time of one computation."""
-        self.crew.spend(who, self.crew.observer.seconds_to_compute)
+        self.crew.spend(who, self.crew.observer.seconds_to_compute, "computing")
+
+    def pricked(self, who: Who, point: str) -> Truths:
+        """Return which of those who act find a point pricked on both prints."""
+        prints = [self._prints[hand].get(point) for hand in (1, 2)]
+        if any(each is None for each in prints):
+            return np.zeros(who.size, dtype=bool)
+        return np.asarray(~np.isnan([each[0, who] for each in prints if each is not None]).any(axis=0))
+
+    def _come_to(self, who: Who, point: str) -> None:
+        """Go to a point, or by mistake to a standard point near it."""
+        near = neighbours(self.seat.model.standard_points, point)
+        self.crew.come_to(who, point, {name: self.pricked(who, name) for name in near})
 
     # --- monocular pointing ---------------------------------------------------------------------------
 
@@ -93,6 +127,7 @@ class Bench:
         readings = np.zeros((2, len(points), crew.sessions))
         for i, point in enumerate(points):
             who = crew.still(who)
+            self._come_to(who, point)
             self._point_once(who, hand, point, level, errors[:, i], slips[:, i], readings[:, i])
         return readings
 
@@ -101,6 +136,7 @@ class Bench:
         crew = self.crew
         for numbers in self._entries[hand, point, level]:
             crew.strike(who, numbers, why)
+        crew.come_back(who)
         self._drive_to_level(who, level)
         errors = crew.errors_again(who, crew.observer.monocular_um, 2)
         slips = crew.slips_again(who, 2)
@@ -119,40 +155,42 @@ class Bench:
         self.eyes.bring_into_view(who, hand, point)
         self.eyes.bisect(crew.still(who), hand, point, errors)
         who = crew.still(who)
-        numbers = []
-        for axis, name in enumerate("XY"):
-            readings[axis, who] = self._read(who, name, slips[axis])
+        items = [f"{name} {side(hand)} at Z {level:.2f}" for name in "XY"]
+        for axis, item in enumerate(items):
+            readings[axis, who] = self._read(who, point, item, slips[axis])
         self.eyes.learn_straying(who, hand, point, readings[:, who])
-        for axis, name in enumerate("XY"):
-            numbers.append(crew.enter(who, point, f"{name} {side(hand)} at Z {level:.2f}", readings[axis, who]))
+        numbers = [crew.enter(who, point, item, readings[axis, who]) for axis, item in enumerate(items)]
         self._entries[hand, point, level] = (numbers[0], numbers[1])
         self._tick()
 
-    def _read(self, who: Who, axis: str, slips: Array) -> Array:
-        """Read a counter ``(m,)``, with what is misread ``(sessions,)``."""
-        self.crew.spend(who, self.crew.observer.seconds_to_read)
-        return np.round(self.hands.counter(who, axis) + slips[who], 4)
+    def _read(self, who: Who, point: str, item: str, slips: Array) -> Array:
+        """Read the counter ``(m,)`` that an item begins with, with what is misread ``(sessions,)``."""
+        self.crew.spend(who, self.crew.observer.seconds_to_read, "reading")
+        return self.crew.write(who, point, item, self.hands.counter(who, item[0]), slips)
 
     # --- y-parallaxes ---------------------------------------------------------------------------------
 
-    def parallaxes(self, who: Who, points: Sequence[str], readings: int) -> Parallaxes:
-        """Measure y-parallaxes with by' and by", so many readings of each."""
+    def parallaxes(
+        self, who: Who, points: Sequence[str], readings: int, projectors: Sequence[int] = (1, 2)
+    ) -> Parallaxes:
+        """Measure y-parallaxes with by' or by" or both, so many readings of each."""
         crew, observer, n = self.crew, self.crew.observer, len(points)
         plan_errors = crew.errors(who, observer.stereo_um, (2, n))
         height_errors = crew.errors(who, observer.height_um, (n,))
-        errors = crew.errors(who, observer.parallax_um, (n, 2, readings))
-        slips = crew.slips(who, (n, 2, readings))
+        errors = crew.errors(who, observer.parallax_um, (n, len(projectors), readings))
+        slips = crew.slips(who, (n, len(projectors), readings))
         rest = self._at_rest(who)
         p, places = np.zeros((n, crew.sessions)), np.zeros((3, n, crew.sessions))
         apart = np.full(crew.sessions, None, dtype=object)
         measuring = who
         for i, point in enumerate(points):
+            self._come_to(measuring, point)
             judgement = Judgement(plan_errors[:, i], height_errors[i])
             fused = self.mark.fuse(measuring, point, judgement)
             readings_there = self.seat.counters(fused) if fused.size else np.zeros((3, 0))
             places[:, i, fused] = self.seat.place(fused, readings_there)
             self.eyes.learn_straying(fused, 1, point, readings_there) if fused.size else None
-            cleared = self._parallax(fused, point, judgement, rest, errors[i], slips[i], p[i])
+            cleared = self._parallax(fused, point, judgement, projectors, rest, errors[i], slips[i], p[i])
             lost = np.setdiff1d(crew.still(measuring), cleared)
             apart[lost] = point
             if lost.size:
@@ -172,7 +210,7 @@ class Bench:
         return rest
 
     def _turn_back(self, who: Who, names: Sequence[str], rest: Mapping[str, Array]) -> None:
-        self.crew.spend(who, self.crew.observer.seconds_to_turn)
+        self.crew.spend(who, self.crew.observer.seconds_to_turn, "turning")
         for name in names:
             self.hands.set_element(who, name, rest[name][who])
 
@@ -181,24 +219,23 @@ class Bench:
         who: Who,
         point: str,
         judgement: Judgement,
+        projectors: Sequence[int],
         rest: Mapping[str, Array],
         errors: Array,
         slips: Array,
         into: Array,
     ) -> Who:
-        """Clear the parallax of a point with by' and by"; put the mean readings ``(sessions,)`` into place."""
-        crew = self.crew
-        values = np.zeros((2, errors.shape[1], crew.sessions))
-        numbers = np.zeros((2, errors.shape[1], crew.sessions), dtype=np.intp)
-        for projector in (1, 2):
+        """Clear the parallax of a point with by of projectors; put the mean readings ``(sessions,)`` into place."""
+        values = np.zeros(errors.shape)
+        numbers = np.zeros(errors.shape, dtype=np.intp)
+        for i, projector in enumerate(projectors):
             for k in range(errors.shape[1]):
                 who = self._clear_with_by(
-                    who, projector, point, judgement, errors[projector - 1, k], slips[projector - 1, k], rest,
-                    values[projector - 1, k], numbers[projector - 1, k],
-                )  # fmt: skip
+                    who, projector, point, judgement, errors[i, k], slips[i, k], rest, values[i, k], numbers[i, k]
+                )
             if who.size:
                 self._turn_back(who, (f"by{projector}",), rest)
-        who = self._without_slips(who, point, judgement, rest, values, numbers)
+        who = self._without_slips(who, point, judgement, projectors, rest, values, numbers)
         into[who] = values[:, :, who].mean(axis=1).mean(axis=0)
         return who
 
@@ -219,8 +256,8 @@ class Bench:
         by, sense = f"by{projector}", self._sense_of_by(projector)
         who = self.mark.settle(who, point, judgement, Clearing(by, np.full(self.crew.sessions, -sense), errors))
         if who.size:
-            self.crew.spend(who, self.crew.observer.seconds_to_read)
-            counts = np.round(self.hands.elements(who, [by])[by] + slips[who], 4)
+            self.crew.spend(who, self.crew.observer.seconds_to_read, "reading")
+            counts = self.crew.write(who, point, by, self.hands.elements(who, [by])[by], slips)
             numbers[who] = self.crew.enter(who, point, by, counts)[who]
             values[who] = sense * (counts - rest[by][who])
         return who
@@ -229,12 +266,20 @@ class Bench:
         return 1.0 if self.seat.model.hand_of(projector) == 1 else -1.0
 
     def _without_slips(
-        self, who: Who, point: str, judgement: Judgement, rest: Mapping[str, Array], values: Array, numbers: Numbers
+        self,
+        who: Who,
+        point: str,
+        judgement: Judgement,
+        projectors: Sequence[int],
+        rest: Mapping[str, Array],
+        values: Array,
+        numbers: Numbers,
     ) -> Who:
         """Strike out readings that their fellows contradict and make them again, in place."""
         crew, observer = self.crew, self.crew.observer
         tolerance = FAINTEST_SLIP_MM + 5e-3 * observer.parallax_um * self.seat.z / self.seat.c
         doubtful, lost = who, who[:0]
+        bys = " and ".join("by'" if projector == 1 else 'by"' for projector in projectors)
         for _ in range(MOST_POINTINGS):
             flat = values.reshape(-1, crew.sessions)[:, doubtful]
             deviations = np.abs(flat - np.median(flat, axis=0))
@@ -245,22 +290,109 @@ class Bench:
                 return np.setdiff1d(crew.still(who), lost)
             for place in np.unique(worst):
                 again = doubtful[worst == place]
-                projector, k = divmod(int(place), values.shape[1])
-                by = f"by{projector + 1}"
-                why = f"does not agree with the other readings of by' and by\" at {point}"
-                crew.strike(again, numbers[projector, k], why)
+                i, k = divmod(int(place), values.shape[1])
+                by = f"by{projectors[i]}"
+                crew.strike(again, numbers[i, k], f"does not agree with the other readings of {bys} at {point}")
                 errors = crew.errors_again(again, observer.parallax_um, 1)[0]
                 slips = crew.slips_again(again, 1)[0]
                 found = self._clear_with_by(
-                    again, projector + 1, point, judgement, errors, slips, rest,
-                    values[projector, k], numbers[projector, k],
-                )  # fmt: skip
+                    again, projectors[i], point, judgement, errors, slips, rest, values[i, k], numbers[i, k]
+                )
                 lost = np.concatenate([lost, np.setdiff1d(again, found)])
                 if found.size:
                     self._turn_back(found, (by,), rest)
             doubtful = np.setdiff1d(doubtful, lost)
-        crew.give_up(doubtful, f"{self.seat.model.name}: the readings of by' and by\" at {point} do not agree")
+        crew.give_up(doubtful, f"{self.seat.model.name}: the readings of {bys} at {point} do not agree")
         return np.setdiff1d(crew.still(who), lost)
+
+    # --- clearing -------------------------------------------------------------------------------------
+
+    def clear(
+        self,
+        who: Who,
+        point: str,
+        element: str,
+        gain_at: Callable[[Who, Array], Array],
+        unless_within: float = 0.0,
+    ) -> Cleared:
+        """Clear the y-parallax of a point by turning an element, unless it seems to be within so many mm already.
+
+        `gain_at` tells what one unit of the element's counter adds to the parallax ``(m,)`` in mm at places
+        ``(3, m)``. What is found and what the element then shows goes into the book.
+        """
+        crew, seat = self.crew, self.seat
+        judgement, error = self._judgement(who)
+        found, before, turn, gain = np.zeros((4, crew.sessions))
+        place = np.zeros((3, crew.sessions))
+        fused = self._arrive(who, point, judgement, error, place, found)
+        apart = np.setdiff1d(crew.still(who), fused)
+        if not fused.size:
+            return Cleared(fused, apart, found, place, gain, before, turn)
+        before[fused] = seat.elements(fused, [element])[element]
+        gain[fused] = gain_at(fused, place[:, fused])
+        turning = fused[np.abs(found[fused]) > unless_within]
+        turned = self._turn_until_clear(turning, point, judgement, Clearing(element, gain, error), before, turn)
+        self._tick()
+        return Cleared(np.setdiff1d(fused, np.setdiff1d(turning, turned)), apart, found, place, gain, before, turn)
+
+    def parallaxes_seen(self, who: Who, points: Sequence[str]) -> Parallaxes:
+        """Look at what y-parallax is left at points, without turning anything but the handwheels."""
+        crew = self.crew
+        p, places = np.zeros((len(points), crew.sessions)), np.zeros((3, len(points), crew.sessions))
+        apart = np.full(crew.sessions, None, dtype=object)
+        for i, point in enumerate(points):
+            judgement, error = self._judgement(who)
+            fused = self._arrive(who, point, judgement, error, places[:, i], p[i])
+            apart[np.setdiff1d(crew.still(who), fused)] = point
+            who = fused
+            if not who.size:
+                break
+            self._tick()
+        return Parallaxes(p, places, apart)
+
+    def _judgement(self, who: Who) -> tuple[Judgement, Array]:
+        """Draw by how much one arrival at a point is misjudged, and its y-parallax ``(sessions,)`` in um."""
+        observer = self.crew.observer
+        x, y, height, parallax = self.crew.errors(who, 1.0, (4,))
+        plan = observer.stereo_um * np.array([x, y])
+        return Judgement(plan, observer.height_um * height), observer.parallax_um * parallax
+
+    def _arrive(self, who: Who, point: str, judgement: Judgement, error: Array, place: Array, found: Array) -> Who:
+        """Set the mark on a point; put into place where it is and what y-parallax it seems to have, and enter that."""
+        seat = self.seat
+        self._come_to(who, point)
+        fused = self.mark.fuse(who, point, judgement)
+        if fused.size:
+            readings = seat.counters(fused)
+            place[:, fused] = seat.place(fused, readings)
+            self.eyes.learn_straying(fused, 1, point, readings)
+            found[fused] = self._seen_parallax(fused, point, error)
+            self.crew.enter(fused, point, "parallax seen", found[fused])
+        return fused
+
+    def _seen_parallax(self, who: Who, point: str, error: Array) -> Array:
+        """Return the y-parallax ``(m,)`` in mm as it seems."""
+        seen = self.mark.looked(who, point)[3] + error[who]
+        return np.asarray(1e-3 * seen * self.seat.z[who] / self.seat.c)
+
+    def _turn_until_clear(
+        self, who: Who, point: str, judgement: Judgement, clearing: Clearing, before: Array, turn: Array
+    ) -> Who:
+        """Turn an element until a point is clear, enter what it shows, and put the turn into place."""
+        crew, seat, element = self.crew, self.seat, clearing.element
+        slips = crew.slips(who, (1,))[0]
+        who = self.mark.settle(who, point, judgement, clearing) if who.size else who
+        if not who.size:
+            return who
+        crew.spend(who, crew.observer.seconds_to_read, "reading")
+        counts = crew.write(who, point, element, seat.elements(who, [element])[element], slips)
+        crew.enter(who, point, element, counts)
+        turned = counts - before[who]
+        turned = wrapped(turned) if seat.manual.elements[element].endless else turned
+        turn[who] = turned - self._seen_parallax(who, point, clearing.error) / clearing.gain[who]
+        seat.learn_settings(who)
+        seat.see_that_it_obeyed(who, f"{seat.model.name}: clearing {point} with {element}")
+        return crew.still(who)
 
     # --- model coordinates ----------------------------------------------------------------------------
 
@@ -276,6 +408,7 @@ class Bench:
         measured = np.full((3, n, crew.sessions), np.nan)
         for i, point in enumerate(points):
             who = crew.still(who)
+            self._come_to(who, point)
             self._measure(who, point, at_point[:, i], anew[:, i], slips[:, i], measured[:, i])
             self._tick()
         self.seat.see_that_it_obeyed(who, f"{self.seat.model.name}: measuring model coordinates")
@@ -317,14 +450,14 @@ class Bench:
         numbers = np.zeros((3, crew.sessions), dtype=np.intp)
         if who.size:
             for axis, name in enumerate("XYZ"):
-                readings[axis, who] = self._read(who, name, slips[axis])
+                readings[axis, who] = self._read(who, point, name, slips[axis])
             self.hands.record(who, point)
             for axis, name in enumerate("XYZ"):
                 numbers[axis] = crew.enter(who, point, name, readings[axis, who])
         return who, numbers
 
     def _agree(self, first: Array, second: Array) -> npt.NDArray[np.bool_]:
-        difference = np.abs(first - second) / [[1.0], [1.0], [self.seat.units_per_mm]]
+        difference = np.abs(first - second) / self.seat.units[:, None]
         return np.asarray((difference <= AGREEMENT_MM + 1e-9).all(axis=0))
 
     def _strike(self, who: Who, numbers: Numbers) -> None:

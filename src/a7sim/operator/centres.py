@@ -1,16 +1,27 @@
-"""Observing the perspective centres at two Z levels (thesis 3.6)."""
+"""The perspective centres: observed at two levels of Z or more (thesis 3.6) or by a grid plate, or read off scales."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from a7sim.geometry import Array
+from a7sim.manual import LEAST_COUNT
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Who
+from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import ModelJob
-from a7sim.reduction import PerspectiveCentre, perspective_centre
+from a7sim.operator.plate import Crosses, lie_of_plate, places_of, point_at_crosses, prints_of
+from a7sim.reduction import (
+    PerspectiveCentre,
+    PlateLie,
+    Resection,
+    grid_plate_centre,
+    perspective_centre,
+    perspective_centre_of_levels,
+)
 
 SUSPICIOUS_RMS = 0.19
 """Counter units; none of the thesis's twenty centres but the misprinted one has a larger rms."""
@@ -20,38 +31,40 @@ SLIPPED = 1.5
 
 MOST_REPETITIONS = 3
 
+FEWEST_CROSSES = 9
+"""Within the model, in two columns or more; the coarsest lines of the plate that have so many there are taken."""
 
-def observe_centre(
-    bench: Bench, who: Who, model: ModelJob, hand: int, levels: tuple[float, float], tolerated_rms: float
-) -> PerspectiveCentre:
-    """Point monocularly at points 1 to 6 at both levels and compute the centres ``(sessions,)`` of one photograph.
+BESIDE_THE_MODEL = 0.1
+"""Crosses are pointed at so far beside the base, as a share of it: further out carriages and rods may not go."""
 
-    hand is 1 for the left-hand photograph, 2 for the right-hand one. A point that does not fit the others is
-    struck out and pointed at again; when the rms stays suspicious though no point stands out, a second set
-    is observed and the mean of both is taken. Those for whom even then the rms is beyond the tolerated give up.
+Levels = npt.NDArray[np.float64]
+
+
+def observe_centre(bench: Bench, who: Who, model: ModelJob, hand: int) -> PerspectiveCentre:
+    """Return the centres ``(sessions,)`` of one photograph in counter units, by the method of the plan.
+
+    hand is 1 for the left-hand photograph, 2 for the right-hand one. Those for whom the rms is beyond the tolerated
+    give up.
     """
-    crew = bench.crew
-    points = [model.standard_points[label] for label in model.points_of_case("A")]
-    shown = bench.seat.levels_shown(who, levels)
+    plan, crew = bench.job.plan, bench.crew
+    shown = bench.seat.levels_shown(who, plan.centre_levels)
     who = crew.still(who)
-    low_level, high_level = float(shown[0, 0]), float(shown[1, 0])
-    low, high = _one_set(bench, who, hand, points, low_level, high_level)
+    levels = shown[:, 0]
+    if plan.centre_method == "scales":
+        return _by_scales(bench, who, hand, plan.centre_levels)
+    if plan.centre_method == "grid plate":
+        centres = _by_grid_plate(bench, who, model, hand, levels)
+    else:
+        centres = _by_levels(bench, who, model, hand, levels)
     who = crew.still(who)
-    doubtful = who[_rms(low, high, low_level, high_level, who) > SUSPICIOUS_RMS]
-    if doubtful.size:
-        crew.remark(doubtful, f"{model.name}: the points of the centre fit badly, a second set is observed")
-        again = _one_set(bench, doubtful, hand, points, low_level, high_level)
-        for pointings, more in zip((low, high), again, strict=True):
-            pointings[:, :, doubtful] = (pointings[:, :, doubtful] + more[:, :, doubtful]) / 2.0
-        who = crew.still(who)
-    rms = _rms(low, high, low_level, high_level, who)
-    for session, bad in zip(who[rms > tolerated_rms], rms[rms > tolerated_rms], strict=True):
+    rms = centres.rms[who]
+    for session, bad in zip(who[rms > plan.tolerated_centre_rms], rms[rms > plan.tolerated_centre_rms], strict=True):
         crew.give_up(
             np.array([session]),
             f"{model.name}: the pointings of a perspective centre do not meet: rms {bad:.2f}, "
-            f"tolerated {tolerated_rms:.2f}",
+            f"tolerated {plan.tolerated_centre_rms:.2f}",
         )
-    return _among_all(perspective_centre(low[:, :, who], high[:, :, who], low_level, high_level), who, crew.sessions)
+    return centres
 
 
 def centre_of(centres: PerspectiveCentre, session: int) -> PerspectiveCentre:
@@ -68,44 +81,191 @@ def _among_all(centres: PerspectiveCentre, who: Who, sessions: int) -> Perspecti
     return PerspectiveCentre(*_each(centres, spread))
 
 
-def _each(centres: PerspectiveCentre, change: Callable[[Array], Array]) -> list[Any]:
-    values = (getattr(centres, field.name) for field in fields(centres))
+def _nowhere(sessions: int) -> PerspectiveCentre:
+    nothing = np.full(sessions, np.nan)
+    values = {field.name: nothing for field in fields(PerspectiveCentre)}
+    return PerspectiveCentre(**values | {"residuals": np.full((3, 0, sessions), np.nan)})
+
+
+def _each(found: PerspectiveCentre | PlateLie, change: Callable[[Array], Array]) -> list[Any]:
+    values = (getattr(found, field.name) for field in fields(found))
     return [None if each is None else change(each) for each in values]
 
 
-def _rms(low: Array, high: Array, low_level: float, high_level: float, who: Who) -> Array:
-    return perspective_centre(low[:, :, who], high[:, :, who], low_level, high_level).rms
+def _by_scales(bench: Bench, who: Who, hand: int, levels: Sequence[float]) -> PerspectiveCentre:
+    """Return where base, by, bz and the scales put the centres ``(sessions,)``, as P 3.1 and 3.2 take them.
+
+    Their standard deviations are those of the rounding to the last digit.
+    """
+    sessions = bench.crew.sessions
+    X0, Y0, Z0 = np.full((3, sessions), np.nan)
+    X0[who], Y0[who], Z0[who] = bench.seat.centre(who, hand)
+    rounding = np.full(sessions, LEAST_COUNT / np.sqrt(12.0))
+    depth = levels[1] - levels[0]
+    return PerspectiveCentre(
+        X0,
+        Y0,
+        Z0,
+        (Z0 - levels[0]) / depth,
+        rounding,
+        rounding,
+        rounding,
+        rounding / abs(depth),
+        np.zeros(sessions),
+        np.zeros((3, 0, sessions)),
+    )
 
 
-def _one_set(
-    bench: Bench, who: Who, hand: int, points: Sequence[str], low_level: float, high_level: float
-) -> tuple[Array, Array]:
+# --- levels of Z --------------------------------------------------------------------------------------
+
+
+def _by_levels(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Levels) -> PerspectiveCentre:
+    """Point monocularly at points 1 to 6 at every level and compute the centres ``(sessions,)``.
+
+    A point that does not fit the others is struck out and pointed at again; when the rms stays suspicious though no
+    point stands out, a second set is observed and the mean of both is taken.
+    """
     crew = bench.crew
-    levels = (low_level, high_level)
-    low, high = (bench.point_with(crew.still(who), hand, points, level) for level in levels)
+    points = [model.standard_points[label] for label in model.points_of_case("A")]
+    pointings = _one_set(bench, who, hand, points, levels)
+    who = crew.still(who)
+    doubtful = who[_rms(pointings[..., who], levels) > SUSPICIOUS_RMS]
+    if doubtful.size:
+        crew.remark(doubtful, f"{model.name}: the points of the centre fit badly, a second set is observed")
+        again = _one_set(bench, doubtful, hand, points, levels)
+        pointings[..., doubtful] = (pointings[..., doubtful] + again[..., doubtful]) / 2.0
+        who = crew.still(who)
+    return _among_all(_centre(pointings[..., who], levels), who, crew.sessions)
+
+
+def _centre(pointings: Array, levels: Levels) -> PerspectiveCentre:
+    """Return the centre from pointings ``(2, k, n, ...)``; T0 goes from the first of two levels to the other."""
+    if len(levels) == 2:
+        return perspective_centre(pointings[:, 0], pointings[:, 1], *levels.tolist())
+    return perspective_centre_of_levels(pointings, levels)
+
+
+def _rms(pointings: Array, levels: Levels) -> Array:
+    return _centre(pointings, levels).rms
+
+
+def _one_set(bench: Bench, who: Who, hand: int, points: Sequence[str], levels: Levels) -> Array:
+    """Return pointings ``(2, k, n, sessions)`` at k levels."""
+    crew = bench.crew
+    pointings = np.stack([bench.point_with(crew.still(who), hand, points, level) for level in levels.tolist()], axis=1)
     looking = crew.still(who)
     bench.compute(looking)
     for _ in range(MOST_REPETITIONS):
-        misread = _misread_points(low, high, low_level, high_level, looking)
+        misread = _misread_points(pointings[..., looking], levels)
         looking, misread = looking[misread >= 0], misread[misread >= 0]
         if not looking.size:
             break
-        why = "does not agree with the other points at the two levels"
+        why = f"does not agree with the other points at the {'two ' if len(levels) == 2 else ''}levels"
         for place in np.unique(misread):
             again = looking[misread == place]
-            for pointings, level in zip((low, high), levels, strict=True):
-                pointings[:, place, again] = bench.point_again(again, hand, points[place], level, why)[:, again]
+            for i, level in enumerate(levels.tolist()):
+                pointed = bench.point_again(again, hand, points[place], level, why)
+                pointings[:, i, place, again] = pointed[:, again]
         looking = crew.still(looking)
         bench.compute(looking)
-    return low, high
+    return pointings
 
 
-def _misread_points(low: Array, high: Array, low_level: float, high_level: float, who: Who) -> Array:
+def _misread_points(pointings: Array, levels: Levels) -> npt.NDArray[np.intp]:
     """Return the index ``(m,)`` of the point that does not fit the others, -1 for none."""
-    n = low.shape[1]
-    of_all = _rms(low, high, low_level, high_level, who)
-    without = np.array(
-        [_rms(np.delete(low, i, axis=1), np.delete(high, i, axis=1), low_level, high_level, who) for i in range(n)]
-    )
+    of_all = _rms(pointings, levels)
+    without = np.array([_rms(np.delete(pointings, i, axis=2), levels) for i in range(pointings.shape[2])])
     suspicious = (of_all > SUSPICIOUS_RMS) & (of_all > SLIPPED * without.min(axis=0))
     return np.where(suspicious, without.argmin(axis=0), -1)
+
+
+# --- a grid plate -------------------------------------------------------------------------------------
+
+
+def _by_grid_plate(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Levels) -> PerspectiveCentre:
+    """Put the grid plate in the picture's place, point at its crosses at every level, and put the picture back.
+
+    The elements stay as they are. Both are centred anew, each as well as a fiducial is registered.
+    """
+    crew, job = bench.crew, bench.job
+    plate = job.grid_plate
+    certificate = plate.certificate(job.certificate)
+    projector = bench.seat.projector(hand)
+    picture = model.left if hand == 1 else model.right
+    centre_picture(bench, who, projector, plate.name, certificate)
+    lie = lie_of_plate(bench, crew.still(who), projector, certificate, times=1)
+    bench.eyes.take_prints({hand: prints_of(bench, crew.still(who), projector)})
+    crosses = _crosses_in_model(bench, crew.still(who), hand, levels)
+    if len(crosses) < FEWEST_CROSSES:
+        crew.give_up(who, f"{model.name}: too few crosses of plate {plate.name} lie within the model for a centre")
+        return _nowhere(crew.sessions)
+    pointings = np.stack(
+        [point_at_crosses(bench, crew.still(who), hand, crosses, level) for level in levels.tolist()], axis=1
+    )
+    who = crew.still(who)
+    bench.compute(who)
+    c = bench.seat.elements(who, [f"c{projector}"])[f"c{projector}"]
+    its_lie = PlateLie(*_each(lie, lambda values: values[who]))
+    found = _resected(bench, crosses, pointings[..., who], levels, c, its_lie)
+    centres = _among_all(found, who, crew.sessions)
+    centre_picture(bench, who, projector, picture, job.certificate)
+    who = crew.still(who)
+    bench.eyes.take_prints({side: prints_of(bench, who, bench.seat.projector(side)) for side in (1, 2)})
+    return centres
+
+
+def _crosses_in_model(bench: Bench, who: Who, hand: int, levels: Levels) -> Crosses:
+    """Return crosses that lie within the model in every session, or none where they are too few."""
+    seat, plate = bench.seat, bench.job.grid_plate
+    bx = np.abs(seat.bx(who))
+    beyond = BESIDE_THE_MODEL * bx
+
+    def in_model(crosses: Crosses) -> Crosses:
+        swung = np.array(
+            [seat.on_carrier(who, hand, np.repeat([place], who.size, axis=0).T) for place in crosses.values()]
+        )
+        depth = seat.in_frame(who, np.zeros((2, levels.size, who.size)), levels[:, None])[2]
+        x = swung[:, 0] * depth.max(axis=0) / seat.c + (0.0 if hand == 1 else bx)
+        inside = ((x >= -beyond) & (x <= bx + beyond)).all(axis=1)
+        return {name: place for (name, place), keep in zip(crosses.items(), inside, strict=True) if keep}
+
+    sets = [*(in_model(plate.some_crosses(count)) for count in plate.even_counts), in_model(plate.crosses)]
+    enough = (each for each in sets if len(each) >= FEWEST_CROSSES and len({x for x, _ in each.values()}) > 1)
+    return next(enough, {})
+
+
+def _resected(
+    bench: Bench, crosses: Crosses, pointings: Array, levels: Levels, c: Array, lie: PlateLie
+) -> PerspectiveCentre:
+    """Return the centres ``(m,)`` from pointings ``(2, k, n, m)`` at crosses, in counter units."""
+    k, n = pointings.shape[1:3]
+    units = bench.seat.units_per_mm
+    placed = np.tile(lie.placed(places_of(crosses)), (1, k, 1))
+    heights = np.repeat(levels / units, n)[:, None]
+    found = grid_plate_centre(placed, pointings.reshape(2, k * n, -1), heights, c)
+    return _in_counter_units(found, levels, units, c, lie)
+
+
+def _in_counter_units(found: Resection, levels: Levels, units: float, c: Array, lie: PlateLie) -> PerspectiveCentre:
+    """Return a resected centre as one of levels: residuals in X and Y at the mean level, T0 from the first to the last.
+
+    How well the plate's lie is known goes into the standard deviations of X0 and Y0.
+    """
+    x, y, z = found.centre
+    sigma_x, sigma_y, sigma_z = found.sigma_centre
+    enlarged = (z - levels.mean() / units) / c
+    of_lie = enlarged * lie.sigma_shift
+    step = float(levels[-1] - levels[0])
+    residuals = enlarged * found.residuals
+    return PerspectiveCentre(
+        x,
+        y,
+        z * units,
+        (z * units - levels[0]) / step,
+        np.hypot(sigma_x, of_lie),
+        np.hypot(sigma_y, of_lie),
+        sigma_z * units,
+        np.abs(sigma_z * units / step),
+        enlarged * found.s0,
+        np.concatenate([residuals, np.zeros((1, *residuals.shape[1:]))]),
+    )

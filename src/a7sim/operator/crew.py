@@ -1,17 +1,25 @@
 """The people at a batch of instruments, one a session: what they get wrong, how long they take, what they write."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array
+from a7sim.manual import POSITIONS_OF
 from a7sim.operator.dice import Dice
 from a7sim.operator.person import Person
+from a7sim.operator.skill import MINUTE, acuity_factor, needs_a_break, slip_factor
+from a7sim.operator.slips import OF_READINGS, Occasion, Slips
+from a7sim.operator.timesheet import Act, Timesheet
 from a7sim.scenario import Observer
 
 Who = npt.NDArray[np.intp]
 """Indices ``(m,)`` of the sessions that act."""
+
+
+class NobodyGoesOn(Exception):
+    """All of a crew have given up."""
 
 
 class Crew:
@@ -26,8 +34,14 @@ class Crew:
         self.person = person
         self.seconds = np.zeros(len(dice))
         self.reasons: dict[int, str] = {}
+        self.timesheet = person.timesheet if person is not None else Timesheet(len(dice))
+        self.slip_log = [person.slips] if person is not None else [[] for _ in dice]
+        """The truth about every slip, by session; no procedure looks at it."""
         self._dice = dice
         self._given_up = np.zeros(len(dice), dtype=bool)
+        self._slips = Slips(observer, dice, self.slip_log)
+        self._rested_at = np.zeros(len(dice))
+        self._model, self._form, self._round = "", "", 0
 
     @classmethod
     def of_one(cls, person: Person) -> "Crew":
@@ -52,35 +66,168 @@ class Crew:
         """Return those who have not given up."""
         return who[~self._given_up[who]]
 
+    # --- headings -------------------------------------------------------------------------------------
+
+    def begin(self, who: Who, model: str, form: str) -> None:
+        """Begin a form of a model, after a break where one is due."""
+        self._rest(who)
+        self._slips.come_back(who.tolist())
+        self._model, self._form, self._round = model, form, 0
+        if self.person is not None:
+            self.person.book.head(model, form)
+
+    def begin_round(self, who: Who, number: int) -> None:
+        """Begin a round of the form, after a break where one is due."""
+        self._rest(who)
+        self._slips.come_back(who.tolist())
+        self._round = number
+        if self.person is not None:
+            self.person.book.round = number
+
+    def _rest(self, who: Who) -> None:
+        tired = who[needs_a_break(self.observer, self._since_rest[who])]
+        if tired.size:
+            self._let_go_by(tired, MINUTE * self.observer.break_minutes, "resting")
+            self._rested_at[tired] = self.seconds[tired]
+
+    @property
+    def _since_rest(self) -> Array:
+        return self.seconds - self._rested_at
+
     # --- chance ---------------------------------------------------------------------------------------
 
     def errors(self, who: Who, sigma: float, shape: tuple[int, ...]) -> Array:
         """Return the errors of planned settings ``(*shape, sessions)``, zero for those who do not act."""
-        return self._drawn(who, shape, lambda dice: dice.errors(sigma, shape))
+        factors = self._acuity_factors
+        return self._drawn(who, shape, lambda session: self._dice[session].errors(sigma * factors[session], shape))
 
     def slips(self, who: Who, shape: tuple[int, ...]) -> Array:
         """Return what is misread at planned readings ``(*shape, sessions)``, in counter units."""
-        return self._drawn(who, shape, lambda dice: dice.slips(shape))
+        factors = self._slip_factors
+        return self._drawn(who, shape, lambda session: self._dice[session].slips(shape, factors[session]))
 
     def errors_again(self, who: Who, sigma: float, count: int) -> Array:
         """Return the errors ``(count, sessions)`` of settings made once more."""
-        return self._drawn(who, (count,), lambda dice: dice.errors_again(sigma, count))
+        factors = self._acuity_factors
+        return self._drawn(
+            who, (count,), lambda session: self._dice[session].errors_again(sigma * factors[session], count)
+        )
 
     def slips_again(self, who: Who, count: int) -> Array:
         """Return what is misread ``(count, sessions)`` at readings made once more."""
-        return self._drawn(who, (count,), lambda dice: dice.slips_again(count))
+        factors = self._slip_factors
+        return self._drawn(who, (count,), lambda session: self._dice[session].slips_again(count, factors[session]))
 
-    def _drawn(self, who: Who, shape: tuple[int, ...], draw: Callable[[Dice], Array]) -> Array:
+    def _drawn(self, who: Who, shape: tuple[int, ...], draw: Callable[[int], Array]) -> Array:
         drawn = np.zeros((self.sessions, *shape))
         for session in who:
-            drawn[session] = draw(self._dice[session])
+            drawn[session] = draw(int(session))
         return np.ascontiguousarray(np.moveaxis(drawn, 0, -1))
+
+    @property
+    def _acuity_factors(self) -> Array:
+        return acuity_factor(self.observer, self.seconds, self._since_rest)
+
+    @property
+    def _slip_factors(self) -> Array:
+        return slip_factor(self.observer, self._since_rest)
+
+    # --- slips ----------------------------------------------------------------------------------------
+
+    def come_to(self, who: Who, point: str, near: Mapping[str, npt.NDArray[np.bool_]]) -> None:
+        """Go to a point, or by mistake to one near it; who can find which of these ``(m,)`` on their prints."""
+        self.come_back(who)
+        if not self._slips.possible("wrong point"):
+            return
+        factors = self._slip_factors
+        for i, session in enumerate(who):
+            candidates = [name for name, found in near.items() if found[i]]
+            self._slips.come_to(self._occasion(session, point), candidates, factors[session])
+
+    def come_back(self, who: Who) -> None:
+        """Look once more which point it is."""
+        self._slips.come_back(who.tolist())
+
+    def pointing_at(self, who: Who, point: str) -> Iterator[tuple[Who, str]]:
+        """Yield who of those at a point really looks at which, as groups."""
+        if self._slips.all_points_right:
+            yield who, point
+            return
+        names = np.array([self._slips.taken_for(int(session), point) for session in who], dtype=object)
+        for name in dict.fromkeys(names.tolist()):
+            yield who[names == name], name
+
+    def looked_at(self, who: Who, point: str, look: Callable[[Who, str], Array]) -> Array:
+        """Return what `look` gives ``(..., m)`` of the points that those at a point really look at."""
+        groups = [(them, look(them, name)) for them, name in self.pointing_at(who, point)]
+        if len(groups) <= 1:
+            return groups[0][1] if groups else look(who, point)
+        seen = np.zeros((*groups[0][1].shape[:-1], self.sessions))
+        for them, each in groups:
+            seen[..., them] = each
+        return np.asarray(seen[..., who])
+
+    def printed(self, prints: Mapping[str, Array], point: str) -> Array:
+        """Return the place ``(2, sessions)`` on the prints of what everybody takes for a point, nan where it is not."""
+        nowhere = np.full((2, self.sessions), np.nan)
+        if self._slips.all_points_right:
+            return prints.get(point, nowhere)
+        taken = [prints.get(self._slips.taken_for(session, point), nowhere) for session in range(self.sessions)]
+        return np.stack([each[:, session] for session, each in enumerate(taken)], axis=-1)
+
+    def write(self, who: Who, point: str, item: str, shown: Array, misread: Array) -> Array:
+        """Return what is written ``(m,)`` of what counters show; `misread` ``(sessions,)`` is what chance adds."""
+        written = np.round(shown + misread[who], 4)
+        factors = self._slip_factors
+        tempted = np.arange(who.size) if self._slips.possible(*OF_READINGS) else np.flatnonzero(misread[who])
+        for i in tempted:
+            session = who[i]
+            occasion = self._occasion(session, point, item)
+            written[i] = self._slips.write(occasion, float(shown[i]), float(written[i]), factors[session])
+        return written
+
+    def puts(self, who: Who, fitting: str, position: str) -> Iterator[tuple[Who, str]]:
+        """Yield who puts a fitting into which position: the right one, but where it is forgotten the other."""
+        if not self._slips.possible("forgotten lever"):
+            yield who, position
+            return
+        (other,) = set(POSITIONS_OF[fitting]) - {position}
+        factors = self._slip_factors
+        forgotten = [
+            self._slips.forgets(self._occasion(session, fitting, "fitting"), position, other, factors[session])
+            for session in who
+        ]
+        left = np.array(forgotten, dtype=bool)
+        for them, put in ((who[~left], position), (who[left], other)):
+            if them.size:
+                yield them, put
+
+    def notes(self, who: Who, now: Mapping[str, Array], before: Mapping[str, Array]) -> Mapping[str, Array]:
+        """Return the elements ``(sessions,)`` as they are noted: where one is not re-read, what it was before."""
+        if not self._slips.possible("element not re-read"):
+            return now
+        noted = {name: each.copy() for name, each in now.items()}
+        factors = self._slip_factors
+        for name, old in before.items():
+            for session in who:
+                occasion = self._occasion(session, name, "element")
+                if self._slips.uses_old(occasion, float(old[session]), float(now[name][session]), factors[session]):
+                    noted[name][session] = old[session]
+        return noted
+
+    def _occasion(self, session: np.intp | int, point: str, item: str = "") -> Occasion:
+        time = float(self.seconds[session])
+        return Occasion(int(session), time, self._model, self._form, self._round, point, item)
 
     # --- time, book, patience -------------------------------------------------------------------------
 
-    def spend(self, who: Who, seconds: float) -> None:
-        """Let time go by."""
+    def spend(self, who: Who, seconds: float, act: Act = "other") -> None:
+        """Let the time of an act go by, so many seconds at an ordinary pace."""
+        self._let_go_by(who, seconds * self.observer.pace, act)
+
+    def _let_go_by(self, who: Who, seconds: float, act: Act) -> None:
         self.seconds[who] += seconds
+        self.timesheet.spend(who, seconds, self._form, act)
         if self.person is not None:
             self.person.clock.spend(seconds)
 
@@ -90,6 +237,7 @@ class Crew:
         if self.person is not None:
             for session, reading in zip(who, readings, strict=True):
                 numbers[session] = self.person.book.enter(self.person.clock.now, point, item, f"{reading:.2f}")
+                self._slips.entered(int(session), point, item, int(numbers[session]))
         return numbers
 
     def strike(self, who: Who, numbers: npt.NDArray[np.intp], why: str) -> None:

@@ -16,14 +16,16 @@ class Dice:
     """The random numbers of one session's operator.
 
     Errors come in blocks, one draw for each setting that a step of the procedure makes, so that the same
-    seed gives the same errors however long the closed loop of turning and looking takes.
+    seed gives the same errors however long the closed loop of turning and looking takes. Lapses, of which most
+    persons have none, come one by one from a stream of their own.
     """
 
     def __init__(self, observer: Observer, seed: int) -> None:
         self.observer = observer
-        planned, again = np.random.SeedSequence(seed, spawn_key=(OPERATOR_STREAM,)).spawn(2)
+        planned, again, lapses = np.random.SeedSequence(seed, spawn_key=(OPERATOR_STREAM,)).spawn(3)
         self._planned = np.random.default_rng(planned)
         self._again = np.random.default_rng(again)
+        self._lapses = np.random.default_rng(lapses)
 
     def errors(self, sigma: float, shape: tuple[int, ...]) -> Array:
         """Return the errors of planned settings, in the unit of sigma."""
@@ -33,18 +35,30 @@ class Dice:
         """Return the errors ``(count,)`` of settings that have to be made once more."""
         return np.array([sigma * float(self._again.standard_normal()) for _ in range(count)])
 
-    def slips(self, shape: tuple[int, ...]) -> Array:
-        """Return what the person misreads at planned readings, in counter units; zero for most."""
-        return _slips(self._planned, self.observer, shape)
+    def slips(self, shape: tuple[int, ...], factor: float = 1.0) -> Array:
+        """Return what the person misreads at planned readings, in counter units; zero for most.
 
-    def slips_again(self, count: int) -> Array:
+        Slips are so many times as frequent as the observer's rates say.
+        """
+        return _slips(self._planned, self.observer, shape, factor)
+
+    def slips_again(self, count: int, factor: float = 1.0) -> Array:
         """Return what the person misreads at readings ``(count,)`` made once more."""
-        return np.array([float(_slips(self._again, self.observer, (1,))[0]) for _ in range(count)])
+        return np.array([float(_slips(self._again, self.observer, (1,), factor)[0]) for _ in range(count)])
+
+    def lapses(self, rate: float) -> bool:
+        """Return whether something happens that does so with this rate."""
+        return rate > 0.0 and bool(self._lapses.random() < rate)
+
+    def choice(self, count: int) -> int:
+        """Return which of so many ways a lapse takes."""
+        return int(self._lapses.integers(count))
 
 
-def _slips(rng: np.random.Generator, observer: Observer, shape: tuple[int, ...]) -> Array:
+def _slips(rng: np.random.Generator, observer: Observer, shape: tuple[int, ...], factor: float) -> Array:
     luck = rng.random(shape)
     last_digit = 0.01 * rng.choice((-1.0, 1.0), shape)
     gross = rng.choice(_GROSS_SLIPS, shape)
-    slipped = np.where(luck < observer.blunder_rate + observer.last_digit_slip, last_digit, 0.0)
-    return np.where(luck < observer.blunder_rate, gross, slipped)
+    blunders = factor * observer.blunder_rate
+    slipped = np.where(luck < blunders + factor * observer.last_digit_slip, last_digit, 0.0)
+    return np.where(luck < blunders, gross, slipped)

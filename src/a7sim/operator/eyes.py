@@ -42,7 +42,7 @@ class Eyes:
     def bring_into_view(self, who: Who, hand: int, point: str) -> None:
         """Drive to where the print shows a point and look around until it is in the field of view."""
         seat = self.seat
-        printed = self._prints[hand].get(point, np.full((2, self.crew.sessions), np.nan))
+        printed = self.crew.printed(self._prints[hand], point)
         nowhere = np.isnan(printed[0, who])
         self.crew.give_up(who[nowhere], f"point {point} is not pricked on the print of the {side(hand)} photograph")
         who = who[~nowhere]
@@ -53,7 +53,7 @@ class Eyes:
         origin = seat.below(who, hand)
         looking = np.arange(who.size)
         for around in _outward():
-            places = origin + (from_below + around[:, None]) * seat.z[who] / seat.c
+            places = origin + seat.in_units((from_below + around[:, None]) * seat.z[who] / seat.c)
             x, y = places[:, looking]
             went = looking[seat.drive(who[looking], {"X": x, "Y": y})]
             found = went[~np.isnan(self.seen(who[went], hand, point)[0])] if went.size else went
@@ -72,13 +72,14 @@ class Eyes:
     def learn_straying(self, who: Who, hand: int, point: str, readings: Array) -> None:
         """Bear in mind how far from where the print showed it a point was found, by its readings ``(2 or 3, m)``."""
         seat = self.seat
-        expected = seat.on_carrier(who, hand, self._prints[hand][point][:, who])
-        self._strayed[hand][:, who] = (readings[:2] - seat.below(who, hand)) * seat.c / seat.z[who] - expected
+        expected = seat.on_carrier(who, hand, self.crew.printed(self._prints[hand], point)[:, who])
+        away = seat.in_mm(readings[:2] - seat.below(who, hand))
+        self._strayed[hand][:, who] = away * seat.c / seat.z[who] - expected
 
     def seen(self, who: Who, hand: int, point: str) -> Array:
         """Look: where the image stands from the mark ``(2, m)`` in um, nan where it is not in the field of view."""
-        self.crew.spend(who, self.crew.observer.seconds_to_look)
-        return self.seat.hands.seen(who, hand, point)
+        self.crew.spend(who, self.crew.observer.seconds_to_look, "looking")
+        return self.crew.looked_at(who, point, lambda them, name: self.seat.hands.seen(them, hand, name))
 
     def bisect(self, who: Who, hand: int, point: str, errors: Array) -> None:
         """Turn X and Y until the image seems to lie at the mark; errors ``(2, sessions)`` in um."""
@@ -95,7 +96,7 @@ class Eyes:
             who = who[moving]
             if not who.size:
                 return
-            seat.turn(who, steps[:, moving])
+            seat.turn(who, seat.in_units(steps[:, moving]))
         seat.see_that_it_obeyed(who, f"{seat.model.name}: pointing at {point}")
         self.crew.give_up(
             self.crew.still(who), f"{seat.model.name}: point {point}: the mark cannot be brought to rest on the image"

@@ -102,7 +102,7 @@ class FloatingMark:
             along_the_rays = -rise / seat.z[who] * np.array([x - seat.bx(who) / 2.0, y])
             steps = (seen[:2] + judgement.plan[:, who]) * scale + along_the_rays
             moving = np.maximum(np.abs(steps).max(axis=0), np.abs(rise)) >= AT_REST_MM
-            wheels = np.concatenate([steps, [rise * seat.units_per_mm]])
+            wheels = np.concatenate([seat.in_units(steps), [rise * seat.units_per_mm]])
             following: Array | None = None
             if counts is not None:
                 following, at_end = counts.after(who, seen[3] * scale, scale)
@@ -128,8 +128,8 @@ class FloatingMark:
 
     def looked(self, who: Who, point: str) -> Array:
         """Return what both eyes see ``(4, m)``: x and y from the mark (mean of both), px, py, um; nan if lost."""
-        self.crew.spend(who, self.crew.observer.seconds_to_look)
-        lx, ly, rx, ry = self.seat.hands.seen_by_both(who, point)
+        self.crew.spend(who, self.crew.observer.seconds_to_look, "looking")
+        lx, ly, rx, ry = self.crew.looked_at(who, point, self.seat.hands.seen_by_both)
         return np.array([(lx + rx) / 2.0, (ly + ry) / 2.0, lx - rx, ly - ry])
 
     def _see_that_it_fuses(self, who: Who, point: str, running_away: Truths, clearing: Clearing | None) -> None:

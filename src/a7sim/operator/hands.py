@@ -36,8 +36,11 @@ class Hands(Protocol):
     def set_element(self, who: Who, name: str, values: Array) -> None:
         """Set an element through its counter to values ``(m,)``, gon or mm, two decimals."""
 
-    def preset(self, who: Who, readings: tuple[float, float, float]) -> None:
-        """Make the X, Y and Z counters show these readings."""
+    def preset(self, who: Who, readings: Mapping[str, float]) -> None:
+        """Make counters show these readings, by axis."""
+
+    def preset_one(self, who: Who, axis: str, readings: Array) -> None:
+        """Make one counter show readings ``(m,)``."""
 
     def load(self, who: Who, projector: int, photograph: str) -> None:
         """Put a photograph into a projector."""

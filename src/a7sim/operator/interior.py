@@ -56,10 +56,22 @@ class InteriorOrientations:
 def interior_orientation(
     bench: Bench, who: Who, projector: int, photograph: str, certificate: Camera
 ) -> InteriorOrientations:
-    """Mount a photograph in a projector and centre it on the calibrated principal point.
+    """Mount a photograph in a projector, centre it and set its principal distance.
 
     Uniform film shrinkage, seen as a change of scale at the fiducials, goes into the principal distance. Those who
     cannot centre the picture give up.
+    """
+    found = centre_picture(bench, who, projector, photograph, certificate)
+    _set_principal_distance(bench, bench.crew.still(who), projector, photograph, certificate, found)
+    return found
+
+
+def centre_picture(
+    bench: Bench, who: Who, projector: int, photograph: str, certificate: Camera
+) -> InteriorOrientations:
+    """Mount a picture in a projector and centre it on the calibrated principal point; no element is touched.
+
+    The principal distances found are zero. Those who cannot centre the picture give up.
     """
     crew, hands = bench.crew, bench.hands
     _mount(bench, who, projector, photograph)
@@ -68,7 +80,7 @@ def interior_orientation(
     found = InteriorOrientations(photograph, np.zeros(crew.sessions, dtype=np.intp), *np.zeros((3, crew.sessions)))
     centring = crew.still(who)
     for round_ in range(1, MOST_ROUNDS + 1):
-        names, displacements = _fiducials_seen(bench, centring, projector)
+        names, displacements = fiducials_seen(bench, centring, projector)
         places = np.array([marks[name] for name in names]).T
         right = _rightly_laid(bench, centring, projector, photograph, displacements, places)
         centring, displacements = centring[right], displacements[:, :, right]
@@ -92,13 +104,12 @@ def interior_orientation(
         bench.seat.see_that_it_obeyed(centring, f"centring {photograph}")
         centring = crew.still(centring)
     crew.give_up(centring, f"picture {photograph} cannot be centred in projector {projector}")
-    _set_principal_distance(bench, crew.still(who), projector, photograph, certificate, found)
     return found
 
 
 def _mount(bench: Bench, who: Who, projector: int, photograph: str) -> None:
     crew = bench.crew
-    crew.spend(who, crew.observer.seconds_to_mount)
+    crew.spend(who, crew.observer.seconds_to_mount, "mounting")
     bench.seat.spend_setting(who)
     bench.hands.load(who, projector, photograph)
     bench.seat.see_that_it_obeyed(who, f"mounting {photograph}")
@@ -107,10 +118,11 @@ def _mount(bench: Bench, who: Who, projector: int, photograph: str) -> None:
         crew.give_up(who, f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it")
 
 
-def _fiducials_seen(bench: Bench, who: Who, projector: int) -> tuple[list[str], Array]:
+def fiducials_seen(bench: Bench, who: Who, projector: int) -> tuple[list[str], Array]:
+    """Return the names of a picture's fiducials and their displacements ``(2, n, m)`` as they are registered, mm."""
     names, exact = bench.hands.fiducials(who, projector)
     crew = bench.crew
-    crew.spend(who, len(names) * crew.observer.seconds_to_read)
+    crew.spend(who, len(names) * crew.observer.seconds_to_read, "reading")
     return names, exact + 1e-3 * crew.errors(who, crew.observer.fiducial_um, exact.shape[:2])[:, :, who]
 
 

@@ -1,9 +1,9 @@
 """What the operator is told: the job sheet. Nothing of it is the truth about a photograph."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from a7sim.scenario import Camera, Plan
+from a7sim.scenario import Camera, GridPlate, Plan
 from a7sim.standard_points import CASES
 
 
@@ -45,8 +45,11 @@ class ModelJob:
 
 @dataclass(frozen=True)
 class Job:
-    """The camera's certificate, the settings, and the models in order."""
+    """The camera's certificate, the settings, the models in order, and what is known of the grid plate."""
 
     certificate: Camera
     plan: Plan
     models: tuple[ModelJob, ...]
+    grid_plate: GridPlate = field(default_factory=GridPlate)
+    control: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    """X, Y, Z in m of ground control, nan for what is not given, where models are levelled at the instrument."""

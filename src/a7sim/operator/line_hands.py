@@ -60,8 +60,11 @@ class LineHands:
     def set_element(self, who: Who, name: str, values: Array) -> None:
         self._send(f"{header(name)} {values[0]:.2f}")
 
-    def preset(self, who: Who, readings: tuple[float, float, float]) -> None:
-        self._send("COUN:X:PRES {:.2f};:COUN:Y:PRES {:.2f};:COUN:Z:PRES {:.2f}".format(*readings))
+    def preset(self, who: Who, readings: Mapping[str, float]) -> None:
+        self._send(";:".join(f"COUN:{axis}:PRES {reading:.2f}" for axis, reading in readings.items()))
+
+    def preset_one(self, who: Who, axis: str, readings: Array) -> None:
+        self._send(f"COUN:{axis}:PRES {readings[0]:.2f}")
 
     def load(self, who: Who, projector: int, photograph: str) -> None:
         self._send(f'PHOT{projector}:LOAD "{photograph}"')

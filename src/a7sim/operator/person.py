@@ -1,11 +1,13 @@
-"""The person in the chair: acuity, slips, pace and patience."""
+"""The person in the chair: a line, a book, a watch and patience."""
 
 from dataclasses import dataclass, field
 
-from a7sim.link.client import Client, InstrumentRefused
+from a7sim.link.client import Client
 from a7sim.link.clock import Clock
 from a7sim.operator.book import Book
 from a7sim.operator.dice import Dice
+from a7sim.operator.slips import Slip
+from a7sim.operator.timesheet import Timesheet
 from a7sim.scenario import Observer
 
 LONGEST_NOTE = 900
@@ -24,41 +26,12 @@ class Person:
     observer: Observer
     seed: int
     book: Book = field(default_factory=Book)
+    timesheet: Timesheet = field(default_factory=lambda: Timesheet(1))
+    slips: list[Slip] = field(default_factory=list)
+    """The truth about every slip, which this person does not have."""
 
     def __post_init__(self) -> None:
         self.dice = Dice(self.observer, self.seed)
-
-    def look(self) -> None:
-        """Let the time of a look go by."""
-        self.clock.spend(self.observer.seconds_to_look)
-
-    def turn(self, line: str) -> None:
-        """Turn something."""
-        self.clock.spend(self.observer.seconds_to_turn)
-        self.client.send(line)
-
-    def set(self, *lines: str) -> None:
-        """Set elements, levers or gears, and see that the instrument took it."""
-        for line in lines:
-            self.clock.spend(self.observer.seconds_to_set)
-            self.client.send(line)
-        self.see_that_it_obeyed("; ".join(lines))
-
-    def see_that_it_obeyed(self, doing: str) -> None:
-        """Give up when the instrument has refused anything since the last look."""
-        try:
-            self.client.check(doing)
-        except InstrumentRefused as refused:
-            raise self.give_up(f"{doing}: the instrument refuses: {'; '.join(refused.errors[:2])}") from refused
-
-    def read(self, question: str, slip: float = 0.0) -> float:
-        """Read a counter, with a slip if there is one."""
-        self.clock.spend(self.observer.seconds_to_read)
-        return round(self.client.numbers(question)[0] + slip, 4)
-
-    def compute(self) -> None:
-        """Let the time at the desk calculator go by."""
-        self.clock.spend(self.observer.seconds_to_compute)
 
     def remark(self, text: str) -> None:
         """Write a remark into the book and into the journal of the instrument."""

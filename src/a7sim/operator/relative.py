@@ -1,17 +1,20 @@
 """Numerical relative orientation with by' and by" (thesis 3.4.2)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import GON, Array
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Who
+from a7sim.operator.crew import NobodyGoesOn, Who
+from a7sim.operator.hands import Truths
 from a7sim.operator.job import ModelJob
 from a7sim.operator.seat import wrapped
 from a7sim.reduction import Stand, Undetermined, element_corrections
+from a7sim.reduction.hallert import REGULAR_POINTS, regular_corrections
+from a7sim.standard_points import CASES
 
 MOST_ROUNDS = 12
 MOST_ROUGH_ROUNDS = 3
@@ -20,6 +23,9 @@ STILL_FALLING = 0.8
 
 GROSS_MM = 0.5
 """While the rms is above this the mean stays in: it comes of the swings and omega, which are still to be found."""
+
+OFF_PATTERN = 0.08
+"""Points may lie off the regular pattern by this share of the height; what that spoils the next round puts right."""
 
 ALL_ELEMENTS = (*(f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz", "c") for n in (1, 2)), "bx")
 
@@ -34,6 +40,8 @@ class Round:
     rms: float
     sigmas: Mapping[str, float]
     """Standard deviations of the corrections computed from this round, gon and mm; empty where none were."""
+    over_correction: float = 0.0
+    """How many times the turn that clears the last point was made; zero where none was."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +55,7 @@ class RelativeOrientation:
     elements: Mapping[str, float]
     residuals: Mapping[str, float]
     places: Mapping[str, tuple[float, float, float]]
+    procedure: str = "numerical"
 
     @property
     def rms(self) -> float:
@@ -65,15 +74,17 @@ class Rounds:
     rms: Array
     corrected: Who
     sigmas: Mapping[str, Array]
+    over_correction: Array | None = None
 
     def of(self, session: int) -> Round:
         """Return one session's round."""
         return Round(
             _picked(self.settings, session),
-            _picked(self.parallaxes, session),
+            _there(_picked(self.parallaxes, session)),
             float(self.mean[session]),
             float(self.rms[session]),
             _picked(self.sigmas, session) if session in self.corrected else {},
+            0.0 if self.over_correction is None else float(self.over_correction[session]),
         )
 
 
@@ -87,12 +98,15 @@ class RelativeOrientations:
     rough_rounds: npt.NDArray[np.intp]
     elements: Mapping[str, Array]
     residuals: Mapping[str, Array]
+    """nan where a session has no such point."""
     places: Mapping[str, Array]
+    procedure: str = "numerical"
 
     @property
     def rms(self) -> Array:
         """Rms ``(sessions,)`` in mm of the residual parallaxes at all standard points."""
-        return np.asarray(np.sqrt(np.mean(np.square(list(self.residuals.values())), axis=0)))
+        squares = np.square(list(self.residuals.values()))
+        return np.asarray(np.sqrt(np.nansum(squares, axis=0) / np.maximum(1, (~np.isnan(squares)).sum(axis=0))))
 
     def of(self, session: int) -> RelativeOrientation:
         """Return one session's orientation."""
@@ -102,13 +116,22 @@ class RelativeOrientations:
             [each.of(session) for each in self.rounds if session in each.who],
             int(self.rough_rounds[session]),
             _picked(self.elements, session),
-            _picked(self.residuals, session),
-            {label: tuple(place[:, session].tolist()) for label, place in self.places.items()},
+            _there(_picked(self.residuals, session)),
+            {
+                label: tuple(place[:, session].tolist())
+                for label, place in self.places.items()
+                if not np.isnan(self.residuals[label][session])
+            },
+            self.procedure,
         )
 
 
 def _picked(values: Mapping[str, Array], session: int) -> dict[str, float]:
     return {name: float(each[session]) for name, each in values.items()}
+
+
+def _there(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in values.items() if not np.isnan(value)}
 
 
 def unknowns_of(method: str, model: ModelJob) -> tuple[str, ...]:
@@ -134,17 +157,24 @@ def relative_orientation(
     then have a larger rms than tolerated, in mm, give up.
     """
     crew, seat = bench.crew, bench.seat
+    if not seat.measures_parallax:
+        crew.give_up(
+            who, f"an {seat.manual.name} has no by' and by\" to measure parallaxes with: it is oriented empirically"
+        )
+        raise NobodyGoesOn
+    plan = bench.job.plan
     labels = model.points_of_case(case)
     unknowns = unknowns_of(method, model)
+    measured_with = {"both": (1, 2), "by1": (1,), "by2": (2,)}[plan.measure_with]
     points = [model.standard_points[label] for label in labels]
     rounds: list[Rounds] = []
     done, rough_rounds = np.zeros((2, crew.sessions), dtype=np.intp)
     best = _Best(unknowns, crew.sessions)
     measuring = who
     while measuring.size:
-        settings = _spread(seat.elements(measuring, unknowns), measuring, crew.sessions)
+        settings = spread(seat.elements(measuring, unknowns), measuring, crew.sessions)
         bench.begin_round(measuring, int(done[measuring].max()) + 1)
-        seen = bench.parallaxes(measuring, points, readings)
+        seen = bench.parallaxes(measuring, points, readings, measured_with)
         measuring = crew.still(measuring)
         apart = measuring[seen.apart[measuring] != None]  # noqa: E711 - elementwise
         together = np.setdiff1d(measuring, apart)
@@ -155,18 +185,20 @@ def relative_orientation(
         falling = together[rms[together] < STILL_FALLING * best.rms[together]]
         best.see(together, settings, mean, rms)
         to_clear = seen.p - mean if method == "independent" else seen.p
-        corrections, sigmas = _corrections(bench, falling, model, seen.places, to_clear, unknowns, base)
+        corrections, sigmas = _corrections(bench, falling, model, labels, seen.places, to_clear, unknowns, base)
         falling = crew.still(falling)
         rounds.append(Rounds(together, settings, dict(zip(labels, seen.p, strict=True)), mean, rms, falling, sigmas))
         if falling.size:
-            seat.set_elements(falling, {n: (settings[n] + corrections[n])[falling] for n in unknowns})
+            noted = crew.notes(falling, settings, rounds[-2].settings if len(rounds) > 1 else {})
+            seat.set_elements(falling, {n: (noted[n] + corrections[n])[falling] for n in unknowns})
         measuring = crew.still(np.sort(np.concatenate([falling, apart])))
         measuring = measuring[done[measuring] < MOST_ROUNDS]
     who = crew.still(who)
     _restore(bench, who, best)
     _set_mean_on_by(bench, who, model, "by1" if method == "independent" else unknowns[3], best.mean)
     bench.begin_round(who, int(done[who].max(initial=0)) + 1)
-    return _assessed(bench, who, model, method, case, readings, tolerated_rms, rounds, rough_rounds)
+    found = RelativeOrientations(method, case, rounds, rough_rounds, {}, {}, {})
+    return assessed(bench, who, model, found, model.all_positions(), readings, tolerated_rms)
 
 
 class _Best:
@@ -194,34 +226,30 @@ def _mean_and_rms(p: Array, who: Who) -> tuple[Array, Array]:
     return mean, rms
 
 
-def _assessed(
+def assessed(
     bench: Bench,
     who: Who,
     model: ModelJob,
-    method: str,
-    case: str,
+    found: RelativeOrientations,
+    labels: Sequence[str],
     readings: int,
     tolerated_rms: float,
-    rounds: Sequence[Rounds],
-    rough_rounds: npt.NDArray[np.intp],
 ) -> RelativeOrientations:
-    """Measure what is left at all standard points; those for whom it is too much give up."""
+    """Return an orientation with what is left at standard points; those for whom it is too much give up."""
     crew = bench.crew
-    everywhere = model.all_positions()
-    names = [model.standard_points[label] for label in everywhere]
-    left = bench.parallaxes(who, names, readings)
+    names = [model.standard_points[label] for label in labels]
+    measured = bench.seat.measures_parallax
+    left = bench.parallaxes(who, names, readings) if measured else bench.parallaxes_seen(who, names)
     who = crew.still(who)
     apart = who[left.apart[who] != None]  # noqa: E711 - elementwise
     crew.give_up(apart, lambda session: f"{model.name}: the images of {left.apart[session]} cannot be fused any more")
     who = crew.still(who)
-    orientations = RelativeOrientations(
-        method,
-        case,
-        rounds,
-        rough_rounds,
-        _spread(bench.seat.elements(who, ALL_ELEMENTS), who, crew.sessions),
-        dict(zip(everywhere, left.p, strict=True)),
-        dict(zip(everywhere, np.moveaxis(left.places, 1, 0), strict=True)),
+    there = [name for name in ALL_ELEMENTS if name in bench.seat.manual.elements]
+    orientations = replace(
+        found,
+        elements=spread(bench.seat.elements(who, there), who, crew.sessions),
+        residuals=dict(zip(labels, left.p, strict=True)),
+        places=dict(zip(labels, np.moveaxis(left.places, 1, 0), strict=True)),
     )
     rms, worst = orientations.rms, np.abs(left.p).argmax(axis=0)
     crew.give_up(
@@ -235,7 +263,7 @@ def _assessed(
     return orientations
 
 
-def _spread(values: Mapping[str, Array], who: Who, sessions: int) -> dict[str, Array]:
+def spread(values: Mapping[str, Array], who: Who, sessions: int) -> dict[str, Array]:
     """Return values ``(m,)`` of those who act among all sessions."""
     spread = {name: np.zeros(sessions) for name in values}
     for name, each in values.items():
@@ -288,20 +316,28 @@ def _bring_together(
         parallaxes[:, one] = (left[1] - right[1]) * where_they_meet
         places[:, :, one] = left * where_they_meet
         settings = seat.elements(one, unknowns)
-        corrections, _ = _corrections(bench, one, model, places, parallaxes, unknowns, base)
+        corrections, _ = _corrections(bench, one, model, (), places, parallaxes, unknowns, base)
         if crew.still(one).size:
             seat.set_elements(one, {name: settings[name] + corrections[name][one] for name in unknowns})
 
 
 def _corrections(
-    bench: Bench, who: Who, model: ModelJob, places: Array, parallaxes: Array, unknowns: Sequence[str], base: float
+    bench: Bench,
+    who: Who,
+    model: ModelJob,
+    labels: Sequence[str],
+    places: Array,
+    parallaxes: Array,
+    unknowns: Sequence[str],
+    base: float,
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return corrections and their standard deviations ``(sessions,)`` by element, gon and mm."""
     nothing = {name: np.zeros(bench.crew.sessions) for name in unknowns}
     if not who.size:
         return nothing, nothing
     hands = [f"{name[:-1]}{model.hand_of(int(name[-1]))}" for name in unknowns]
-    left, right = (_stand(bench, who, n, x) for n, x in ((model.left_projector, 0.0), (model.right_projector, base)))
+    left = stand_of(bench, who, model.left_projector, np.zeros(who.size))
+    right = stand_of(bench, who, model.right_projector, np.full(who.size, base))
     bench.compute(who)
     in_frame = places[:, :, who] * np.array([1.0, 1.0, -1.0])[:, None, None]
     try:
@@ -310,16 +346,38 @@ def _corrections(
         bench.crew.give_up(who, f"{model.name}: {undetermined}")
         return nothing, nothing
     factors = np.array([1.0 if name[:2] in ("by", "bz") else 1.0 / GON for name in unknowns])[:, None]
+    found = np.array([solution.unknowns, solution.sigmas])
+    if bench.job.plan.solution == "hallert":
+        on_pattern = _on_pattern(bench, who, labels, places[:, :, who], base)
+        b, d, h = _pattern(places[:, :, who[on_pattern]], base)
+        found[:, :, on_pattern] = regular_corrections(parallaxes[:, who[on_pattern]], b, d, h, hands)
     values, sigmas = (
-        _spread(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.sessions)
-        for each in (solution.unknowns, solution.sigmas)
+        spread(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.sessions) for each in found
     )
     return values, sigmas
 
 
-def _stand(bench: Bench, who: Who, projector: int, x: float) -> Stand:
-    """Return how projectors stand by their counters ``(m,)``, the centre at x of the instrument frame."""
+def _pattern(places: Array, base: float) -> tuple[Array, Array, Array]:
+    """Return b, the mean half width d and the mean depth h ``(m,)`` of points ``(3, n, m)`` in the order of a case."""
+    _, y, z = places
+    rows = np.array(REGULAR_POINTS[1][: len(y)])
+    return np.full(y.shape[-1], base), (rows @ y) / np.abs(rows).sum(), z.mean(axis=0)
+
+
+def _on_pattern(bench: Bench, who: Who, labels: Sequence[str], places: Array, base: float) -> Truths:
+    """Return whose points ``(3, n, m)`` lie near enough to the pattern of six or nine for the closed form."""
+    if "".join(labels) not in (CASES["A"], CASES["D"]):
+        return np.zeros(who.size, dtype=bool)
+    pattern = np.array(_pattern(places, base))
+    x, y = np.array(REGULAR_POINTS)[:, : len(labels), None]
+    off = np.abs(places - [x * pattern[0], y * pattern[1], np.broadcast_to(pattern[2], places[2].shape)])
+    near = np.asarray((off <= OFF_PATTERN * pattern[2]).all(axis=(0, 1)))
+    bench.crew.remark(who[~near], f"{bench.seat.model.name}: the points lie off the pattern, so by least squares")
+    return near
+
+
+def stand_of(bench: Bench, who: Who, projector: int, x: Array) -> Stand:
+    """Return how projectors stand by their counters, the centres at x ``(m,)`` of the instrument frame."""
     names = [f"{name}{projector}" for name in ("omega", "phi", "kappa", "by", "bz")]
-    seen = bench.seat.elements(who, names)
-    omega, phi, kappa, by, bz = (seen[name] - bench.seat.manual.elements[name].zero for name in names)
-    return Stand(np.array([np.full(who.size, x), -by, bz]), GON * np.array([omega, phi, wrapped(kappa)]))
+    omega, phi, kappa, by, bz = bench.seat.from_zero(who, names).values()
+    return Stand(np.array([x, -by, bz]), GON * np.array([omega, phi, wrapped(kappa)]))

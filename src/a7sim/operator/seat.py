@@ -32,6 +32,8 @@ class Seat:
         self.z = np.zeros(crew.sessions)
         """How far the mark stood below the base line when the counters were last read."""
         self.c = job.certificate.c
+        self._plane = np.ones(2)
+        """Units of the X and Y counters a mm."""
         self._settings = {name: np.zeros(crew.sessions) for name in STEADY}
         self._offset = np.zeros((3, crew.sessions))
 
@@ -46,7 +48,10 @@ class Seat:
         self.spend_setting(who, 6)
         hands.set_element(who, "bx", np.full(who.size, plan.bx))
         hands.drive(who, {"Z": np.full(who.size, -plan.projection_height)})
-        hands.drive(who, {"X": np.zeros(who.size), "Y": np.zeros(who.size)})
+        self._plane = np.array([self.manual.scales[axis].units_per_mm for axis in "XY"])
+        for row, axis in enumerate("XY"):
+            self._offset[row, who] = self.manual.scales[axis].at_origin
+        hands.drive(who, dict(zip("XY", self._offset[:2, who], strict=True)))
         height = hands.counter(who, "Z")
         hands.engage(who, gear, plan.plan_gear)
         self.see_that_it_obeyed(who, "preparing the instrument")
@@ -58,22 +63,59 @@ class Seat:
         self.learn_settings(who)
 
     def preset(self, who: Who, readings: tuple[float, float, float]) -> None:
-        """Make the counters show these readings where the mark stands."""
+        """Make the counters that can be preset show these readings where the mark stands."""
+        wanted = {a: reading for a, reading in zip("XYZ", readings, strict=True) if self.manual.scales[a].preset}
         before = self.hands.counters(who)
         self.spend_setting(who)
-        self.hands.preset(who, readings)
+        self.hands.preset(who, wanted)
         self.see_that_it_obeyed(who, "presetting the counters")
-        self._offset[:, who] += np.array(readings)[:, None] - before
+        for axis, reading in wanted.items():
+            self._offset["XYZ".index(axis), who] += reading - before["XYZ".index(axis)]
+
+    def shift_counter(self, who: Who, axis: str, by: Array) -> Array:
+        """Make a counter read so much more ``(m,)``, its carriage on a full count; return by how much it does."""
+        self.drive(who, {axis: self.hands.counter(who, axis)})
+        before = self.hands.counter(who, axis)
+        self.spend_setting(who)
+        self.hands.preset_one(who, axis, np.round(before + by, 2))
+        self.see_that_it_obeyed(who, f"presetting the {axis} counter")
+        more = np.round(self.hands.counter(who, axis) - before, 2)
+        self._offset["XYZ".index(axis), who] += more
+        return np.asarray(more)
+
+    def engage(self, who: Who, gear: str | float) -> None:
+        """Engage a height gear; the Z counter goes on from what it shows, the carriage standing on a full count."""
+        self.drive(who, {"Z": self.hands.counter(who, "Z")})
+        height = (self.hands.counter(who, "Z") - self._offset[2, who]) / self.units_per_mm
+        self.spend_setting(who)
+        self.hands.engage(who, gear, self.job.plan.plan_gear)
+        self.see_that_it_obeyed(who, f"engaging the height gear {gear}")
+        self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
+        self._offset[2, who] = self.hands.counter(who, "Z") - self.units_per_mm * height
 
     def spend_setting(self, who: Who, times: int = 1) -> None:
         """Let the time of setting something go by."""
-        self.crew.spend(who, times * self.crew.observer.seconds_to_set)
+        self.crew.spend(who, times * self.crew.observer.seconds_to_set, "setting")
 
     # --- elements -------------------------------------------------------------------------------------
 
     def elements(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
-        """Read the counters of elements ``(m,)``."""
-        return self.hands.elements(who, names)
+        """Read the counters of elements ``(m,)``; one that the instrument has not stands at nothing."""
+        there = [name for name in names if name in self.manual.elements]
+        seen = self.hands.elements(who, there) if there else {}
+        return {name: seen.get(name, np.zeros(who.size)) for name in names}
+
+    def from_zero(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
+        """Read the counters of elements ``(m,)`` from their zeros; one that the instrument has not stands there."""
+        return {
+            name: counts - (self.manual.elements[name].zero if name in self.manual.elements else 0.0)
+            for name, counts in self.elements(who, names).items()
+        }
+
+    @property
+    def measures_parallax(self) -> bool:
+        """Whether y-parallaxes can be measured: with by' and by", which not every plotter has."""
+        return {"by1", "by2"} <= set(self.manual.elements)
 
     def set_elements(self, who: Who, settings: Mapping[str, Array]) -> None:
         """Set elements through their counters to values ``(m,)``, and enter them in the book."""
@@ -106,8 +148,8 @@ class Seat:
         self.z[who] = (self._offset[2, who] - readings[2]) / self.units_per_mm
         return readings
 
-    def levels_shown(self, who: Who, levels: tuple[float, float]) -> Array:
-        """Return two Z readings ``(2, m)`` as the counters show them when they are driven there."""
+    def levels_shown(self, who: Who, levels: Sequence[float]) -> Array:
+        """Return Z readings ``(k, m)`` as the counters show them when they are driven there."""
         shown = []
         for level in levels:
             self.drive(who, {"Z": np.full(who.size, level)})
@@ -117,7 +159,7 @@ class Seat:
 
     def drive(self, who: Who, readings: Mapping[str, Array]) -> Truths:
         """Run carriages to readings ``(m,)``; return which instruments let them go there."""
-        self.crew.spend(who, self.crew.observer.seconds_to_drive)
+        self.crew.spend(who, self.crew.observer.seconds_to_drive, "driving")
         return self.hands.drive(who, readings)
 
     def drive_z_to(self, who: Who, height: Array) -> Truths:
@@ -126,7 +168,7 @@ class Seat:
 
     def turn(self, who: Who, wheels: Array, element: str | None = None, counts: Array | None = None) -> None:
         """Turn the handwheels ``(2 or 3, m)`` in counter units and an element with them (see `Hands`)."""
-        self.crew.spend(who, self.crew.observer.seconds_to_turn)
+        self.crew.spend(who, self.crew.observer.seconds_to_turn, "turning")
         self.hands.turn(who, wheels, element, counts)
 
     def see_that_it_obeyed(self, who: Who, doing: str) -> None:
@@ -140,19 +182,44 @@ class Seat:
 
     def place(self, who: Who, readings: Array) -> Array:
         """Return readings ``(3, m)`` as x, y, z in mm: from the left-hand centre, the base line, downward."""
-        x, y, z = readings - self._offset[:, who]
-        return np.array([x, y, -z / self.units_per_mm])
+        x, y = self.in_mm(readings[:2] - self._offset[:2, who])
+        z = (self._offset[2, who] - readings[2]) / self.units_per_mm
+        return np.array([x - self._share(1) * self.bx(who), y, z])
 
     def in_frame(self, who: Who, readings: Array, level: Array) -> Array:
         """Return X, Y readings ``(2, n, m)`` at Z readings ``(m,)`` as places x, y, z ``(3, n, m)`` in mm."""
-        x, y = readings - self._offset[:2, None, who]
+        x, y = self.in_mm(readings - self._offset[:2, None, who])
+        x = x - self._share(1) * self.bx(who)
         z = np.broadcast_to((self._offset[2, who] - level) / self.units_per_mm, x.shape)
         return np.array([x, y, z])
 
     def below(self, who: Who, hand: int) -> Array:
         """Return the X and Y readings ``(2, m)`` straight below a photograph's centre, as far as by and bx tell."""
-        x = np.zeros(who.size) if hand == 1 else self.bx(who)
-        return np.array([x, -self._settings[f"by{self.projector(hand)}"][who]]) + self._offset[:2, who]
+        below = np.array([self._share(hand) * self.bx(who), -self._settings[f"by{self.projector(hand)}"][who]])
+        return self.in_units(below) + self._offset[:2, who]
+
+    def centre(self, who: Who, hand: int) -> Array:
+        """Return the readings ``(3, m)`` of a photograph's centre, as far as elements and scales tell (P 3.1, 3.2)."""
+        heights = self.from_zero(who, [f"bz{self.projector(hand)}"])[f"bz{self.projector(hand)}"]
+        below = self.below(who, hand)
+        return np.array([*below, self._offset[2, who] + self.units_per_mm * heights])
+
+    def _share(self, hand: int) -> float:
+        """Return where a centre stands along X from the frame's origin, as a share of bx."""
+        return self.manual.centres_on_base[hand - 1]
+
+    def in_units(self, shift: Array) -> Array:
+        """Return shifts ``(2, ...)`` in mm as so much of the X and Y counters."""
+        return np.asarray(self._plane.reshape((2,) + (1,) * (shift.ndim - 1)) * shift)
+
+    def in_mm(self, counted: Array) -> Array:
+        """Return differences ``(2, ...)`` of X and Y readings in mm."""
+        return np.asarray(counted / self._plane.reshape((2,) + (1,) * (counted.ndim - 1)))
+
+    @property
+    def units(self) -> Array:
+        """Units a mm ``(3,)`` of the X, Y and Z counters."""
+        return np.array([*self._plane, self.units_per_mm])
 
     def on_carrier(self, who: Who, hand: int, print_place: Array) -> Array:
         """Return places of paper prints ``(2, m)`` as the swing of their photograph turns them."""

@@ -8,9 +8,11 @@ import numpy as np
 
 from a7sim.geometry import Array
 from a7sim.manual import RIGHT_FITTINGS
+from a7sim.operator.absolute import OnGround, absolute_orientation_at
 from a7sim.operator.bench import Bench
 from a7sim.operator.centres import centre_of, observe_centre
-from a7sim.operator.crew import Crew, Who
+from a7sim.operator.crew import Crew, NobodyGoesOn, Who
+from a7sim.operator.empirical import empirical_orientation, set_off
 from a7sim.operator.interior import InteriorOrientation, InteriorOrientations, interior_orientation
 from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.line_hands import LineHands
@@ -29,9 +31,12 @@ class ModelRecord:
     points: Mapping[str, tuple[float, float, float]]
     centres: Mapping[int, PerspectiveCentre]
     """By hand: 1 left, 2 right."""
+    xy_units_per_mm: float
     z_units_per_mm: float
     finished_at: float
     """Simulated seconds."""
+    on_ground: OnGround | None = None
+    """The model in the system of the ground, where it was oriented absolutely at the instrument."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +51,11 @@ class ModelRecords:
     points: Mapping[str, Array]
     """X, Y, Z ``(3, sessions)``, nan where a point was not measured."""
     centres: Mapping[int, PerspectiveCentre]
+    xy_units_per_mm: float
     z_units_per_mm: float
     finished_at: Array
+    on_ground: Mapping[int, OnGround] | None = None
+    """By session, where models are levelled and scaled at the instrument; those without enough control have none."""
 
     def of(self, session: int) -> ModelRecord:
         """Return one session's record."""
@@ -58,8 +66,10 @@ class ModelRecords:
             self.orientation.of(session),
             {point: (x, y, z) for point, (x, y, z) in places.items() if not math.isnan(x)},
             {hand: centre_of(each, session) for hand, each in self.centres.items()},
+            self.xy_units_per_mm,
             self.z_units_per_mm,
             float(self.finished_at[session]),
+            self.on_ground.get(session) if self.on_ground else None,
         )
 
 
@@ -86,37 +96,31 @@ def worked(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iter
         return
 
 
-class NobodyGoesOn(Exception):
-    """All of a crew have given up."""
-
-
 def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecords]:
     job, crew = bench.job, bench.crew
     interior: dict[str, InteriorOrientations] = {}
     bench.seat.prepare(crew.everybody)
     for model in job.models:
-        _begin(bench, model, "interior orientation", begins)
-        _set_base_and_fittings(bench, model)
-        _mount(bench, model, interior)
-        prints = _prints(bench, model)
-        _see_that_somebody_goes_on(bench)
+        begin_form(bench, model, "interior orientation", begins)
+        set_base_and_fittings(bench, model)
+        mount(bench, model, interior)
+        prints = take_up_prints(bench, model)
+        see_that_somebody_goes_on(bench)
         bench.begin(crew.everybody, model, prints)
         bench.preset(crew.everybody, model.standard_points["1"])
-        _begin(bench, model, "relative orientation", begins)
-        plan = job.plan
-        tolerated = 1e-3 * plan.tolerated_parallax_um * plan.projection_height / job.certificate.c
-        orientation = relative_orientation(
-            bench, crew.everybody, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated
-        )
-        _begin(bench, model, "model coordinates", begins)
-        points = _model_coordinates(bench, model, prints)
+        begin_form(bench, model, "relative orientation", begins)
+        orientation = oriented(bench, model)
+        begin_form(bench, model, "model coordinates", begins)
+        points = model_coordinates(bench, model, prints)
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
-            _begin(bench, model, f"{side} perspective centre", begins)
-            centres[hand] = observe_centre(
-                bench, crew.everybody, model, hand, plan.centre_levels, plan.tolerated_centre_rms
-            )
-        _see_that_somebody_goes_on(bench)
+            begin_form(bench, model, f"{side} perspective centre", begins)
+            centres[hand] = observe_centre(bench, crew.everybody, model, hand)
+        on_ground = None
+        if job.control:
+            begin_form(bench, model, "absolute orientation", begins)
+            on_ground = absolute_orientation_at(bench, model, job.control)
+        see_that_somebody_goes_on(bench)
         yield ModelRecords(
             model,
             crew.everybody,
@@ -124,17 +128,20 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
             orientation,
             points,
             centres,
+            float(bench.seat.units[0]),
             bench.seat.units_per_mm,
             crew.seconds.copy(),
+            on_ground,
         )
 
 
-def _see_that_somebody_goes_on(bench: Bench) -> None:
+def see_that_somebody_goes_on(bench: Bench) -> None:
+    """Raise NobodyGoesOn when all have given up."""
     if not bench.crew.everybody.size:
         raise NobodyGoesOn
 
 
-def _model_coordinates(bench: Bench, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> dict[str, Array]:
+def model_coordinates(bench: Bench, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> dict[str, Array]:
     """Measure all points that both prints show; sessions whose prints show the same do it together."""
     crew = bench.crew
     wanted = dict.fromkeys([*model.standard_points.values(), *model.other_points])
@@ -149,25 +156,41 @@ def _model_coordinates(bench: Bench, model: ModelJob, prints: Mapping[int, Mappi
     return {name: points[name] for name in on_both}
 
 
-def _begin(bench: Bench, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
-    _see_that_somebody_goes_on(bench)
+def begin_form(bench: Bench, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
+    """Begin a form of a model in book and journal."""
+    see_that_somebody_goes_on(bench)
     begins(f"model {model.name}: {form}")
-    if bench.crew.person is not None:
-        bench.crew.person.book.head(model.name, form)
+    bench.crew.begin(bench.crew.everybody, model.name, form)
     bench.hands.note(bench.crew.everybody, f"{model.name}: {form}")
 
 
-def _set_base_and_fittings(bench: Bench, model: ModelJob) -> None:
+def oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
+    """Orient a model by the procedure on the job sheet."""
+    plan, who = bench.job.plan, bench.crew.everybody
+    tolerated = 1e-3 * plan.tolerated_parallax_um * plan.projection_height / bench.job.certificate.c
+    if plan.start_off_gon:
+        set_off(bench, who, model, plan.method, plan.start_off_gon)
+    if plan.procedure == "empirical":
+        return empirical_orientation(
+            bench, who, model, plan.method, plan.case, plan.over_correction, plan.parallax_readings, tolerated
+        )
+    return relative_orientation(bench, who, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated)
+
+
+def set_base_and_fittings(bench: Bench, model: ModelJob) -> None:
+    """Set base in or out, and the fittings that belong to it and to the pictures."""
     who, hands = bench.crew.everybody, bench.hands
-    right = RIGHT_FITTINGS[model.polarity, model.base].as_words()
+    words = RIGHT_FITTINGS[model.polarity, model.base].as_words()
+    right = {name: position for name, position in words.items() if name in bench.seat.manual.fittings}
     bench.seat.spend_setting(who, 1 + len(right))
     hands.set_base_mode(who, model.base)
     for name, position in right.items():
-        hands.set_fitting(who, name, position)
+        for them, put in bench.crew.puts(who, name, position):
+            hands.set_fitting(them, name, put)
     bench.seat.see_that_it_obeyed(who, f"{model.name}: setting base {model.base} and its fittings")
 
 
-def _mount(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientations]) -> None:
+def mount(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientations]) -> None:
     """Mount what is not yet in its projector; a projector with a new picture starts from its counter zeros."""
     seat, hands = bench.seat, bench.hands
     for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
@@ -187,7 +210,7 @@ def _mount(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientatio
         )
 
 
-def _prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]:
+def take_up_prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]:
     """Take up the paper prints of both photographs and see that they overlap the right way round."""
     crew = bench.crew
     who = crew.everybody

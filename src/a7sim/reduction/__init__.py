@@ -16,6 +16,7 @@ from a7sim.reduction.centres import (
 )
 from a7sim.reduction.coplanarity import RelativeOrientation, relative_orientation, relative_poses
 from a7sim.reduction.corrections import corrected_image
+from a7sim.reduction.grid_test import Elements, PlateLie, ProjectorTest, grid_test, plate_lie
 from a7sim.reduction.hallert import orientation_by_parallaxes
 from a7sim.reduction.interior import (
     PictureLie,
@@ -39,6 +40,7 @@ __all__ = [
     "Adjustment",
     "BlockAdjustment",
     "Deck",
+    "Elements",
     "Ground",
     "GroundFit",
     "Join",
@@ -46,6 +48,8 @@ __all__ = [
     "PerspectiveCentre",
     "PictureLie",
     "PlaneFit",
+    "PlateLie",
+    "ProjectorTest",
     "RelativeOrientation",
     "Resection",
     "Similarity",
@@ -66,6 +70,7 @@ __all__ = [
     "formed_strip",
     "free_format_lines",
     "grid_plate_centre",
+    "grid_test",
     "is_deck",
     "joined",
     "model_coordinates",
@@ -76,6 +81,7 @@ __all__ = [
     "perspective_centre_of_levels",
     "picture_lie",
     "plane_fit",
+    "plate_lie",
     "principal_distance_for_film",
     "read_cards",
     "relative_orientation",

@@ -1,11 +1,19 @@
 """Numerical relative orientation after Hallert: from y-parallaxes, at six standard points in closed form."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 
-from a7sim.geometry import PARALLAX_ELEMENTS, Array, parallax_coefficients, ray_of, rotation, stereoscopic_intersection
+from a7sim.geometry import (
+    PARALLAX_ELEMENTS,
+    Array,
+    near_vertical_parallax_coefficients,
+    parallax_coefficients,
+    ray_of,
+    rotation,
+    stereoscopic_intersection,
+)
 from a7sim.reduction.coplanarity import (
     FEWEST_POINTS,
     LARGEST_CONDITION,
@@ -19,8 +27,14 @@ from a7sim.reduction.coplanarity import (
 )
 from a7sim.reduction.least_squares import Undetermined, adjusted
 
+Scalars = float | Array
+"""One number, or one for each pair of a batch ``(...)``."""
 
-def six_point_corrections(parallaxes: Array, b: float, d: float, h: float) -> tuple[Mapping[str, Array], Array]:
+REGULAR_POINTS = ((0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.5, 0.5, 0.5), (0.0, 0.0, 1.0, 1.0, -1.0, -1.0, 1.0, 0.0, -1.0))
+"""x in b and y in d of the six, or all nine, points at which parallaxes are measured, in the order asked for."""
+
+
+def six_point_corrections(parallaxes: Array, b: Scalars, d: Scalars, h: Scalars) -> tuple[Mapping[str, Array], Array]:
     """Return the corrections to the right projector, radians and mm, and s0 in mm, in closed form.
 
     `parallaxes` ``(6, ...)`` in mm are those at (0, 0), (b, 0), (0, d), (b, d), (0, -d), (b, -d), h below the centres
@@ -41,6 +55,60 @@ def six_point_corrections(parallaxes: Array, b: float, d: float, h: float) -> tu
     omega = h * (-2 * p31 - 2 * p33 + p51 + p53 + p11 + p13) / (4 * dd)
     s0 = np.abs(-2 * p31 + 2 * p33 + p51 - p53 + p11 - p13) / np.sqrt(12.0)
     return {"by2": by, "bz2": bz, "kappa2": -kappa, "phi2": phi, "omega2": omega}, np.asarray(s0)
+
+
+def nine_point_corrections(parallaxes: Array, b: Scalars, d: Scalars, h: Scalars) -> tuple[Mapping[str, Array], Array]:
+    """Return the same from nine points: those six and (b/2, d), (b/2, 0), (b/2, -d), ``(9, ...)`` in mm.
+
+    Derived like Hallert's six: on three columns of three, 1, x, y, xy and y^2 are fitted to the parallaxes, and T 2.33
+    says which elements these are. Exactly the least-squares solution.
+    """
+    p31, p33, p51, p53, p11, p13, p52, p32, p12 = p = np.asarray(parallaxes, dtype=float)
+    left, right, middle = p31 + p51 + p11, p33 + p53 + p13, p31 + p32 + p33
+    kappa = (left - right) / (3 * b)
+    phi = h * (p51 - p53 - p11 + p13) / (2 * b * d)
+    bz = h * (5 * (p53 - p13) + 2 * (p52 - p12) - (p51 - p11)) / (12 * d)
+    omega = h * (p.sum(axis=0) - 3 * middle) / (6 * d**2)
+    by = h * omega * (1 + 2 * d**2 / (3 * h**2)) + (left - right) / 6 - p.mean(axis=0)
+    x, y = (_shaped(each, p) for each in REGULAR_POINTS)
+    u, slope = (x - 1) * b, y * d / h
+    residuals = p + u * kappa + u * slope * phi - h * (1 + slope**2) * omega + by - slope * bz
+    s0 = np.sqrt((residuals**2).sum(axis=0) / (9 - 5))
+    return {"by2": by, "bz2": bz, "kappa2": -kappa, "phi2": phi, "omega2": omega}, np.asarray(s0)
+
+
+def _shaped(values: Sequence[float], like: Array) -> Array:
+    return np.asarray(values, dtype=float).reshape((len(values), *(1,) * (like.ndim - 1)))
+
+
+def regular_corrections(
+    parallaxes: Array, b: Scalars, d: Scalars, h: Scalars, unknowns: Sequence[str]
+) -> tuple[Array, Array]:
+    """Return corrections and their standard deviations ``(5, ...)``, radians and mm, at six or nine regular points.
+
+    The points are those of `six_point_corrections` or `nine_point_corrections`; b, d and h ``(...)`` in mm. Unknowns
+    by2, bz2, kappa2, phi2, omega2, or kappa1, kappa2, phi1, phi2 and either omega: a base turned by by / b and bz / b
+    is the same as both photographs turned back by as much.
+    """
+    closed = six_point_corrections if len(parallaxes) == 6 else nine_point_corrections
+    right, s0 = closed(parallaxes, b, d, h)
+    swing, tilt = right["by2"] / b, right["bz2"] / b
+    both = {
+        "kappa1": swing,
+        "kappa2": right["kappa2"] + swing,
+        "phi1": tilt,
+        "phi2": right["phi2"] + tilt,
+        "omega1": -right["omega2"],
+        "omega2": right["omega2"],
+    }
+    corrections = right if "by2" in unknowns else both
+    x, y = (_shaped(each, parallaxes) for each in REGULAR_POINTS)
+    rows = [PARALLAX_ELEMENTS.index(name) for name in unknowns]
+    n = len(parallaxes)
+    design = near_vertical_parallax_coefficients(x[:n] * b, y[:n] * d, h, b)[rows]
+    cofactors = adjusted(np.swapaxes(design, 0, 1), parallaxes).cofactors
+    spreads = np.sqrt(np.einsum("ii...->i...", cofactors))
+    return np.array([corrections[name] for name in unknowns]), np.asarray(s0 * spreads)
 
 
 def orientation_by_parallaxes(

@@ -12,6 +12,7 @@ from a7sim.scenario.schema import (
     Camera,
     Comparator,
     Condition,
+    GridPlate,
     GridTest,
     Instrument,
     Observer,
@@ -22,12 +23,15 @@ from a7sim.scenario.schema import (
     StripPlan,
 )
 from a7sim.scenario.schema import Model as ModelPlan
+from a7sim.scenario.skills import PROFILES, observer_of_skill
 
 __all__ = [
+    "PROFILES",
     "SCHEMA_VERSION",
     "Camera",
     "Comparator",
     "Condition",
+    "GridPlate",
     "GridTest",
     "Instrument",
     "ModelPlan",
@@ -40,6 +44,7 @@ __all__ = [
     "StripPlan",
     "find_scenario",
     "load_scenario",
+    "observer_of_skill",
     "scenario_of",
     "scenario_schema",
 ]

@@ -12,6 +12,7 @@ import msgspec
 from a7sim.mistakes import Mistake
 from a7sim.scenario.references import mistakes_of_reference
 from a7sim.scenario.schema import Scenario
+from a7sim.scenario.skills import PROFILES
 from a7sim.scenario.validation import mistakes_of_form
 
 
@@ -59,6 +60,7 @@ def load_scenario(name: str | Path, overrides: Mapping[str, str] | None = None) 
         raise ScenarioError(str(path), [f"expected TOML, got a file that breaks its rules: {error}"]) from error
     except OSError as error:
         raise ScenarioError(str(path), [f"expected a readable file: {error.strerror}"]) from error
+    raw = _with_skill_as_table(raw)
     for key, text in (overrides or {}).items():
         _override(raw, key, text)
     return scenario_of(raw, path.parent, str(path))
@@ -66,7 +68,7 @@ def load_scenario(name: str | Path, overrides: Mapping[str, str] | None = None) 
 
 def scenario_of(raw: Mapping[str, Any], folder: Path, source: str = "scenario") -> Scenario:
     """Return the scenario of raw tables whose files stand in `folder`. Raises ScenarioError."""
-    raw = _with_models(raw)
+    raw = _with_models(_with_profile(_with_skill_as_table(raw)))
     mistakes = [
         *mistakes_of_form(raw, _expected()),
         *mistakes_of_reference(raw, folder),
@@ -96,9 +98,26 @@ def _with_models(raw: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**raw, "models": [{"name": str(i), "left": left, "right": right} for i, (left, right) in pairs]}
 
 
+def _with_skill_as_table(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables with ``observer = "novice"`` written as a table."""
+    observer = raw.get("observer")
+    return {**raw, "observer": {"skill": observer}} if isinstance(observer, str) and observer in PROFILES else dict(raw)
+
+
+def _with_profile(raw: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the tables with an observer's profile beneath what they say of the observer."""
+    observer = raw.get("observer")
+    profile = PROFILES.get(str(observer.get("skill"))) if isinstance(observer, Mapping) else None
+    return {**raw, "observer": {**profile, **observer}} if profile and isinstance(observer, Mapping) else raw
+
+
 def scenario_schema() -> dict[str, Any]:
     """Return the JSON Schema of scenario files."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(Scenario)}
+    schema = msgspec.json.schema(Scenario)
+    observer = schema["$defs"]["Scenario"]["properties"]["observer"]
+    table = {"$ref": observer.pop("$ref")} if "$ref" in observer else {"allOf": observer.pop("allOf")}
+    observer["anyOf"] = [{"enum": list(PROFILES)}, table]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,9 @@ from a7sim.standard_points import CASES, POSITIONS
 
 LEAST_SEPARATION = 1.0
 """Counter units between the two levels of a perspective centre."""
+
+FARTHEST_CROSS_MM = 110.0
+"""Along either axis: the plate is a picture of 230 mm with a margin."""
 
 FEWEST_IN_PLAN, FEWEST_IN_HEIGHT = 2, 3
 """Points of control that place a strip on the ground (S)."""
@@ -20,7 +24,9 @@ def mistakes_of_reference(raw: Mapping[str, Any], folder: Path) -> Iterator[str]
     yield from _mistakes_in_camera(_table(raw, "camera"))
     yield from _mistakes_in_photos(raw, folder)
     yield from _mistakes_in_models(raw)
-    yield from _mistakes_in_levels(_table(raw, "plan").get("centre_levels"))
+    yield from _mistakes_in_slips(raw)
+    yield from _mistakes_in_levels(_table(raw, "plan"))
+    yield from _mistakes_in_grid_plate(raw)
     yield from _mistakes_in_work(raw)
     yield from _mistakes_in_control(raw)
     if _table(raw, "instrument").get("variant") == "A8":
@@ -29,11 +35,38 @@ def mistakes_of_reference(raw: Mapping[str, Any], folder: Path) -> Iterator[str]
         yield "instrument.grid_test: expected variant = 'A8' beside it; the faults of an A7 stand in condition"
 
 
-def _mistakes_in_levels(levels: object) -> Iterator[str]:
-    if isinstance(levels, Sequence) and len(levels) == 2 and all(isinstance(each, int | float) for each in levels):
-        low, high = levels
-        if abs(high - low) < LEAST_SEPARATION:
+def _mistakes_in_levels(plan: Mapping[str, Any]) -> Iterator[str]:
+    levels = plan.get("centre_levels", [])
+    if not isinstance(levels, Sequence) or not all(isinstance(each, int | float) for each in levels):
+        return
+    method = plan.get("centre_method", "two levels")
+    if method == "two levels" and len(levels) > 2:
+        yield f"plan.centre_levels: expected two levels, got {len(levels)} (centre_method = 'levels' takes more)"
+    for low, high in pairwise(sorted(levels)):
+        if high - low < LEAST_SEPARATION:
             yield f"plan.centre_levels: expected levels {LEAST_SEPARATION:g} or more apart, got {low:g} and {high:g}"
+
+
+def _mistakes_in_grid_plate(raw: Mapping[str, Any]) -> Iterator[str]:
+    plate = _table(raw, "grid_plate")
+    outermost = (_number(plate.get("lines"), 9) - 1.0) / 2.0 * _number(plate.get("spacing_mm"), 25.0)
+    if outermost > FARTHEST_CROSS_MM:
+        yield (
+            f"grid_plate.spacing_mm: expected crosses within {FARTHEST_CROSS_MM:g} mm of the middle, got "
+            f"{outermost:g} mm"
+        )
+    name = plate.get("name", "grid")
+    for index, photo in enumerate(_tables(raw, "photos")):
+        if photo.get("name") == name:
+            yield f"photos[{index}].name: expected another name than that of the grid plate, got {name!r}"
+
+
+def _mistakes_in_slips(raw: Mapping[str, Any]) -> Iterator[str]:
+    models = [str(model.get("name")) for model in _tables(raw, "models")]
+    for index, slip in enumerate(_tables(_table(raw, "observer"), "certain_slips")):
+        if slip.get("model", "") not in ("", *models):
+            path = f"observer.certain_slips[{index}].model"
+            yield f"{path}: expected the name of a model ({', '.join(models)}), got {slip['model']!r}"
 
 
 def _ways(raw: Mapping[str, Any]) -> list[object]:
@@ -68,8 +101,6 @@ def _mistakes_in_control(raw: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _mistakes_with_an_a8(raw: Mapping[str, Any]) -> Iterator[str]:
-    if "condition" in _table(raw, "instrument"):
-        yield "instrument.condition: expected grid_test in its place for an A8, got the faults of an A7"
     method = _table(raw, "plan").get("method", "independent")
     if method != "independent":
         yield f"plan.method: expected 'independent' on an A8, which has neither by nor bz, got {method!r}"

@@ -3,9 +3,10 @@
 Every description completes the sentence "expected ...": validation and the JSON Schema both read it.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from msgspec import Meta, Struct, field
+from msgspec.structs import replace
 
 from a7sim.mistakes import Mistake
 
@@ -136,6 +137,16 @@ class GroundPoint(_Data, frozen=True, kw_only=True):
     role: Literal["control", "plan", "height", "check"] = "check"
 
 
+class Line(_Data, frozen=True, kw_only=True):
+    """A line that is seen on the ground: a smooth curve through vertices, lighter than what lies beside it."""
+
+    name: Name
+    kind: Literal["road", "track"] = "road"
+    width: Annotated[float, Meta(ge=1, le=50, description="metres, 1 to 50")] = 7.0
+    vertices: Annotated[list[tuple[Metres, Metres]], Meta(min_length=2, max_length=200, description="2 to 200 places")]
+    """East and north."""
+
+
 class Published(_Data, frozen=True, kw_only=True):
     """A relative orientation that others published, to stand beside the instrument's."""
 
@@ -178,18 +189,37 @@ class ProjectorCondition(_Data, frozen=True, kw_only=True):
     bz_zero_mm: OffsetMm = 0.0
     axes_um: tuple[SmallUm, SmallUm, SmallUm] = (0.0, 0.0, 0.0)
     """By how much the tilt axes miss the projection centre, in the camera's axes."""
+    rod_um: tuple[SmallUm, SmallUm] = (0.0, 0.0)
+    """By how much the space rod passes beside the centre of its cardan, along the two axes of the cardan: it goes
+    round with the inclination of the rod."""
+    local_um: Sigma = 0.0
+    """Standard error of a grid test: smooth local errors of the projector, each coordinate at photo scale."""
+    local_pattern: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] | None = None
+    """Which pattern these local errors have; every seed has its own when absent."""
+
+
+Upkeep = Literal["new", "serviced", "worn"]
+"""Classes of maintenance (docs/decisions/0006-condition.md)."""
 
 
 class Condition(_Data, frozen=True, kw_only=True):
     """The state of maintenance of an instrument; all zero is a faultless one (never true)."""
 
+    upkeep: Upkeep | None = None
+    """The faults listed beside it come on top of those that a seed draws for this class."""
     left: ProjectorCondition = ProjectorCondition()
     right: ProjectorCondition = ProjectorCondition()
     bx_zero_mm: OffsetMm = 0.0
+    common_phi_zero_gon: OffsetMm = 0.0
+    """Of an A8."""
     carriage_scale_ppm: tuple[Ppm, Ppm, Ppm] = (0.0, 0.0, 0.0)
     """Scale errors of the X, Y and Z spindles."""
     carriage_skew_ppm: tuple[Ppm, Ppm, Ppm] = (0.0, 0.0, 0.0)
     """Departures from right angles of XY, XZ and YZ."""
+    carriage_periodic_um: tuple[Sigma, Sigma, Sigma] = (0.0, 0.0, 0.0)
+    """Amplitude of the error that repeats with every turn of the X, Y and Z spindles, in the model."""
+    carriage_periodic_phase_gon: tuple[Gon, Gon, Gon] = (0.0, 0.0, 0.0)
+    """Where in a turn it begins."""
     setting_sigma_mm: Sigma = 0.0
     setting_sigma_gon: Sigma = 0.0
     """Setting error of the element spindles, drawn at every setting."""
@@ -198,6 +228,8 @@ class Condition(_Data, frozen=True, kw_only=True):
     """Play of the element spindles."""
     carriage_backlash_mm: Sigma = 0.0
     """Play of the X, Y and Z spindles."""
+    counter_slip_share: Share = 0.0
+    """Share of the passes over zero at which the last drum of the X, Y or Z counter does not carry the next one."""
 
 
 class GridTest(_Data, frozen=True, kw_only=True):
@@ -217,18 +249,45 @@ class Instrument(_Data, frozen=True, kw_only=True):
 
     variant: Literal["A7", "A8"] = "A7"
     serial: Name = "3268"
-    condition: Condition = Condition()
-    """Of an A7."""
+    condition: Condition | Upkeep = Condition()
+    """Faults in a table, or a class of maintenance by its name."""
     grid_test: GridTest = GridTest()
-    """Of an A8."""
+    """Of the A8 of an A8 strip."""
     laying_sigma_mm: Sigma = 0.3
     laying_sigma_gon: Sigma = 0.2
     """How far from centred a picture lies when it is put on its carrier by hand."""
 
 
-class Observer(_Data, frozen=True, kw_only=True):
-    """The person in the chair. um are at photo scale; sources in docs/decisions/0004-observer.md."""
+Skill = Literal["novice", "trained", "first-order"]
+"""Profiles of operators; their numbers stand in scenario/skills.py."""
 
+SlipKind = Literal[
+    "last digit",
+    "gross",
+    "wrong point",
+    "wrong sign",
+    "transposed digits",
+    "forgotten lever",
+    "element not re-read",
+]
+
+
+class CertainSlip(_Data, frozen=True, kw_only=True):
+    """A slip that is made for certain, once, at the first occasion that fits; what is empty fits everywhere."""
+
+    kind: SlipKind
+    model: Annotated[str, Meta(max_length=64, description="the name of a model, or an empty text")] = ""
+    form: Annotated[str, Meta(max_length=64, description="the form, such as 'relative orientation'")] = ""
+    """Heading in the book; that of the fittings is 'interior orientation'."""
+    point: Annotated[str, Meta(max_length=64, description="a point, fitting or element, or an empty text")] = ""
+    """Name of the point; of the fitting for a forgotten lever, of the element for one that is not re-read."""
+
+
+class Observer(_Data, frozen=True, kw_only=True):
+    """The person in the chair. um are at photo scale; sources in docs/decisions/0004-observer.md and 0008-skill.md."""
+
+    skill: Skill | None = None
+    """Profile that gives all that is not said here; without one, what stands below."""
     parallax_um: Sigma = 4.0
     """One setting of by on vanishing y-parallax (surveys: 2.2 to 5.7)."""
     monocular_um: Sigma = 4.0
@@ -246,6 +305,33 @@ class Observer(_Data, frozen=True, kw_only=True):
     """Share of readings whose last digit is read one off."""
     blunder_rate: Share = 0.003
     """Share of readings with a gross slip (a wrong digit further up)."""
+    wrong_point_rate: Share = 0.0
+    """Share of the points gone to at which a neighbouring standard point is taken instead."""
+    wrong_sign_rate: Share = 0.0
+    """Share of by readings written with the wrong sign."""
+    transposed_rate: Share = 0.0
+    """Share of readings with two neighbouring digits exchanged."""
+    forgotten_lever_rate: Share = 0.0
+    """Share of fittings left in the other position."""
+    not_reread_rate: Share = 0.0
+    """Share of the elements of a round for which the reading of the round before is used."""
+    certain_slips: Annotated[list[CertainSlip], Meta(max_length=20, description="up to 20 slips")] = []
+    """Slips planted whatever the rates; each happens once."""
+    warm_up: Annotated[float, Meta(ge=0, le=10, description="a share of the settings' errors, 0 to 10")] = 0.0
+    """By what share settings are worse on sitting down; it falls evenly to nothing."""
+    warm_up_minutes: Annotated[float, Meta(gt=0, le=1440, description="minutes above 0")] = 30.0
+    fresh_hours: Annotated[float, Meta(ge=0, le=24, description="hours from 0 to 24")] = 1.0
+    """How long a person stays fresh after sitting down or after a break."""
+    fatigue_per_hour: Annotated[float, Meta(ge=0, le=10, description="a share an hour, 0 to 10")] = 0.0
+    """By what share settings get worse in an hour without a break, once no longer fresh."""
+    slip_fatigue_per_hour: Annotated[float, Meta(ge=0, le=10, description="a share an hour, 0 to 10")] = 0.0
+    """By what share slips get more frequent in an hour without a break, once no longer fresh."""
+    takes_breaks: bool = False
+    break_every_hours: Annotated[float, Meta(gt=0, le=24, description="hours above 0")] = 2.0
+    """A break is taken when the next form or round is begun so long after the last."""
+    break_minutes: Annotated[float, Meta(ge=0, le=1440, description="minutes, zero or more")] = 15.0
+    pace: Annotated[float, Meta(gt=0, le=100, description="a factor above 0 to 100")] = 1.0
+    """Factor of all the seconds below."""
     seconds_to_look: Seconds = 2.0
     seconds_to_turn: Seconds = 2.5
     seconds_to_read: Seconds = 3.0
@@ -269,10 +355,29 @@ class Observer(_Data, frozen=True, kw_only=True):
         )
 
 
+OBSERVER_IN_WORDS = f"{', '.join(repr(skill) for skill in get_args(Skill))} or a table"
+
+
+CentreLevels = Annotated[list[Reading], Meta(min_length=2, max_length=10, description="2 to 10 counter readings")]
+
+
 class Plan(_Data, frozen=True, kw_only=True):
     """The settings and the procedure on the operator's job sheet."""
 
     method: Literal["independent", "dependent"] = "independent"
+    """Swing-swing, or everything with the projector that has the new photograph (T 2.34, 2.33)."""
+    procedure: Literal["numerical", "empirical"] = "numerical"
+    """Parallaxes measured and elements computed from them, or cleared point by point."""
+    solution: Literal["least squares", "hallert"] = "least squares"
+    """Of the numerical procedure: Hallert's closed forms in cases A and D, where the points lie on the pattern."""
+    measure_with: Literal["both", "by1", "by2"] = "both"
+    """The measuring element of the numerical procedure."""
+    over_correction: (
+        Annotated[float, Meta(gt=0, le=5, description="how many times the turn, above 0 to 5")] | Literal["computed"]
+    ) = "computed"
+    """Of the last omega step of the empirical procedure; 1 is to clear the last point and no more."""
+    start_off_gon: Annotated[float, Meta(ge=0, le=4, description="0 to 4 gon")] = 0.0
+    """By up to how much the operator sets the elements off before starting, for practice."""
     case: Literal["A", "B", "C", "D", "E"] = "A"
     bx: Annotated[float, Meta(ge=10, le=280, description="a base of 10 to 280 mm")]
     projection_height: Annotated[float, Meta(ge=140, le=490, description="a projection height of 140 to 490 mm")]
@@ -284,8 +389,11 @@ class Plan(_Data, frozen=True, kw_only=True):
     plan_gear: Name = "1-2-1"
     preset: tuple[Reading, Reading, Reading] = (5000.0, 5000.0, 5000.0)
     """What X, Y and Z shall show at point 1."""
-    centre_levels: tuple[Reading, Reading] = (4900.0, 5100.0)
-    """Z-counter readings for the perspective centres."""
+    centre_method: Literal["two levels", "levels", "grid plate", "scales"] = "two levels"
+    """Lines through points 1 to 6 at two levels of Z or more (thesis 3.6), or resection of a grid plate put in the
+    picture's place."""
+    centre_levels: CentreLevels = field(default_factory=lambda: [4900.0, 5100.0])
+    """Z-counter readings for the perspective centres; just two for the method of two levels."""
     parallax_readings: Annotated[int, Meta(ge=1, le=20, description="1 to 20 readings")] = 3
     tolerated_parallax_um: Sigma = 40.0
     """Rms of the residual y-parallaxes at photo scale beyond which a model does not fit (17 answers: 10 to 40)."""
@@ -293,6 +401,54 @@ class Plan(_Data, frozen=True, kw_only=True):
     """Rms of a perspective centre beyond which its pointings do not meet (the thesis's largest is 0.187)."""
     half_width: Annotated[float, Meta(ge=5, le=115, description="5 to 115 mm")] = HALF_WIDTH_MM
     """Distance of the outer rows of standard points from the base, mm in the photograph."""
+    absolute_orientation: bool = False
+    """Whether every model is also levelled and scaled at the instrument, on the control that it shows."""
+
+
+class GridPlate(_Data, frozen=True, kw_only=True):
+    """A glass plate with crosses in equal squares, with which projectors are tested; it lies in the drawer."""
+
+    name: Name = "grid"
+    lines: Annotated[int, Meta(ge=3, le=23, description="3 to 23 lines each way")] = 9
+    spacing_mm: Annotated[float, Meta(ge=5, le=100, description="5 to 100 mm")] = 25.0
+    """From line to line."""
+    accuracy_um: Annotated[float, Meta(ge=0, le=100, description="micrometres, 0 to 100")] = 1.0
+    """Standard error of every cross and fiducial mark, each coordinate [assumption; no source at hand]."""
+    seed: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] = 0
+    """Draws where the crosses really are: the plate is the same whatever is flown."""
+
+    @property
+    def crosses(self) -> dict[str, tuple[float, float]]:
+        """Nominal places in mm about the middle; G and line and column, counted from the front left corner."""
+        digits = len(str(self.lines))
+        at = [(i - (self.lines - 1) / 2.0) * self.spacing_mm for i in range(self.lines)]
+        return {
+            f"G{row:0{digits}}{column:0{digits}}": (x, y)
+            for row, y in enumerate(at, start=1)
+            for column, x in enumerate(at, start=1)
+        }
+
+    @property
+    def even_counts(self) -> list[int]:
+        """Numbers of crosses that lie on lines evenly spaced over the whole plate, its corners among them."""
+        return [k * k for k in range(3, self.lines + 1) if (self.lines - 1) % (k - 1) == 0]
+
+    def some_crosses(self, count: int) -> dict[str, tuple[float, float]]:
+        """Return so many crosses, evenly spaced over the whole plate. Raises Mistake where none lie so."""
+        if count not in self.even_counts:
+            known = ", ".join(map(str, self.even_counts))
+            raise Mistake(f"expected a number of crosses that lie evenly on the grid plate ({known}), got {count}")
+        step = (self.lines - 1) // (round(count**0.5) - 1)
+        crosses = list(self.crosses.items())
+        return {
+            name: place
+            for i, (name, place) in enumerate(crosses)
+            if i // self.lines % step == 0 and i % self.lines % step == 0
+        }
+
+    def certificate(self, camera: Camera) -> Camera:
+        """Return the camera by which the plate is centred: its middle belongs under the middle of the fiducials."""
+        return replace(camera, name=self.name, principal_point=(0.0, 0.0), distortion=[])
 
 
 class Comparator(_Data, frozen=True, kw_only=True):
@@ -323,8 +479,8 @@ class StripPlan(_Data, frozen=True, kw_only=True):
     """Degree of the adjustment on the control after absolute orientation; none when absent."""
 
 
-Way = Literal["plotter", "comparator"]
-"""How a strip is measured."""
+Way = Literal["plotter", "comparator", "readings"]
+"""How a strip is measured: by an operator at a plotter, in a comparator, or as an A8's readings on arrays."""
 
 
 class Scenario(_Data, frozen=True, kw_only=True):
@@ -339,14 +495,17 @@ class Scenario(_Data, frozen=True, kw_only=True):
     terrain: Terrain = Terrain()
     air: Air = Air()
     ground: list[GroundPoint] = []
+    lines: list[Line] = []
+    """Roads and tracks, shown by the photographs."""
     models: Annotated[list[Model], Meta(min_length=1, description="one model or more")] = []
     """When absent, each photograph and the next, numbered from 1."""
-    work: Annotated[list[Way], Meta(min_length=1, description="'plotter' or 'comparator' or both")] = field(
-        default_factory=lambda: ["plotter"]
+    work: Annotated[list[Way], Meta(min_length=1, description="'plotter', 'comparator' or 'readings', or several")] = (
+        field(default_factory=lambda: ["plotter"])
     )
     """Who measures the strip."""
     instrument: Instrument = Instrument()
-    observer: Observer = Observer()
+    grid_plate: GridPlate = GridPlate()
+    observer: Annotated[Observer, Meta(description=OBSERVER_IN_WORDS)] = Observer()
     plotting: Plan | None = field(default=None, name="plan")
     """`plan` in the file; needed where somebody works at a plotter."""
     comparator: Comparator = Comparator()

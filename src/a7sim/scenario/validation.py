@@ -16,7 +16,7 @@ def mistakes_of_form(raw: Raw, expected: inspect.Type, path: str = "") -> Iterat
     """Yield a sentence for every value of `raw` that is not of the expected type, range or name."""
     constraint, described = _unwrap(expected)
     if isinstance(constraint, inspect.StructType):
-        yield from _mistakes_in_table(raw, constraint, path)
+        yield from _mistakes_in_table(raw, constraint, described, path)
     elif isinstance(constraint, inspect.UnionType):
         yield from _mistakes_in_union(raw, constraint, path)
     elif isinstance(constraint, inspect.ListType | inspect.TupleType):
@@ -33,9 +33,9 @@ def _unwrap(expected: inspect.Type) -> tuple[inspect.Type, str | None]:
     return expected, None
 
 
-def _mistakes_in_table(raw: Raw, table: inspect.StructType, path: str) -> Iterator[str]:
+def _mistakes_in_table(raw: Raw, table: inspect.StructType, described: str | None, path: str) -> Iterator[str]:
     if not isinstance(raw, Mapping):
-        yield f"{path or 'the scenario'}: expected a table, got {_shown(raw)}"
+        yield f"{path or 'the scenario'}: expected {described or 'a table'}, got {_shown(raw)}"
         return
     fields = {field.encode_name: field for field in table.fields}
     for key in raw:

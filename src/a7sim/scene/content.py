@@ -1,10 +1,11 @@
 """What a photograph shows: texture of the ground and signals, evaluated where a place's ray meets the ground."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from a7sim.geometry import Array, length_of, ray_of
+from a7sim.scene.lines import GroundLine, with_lines
 from a7sim.scene.photograph import Marks
 from a7sim.scene.terrain import Ground
 
@@ -66,6 +67,7 @@ def picture_of_ground(
     to_film: Array,
     points: Marks,
     imaging: Callable[[Array], Array],
+    lines: Sequence[GroundLine] = (),
 ) -> Callable[[Array], Array]:
     """Return the picture of the ground from a station.
 
@@ -77,7 +79,8 @@ def picture_of_ground(
     def content(xy: Array) -> Array:
         perspective = _undone(imaging, np.einsum("ij,j...->i...", from_film, xy))
         met = ground.met_by(centre, ray_of(perspective, rotation, c))
-        return np.maximum(ground_texture(met[0], met[1]), covered(xy))
+        grey = with_lines(lines, met[:2], ground_texture(met[0], met[1]))
+        return np.maximum(grey, covered(xy))
 
     return content
 

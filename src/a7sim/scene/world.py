@@ -10,6 +10,8 @@ from a7sim.mistakes import Mistake
 from a7sim.scenario.schema import Model, Photo, Published, Scenario
 from a7sim.scene.camera import distorted, fiducial_places, lowered_by_curvature, refracted
 from a7sim.scene.content import picture_of_ground, picture_of_marks
+from a7sim.scene.grid_plate import grid_plate
+from a7sim.scene.lines import GroundLine, lines_of
 from a7sim.scene.measured import measured_marks
 from a7sim.scene.photograph import Deformation, Marks, Photograph, chosen, sketched, within_format
 from a7sim.scene.terrain import Ground
@@ -48,6 +50,15 @@ class Scene:
     other_points: tuple[str, ...]
     """Names of the signalised and the measured points that a job sheet lists beside the standard points."""
     published: dict[str, RelativeTruth]
+    grid_plate: Photograph
+    ground: Ground
+    lines: dict[str, GroundLine]
+    """Roads and tracks by name."""
+
+    @property
+    def drawer(self) -> dict[str, Photograph]:
+        """All that can be put on a carrier: the photographs and the grid plate."""
+        return self.photographs | {self.grid_plate.name: self.grid_plate}
 
     def relative_truth(self, model: Model) -> RelativeTruth | None:
         """Return the true (flown) or published relative orientation of a model, if any is known."""
@@ -91,7 +102,9 @@ def build_scene(scenario: Scenario, seed: int) -> Scene:
     _see_that_positions_are_measured(scenario, photographs)
     measured = [photographs[photo.name].points.names for photo in scenario.photos if photo.measured is not None]
     listed = dict.fromkeys([point.point for point in scenario.ground] + [name for names in measured for name in names])
-    return Scene(photographs, stations, signalised, standard, tuple(listed), published)
+    plate = grid_plate(scenario.grid_plate, scenario.camera, scenario.photos[0].polarity)
+    lines = lines_of(scenario.lines)
+    return Scene(photographs, stations, signalised, standard, tuple(listed), published, plate, ground, lines)
 
 
 def _see_that_positions_are_measured(scenario: Scenario, photographs: dict[str, Photograph]) -> None:
@@ -174,7 +187,14 @@ def _photograph(
         points = chosen(imaged, within_format(imaged.xy) & before)
         to_film = deformation.matrix
         content = picture_of_ground(
-            ground, station.centre, station.rotation, camera.c, to_film, points, _imaging(scenario, station, ground)
+            ground,
+            station.centre,
+            station.rotation,
+            camera.c,
+            to_film,
+            points,
+            _imaging(scenario, station, ground),
+            tuple(lines_of(scenario.lines).values()),
         )
     return Photograph(
         photo.name,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array, plane_rotation
-from a7sim.instrument.autograph import INSTRUMENT_STREAM
+from a7sim.instrument.condition import INSTRUMENT_STREAM
 from a7sim.operator.dice import OPERATOR_STREAM
 from a7sim.reduction import Model, a8_centres, a8_model_coordinates, picture_lie
 from a7sim.scenario import ModelPlan, Observer, Scenario

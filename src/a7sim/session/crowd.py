@@ -56,7 +56,7 @@ class Crowd:
 def open_crowd(scenario: Scenario, seeds: Sequence[int]) -> Crowd:
     """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
     scenes = tuple(build_scene(scenario, seed) for seed in seeds)
-    fleet = build_fleet(scenario.instrument, [scene.photographs for scene in scenes], seeds)
+    fleet = build_fleet(scenario.instrument, [scene.drawer for scene in scenes], seeds)
     crew = Crew(scenario.observer, [Dice(scenario.observer, seed) for seed in seeds])
     job = job_of(scenario, scenes[0])
     return Crowd(scenario, tuple(seeds), scenes, fleet, Bench(crew, FleetHands(fleet), job), job)

@@ -34,9 +34,13 @@ class FleetHands:
     def set_element(self, who: Who, name: str, values: Array) -> None:
         self._fleet.set_element(who, name, np.round(values, 2))
 
-    def preset(self, who: Who, readings: tuple[float, float, float]) -> None:
-        for axis, reading in zip("XYZ", readings, strict=True):
+    def preset(self, who: Who, readings: Mapping[str, float]) -> None:
+        for axis, reading in readings.items():
             self._fleet.preset(who, axis, round(reading, 2))
+
+    def preset_one(self, who: Who, axis: str, readings: Array) -> None:
+        for session, reading in zip(who, readings.tolist(), strict=True):
+            self._fleet.preset(np.array([session]), axis, round(reading, 2))
 
     def load(self, who: Who, projector: int, photograph: str) -> None:
         self._fleet.load(who, projector, photograph)

@@ -7,7 +7,9 @@ from a7sim.mistakes import Mistake
 JOURNAL, BOOK, MODELS, STRIP, RESULTS = "session.jsonl", "book.csv", "models.csv", "strip.csv", "results.json"
 CARDS, OUTPUT_CARDS, CARD_KEY = "strip.crd", "strip-output.crd", "strip-numbers.csv"
 STRIPS = "strips.csv"
-FILES = (JOURNAL, BOOK, MODELS, STRIP, CARDS, OUTPUT_CARDS, CARD_KEY, STRIPS, RESULTS)
+GEOJSON, SVG = "map.geojson", "map.svg"
+RESIDUALS = "residuals.csv"
+FILES = (JOURNAL, BOOK, MODELS, STRIP, CARDS, OUTPUT_CARDS, CARD_KEY, STRIPS, RESIDUALS, GEOJSON, SVG, RESULTS)
 
 
 def prepare_folder(out: Path, force: bool) -> None:

@@ -1,13 +1,14 @@
 """What a session found, as one document for machines and as model files."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import a7sim
 from a7sim.documents import Document, head
 from a7sim.files import csv_text
-from a7sim.operator import ModelRecord
+from a7sim.operator import ModelRecord, Person
+from a7sim.operator.absolute import OnGround
 from a7sim.reduction import Model, PerspectiveCentre
 from a7sim.scenario import Scenario
 from a7sim.scenario.schema import Published
@@ -47,6 +48,7 @@ def of_model(
         "left": model.left,
         "right": model.right,
         "base": model.base,
+        "xy_units_per_mm": record.xy_units_per_mm,
         "z_units_per_mm": record.z_units_per_mm,
         "finished_at_s": round(record.finished_at, 1),
         "interior_orientation": [
@@ -60,6 +62,7 @@ def of_model(
             for each in record.interior.values()
         ],
         "relative_orientation": {
+            "procedure": orientation.procedure,
             "method": orientation.method,
             "case": orientation.case,
             "iterations": len(orientation.rounds),
@@ -71,6 +74,7 @@ def of_model(
                     "parallax_mm": _rounded(each.parallaxes),
                     "sigmas": _rounded(each.sigmas),
                 }
+                | ({"over_correction": round(each.over_correction, 3)} if orientation.procedure == "empirical" else {})
                 for each in orientation.rounds
             ],
             "rms_parallax_mm": round(orientation.rms, 6),
@@ -83,7 +87,72 @@ def of_model(
             for point, place in record.points.items()
         },
         "standard_points": dict(model.standard_points),
+        **({"absolute_orientation": _on_ground(record.on_ground)} if record.on_ground else {}),
         "truth": _beside_truth(record, autograph, truth, found) | _published_sigmas(published),
+    }
+
+
+def of_operator(person: Person, lines: int) -> dict[str, Any]:
+    """Return what an operator wrote and where the time went, hours."""
+    book, timesheet = person.book, person.timesheet
+    return {
+        "hours": round(person.clock.now / 3600.0, 3),
+        "time_by_activity_h": _hours(timesheet.activities_of(0)),
+        "time_by_act_h": _hours(timesheet.acts_of(0)),
+        "lines_over_the_link": lines,
+        "book_entries": len(book.entries),
+        "struck_out": sum(bool(entry.struck) for entry in book.entries),
+        "remarks": book.remarks,
+    }
+
+
+def of_slips(person: Person) -> list[dict[str, Any]]:
+    """Return what an operator did wrongly without knowing it, beside what was right."""
+    struck = {entry.number for entry in person.book.entries if entry.struck}
+    return [
+        {
+            "time_s": round(slip.time, 1),
+            "model": slip.model,
+            "form": slip.form,
+            "round": slip.round,
+            "point": slip.point,
+            "item": slip.item,
+            "kind": slip.kind,
+            "written": slip.written,
+            "right": slip.right,
+            "entry": slip.entry or None,
+            "struck": slip.entry in struck,
+        }
+        for slip in person.slips
+    ]
+
+
+def _hours(seconds: Mapping[str, float]) -> dict[str, float]:
+    return {name: round(each / 3600.0, 4) for name, each in seconds.items()}
+
+
+def _on_ground(found: OnGround) -> dict[str, Any]:
+    return {
+        "scale_number": found.scale_number,
+        "height_gear": found.height_gear,
+        "rounds": [
+            {
+                "height_rms_m": round(each.height_rms, 4),
+                "scale": round(each.scale, 6),
+                "tilts_gon": [round(tilt, 4) for tilt in each.tilts],
+            }
+            for each in found.rounds
+        ],
+        "elements": dict(found.elements),
+        "elements_before": dict(found.before),
+        "heights_m": {point: round(off, 3) for point, off in found.heights.items()},
+        "distance_m": round(found.distance, 3),
+        "tolerated_m": round(found.tolerated, 3),
+        "agrees": found.agrees,
+        "points": {
+            point: {axis: round(value, 3) for axis, value in zip("XYZ", place, strict=True)}
+            for point, place in found.points.items()
+        },
     }
 
 

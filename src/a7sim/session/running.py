@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from a7sim.documents import Document, as_json
 from a7sim.files import csv_text
 from a7sim.instrument import Autograph, build_autograph
@@ -49,7 +51,7 @@ class Session:
 def open_session(scenario: Scenario, seed: int, listener: Listener | None = None) -> Session:
     """Return a session ready to begin. Raises Mistake when a file of measurements is bad."""
     scene = build_scene(scenario, seed)
-    autograph = build_autograph(scenario.instrument, scene.photographs, seed)
+    autograph = build_autograph(scenario.instrument, scene.drawer, seed)
     clock = Clock()
     port = InProcessSerial(desk=Desk(autograph, listener), clock=clock, timeout=1.0)
     person = Person(Client(port), clock, scenario.observer, seed)
@@ -70,7 +72,18 @@ def job_of(scenario: Scenario, scene: Scene) -> Job:
         )
         for model in scenario.models
     )
-    return Job(scenario.camera, scenario.plan, models)
+    control = _control_of(scenario, scene) if scenario.plan.absolute_orientation else {}
+    return Job(scenario.camera, scenario.plan, models, scenario.grid_plate, control)
+
+
+def _control_of(scenario: Scenario, scene: Scene) -> dict[str, tuple[float, float, float]]:
+    ground = ground_of(scenario, scene)
+    known = np.where(ground.used > 0.0, ground.coordinates, np.nan)
+    return {
+        name: (x, y, z)
+        for name, (x, y, z), used in zip(ground.points, known.T.tolist(), ground.used.T, strict=True)
+        if used.any()
+    }
 
 
 @dataclass(frozen=True)
@@ -115,19 +128,13 @@ def run(
             document |= {"status": "interrupted", "message": "the session was interrupted"}
             raise
         finally:
-            book = session.person.book
             document |= {
                 "models": done,
-                "operator": {
-                    "hours": round(session.person.clock.now / 3600.0, 3),
-                    "lines_over_the_link": journal.events,
-                    "book_entries": len(book.entries),
-                    "struck_out": sum(bool(entry.struck) for entry in book.entries),
-                    "remarks": book.remarks,
-                },
+                "operator": results.of_operator(session.person, journal.events),
+                "truth": {"slips": results.of_slips(session.person)},
             }
             if out is not None:
-                write_whole(out / BOOK, book.as_csv())
+                write_whole(out / BOOK, session.person.book.as_csv())
                 write_whole(out / MODELS, results.models_csv(models_of(done)))
                 write_whole(out / RESULTS, as_json(document))
     return _concluded(session, document, out)

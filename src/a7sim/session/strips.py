@@ -84,11 +84,11 @@ def models_of(documents: Sequence[Document]) -> list[Model]:
 
 
 def _model(document: Document) -> Model:
-    units = document["z_units_per_mm"]
+    plane, height = document["xy_units_per_mm"], document["z_units_per_mm"]
     places = {point: (each["X"], each["Y"], each["Z"]) for point, each in document["points"].items()}
     for side, centre in document["perspective_centres"].items():
         places[f"{document[side]}:centre"] = (centre["X0"], centre["Y0"], centre["Z0"])
-    coordinates = np.array(list(places.values())).T / [[1.0], [1.0], [units]]
+    coordinates = np.array(list(places.values())).T / [[plane], [plane], [height]]
     return Model(document["model"], tuple(places), coordinates)
 
 

@@ -8,7 +8,7 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
-from a7sim.standard_points import FIGURE_4_1
+from a7sim.standard_points import FIGURE_4_1, POSITIONS
 
 _ELEMENTS = (
     ("κ", "kappa", "gon"),
@@ -40,9 +40,11 @@ def of_session(document: dict[str, Any]) -> RenderableType:
 
 
 def _hours(operator: dict[str, Any]) -> Text:
+    activities = (f"{name} {hours:.1f}" for name, hours in operator["time_by_activity_h"].items())
     return Text(
         f"{operator['hours']:.1f} hours at the instrument, {operator['lines_over_the_link']} lines over the link, "
-        f"{operator['book_entries']} readings in the book, {operator['struck_out']} struck out"
+        f"{operator['book_entries']} readings in the book, {operator['struck_out']} struck out\n"
+        f"Where they went: {', '.join(activities)}"
     )
 
 
@@ -115,6 +117,8 @@ def _of_model(model: dict[str, Any]) -> Iterator[RenderableType]:
     yield _elements(orientation["elements"], model["truth"].get("elements", {}))
     yield _residuals(orientation)
     yield _centres(model)
+    if "absolute_orientation" in model:
+        yield _on_ground(model["absolute_orientation"])
     yield _truth(model["truth"])
     yield Text()
 
@@ -132,11 +136,25 @@ def _titled(title: str, table: Table) -> RenderableType:
 
 
 def _rounds(orientation: dict[str, Any]) -> RenderableType:
+    if orientation["procedure"] == "empirical":
+        return _cleared_rounds(orientation)
     table = _table("iteration", "mean p, mm", "rms, mm")
     for number, each in enumerate(orientation["rounds"], start=1):
         table.add_row(str(number), f"{each['mean_mm']:.4f}", f"{each['rms_mm']:.4f}")
     title = f"Numerical relative orientation, {orientation['method']}, case {orientation['case']}"
     return _titled(title, table)
+
+
+def _cleared_rounds(orientation: dict[str, Any]) -> RenderableType:
+    """Return what was seen at the points before omega was turned, round by round, and how many times it was."""
+    labels = [label for label in POSITIONS if any(label in each["parallax_mm"] for each in orientation["rounds"])]
+    table = _table("iteration", *labels, "rms, mm", "omega turned n times")
+    for number, each in enumerate(orientation["rounds"], start=1):
+        seen = [f"{each['parallax_mm'][label]:+.3f}" if label in each["parallax_mm"] else "" for label in labels]
+        n = each["over_correction"]
+        table.add_row(str(number), *seen, f"{each['rms_mm']:.4f}", f"{n:.2f}" if n else "")
+    method = "one projector" if orientation["method"] == "dependent" else "swing-swing"
+    return _titled(f"Empirical relative orientation, {method}: y-parallaxes seen before omega is turned, mm", table)
 
 
 def _elements(elements: dict[str, float], true: dict[str, float]) -> RenderableType:
@@ -146,6 +164,8 @@ def _elements(elements: dict[str, float], true: dict[str, float]) -> RenderableT
         return [f"{elements[name]:.2f}", f"{true[name]:.3f}" if name in true else ""]
 
     for symbol, name, unit in _ELEMENTS:
+        if f"{name}1" not in elements:
+            continue
         table.add_row(symbol, *cells(f"{name}1"), *cells(f"{name}2"), unit)
     table.add_row("bx", *cells("bx"), "", "", "mm")
     return _titled("Elements as set", table)
@@ -174,6 +194,26 @@ def _centres(model: dict[str, Any]) -> RenderableType:
         table.add_row(name, *cells)
     table.add_row("rms", *(cell for side in sides for cell in (f"{centres[side]['rms']:.3f}", "", "")))
     return _titled("Perspective centres, counter units", table)
+
+
+def _on_ground(found: dict[str, Any]) -> RenderableType:
+    table = _table("round", "heights, rms m", "scale", "along, gon", "across, gon")
+    for number, each in enumerate(found["rounds"], start=1):
+        tilts = (f"{tilt:+.3f}" for tilt in each["tilts_gon"])
+        table.add_row(str(number), f"{each['height_rms_m']:.3f}", f"{each['scale']:.5f}", *tilts)
+    heights = "  ".join(f"{point} {off:+.3f}" for point, off in found["heights_m"].items())
+    changed = (
+        f"{name} {value:.2f} (before {found['elements_before'][name]:.2f})"
+        for name, value in found["elements"].items()
+        if value != found["elements_before"][name]
+    )
+    agree = "agree" if found["agrees"] else "do not agree"
+    return Group(
+        _titled(f"Absolute orientation at 1:{found['scale_number']:.0f}, gear {found['height_gear']}", table),
+        Text(f"Heights at control, m: {heights}; they {agree} within {found['tolerated_m']:.2f} m"),
+        Text(f"Distance between control, m: {found['distance_m']:+.3f}"),
+        Text(f"Set meanwhile: {', '.join(changed)}"),
+    )
 
 
 def _truth(truth: dict[str, Any]) -> Text:

@@ -90,8 +90,8 @@ def _base_of(elements: Mapping[str, float], model: ModelJob) -> Array:
     return np.array(
         [
             elements["bx"],
-            elements[f"by{left}"] - elements[f"by{right}"],
-            elements[f"bz{right}"] - elements[f"bz{left}"],
+            elements.get(f"by{left}", 0.0) - elements.get(f"by{right}", 0.0),
+            elements.get(f"bz{right}", 0.0) - elements.get(f"bz{left}", 0.0),
         ]
     )
 

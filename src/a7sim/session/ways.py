@@ -21,10 +21,11 @@ def run_all_ways(
 ) -> Document:
     """Measure the strip of a scenario in every way it asks for and return the document of results.
 
-    An A7 is worked by an operator over the link (`run`); what the comparator gives, and the A8 as it is held today, as
-    arrays of readings, stands under `ways`. Raises Mistake for what does not make a strip.
+    A plotter is worked by an operator over the link (`run`). What the comparator gives, and readings of an A8 simulated
+    as arrays, its elements standing where a hand leaves them and not on counts, stands under `ways`.
+    Raises Mistake for what does not make a strip.
     """
-    if "plotter" in scenario.work and scenario.instrument.variant == "A7":
+    if "plotter" in scenario.work:
         document = run(scenario, seed, out, watcher, force)
     else:
         document = results.header(scenario, seed) | {"status": "complete", "message": ""}
@@ -48,7 +49,7 @@ def _computed(scenario: Scenario, scene: Scene, seed: int) -> dict[str, StripRes
     try:
         if "comparator" in scenario.work:
             ways["comparator"] = strip_by_comparator(scenario, scene, seed)
-        if "plotter" in scenario.work and scenario.instrument.variant == "A8":
+        if "readings" in scenario.work:
             ways["A8"] = strip_on_a8(scenario, scene, seed)
     except Undetermined as undetermined:
         raise Mistake(f"{scenario.title}: {undetermined}") from undetermined

@@ -207,7 +207,7 @@ def _fitting(node: str, name: str, words: tuple[str, ...], about: str) -> list[C
 
     return [
         Command(f"FITTing:{node}", put, (Choice(words),), turns=True, about=about),
-        Command(f"FITTing:{node}?", lambda e, c: shown[_autograph(e).fittings.as_words()[name]]),
+        Command(f"FITTing:{node}?", lambda e, c: shown[_autograph(e).fitting(name)]),
     ]
 
 
@@ -263,7 +263,10 @@ def _counters(engine: "Engine", call: Call) -> str:
 
 
 def _axis(axis: str) -> list[Command]:
-    unit = "" if axis == "Z" else "mm"
+    usual = "" if axis == "Z" else "mm"
+
+    def unit(engine: "Engine") -> str:
+        return _autograph(engine).variant.scales[axis].unit
 
     def limits(engine: "Engine", suffix: int) -> Limits:
         autograph = _autograph(engine)
@@ -297,21 +300,21 @@ def _axis(axis: str) -> list[Command]:
         Command(
             f"COUNter:{axis}:PRESet",
             preset,
-            (Quantity(unit, preset_limits, name="reading"),),
+            (Quantity(usual, preset_limits, name="reading", unit_there=unit),),
             turns=True,
             about="what the counter shall show here",
         ),
         Command(
             f"DRIVe:{axis}",
             drive,
-            (Quantity(unit, limits, name="reading"),),
+            (Quantity(usual, limits, name="reading", unit_there=unit),),
             turns=True,
             about="run to a counter reading",
         ),
         Command(
             f"WHEel:{axis}",
             wheel,
-            (Quantity(unit, to_the_ends, name="amount"),),
+            (Quantity(usual, to_the_ends, name="amount", unit_there=unit),),
             turns=True,
             about="turn by so much counter, signed",
         ),
@@ -443,12 +446,17 @@ _RECORDED = {short_form(node): name for node, name, _, _ in _ELEMENT_NODES}
 _RECORDED |= {node.upper(): name for node, name, _, _ in _ELEMENT_NODES}
 
 
+_COMMON_TO_BOTH = {"BX": "bx", "CPHI": "common_phi"}
+
+
 def _recorded_element(word: str) -> str:
-    if word == "BX":
-        return "bx"
+    if word in _COMMON_TO_BOTH:
+        return _COMMON_TO_BOTH[word]
     found = re.fullmatch(r"([A-Z]+)([12])", word)
     if found is None or found[1] not in _RECORDED:
-        raise LanguageError(ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected BX or an element such as BY1, got {word}")
+        raise LanguageError(
+            ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected BX, CPHI or an element such as BY1, got {word}"
+        )
     return f"{_RECORDED[found[1]]}{found[2]}"
 
 
@@ -492,7 +500,7 @@ _RECORDING = [
         _record,
         (Quoted("point"),),
         repeats=AnyWord("element"),
-        about="register X, Y, Z and the named elements (BY1, KAPP2, BX ...) under the point",
+        about="register X, Y, Z and the named elements (BY1, KAPP2, BX, CPHI ...) under the point",
     ),
     Command("RECord:LAST?", _last_record, about="number, point, X, Y, Z and element,reading ..."),
     Command("RECord:COUNt?", lambda e, c: str(len(_autograph(e).recorder.registrations)), about="registrations"),

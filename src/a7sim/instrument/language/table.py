@@ -56,6 +56,8 @@ class Quantity:
     whole: bool = False
     optional: bool = False
     name: str = "value"
+    unit_there: Callable[[Any], str] | None = None
+    """Tells the unit where it depends on the instrument."""
 
     def read(self, parameter: Parameter, client: Any, suffix: int) -> float:
         """Return the number in its base unit."""
@@ -63,7 +65,7 @@ class Quantity:
             return self._named(parameter, client, suffix)
         if not isinstance(parameter, Number):
             raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a number, got the text '{parameter.value}'")
-        factors = UNITS[self.unit]
+        factors = UNITS[self.unit_there(client) if self.unit_there else self.unit]
         if parameter.unit not in factors:
             if len(factors) == 1:
                 raise LanguageError(ErrorNumber.SUFFIX_NOT_ALLOWED, f"expected a bare number, got {parameter.unit}")

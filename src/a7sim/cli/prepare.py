@@ -1,0 +1,101 @@
+"""`a7sim prepare`: the settings for a flight, before a picture is mounted."""
+
+from typing import Any
+
+import click
+import msgspec
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from a7sim.documents import as_json, head
+from a7sim.manual import VARIANTS
+from a7sim.operator.preparation import Flight, ModelScale, Preparation, preparation
+
+
+@click.command("prepare")
+@click.option("--c", "c", type=float, required=True, help="Principal distance of the camera, mm.")
+@click.option("--photo-scale", type=float, help="Scale number of the photographs at the mean ground.")
+@click.option("--flying-height", type=float, help="Above the mean ground, m, in place of the photo scale.")
+@click.option("--photo-base", type=float, required=True, help="Base in the photograph, mm.")
+@click.option("--heights", type=float, nargs=2, required=True, help="Lowest and highest ground, m.")
+@click.option("--map-scale", type=float, help="Scale number of the map that is drawn.")
+@click.option("--variant", type=click.Choice(list(VARIANTS)), default="A7", show_default=True)
+@click.option("--json", "as_document", is_flag=True, help="Print the sheet as one JSON document.")
+def command(
+    c: float,
+    photo_scale: float | None,
+    flying_height: float | None,
+    photo_base: float,
+    heights: tuple[float, float],
+    map_scale: float | None,
+    variant: str,
+    as_document: bool,
+) -> None:
+    """Choose model scale, gears, projection height and bx for a flight (thesis 3.2.3).
+
+    Example: a7sim prepare --c 152.676 --photo-scale 8000 --photo-base 91 --heights 430.24 487.92 --map-scale 2500
+    """
+    flight = Flight.of_heights(c, photo_base, heights, photo_scale, flying_height)
+    found = preparation(flight, VARIANTS[variant], map_scale)
+    if as_document:
+        click.echo(as_json(_document(found, variant)), nl=False)
+    else:
+        Console().print(_sheet(found, variant, map_scale))
+
+
+def _document(found: Preparation, variant: str) -> dict[str, Any]:
+    flight = found.flight
+    return (
+        head("prepare")
+        | {"variant": variant}
+        | {
+            "flight": msgspec.to_builtins(flight)
+            | {
+                "flying_height": round(flight.flying_height, 3),
+                "above_ground": [round(flight.lowest_flown, 3), round(flight.highest_flown, 3)],
+                "field_angle_deg": round(flight.field_angle_deg, 2),
+            },
+            "optimum": {"number": round(found.optimum, 3), "bx": round(found.optimum_bx, 2)},
+            "scales": [_of_scale(scale) for scale in found.scales],
+            "chosen": _of_scale(found.chosen),
+            "reason": found.reason,
+        }
+    )
+
+
+def _of_scale(scale: ModelScale) -> dict[str, Any]:
+    rounded = {name: round(value, 3) if isinstance(value, float) else value for name, value in vars(scale).items()}
+    return rounded | {"against": list(scale.against)}
+
+
+def _sheet(found: Preparation, variant: str, map_scale: float | None) -> RenderableType:
+    flight, chosen = found.flight, found.chosen
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    for column in ("model scale", "gear", "last digit, m", "plan", "Z, mm", "bx, mm"):
+        table.add_column(column, justify="left" if column == "model scale" else "right")
+    table.add_column("", overflow="fold")
+    for scale in found.scales:
+        table.add_row(
+            f"1:{scale.number:.0f}",
+            scale.height_gear,
+            f"{scale.interval:g}",
+            scale.plan_gear,
+            f"{scale.lowest:.1f}-{scale.highest:.1f}",
+            f"{scale.bx:.2f}",
+            "chosen" if scale == chosen else "; ".join(scale.against),
+        )
+    to_map = f", {chosen.plan_gear} to the map 1:{map_scale:.0f}" if map_scale is not None else ""
+    return Group(
+        Text(f"Settings for an {variant}", style="bold"),
+        Text(
+            f"Flown {flight.flying_height:.3f} m above {flight.mean_ground:.2f} m, {flight.lowest_flown:.3f} to "
+            f"{flight.highest_flown:.3f} m above the ground; {flight.angle} angle, {flight.field_angle_deg:.1f} degrees"
+        ),
+        Text(f"Optimum model scale 1:{found.optimum:.1f}, which would ask for bx {found.optimum_bx:.2f} mm\n"),
+        table,
+        Text(f"\nModel scale         1:{chosen.number:.0f}: {found.reason}"),
+        Text(f"Gears               {chosen.height_gear} for heights in {chosen.interval:g} m{to_map}"),
+        Text(f"Projection height   {chosen.projection_height:.3f} mm"),
+        Text(f"bx                  {chosen.bx:.2f} mm, from the photo base"),
+    )

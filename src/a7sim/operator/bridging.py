@@ -1,0 +1,282 @@
+"""Bridging, or aeropolygon: base in, base out, base in ... through a strip, without joining models afterwards.
+
+The photograph that is oriented stays as it is in its projector; the next one is oriented to it by the dependent method,
+and bx carries the scale on: it is changed until common points read the heights that they had in the model before.
+The counters are preset so that readings go on in the system of the first model.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.geometry import GON, Array
+from a7sim.manual import LEAST_COUNT
+from a7sim.operator.bench import Bench
+from a7sim.operator.crew import Crew, NobodyGoesOn, Who
+from a7sim.operator.interior import InteriorOrientations
+from a7sim.operator.job import Job, ModelJob
+from a7sim.operator.line_hands import LineHands
+from a7sim.operator.person import Person
+from a7sim.operator.relative import (
+    RelativeOrientations,
+    assessed,
+    relative_orientation,
+    spread,
+    stand_of,
+    unknowns_of,
+)
+from a7sim.operator.seat import wrapped
+from a7sim.operator.work import (
+    begin_form,
+    model_coordinates,
+    mount,
+    see_that_somebody_goes_on,
+    set_base_and_fittings,
+    take_up_prints,
+)
+from a7sim.reduction import Undetermined, element_corrections
+
+MOST_SCALINGS = 4
+MOST_REFINEMENTS = 4
+STILL_FALLING = 0.95
+"""Residual parallaxes go on falling while their rms is below this share of the best so far."""
+
+SHARE_OF_RANGE = 0.5
+"""Of the range of by or bz, beyond which the strip is brought back to their zeros and Y or Z preset."""
+
+
+@dataclass(frozen=True)
+class BridgedModels:
+    """A model in a crew's strips; arrays have all sessions as their last axis."""
+
+    model: ModelJob
+    who: Who
+    orientation: RelativeOrientations
+    points: Mapping[str, Array]
+    """Readings X, Y, Z ``(3, sessions)`` that go on from the first model, nan where a point was not measured."""
+    common: Mapping[str, Array]
+    """Readings at common points, this model's minus those of the one before ``(3, sessions)``."""
+    scale: Array
+    """Factor ``(sessions,)`` that bx took on to carry the scale."""
+    z_units_per_mm: float
+
+    def places_of(self, session: int) -> dict[str, tuple[float, float, float]]:
+        """Return one session's points in mm, Z upward."""
+        each = {
+            name: (place[:, session] / [1.0, 1.0, self.z_units_per_mm]).tolist() for name, place in self.points.items()
+        }
+        return {name: (x, y, z) for name, (x, y, z) in each.items() if np.isfinite(x)}
+
+
+def bridge(
+    person: Person,
+    job: Job,
+    tick: Callable[[], None] = lambda: None,
+    begins: Callable[[str], None] = lambda _: None,
+) -> Iterator[BridgedModels]:
+    """Yield the models of a strip as a person bridges it. Raises DoesNotFit when one cannot be set up."""
+    person.book.head("", "preparation")
+    yield from bridged(Bench(Crew.of_one(person), LineHands(person), job, tick), begins)
+
+
+def bridged(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[BridgedModels]:
+    """Yield the models of a strip as a crew bridges it, each session at its own instrument.
+
+    Every model must have the photograph of the one before it as its left-hand one and the other base; give up if not.
+    """
+    try:
+        yield from _bridged(bench, begins)
+    except NobodyGoesOn:
+        return
+
+
+def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedModels]:
+    crew, seat, job = bench.crew, bench.seat, bench.job
+    interior: dict[str, InteriorOrientations] = {}
+    seat.prepare(crew.everybody)
+    before: dict[str, Array] = {}
+    last: ModelJob | None = None
+    for model in job.models:
+        begin_form(bench, model, "interior orientation", begins)
+        if last is not None:
+            _see_that_it_follows(bench, last, model)
+            _carry_on(bench, model)
+        set_base_and_fittings(bench, model)
+        mount(bench, model, interior)
+        prints = take_up_prints(bench, model)
+        see_that_somebody_goes_on(bench)
+        bench.begin(crew.everybody, model, prints)
+        if last is None:
+            bench.preset(crew.everybody, model.standard_points["1"])
+        else:
+            _set_as_its_neighbour(bench, model)
+        begin_form(bench, model, "relative orientation", begins)
+        orientation = _oriented(bench, model)
+        scale = np.ones(crew.sessions)
+        if last is not None:
+            begin_form(bench, model, "scale", begins)
+            scale = _scaled(bench, crew.everybody, model, before)
+        orientation = _refined(bench, model, orientation)
+        if last is not None:
+            scale *= _scaled(bench, crew.everybody, model, before)
+        begin_form(bench, model, "model coordinates", begins)
+        points = model_coordinates(bench, model, prints)
+        see_that_somebody_goes_on(bench)
+        common = {name: points[name] - before[name] for name in points if name in before}
+        yield BridgedModels(model, crew.everybody, orientation, points, common, scale, seat.units_per_mm)
+        before, last = points, model
+
+
+def _see_that_it_follows(bench: Bench, last: ModelJob, model: ModelJob) -> None:
+    if model.left != last.right or model.left_projector != last.right_projector:
+        bench.crew.give_up(
+            bench.crew.everybody,
+            f"model {model.name} does not go on from model {last.name}: expected {last.right} on the left and base "
+            f"{'outside' if last.base == 'inside' else 'inside'}, got {model.left} and base {model.base}",
+        )
+        see_that_somebody_goes_on(bench)
+
+
+# --- from one model to the next ---------------------------------------------------------------------------------------
+
+
+def _carry_on(bench: Bench, model: ModelJob) -> None:
+    """Preset X for the oriented photograph's new place on the left, and Y and Z where its by and bz run out.
+
+    With the base changed over, its centre comes from X = bx to X = 0: what stands in X = 0 has to read bx more.
+    """
+    seat, who, n = bench.seat, bench.crew.everybody, model.left_projector
+    seat.shift_counter(who, "X", seat.elements(who, ["bx"])["bx"])
+    for name, axis, units in ((f"by{n}", "Y", -1.0), (f"bz{n}", "Z", seat.units_per_mm)):
+        element = seat.manual.elements[name]
+        counts = seat.elements(who, [name])[name]
+        far = np.abs(counts - element.zero) > SHARE_OF_RANGE * (element.high - element.low) / 2.0
+        if far.any():
+            seat.shift_counter(who[far], axis, units * (counts - element.zero)[far])
+            seat.set_elements(who[far], {name: np.full(int(far.sum()), element.zero)})
+
+
+def _set_as_its_neighbour(bench: Bench, model: ModelJob) -> None:
+    """Start the new photograph from the tilts and the by and bz of the oriented one, and bx from the plan."""
+    seat, who = bench.seat, bench.crew.everybody
+    left, right = model.left_projector, model.right_projector
+    names = ("phi", "omega", "by", "bz")
+    shown = seat.elements(who, [f"{name}{left}" for name in names])
+    within = {}
+    for name in names:
+        element = seat.manual.elements[f"{name}{right}"]
+        within[f"{name}{right}"] = np.clip(shown[f"{name}{left}"], element.low, element.high)
+    seat.set_elements(who, {"bx": np.full(who.size, bench.job.plan.bx)} | within)
+
+
+def _oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
+    plan, who = bench.job.plan, bench.crew.everybody
+    tolerated = 1e-3 * plan.tolerated_parallax_um * plan.projection_height / bench.job.certificate.c
+    return relative_orientation(bench, who, model, "dependent", plan.case, plan.parallax_readings, plan.bx, tolerated)
+
+
+# --- scale ------------------------------------------------------------------------------------------------------------
+
+
+def _scaled(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]) -> Array:
+    """Change the base until common points read the heights that they had; return the factor ``(sessions,)``.
+
+    by and bz of the new photograph follow, so that the base keeps its direction and the parallaxes stay cleared.
+    """
+    crew, seat = bench.crew, bench.seat
+    left, right = model.left_projector, model.right_projector
+    factor = np.ones(crew.sessions)
+    names = [name for name in map(model.standard_points.get, "135") if name is not None and name in before]
+    for number in range(1, MOST_SCALINGS + 1):
+        bench.begin_round(who, number)
+        readings = bench.measure(who, names)[:, :, who]
+        wanted = np.stack([before[name][:, who] for name in names], axis=1)
+        bench.compute(who)
+        settings = seat.elements(who, ["bx", *(f"{name}{n}" for name in ("by", "bz") for n in (left, right))])
+        depths = [
+            settings[f"bz{left}"] + np.stack([seat.place(who, each[:, i])[2] for i in range(len(names))])
+            for each in (readings, wanted)
+        ]
+        larger = np.nanmean(depths[1] / depths[0], axis=0)
+        turning = np.abs(larger - 1.0) * np.abs(settings["bx"]) > LEAST_COUNT / 2.0
+        crew.give_up(who[~np.isfinite(larger)], f"{model.name}: no common point carries the scale on")
+        turning &= crew.goes_on(who)
+        if not turning.any():
+            break
+        new = {"bx": larger * settings["bx"]}
+        for name in ("by", "bz"):
+            fixed = settings[f"{name}{left}"]
+            new[f"{name}{right}"] = fixed + larger * (settings[f"{name}{right}"] - fixed)
+        who = who[turning]
+        seat.set_elements(who, {name: values[turning] for name, values in new.items()})
+        factor[who] *= larger[turning]
+    return factor
+
+
+# --- refinement -------------------------------------------------------------------------------------------------------
+
+
+def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> RelativeOrientations:
+    """Look at what is left at all standard points and correct the new photograph while it falls.
+
+    The eye sees finer than by counts; the settings with the smallest residual parallaxes stand.
+    """
+    crew, seat = bench.crew, bench.seat
+    unknowns = unknowns_of("dependent", model)
+    points = [model.standard_points[label] for label in model.all_positions()]
+    best = {name: np.zeros(crew.sessions) for name in unknowns}
+    least = np.full(crew.sessions, np.inf)
+    everybody = who = crew.everybody
+    for number in range(1, MOST_REFINEMENTS + 1):
+        bench.begin_round(who, number)
+        seen = bench.parallaxes_seen(who, points)
+        who = crew.still(who)
+        who = who[seen.apart[who] == None]  # noqa: E711 - elementwise
+        rms = np.sqrt((seen.p**2).mean(axis=0))
+        now = spread(seat.elements(who, unknowns), who, crew.sessions)
+        better = who[rms[who] < least[who]]
+        falling = who[rms[who] < STILL_FALLING * least[who]]
+        least[better] = rms[better]
+        for name, kept in best.items():
+            kept[better] = now[name][better]
+        who = falling
+        if not who.size or number == MOST_REFINEMENTS:
+            break
+        corrections = _corrections(bench, who, model, seen.places[:, :, who], seen.p[:, who], unknowns)
+        seat.set_elements(who, {name: now[name][who] + corrections[name] for name in unknowns})
+    _set_changed(bench, crew.still(everybody), best)
+    plan = bench.job.plan
+    tolerated = 1e-3 * plan.tolerated_parallax_um * plan.projection_height / bench.job.certificate.c
+    everybody = crew.still(everybody)
+    bench.begin_round(everybody, MOST_REFINEMENTS + 1)
+    return assessed(bench, everybody, model, found, model.all_positions(), plan.parallax_readings, tolerated)
+
+
+def _corrections(
+    bench: Bench, who: Who, model: ModelJob, places: Array, parallaxes: Array, unknowns: Sequence[str]
+) -> dict[str, Array]:
+    """Return corrections ``(m,)`` of the new photograph's elements, gon and mm."""
+    hands = [f"{name[:-1]}2" for name in unknowns]
+    left = stand_of(bench, who, model.left_projector, np.zeros(who.size))
+    right = stand_of(bench, who, model.right_projector, bench.seat.elements(who, ["bx"])["bx"])
+    bench.compute(who)
+    try:
+        found = element_corrections(parallaxes, places * np.array([1.0, 1.0, -1.0])[:, None, None], left, right, hands)
+    except Undetermined as undetermined:
+        bench.crew.give_up(who, f"{model.name}: {undetermined}")
+        return {name: np.zeros(who.size) for name in unknowns}
+    return {
+        name: values if name[:2] in ("by", "bz") else values / GON
+        for name, values in zip(unknowns, found.unknowns, strict=True)
+    }
+
+
+def _set_changed(bench: Bench, who: Who, wanted: Mapping[str, Array]) -> None:
+    for name, values in wanted.items():
+        if not who.size:
+            return
+        off = values[who] - bench.seat.elements(who, [name])[name]
+        changed = who[np.abs(wrapped(off) if name.startswith("kappa") else off) > LEAST_COUNT / 2.0]
+        if changed.size:
+            bench.seat.set_elements(changed, {name: values[changed]})

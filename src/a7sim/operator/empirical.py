@@ -1,0 +1,470 @@
+"""Empirical relative orientation: the y-parallax cleared at one point after the other, each with one element.
+
+One-projector (dependent): by, kappa, bz, phi, omega of the projector with the new photograph at 2, 1, 4, 3, 6.
+Swing-swing (independent): kappa', kappa", phi', phi", omega. Each of the first four points is cleared with an element
+that leaves the points before it clear. The last one is not so lucky: a turn of omega alone that clears it is too
+small, since part of what omega did has been taken up by the other four; it has to be made n times (geometry.md,
+Observation errors), and the four points are cleared again.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, parallax_coefficients, rotation
+from a7sim.manual import COUNTER_DECIMALS, LEAST_COUNT
+from a7sim.operator.bench import Bench
+from a7sim.operator.crew import Who
+from a7sim.operator.job import ModelJob
+from a7sim.operator.relative import RelativeOrientations, Rounds, assessed, spread, stand_of, unknowns_of
+from a7sim.reduction import Stand
+from a7sim.standard_points import CASES, FIGURE_4_1, PLACES, POSITIONS
+
+MOST_ROUNDS = 15
+MOST_PASSES = 5
+"""Over the first four points in a round."""
+
+VISIBLE_SIGMAS = 2.5
+"""What is smaller than so many standard deviations of one setting is not seen as a parallax."""
+
+VISIBLE_SIGMAS_AT_LAST = 1.5 * 6.0**0.5
+"""At the last point the errors of all five come together: twice those of 1 and 2, or of 2, once the others'."""
+
+LARGEST_OVER_CORRECTION = 10.0
+"""Beyond it the last point says next to nothing of omega."""
+
+SMALL_COUNTS = 3.0
+"""A turn of omega, n times as far as would clear, that is smaller than so many counts is made once."""
+
+TRIES = 4
+"""At a point whose images are too far apart, or part while a long turn is made."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A position (thesis fig. 4.1) and the element with which its parallax is cleared."""
+
+    position: str
+    element: str
+
+
+def over_correction(z: Array, d: Array) -> Array:
+    """Return how many times the turn of omega that clears the last point has to be made, by z and d = |y| in mm.
+
+    Over flat ground, points 1 to 4 clear: omega off by w leaves ``2 w d^2 / z`` at the last point, and omega alone
+    changes that by ``w z (1 + d^2 / z^2)`` (T 2.32).
+    """
+    return np.asarray((1.0 + (z / d) ** 2) / 2.0)
+
+
+def over_correction_by_coefficients(coefficients: Array) -> Array:
+    """Return the same for any five points, from the coefficients ``(5, 5, ...)`` of five elements (rows) at them.
+
+    The last element's own coefficient at the last point, over what is left of it when the other four elements keep
+    the other four points clear. Not a number where they cannot.
+    """
+    first = np.moveaxis(coefficients[:4, :4], (0, 1), (-1, -2))
+    by_last = np.moveaxis(coefficients[4, :4], 0, -1)[..., None]
+    determined = np.linalg.cond(first) < 1e6
+    first = np.where(determined[..., None, None], first, np.eye(4))
+    following = np.moveaxis(-np.linalg.solve(first, by_last)[..., 0], -1, 0)
+    own = coefficients[4, 4]
+    left = own + (coefficients[:4, 4] * following).sum(axis=0)
+    return np.asarray(np.where(determined & (left != 0.0), own / np.where(left == 0.0, 1.0, left), np.nan))
+
+
+def clearing_coefficients(points: Array, left: Stand, right: Stand) -> Array:
+    """Return what the ten elements add to the y-parallax at points ``(3, n, m)``, in the order of PARALLAX_ELEMENTS.
+
+    mm a radian or mm a mm, for any tilt, of the parallax that is seen when the mark has followed in height: that of
+    T 2.32 less what the x-parallax takes of it where the base runs aslant. The parallax is
+    ``b . (r1 x r2) / (x1 z2 - z1 x2)`` with the rays r1 and r2 to the point.
+    """
+    r1, r2 = points - left.centre[:, None], points - right.centre[:, None]
+    base = np.broadcast_to((right.centre - left.centre)[:, None], points.shape)
+    across = r1[0] * r2[2] - r1[2] * r2[0]
+    normal = np.cross(r1, r2, axis=0) / across
+    sides = ((left, r1, np.cross(r2, base, axis=0) / across), (right, r2, np.cross(base, r1, axis=0) / across))
+    rows: dict[str, Array] = {"by1": normal[1], "by2": -normal[1], "bz1": -normal[2], "bz2": normal[2]}
+    for hand, (stand, ray, lever) in enumerate(sides, start=1):
+        omega, phi, kappa = stand.angles
+        axes = {
+            "kappa": rotation(omega, phi, kappa)[:, 2],
+            "phi": rotation(omega, np.zeros_like(omega), np.zeros_like(omega))[:, 1],
+            "omega": np.broadcast_to(np.array([1.0, 0.0, 0.0])[:, None], stand.angles.shape),
+        }
+        for name, axis in axes.items():
+            turned = np.cross(np.broadcast_to(axis[:, None], ray.shape), ray, axis=0)
+            rows[f"{name}{hand}"] = (turned * lever).sum(axis=0)
+    return np.array([rows[name] for name in PARALLAX_ELEMENTS])
+
+
+def steps_of(method: str, model: ModelJob, usable: Sequence[str]) -> tuple[Step, ...] | None:
+    """Return where to clear with what, given the positions that can be seen; none where they do not suffice.
+
+    Two points on the base line, two in one outer row and one in the other, as near the corners as there are any: with
+    6 missing omega is turned at 5, with 3 or 4 missing the rows change places.
+    """
+    top, base, bottom = (_ends(row, usable) for row in FIGURE_4_1)
+    pair, last = (top, bottom) if _apart(top) else (bottom, top)
+    if base is None or pair is None or last is None or not (_apart(base) and _apart(pair)):
+        return None
+    left, right, n = model.left_projector, model.right_projector, model.right_projector
+    if method == "dependent":
+        return (
+            Step(base[1], f"by{n}"),
+            Step(base[0], f"kappa{n}"),
+            Step(pair[1], f"bz{n}"),
+            Step(pair[0], f"phi{n}"),
+            Step(last[1], f"omega{n}"),
+        )
+    first = sorted([Step(base[1], f"kappa{left}"), Step(base[0], f"kappa{right}")], key=lambda step: step.element)
+    second = sorted([Step(pair[1], f"phi{left}"), Step(pair[0], f"phi{right}")], key=lambda step: step.element)
+    return (*first, *second, Step(last[1], "omega1"))
+
+
+def _ends(row: str, usable: Sequence[str]) -> tuple[str, str] | None:
+    there = [label for label in row if label in usable]
+    return (there[0], there[-1]) if there else None
+
+
+def _apart(ends: tuple[str, str] | None) -> bool:
+    """Return whether two points are half a base apart or more."""
+    return ends is not None and PLACES[ends[1]][0] - PLACES[ends[0]][0] >= 0.5
+
+
+def set_off(bench: Bench, who: Who, model: ModelJob, method: str, most: float) -> None:
+    """Set the elements that a method turns off by anything up to so many gon, alike on both sides.
+
+    A component of the base by as much as tilts the base by that angle.
+    """
+    unknowns = unknowns_of(method, model)
+    shares = np.vectorize(math.erf)(bench.crew.errors(who, 0.5**0.5, (len(unknowns),)))
+    now = bench.seat.elements(who, unknowns)
+    base = np.abs(bench.seat.bx(who)) * GON
+    bench.crew.remark(who, f"{model.name}: elements set off by up to {most:g} gon, for practice")
+    bench.seat.set_elements(
+        who,
+        {
+            name: now[name] + most * share[who] * (base if name.startswith("b") else 1.0)
+            for name, share in zip(unknowns, shares, strict=True)
+        },
+    )
+
+
+def empirical_orientation(
+    bench: Bench,
+    who: Who,
+    model: ModelJob,
+    method: str,
+    case: str,
+    over_corrected: str | float,
+    readings: int,
+    tolerated_rms: float,
+) -> RelativeOrientations:
+    """Clear the y-parallaxes of a model point by point, in rounds, until the last point stays clear.
+
+    In a round the first four points are cleared until they are seen to be clear; then omega is turned at the last one
+    n times as far as would clear it, n 'computed' from the places of the points or given. Points that are not
+    pricked on both prints, or whose images cannot be brought together, are done without where others of the
+    case do. Those whose residual parallaxes at all standard points in the end have a larger rms than tolerated, in
+    mm, give up.
+    """
+    crew = bench.crew
+    labels = model.points_of_case(case)
+    waiting = _with_pricked(bench, who, model, labels)
+    done: list[tuple[Who, RelativeOrientations]] = []
+    while waiting:
+        missing, group = waiting.popitem()
+        usable = [label for label in labels if label not in missing]
+        steps = steps_of(method, model, usable)
+        if steps is None:
+            crew.give_up(group, _too_few(model, missing))
+            continue
+        clearing = _Clearing(bench, model, steps, _checks(usable, steps), over_corrected)
+        ended = clearing.run(group)
+        for lost, label in clearing.lost:
+            waiting[missing | {label}] = np.union1d(waiting.get(missing | {label}, lost), lost)
+        found = RelativeOrientations(method, case, clearing.rounds, clearing.rough, {}, {}, {}, "empirical")
+        done.append((ended, _assessed(bench, ended, model, found, missing, readings, tolerated_rms)))
+    return _merged(done, method, case, crew.sessions)
+
+
+def _checks(usable: Sequence[str], steps: Sequence[Step]) -> list[str]:
+    """Return the positions of case A that are not needed."""
+    return [label for label in usable if label in CASES["A"] and label not in {step.position for step in steps}]
+
+
+def _assessed(
+    bench: Bench,
+    who: Who,
+    model: ModelJob,
+    found: RelativeOrientations,
+    missing: frozenset[str],
+    readings: int,
+    tolerated_rms: float,
+) -> RelativeOrientations:
+    if not who.size:
+        return found
+    bench.begin_round(who, len(found.rounds) + 1)
+    there = [label for label in model.all_positions() if label not in missing]
+    there = [label for label in there if bench.pricked(who, model.standard_points[label]).all()]
+    return assessed(bench, who, model, found, there, readings, tolerated_rms)
+
+
+def _with_pricked(bench: Bench, who: Who, model: ModelJob, labels: Sequence[str]) -> dict[frozenset[str], Who]:
+    """Return the sessions by what positions are not in their model, or not pricked on both their prints."""
+    absent = frozenset(CASES["A"]) - frozenset(labels)
+    pricked = {label: bench.pricked(who, model.standard_points[label]) for label in labels}
+    groups: dict[frozenset[str], list[int]] = {}
+    for i, session in enumerate(who):
+        missing = absent | {label for label, there in pricked.items() if not there[i]}
+        groups.setdefault(missing, []).append(int(session))
+    return {missing: np.array(sessions, dtype=np.intp) for missing, sessions in groups.items()}
+
+
+def _too_few(model: ModelJob, missing: frozenset[str]) -> str:
+    return (
+        f"{model.name}: {', '.join(sorted(missing))} of the standard points cannot be used: there must be two points "
+        "on the base line, two in one of the outer rows and one in the other to clear a model"
+    )
+
+
+def _merged(
+    groups: Sequence[tuple[Who, RelativeOrientations]], method: str, case: str, sessions: int
+) -> RelativeOrientations:
+    """Return the orientations of all groups in one."""
+    elements: dict[str, Array] = {}
+    residuals: dict[str, Array] = {}
+    places: dict[str, Array] = {}
+    for who, found in groups:
+        for into, values, empty in (
+            (elements, found.elements, np.zeros(sessions)),
+            (residuals, found.residuals, np.full(sessions, np.nan)),
+            (places, found.places, np.full((3, sessions), np.nan)),
+        ):
+            for name, each in values.items():
+                into.setdefault(name, empty.copy())[..., who] = each[..., who]
+    rounds = [each for _, found in groups for each in found.rounds]
+    rough = np.sum([found.rough_rounds for _, found in groups], axis=0, dtype=np.intp)
+    return RelativeOrientations(
+        method, case, rounds, np.broadcast_to(rough, sessions), elements, residuals, places, "empirical"
+    )
+
+
+class _Clearing:
+    """The rounds of those sessions that clear with the same elements at the same points."""
+
+    def __init__(
+        self, bench: Bench, model: ModelJob, steps: Sequence[Step], checks: Sequence[str], over_corrected: str | float
+    ) -> None:
+        self.bench = bench
+        self.crew = bench.crew
+        self.model = model
+        self.steps = steps
+        self.checks = checks
+        self.rounds: list[Rounds] = []
+        self.rough = np.zeros(self.crew.sessions, dtype=np.intp)
+        self.lost: list[tuple[Who, str]] = []
+        """Who could not bring the images together, and at which position."""
+        self._over_corrected = over_corrected
+        self._small_before = np.zeros(self.crew.sessions, dtype=bool)
+        self._found = {label: np.full(self.crew.sessions, np.nan) for label in self._labels()}
+        self._places = np.zeros((3, len(steps), self.crew.sessions))
+        self._visible = 1e-3 * self.crew.observer.parallax_um * bench.job.plan.projection_height / bench.seat.c
+
+    def run(self, who: Who) -> Who:
+        """Go round until the last point is found clear; return those who came to an end."""
+        ended = who[:0]
+        while who.size:
+            self.bench.begin_round(who, len(self.rounds) + 1)
+            settings = spread(self.bench.seat.elements(who, self._elements()), who, self.crew.sessions)
+            who = self._clear_first_four(who)
+            if not who.size:
+                break
+            self._look_at_checks(who)
+            who, turning, n = self._over_correct(who)
+            self._close_round(who, turning, settings, n)
+            if len(self.rounds) == MOST_ROUNDS:
+                ended = np.union1d(ended, self._clear_first_four(turning))
+                turning = turning[:0]
+            ended = np.union1d(ended, np.setdiff1d(who, np.flatnonzero(n)))
+            who = self._going(turning)
+        return self._going(ended)
+
+    def _labels(self) -> list[str]:
+        used = {*(step.position for step in self.steps), *self.checks}
+        return [label for label in POSITIONS if label in used]
+
+    def _elements(self) -> list[str]:
+        return [step.element for step in self.steps]
+
+    def _going(self, who: Who) -> Who:
+        who = self.crew.still(np.asarray(who, dtype=np.intp))
+        for lost, _ in self.lost:
+            who = np.setdiff1d(who, lost)
+        return who
+
+    # --- a round --------------------------------------------------------------------------------------
+
+    def _clear_first_four(self, who: Who) -> Who:
+        """Clear them over and over until on arriving each is seen to be clear."""
+        clearing = who
+        for _ in range(MOST_PASSES):
+            again = clearing[:0]
+            for place, step in enumerate(self.steps[:4]):
+                cleared, gain = self._clear(self._going(clearing), place, step)
+                seen = np.abs(self._found[step.position][cleared])
+                unclear = seen > VISIBLE_SIGMAS * self._visible + 0.5 * LEAST_COUNT * np.abs(gain[cleared])
+                again = np.union1d(again, cleared[unclear])
+            clearing = self._going(again)
+            if not clearing.size:
+                break
+        return self._going(who)
+
+    def _over_correct(self, who: Who) -> tuple[Who, Who, Array]:
+        """Turn omega n times as far as clears the last point; return who is there, who had to turn, and n."""
+        step, threshold = self.steps[-1], VISIBLE_SIGMAS_AT_LAST * self._visible
+        turns = np.zeros((2, self.crew.sessions))
+        who, _ = self._clear(who, len(self.steps) - 1, step, threshold, turns)
+        n = np.zeros(self.crew.sessions)
+        if not who.size:
+            return who, who, n
+        n[who] = self._times(who)
+        who = self._going(who)
+        before, turn = turns
+        n[self._near_enough(who, np.abs(n * turn))] = 0.0
+        wanted = np.round(before + n * turn, COUNTER_DECIMALS)
+        off = who[self.bench.seat.elements(who, [step.element])[step.element] != wanted[who]] if who.size else who
+        if off.size:
+            self.bench.seat.set_elements(off, {step.element: wanted[off]})
+        turning = who[wanted[who] != np.round(before[who], COUNTER_DECIMALS)]
+        n[np.setdiff1d(np.arange(self.crew.sessions), turning)] = 0.0
+        return self._going(who), self._going(turning), n
+
+    def _near_enough(self, who: Who, turns: Array) -> Who:
+        """Return for whom another turn ``(sessions,)`` of omega is of no use: so small a one was made before.
+
+        The counts of the other elements leave at the last point what a turn or two of the last drum would clear.
+        """
+        small = who[turns[who] <= SMALL_COUNTS * LEAST_COUNT]
+        again = small[self._small_before[small]]
+        self._small_before[small] = True
+        return again
+
+    def _times(self, who: Who) -> Array:
+        """Return the over-correction ``(m,)``: as given, or from the places of the five points."""
+        if not isinstance(self._over_corrected, str):
+            return np.full(who.size, float(self._over_corrected))
+        n = over_correction_by_coefficients(self._coefficients(who))
+        hopeless = ~((n > 0.0) & (n < LARGEST_OVER_CORRECTION))
+        self.crew.give_up(
+            who[hopeless],
+            f"{self.model.name}: the heights of the points leave omega open: what {self.steps[-1].element} does at "
+            f"{self.steps[-1].position} the other elements take up again (critical surface)",
+        )
+        return np.where(hopeless, 0.0, n)
+
+    def _look_at_checks(self, who: Who) -> None:
+        for label in self.checks:
+            seen = self.bench.parallaxes_seen(who, [self.model.standard_points[label]])
+            together = self.crew.still(who)
+            apart = together[seen.apart[together] != None]  # noqa: E711 - elementwise
+            self._found[label][together] = seen.p[0, together]
+            self._found[label][apart] = np.nan
+
+    def _close_round(self, who: Who, turning: Who, settings: Mapping[str, Array], n: Array) -> None:
+        parallaxes = {label: p.copy() for label, p in self._found.items()}
+        squares = np.square(list(parallaxes.values()))
+        rms = np.sqrt(np.nansum(squares, axis=0) / np.maximum(1, (~np.isnan(squares)).sum(axis=0)))
+        nothing = np.zeros(self.crew.sessions)
+        self.rounds.append(Rounds(who, settings, parallaxes, nothing, rms, turning, {}, n))
+
+    # --- a point --------------------------------------------------------------------------------------
+
+    def _clear(
+        self, who: Who, place: int, step: Step, unless_within: float = 0.0, turns: Array | None = None
+    ) -> tuple[Who, Array]:
+        """Clear a point, its images brought together first where they are too far apart; return who did, and gains."""
+        point, cleared, gain = self.model.standard_points[step.position], who[:0], np.zeros(self.crew.sessions)
+        parted = who[:0]
+        for tries_left in reversed(range(TRIES)):
+            if not who.size:
+                break
+            done = self.bench.clear(who, point, step.element, partial(self._gain, step.element), unless_within)
+            self._found[step.position][done.who] = done.found[done.who]
+            self._places[:, place, done.who] = done.place[:, done.who]
+            gain[done.who] = done.gain[done.who]
+            if turns is not None:
+                turns[:, done.who] = [done.before[done.who], done.turn[done.who]]
+            cleared = np.union1d(cleared, done.who)
+            who = np.setdiff1d(self.crew.still(who), done.who)
+            parted = np.setdiff1d(who, done.apart)
+            if tries_left:
+                for session in np.intersect1d(who, done.apart):
+                    self._bring_together(np.array([session]), point, step)
+                who = self.crew.still(who)
+        self.crew.give_up(
+            self.crew.still(parted),
+            f"{self.model.name}: {point} cannot be cleared with {step.element}: that comes to its end, or images part",
+        )
+        who = self.crew.still(who)
+        if who.size:
+            self.crew.remark(who, f"{self.model.name}: the images of {point} cannot be fused: done without it")
+            self.lost.append((who, step.position))
+        return self.crew.still(np.asarray(cleared, dtype=np.intp)), gain
+
+    def _bring_together(self, one: Who, point: str, step: Step) -> None:
+        """Turn an element by what the Y readings of each eye alone differ by."""
+        bench, seat, element = self.bench, self.bench.seat, step.element
+        self.rough[one] += 1
+        self.crew.remark(
+            one, f"{self.model.name}: the images of {point} are too far apart: {element} by each eye alone"
+        )
+        level = float(seat.counters(one)[2, 0])
+        readings = [bench.point_with(one, hand, [point], level) for hand in (1, 2)]
+        if not self.crew.still(one).size:
+            return
+        left, right = (seat.in_frame(one, each[:, :, one], np.array([level]))[:, 0] for each in readings)
+        base = seat.bx(one)
+        place = left * base / (left[0] - right[0] + base)
+        parallax = (left[1] - right[1]) * base / (left[0] - right[0] + base)
+        limits = seat.manual.elements[element]
+        wanted = seat.elements(one, [element])[element] - parallax / self._gain(element, one, place)
+        seat.set_elements(one, {element: wanted if limits.endless else np.clip(wanted, limits.low, limits.high)})
+
+    # --- coefficients ---------------------------------------------------------------------------------
+
+    def _by_hand(self, element: str) -> str:
+        return f"{element[:-1]}{self.model.hand_of(int(element[-1]))}"
+
+    def _gain(self, element: str, who: Who, place: Array) -> Array:
+        """Return what one unit of an element's counter adds to the parallax ``(m,)`` at places ``(3, m)``, mm.
+
+        While it is turned, that is, and the mark is still to follow in height.
+        """
+        left, right = self._stands(who)
+        point = _in_frame(place)
+        row = PARALLAX_ELEMENTS.index(self._by_hand(element))
+        coefficients = parallax_coefficients(point, point, left.centre, right.centre, left.angles, right.angles)[row]
+        return np.asarray(coefficients * (1.0 if element.startswith("b") else GON))
+
+    def _coefficients(self, who: Who) -> Array:
+        """Return those of the five elements at the five points ``(5, 5, m)``, mm a radian or mm a mm."""
+        rows = [PARALLAX_ELEMENTS.index(self._by_hand(name)) for name in self._elements()]
+        return clearing_coefficients(_in_frame(self._places[:, :, who]), *self._stands(who))[rows]
+
+    def _stands(self, who: Who) -> tuple[Stand, Stand]:
+        model = self.model
+        return (
+            stand_of(self.bench, who, model.left_projector, np.zeros(who.size)),
+            stand_of(self.bench, who, model.right_projector, self.bench.seat.bx(who)),
+        )
+
+
+def _in_frame(places: Array) -> Array:
+    """Return places ``(3, ...)``, z downward, with Z upward."""
+    return np.array([places[0], places[1], -places[2]])

@@ -1,0 +1,207 @@
+"""The grid test: a plate in each projector in turn, its crosses pointed at, and the projector's errors computed."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from a7sim.geometry import GON, Array
+from a7sim.manual import RIGHT_FITTINGS, Variant
+from a7sim.operator.bench import Bench
+from a7sim.operator.crew import Crew, Who
+from a7sim.operator.interior import centre_picture
+from a7sim.operator.job import Job, ModelJob
+from a7sim.operator.line_hands import LineHands
+from a7sim.operator.person import Person
+from a7sim.operator.plate import Crosses, lie_of_plate, places_of, point_at_crosses, prints_of
+from a7sim.operator.seat import side, wrapped
+from a7sim.reduction import Elements, PlateLie, ProjectorTest, grid_test
+from a7sim.scenario import Camera, GridPlate, Plan
+
+TIMES_REGISTERED = 4
+"""Each of the plate's fiducials, before the pointings: principal point and swing are no better than these."""
+
+MARGIN_MM = 5.0
+"""Kept from the ends of the carriages."""
+
+WHOLE_LEVELS_MM = 5.0
+
+FARTHEST_OVER_NEAREST = 2.0
+"""Of the levels below the centre, where the carriages allow it."""
+
+PREPARED_HEIGHT_MM, PREPARED_BASE_MM = 300.0, 10.0
+"""To begin with; the test is made with bx at zero."""
+
+
+@dataclass(frozen=True)
+class GridTestOrder:
+    """What is ordered: a plate, so many of its crosses, so many levels of Z, so many pointings at each."""
+
+    camera: Camera
+    """Its collimating marks are in the carriers, and its principal distance is set."""
+    plate: GridPlate
+    crosses: int = 25
+    levels: int = 2
+    pointings: int = 2
+    polarity: str = "positive"
+    """How the plate is laid."""
+
+    @property
+    def job(self) -> Job:
+        """The job sheet for it: counters in mm of the instrument frame."""
+        plan = Plan(bx=PREPARED_BASE_MM, projection_height=PREPARED_HEIGHT_MM, height_gear=1.0, plan_gear="1-1-1")
+        return Job(self.plate.certificate(self.camera), plan, (), self.plate)
+
+    @property
+    def chosen(self) -> Crosses:
+        """The crosses pointed at. Raises Mistake for a number of them that do not lie evenly on the plate."""
+        return self.plate.some_crosses(self.crosses)
+
+    def heights(self, manual: Variant) -> list[float]:
+        """Return the levels in mm of the frame, from the highest to the lowest, as far apart as the carriages allow."""
+        return level_heights(manual, self.camera.c, float(np.abs(places_of(self.chosen)).max()), self.levels)
+
+
+def level_heights(manual: Variant, c: float, outermost: float, levels: int) -> list[float]:
+    """Return levels of Z in mm of the frame where crosses so far out on a plate can be reached; one is the middle."""
+    reach = min(abs(end) for axis in "XY" for end in manual.carriages[axis]) - MARGIN_MM
+    lowest, highest = manual.carriages["Z"]
+    farthest = min(reach * c / outermost, -lowest - MARGIN_MM)
+    nearest = max(farthest / FARTHEST_OVER_NEAREST, -highest + MARGIN_MM)
+    far = math.floor(farthest / WHOLE_LEVELS_MM) * WHOLE_LEVELS_MM
+    near = min(math.ceil(nearest / WHOLE_LEVELS_MM) * WHOLE_LEVELS_MM, far)
+    wanted = np.linspace(near, far, levels) if levels > 1 else np.array([(near + far) / 2.0])
+    return [-float(each) for each in np.round(wanted, 2)]
+
+
+@dataclass(frozen=True)
+class ProjectorSheet:
+    """A projector's grid test; arrays ``(..., m)`` have those who came to the end of it as their last axis."""
+
+    projector: int
+    who: Who
+    counters: Mapping[str, Array]
+    """What the counters of its elements and of bx show, gon and mm."""
+    heights: tuple[float, ...]
+    crosses: Crosses
+    test: ProjectorTest
+    pointing: Array
+    """Standard deviation of one pointing, from its repetitions, mm at photo scale; nan of one."""
+    finished_at: Array
+    """Simulated seconds."""
+
+
+def calibrate(
+    person: Person,
+    order: GridTestOrder,
+    tick: Callable[[], None] = lambda: None,
+    begins: Callable[[str], None] = lambda _: None,
+) -> Iterator[ProjectorSheet]:
+    """Yield both projectors as one person tests them. Raises DoesNotFit when one cannot be tested."""
+    yield from calibrated(Bench(Crew.of_one(person), LineHands(person), order.job, tick), order, begins)
+
+
+def calibrated(
+    bench: Bench, order: GridTestOrder, begins: Callable[[str], None] = lambda _: None
+) -> Iterator[ProjectorSheet]:
+    """Yield the left and the right projector as a crew tests them, each session at its own instrument."""
+    crew = bench.crew
+    crew.begin(crew.everybody, "", "preparation")
+    bench.seat.prepare(crew.everybody)
+    _set_fittings(bench, order.polarity)
+    for hand in (1, 2):
+        form = f"grid test, {side(hand)} projector"
+        begins(form)
+        crew.begin(crew.everybody, order.plate.name, form)
+        bench.hands.note(crew.everybody, form)
+        yield _tested(bench, order, hand)
+        bench.hands.unload(crew.everybody, hand)
+
+
+def _set_fittings(bench: Bench, polarity: str) -> None:
+    seat, who = bench.seat, bench.crew.everybody
+    right = {
+        name: put for name, put in RIGHT_FITTINGS[polarity, "inside"].as_words().items() if name in seat.manual.fittings
+    }
+    seat.spend_setting(who, 1 + len(right))
+    bench.hands.set_base_mode(who, "inside")
+    for name, position in right.items():
+        bench.hands.set_fitting(who, name, position)
+    seat.see_that_it_obeyed(who, "setting base inside and its fittings")
+
+
+def _tested(bench: Bench, order: GridTestOrder, hand: int) -> ProjectorSheet:
+    crew, seat, plate = bench.crew, bench.seat, order.plate
+    model = ModelJob(f"{plate.name} in projector {hand}", plate.name, plate.name, "inside", order.polarity, {})
+    certificate = bench.job.certificate
+    _set_to_zeros(bench, hand)
+    centre_picture(bench, crew.everybody, hand, plate.name, certificate)
+    lie = lie_of_plate(bench, crew.everybody, hand, certificate, TIMES_REGISTERED)
+    bench.begin(crew.everybody, model, {hand: prints_of(bench, crew.everybody, hand)})
+    heights = order.heights(seat.manual)
+    sets = np.stack([_pointings(bench, order, hand, height) for height in heights], axis=2)
+    who = crew.everybody
+    bench.compute(who)
+    counters = _counters(bench, who, hand)
+    means = sets.mean(axis=0)[..., who]
+    its_lie = PlateLie(*(getattr(lie, field.name)[who] for field in fields(lie)))
+    test = grid_test(places_of(order.chosen), means, heights, _elements(seat.manual, counters, hand), its_lie)
+    enlarged = -np.array(heights)[:, None, None] / seat.c
+    pointing = _repeatability(sets[..., who], enlarged)
+    return ProjectorSheet(hand, who, counters, tuple(heights), order.chosen, test, pointing, crew.seconds[who].copy())
+
+
+def _set_to_zeros(bench: Bench, projector: int) -> None:
+    """Set a projector's elements and bx to their counter zeros, and the camera's principal distance."""
+    seat, who = bench.seat, bench.crew.everybody
+    elements = seat.manual.elements
+    zeros = {
+        name: np.full(who.size, element.zero)
+        for name, element in elements.items()
+        if name == "bx" or (name[-1] == str(projector) and name != f"c{projector}")
+    }
+    seat.set_elements(who, zeros | {f"c{projector}": np.full(who.size, bench.job.certificate.c)})
+
+
+def _pointings(bench: Bench, order: GridTestOrder, hand: int, height: float) -> Array:
+    """Return places of the mark ``(p, 2, n, sessions)`` in mm of the frame, pointed at all crosses p times."""
+    crew, seat = bench.crew, bench.seat
+    places = np.zeros((order.pointings, 2, len(order.chosen), crew.sessions))
+    level = seat.units_per_mm * height
+    for i in range(order.pointings):
+        readings = point_at_crosses(bench, crew.everybody, hand, order.chosen, level)
+        who = crew.everybody
+        places[i][:, :, who] = seat.in_frame(who, readings[:, :, who], np.full(who.size, level))[:2]
+    return places
+
+
+def _counters(bench: Bench, who: Who, projector: int) -> Mapping[str, Array]:
+    names = [name for name in bench.seat.manual.elements if name == "bx" or name[-1] == str(projector)]
+    return bench.seat.elements(who, names)
+
+
+def _elements(manual: Variant, counters: Mapping[str, Array], projector: int) -> Elements:
+    """Return what the counters say of a projector, in mm and radians from the zeros; base in."""
+
+    def tilt(name: str) -> Array:
+        return (counters[f"{name}{projector}"] - manual.elements[f"{name}{projector}"].zero) * GON
+
+    return Elements(
+        c=counters[f"c{projector}"],
+        omega=tilt("omega"),
+        phi=tilt("phi"),
+        kappa=wrapped(counters[f"kappa{projector}"]) * GON,
+        bx=np.zeros_like(counters["bx"]) if projector == 1 else counters["bx"],
+        by=counters[f"by{projector}"],
+        bz=counters[f"bz{projector}"],
+    )
+
+
+def _repeatability(sets: Array, enlarged: Array) -> Array:
+    """Return the standard deviation ``(m,)`` of a pointing at photo scale from p sets ``(p, 2, k, n, m)``."""
+    p = sets.shape[0]
+    if p == 1:
+        return np.full(sets.shape[-1], np.nan)
+    off = (sets - sets.mean(axis=0)) / enlarged
+    return np.asarray(np.sqrt((off**2).sum(axis=(0, 1, 2, 3)) / ((p - 1) * off[0, ..., 0].size)))

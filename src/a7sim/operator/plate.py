@@ -1,0 +1,88 @@
+"""Working with a grid plate: how it lies on its carrier, and pointing at its crosses."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from a7sim.geometry import Array
+from a7sim.operator.bench import Bench
+from a7sim.operator.crew import Who
+from a7sim.operator.interior import fiducials_seen
+from a7sim.reduction import PlateLie, plane_fit, plate_lie
+from a7sim.scenario import Camera
+
+Crosses = Mapping[str, tuple[float, float]]
+"""Names and nominal places in mm."""
+
+LARGEST_SLIP_SIGMAS = 4.5
+"""A cross that stands further from where its fellows put it is pointed at again; of 25 good ones 1 in 3000 does."""
+
+FAINTEST_SLIP_MM = 0.01
+"""At photo scale: less is never taken for a slip."""
+
+MOST_REPETITIONS = 12
+
+_LEAST_REDUNDANCY_NUMBER = 0.05
+
+
+def places_of(crosses: Crosses) -> Array:
+    """Return nominal places ``(2, n)`` in mm."""
+    return np.array(list(crosses.values())).T
+
+
+def prints_of(bench: Bench, who: Who, projector: int) -> dict[str, Array]:
+    """Return where the sketch of what lies in a projector shows points ``(2, sessions)``, nan for those not asked."""
+    prints = {}
+    for name, place in bench.hands.prints(who, projector).items():
+        prints[name] = np.full((2, bench.crew.sessions), np.nan)
+        prints[name][:, who] = place
+    return prints
+
+
+def lie_of_plate(bench: Bench, who: Who, projector: int, certificate: Camera, times: int) -> PlateLie:
+    """Register a mounted plate's fiducials so many times and return how it lies ``(sessions,)``."""
+    marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
+    registered = [fiducials_seen(bench, who, projector) for _ in range(times)]
+    displacements = np.concatenate([seen for _, seen in registered], axis=1)
+    every = np.zeros((*displacements.shape[:2], bench.crew.sessions))
+    every[:, :, who] = displacements
+    return plate_lie(every, np.array([marks[name] for names, _ in registered for name in names]).T)
+
+
+def point_at_crosses(bench: Bench, who: Who, hand: int, crosses: Crosses, level: float) -> Array:
+    """Point with one eye at crosses at a Z reading; X, Y readings ``(2, n, sessions)``.
+
+    A cross that its fellows contradict is struck out and pointed at again.
+    """
+    crew = bench.crew
+    names = list(crosses)
+    _go_below(bench, who, hand)
+    readings = bench.point_with(who, hand, names, level)
+    looking = crew.still(who)
+    for _ in range(MOST_REPETITIONS):
+        misread = _misread(readings[:, :, looking], places_of(crosses)) if looking.size else np.zeros(0, dtype=np.intp)
+        looking, misread = looking[misread >= 0], misread[misread >= 0]
+        for place in np.unique(misread):
+            again = looking[misread == place]
+            why = "does not agree with the other crosses of the plate"
+            readings[:, place, again] = bench.point_again(again, hand, names[place], level, why)[:, again]
+        looking = crew.still(looking)
+    return readings
+
+
+def _go_below(bench: Bench, who: Who, hand: int) -> None:
+    """Run the mark straight below a centre, whence it can go to any level: from the side the rods may not let it."""
+    x, y = np.round(bench.seat.below(who, hand), 2)
+    bench.seat.drive(who, {"X": x, "Y": y})
+
+
+def _misread(readings: Array, crosses: Array) -> npt.NDArray[np.intp]:
+    """Return which cross ``(m,)`` does not fit the others, -1 for none; a tilted plane is seen in perspective."""
+    fit = plane_fit(readings, crosses, "projective")
+    controlled = fit.adjustment.redundancy_numbers.reshape(fit.residuals.shape)
+    off = np.abs(fit.residuals) / np.sqrt(np.maximum(controlled, _LEAST_REDUNDANCY_NUMBER))
+    sigma = 1.4826 * np.median(off, axis=(0, 1))
+    worst = off.max(axis=0)
+    suspicious = worst.max(axis=0) > np.maximum(LARGEST_SLIP_SIGMAS * sigma, FAINTEST_SLIP_MM)
+    return np.where(suspicious, worst.argmax(axis=0), -1)

@@ -1,0 +1,174 @@
+"""A sheet from the pictures in the drawer to the last line: the work of one person at the plotter and its table."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from a7sim.geometry import Array, length_of
+from a7sim.mistakes import Mistake
+from a7sim.operator.bench import Bench
+from a7sim.operator.compilation import Area, Compilation, Errand, Spots, Traced, Tracing
+from a7sim.operator.crew import Crew
+from a7sim.operator.job import Job
+from a7sim.operator.levelling import LevelModel, levelled, oriented
+from a7sim.operator.line_hands import LineHands
+from a7sim.operator.person import Person
+from a7sim.operator.preparation import PLAN_GEARS
+from a7sim.operator.stereo_view import StereoView
+from a7sim.operator.work import ModelRecord, worked
+from a7sim.reduction import Ground
+
+TABLE_GEARS: Mapping[str, float] = MappingProxyType({"1-1-1": 1.0, **PLAN_GEARS})
+"""How many times larger than the model the plotting table draws; 1-1-1 is taken for equal gears [assumption]."""
+
+ROUND_SCALE = 500.0
+"""The map's scale number is made the nearest multiple of this."""
+
+MOST_CONTOURS = 100
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is to be drawn: heights of contours in m, all multiples of an interval, lines, and at what scale."""
+
+    contours: tuple[float, ...]
+    interval: float | None
+    errands: tuple[Errand, ...]
+    tracing: Tracing
+    map_scale: float | None = None
+    """Scale number of the map; when absent, the nearest round one."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A compiled model as the person who compiled it knows it."""
+
+    record: ModelRecord
+    model: LevelModel
+    area: Area
+    spots: Spots
+    lines: tuple[Traced, ...]
+    heights: tuple[float, ...]
+    """Of the contours, m."""
+    gear: float
+    """How many times larger than the model the table draws."""
+    height_above_ground: float
+    """Of the projection centres, m."""
+    sigma_height: float
+    sigma_plan: float
+    """Standard errors in m that the person expects: of a setting and tremor, with the misfit of the control."""
+
+    @property
+    def map_scale(self) -> float:
+        """Scale number of the sheet."""
+        return self.model.scale_number / self.gear
+
+    def on_table(self, readings: Array) -> Array:
+        """Return where the pencil stands ``(2, ...)`` in mm from the mark's place at readings of zero, north up.
+
+        The sheet is turned on the table until the control fits.
+        """
+        east, north = self.model.absolute.similarity.rotation[:2, 0], self.model.absolute.similarity.rotation[:2, 1]
+        turn = np.array([[east[0] + north[1], north[0] - east[1]], [east[1] - north[0], east[0] + north[1]]])
+        turn /= length_of(turn[0])
+        return np.asarray(self.gear * np.einsum("ij,j...->i...", turn, readings[:2]))
+
+
+def plotted(
+    person: Person,
+    job: Job,
+    control: Ground,
+    order: Order,
+    tick: Callable[[], None] = lambda: None,
+    begins: Callable[[str], None] = lambda _: None,
+) -> Sheet:
+    """Set up the one model of a job, level it on the control, and compile what is ordered.
+
+    Raises DoesNotFit when it cannot be set up, Mistake for a contour that does not run in the model.
+    """
+    person.book.head("", "preparation")
+    bench = Bench(Crew.of_one(person), LineHands(person), job, tick)
+    record = next(worked(bench, begins)).of(0)
+    view = StereoView(bench, person)
+    _begin(bench, "absolute orientation", begins)
+    gear = TABLE_GEARS[job.plan.plan_gear]
+    corners = [record.model.standard_points[label] for label in "3456" if label in record.model.standard_points]
+    first = oriented(bench, record.points, control, record.z_units_per_mm)
+    number = gear * (order.map_scale or _round_scale(1e3 * float(first.similarity.scale) / gear))
+    model = levelled(bench, view, record.points, control, number, corners)
+    if len(corners) < 4 or not all(name in model.points for name in corners):
+        bench.crew.give_up(
+            bench.crew.everybody, f"{record.model.name}: standard points 3 to 6, the corners of the model, are not seen"
+        )
+    area = Area.within(record.model.standard_points, model.points)
+    work = Compilation(bench, person, view, model, area, order.tracing)
+    _begin(bench, "spot heights", begins)
+    spots = work.spot_heights()
+    heights = _heights(order, spots)
+    lines: list[Traced] = []
+    for height in heights:
+        _begin(bench, f"contour {height:g}", begins)
+        lines += work.contour(height, spots)
+        tick()
+    for errand in order.errands:
+        _begin(bench, f"line {errand.name}", begins)
+        lines.append(work.line(errand, spots))
+        tick()
+    above, sigma_height, sigma_plan = _expected(bench, view, model, spots, order.tracing)
+    return Sheet(
+        replace(record, finished_at=float(bench.crew.seconds[0])),
+        model, area, spots, tuple(lines), heights, gear, above, sigma_height, sigma_plan,
+    )  # fmt: skip
+
+
+def _begin(bench: Bench, form: str, begins: Callable[[str], None]) -> None:
+    name = bench.seat.model.name
+    begins(f"model {name}: {form}")
+    bench.crew.begin(bench.crew.everybody, name, form)
+    bench.hands.note(bench.crew.everybody, f"{name}: {form}")
+
+
+def _round_scale(number: float) -> float:
+    return max(ROUND_SCALE, ROUND_SCALE * round(number / ROUND_SCALE))
+
+
+def _heights(order: Order, spots: Spots) -> tuple[float, ...]:
+    """Return the heights to be contoured in order. Raises Mistake for one outside the model."""
+    low, high = spots.range
+    for height in order.contours:
+        if not low < height < high:
+            raise Mistake(
+                f"contour {height:g}: expected a height within the model, {low:.1f} to {high:.1f} m, got {height:g}"
+            )
+    heights = set(order.contours)
+    if order.interval is not None:
+        first, last = math.ceil(low / order.interval), math.floor(high / order.interval)
+        if last - first >= MOST_CONTOURS:
+            raise Mistake(
+                f"contour interval {order.interval:g}: expected at most {MOST_CONTOURS} contours from {low:.1f} to "
+                f"{high:.1f} m, got {last - first + 1}"
+            )
+        if last < first and not heights and not order.errands:
+            raise Mistake(
+                f"contour interval {order.interval:g}: expected a multiple of it from {low:.1f} to {high:.1f} m"
+            )
+        heights |= {order.interval * k for k in range(first, last + 1)}
+    return tuple(sorted(heights))
+
+
+def _expected(
+    bench: Bench, view: StereoView, model: LevelModel, spots: Spots, tracing: Tracing
+) -> tuple[float, float, float]:
+    """Return the height of the centres above the mean spot in m, and the standard errors in m that a person expects."""
+    who, observer = bench.crew.everybody, bench.crew.observer
+    look = view.look()
+    residuals = model.absolute.fit.at_control
+    misfit = np.sqrt(np.nanmean(residuals**2, axis=1))
+    setting = 1e-3 * observer.height_um / look.parallax_by_height * model.metres_per_mm
+    tremor = 1e-3 * tracing.tremor_um * look.enlargement * model.metres_per_mm
+    mean_spot = np.nanmean(spots.readings, axis=(1, 2))[:, None]
+    above = float(bench.seat.place(who, mean_spot)[2, 0]) * model.metres_per_mm
+    return above, math.hypot(float(misfit[2]), setting), math.hypot(float(np.hypot(*misfit[:2]) / np.sqrt(2.0)), tremor)

@@ -1,0 +1,31 @@
+"""How a person's eyes and attention change over the day: warm-up, fatigue, breaks (docs/decisions/0008-skill.md)."""
+
+import numpy as np
+
+from a7sim.geometry import Array
+from a7sim.scenario import Observer
+
+HOUR = 3600.0
+MINUTE = 60.0
+
+
+def acuity_factor(observer: Observer, since_start: Array, since_rest: Array) -> Array:
+    """Return by what factor settings are worse than the observer's best, from seconds at work and since a rest."""
+    still_cold = np.maximum(1.0 - since_start / (MINUTE * observer.warm_up_minutes), 0.0)
+    return (1.0 + observer.warm_up * still_cold) * (
+        1.0 + observer.fatigue_per_hour * _tired_hours(observer, since_rest)
+    )
+
+
+def slip_factor(observer: Observer, since_rest: Array) -> Array:
+    """Return by what factor slips are more frequent than in a fresh person, from seconds since a rest."""
+    return np.asarray(1.0 + observer.slip_fatigue_per_hour * _tired_hours(observer, since_rest))
+
+
+def needs_a_break(observer: Observer, since_rest: Array) -> Array:
+    """Return who takes a break before beginning anything new, from seconds since the last."""
+    return np.asarray(observer.takes_breaks & (since_rest >= HOUR * observer.break_every_hours))
+
+
+def _tired_hours(observer: Observer, since_rest: Array) -> Array:
+    return np.asarray(np.maximum(since_rest / HOUR - observer.fresh_hours, 0.0))

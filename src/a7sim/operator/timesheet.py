@@ -1,0 +1,52 @@
+"""Where the time of a crew went: simulated seconds by activity and by act."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from a7sim.geometry import Array
+
+Act = Literal["looking", "turning", "reading", "setting", "driving", "mounting", "computing", "resting", "other"]
+
+_OF_ACT: Mapping[str, str] = MappingProxyType({"computing": "computing", "resting": "breaks"})
+
+_OF_FORM: Mapping[str, str] = MappingProxyType(
+    {
+        "": "mounting and interior orientation",
+        "preparation": "mounting and interior orientation",
+        "interior orientation": "mounting and interior orientation",
+        "left perspective centre": "perspective centres",
+        "right perspective centre": "perspective centres",
+    }
+)
+"""Forms that count as one activity; every other form is an activity by its own name."""
+
+
+class Timesheet:
+    """Seconds ``(sessions,)`` by activity and by act; either sums to all the time that was spent."""
+
+    def __init__(self, sessions: int) -> None:
+        self._sessions = sessions
+        self.by_activity: dict[str, Array] = {}
+        self.by_act: dict[str, Array] = {}
+
+    def spend(self, who: npt.NDArray[np.intp], seconds: float, form: str, act: Act) -> None:
+        """Write down that those who act spent so many seconds each."""
+        activity = _OF_ACT.get(act) or _OF_FORM.get(form, form)
+        for column, name in ((self.by_activity, activity), (self.by_act, act)):
+            column.setdefault(name, np.zeros(self._sessions))[who] += seconds
+
+    def activities_of(self, session: int) -> dict[str, float]:
+        """Return the seconds of one session by activity, in the order in which they were first taken up."""
+        return _of(self.by_activity, session)
+
+    def acts_of(self, session: int) -> dict[str, float]:
+        """Return the seconds of one session by act."""
+        return _of(self.by_act, session)
+
+
+def _of(column: Mapping[str, Array], session: int) -> dict[str, float]:
+    return {name: float(seconds[session]) for name, seconds in column.items() if seconds[session]}

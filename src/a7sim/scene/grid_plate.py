@@ -1,0 +1,35 @@
+"""A grid plate as it lies in the drawer: a picture whose points are its crosses."""
+
+import numpy as np
+
+from a7sim.scenario.schema import Camera, GridPlate
+from a7sim.scene.camera import fiducial_places
+from a7sim.scene.content import picture_of_marks
+from a7sim.scene.photograph import Marks, Photograph, sketched
+
+GRID_PLATE_STREAM = 6
+"""Spawn key of a plate's random numbers, under the plate's own seed."""
+
+
+def grid_plate(plate: GridPlate, camera: Camera, polarity: str) -> Photograph:
+    """Return a grid plate that fits the collimating marks of a camera's pictures and is laid as these are.
+
+    Crosses and fiducial marks are off their nominal places by the plate's accuracy.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence(plate.seed, spawn_key=(GRID_PLATE_STREAM,)))
+    certificate = plate.certificate(camera)
+    names, nominal = fiducial_places(certificate)
+    crosses = plate.crosses
+    ruled = np.array(list(crosses.values())).T
+    sigma = 1e-3 * plate.accuracy_um
+    points = Marks(tuple(crosses), ruled + sigma * rng.standard_normal(ruled.shape))
+    fiducials = Marks(names, nominal + sigma * rng.standard_normal(nominal.shape))
+    return Photograph(
+        plate.name,
+        certificate,
+        fiducials,
+        points,
+        sketched(points, rng),
+        polarity,
+        content=picture_of_marks(points),
+    )

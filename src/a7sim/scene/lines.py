@@ -1,0 +1,69 @@
+"""Lines on the ground: roads and tracks, smooth in plan, lighter than what lies beside them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.geometry import Array, length_of
+from a7sim.mistakes import Mistake
+from a7sim.scenario.schema import Line
+
+TONE, TEXTURE = 0.85, 0.3
+"""Mean grey of a road, where bare ground has 0.5 on the average, and what share of the ground's texture it has
+[assumptions]."""
+
+_PIECES = 24
+"""Straight pieces of a line between two of its vertices."""
+
+
+@dataclass(frozen=True)
+class GroundLine:
+    """A line in plan: its middle as a chain of places ``(2, n)`` and its width, all in m."""
+
+    name: str
+    kind: str
+    width: float
+    middle: Array
+
+    def distance(self, plan: Array) -> Array:
+        """Return how far places ``(2, ...)`` lie from the middle, in m; infinity where that is certainly far."""
+        places = plan.reshape(2, -1)
+        low, high = places.min(axis=1)[:, None] - self.width, places.max(axis=1)[:, None] + self.width
+        begins, ends = self.middle[:, :-1], self.middle[:, 1:]
+        near = ((np.maximum(begins, ends) >= low) & (np.minimum(begins, ends) <= high)).all(axis=0)
+        nearest = np.full(places.shape[1], np.inf)
+        for begin, end in zip(begins[:, near].T, ends[:, near].T, strict=True):
+            piece = end - begin
+            share = np.clip(piece @ (places - begin[:, None]) / (piece @ piece), 0.0, 1.0)
+            nearest = np.minimum(nearest, length_of(places - begin[:, None] - piece[:, None] * share))
+        return nearest.reshape(plan.shape[1:])
+
+
+def lines_of(lines: Sequence[Line]) -> dict[str, GroundLine]:
+    """Return the lines of a scenario by name. Raises Mistake when two have the same name."""
+    found: dict[str, GroundLine] = {}
+    for line in lines:
+        if line.name in found:
+            raise Mistake(f"lines: expected every name once, got {line.name!r} twice")
+        found[line.name] = GroundLine(line.name, line.kind, line.width, _smooth(np.array(line.vertices).T))
+    return found
+
+
+def _smooth(vertices: Array) -> Array:
+    """Return the chain ``(2, n)`` of a Catmull-Rom curve through vertices ``(2, m)``."""
+    before = np.concatenate([2.0 * vertices[:, :1] - vertices[:, 1:2], vertices], axis=1)
+    points = np.concatenate([before, 2.0 * vertices[:, -1:] - vertices[:, -2:-1]], axis=1)
+    t = np.arange(_PIECES) / _PIECES
+    p0, p1, p2, p3 = (points[:, i : points.shape[1] - 3 + i, None] for i in range(4))
+    curve = 0.5 * (
+        2.0 * p1 + (p2 - p0) * t + (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3) * t**2 + (3.0 * p1 - p0 - 3.0 * p2 + p3) * t**3
+    )
+    return np.concatenate([curve.reshape(2, -1), vertices[:, -1:]], axis=1)
+
+
+def with_lines(lines: Sequence[GroundLine], plan: Array, grey: Array) -> Array:
+    """Return the grey ``(...)`` of ground places ``(2, ...)`` with the lines laid over it."""
+    for line in lines:
+        grey = np.where(line.distance(plan) <= line.width / 2.0, TONE + TEXTURE * (grey - 0.5), grey)
+    return grey

@@ -1,0 +1,138 @@
+"""A strip bridged at the instrument beside the same strip of independent models, both on the ground."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from a7sim.documents import Document, head, of_absolute, of_adjustment
+from a7sim.mistakes import Mistake
+from a7sim.operator import DoesNotFit
+from a7sim.operator.bridging import BridgedModels, bridge
+from a7sim.reduction import Ground, Model, Undetermined, absolute_orientation, strip_adjustment
+from a7sim.scenario import Scenario
+from a7sim.session.running import Watcher, open_session, run
+from a7sim.session.strips import ground_of
+
+Places = dict[str, tuple[float, float, float]]
+
+
+def run_bridge(scenario: Scenario, seed: int, watcher: Watcher | None = None) -> Document:
+    """Bridge a strip, work the same models independently, and return both on the ground.
+
+    `status` is 'complete', or 'does not fit' with the `message` of the operator who gave up. Raises Mistake for a
+    plotter that cannot bridge.
+    """
+    watcher = watcher or Watcher()
+    if len(scenario.models) < 2 or "outside" not in {model.base for model in scenario.models}:
+        raise Mistake("models: expected a strip with base inside and outside in turn, as bridging needs")
+    document = head("bridge") | {"scenario": scenario.title, "seed": seed, "status": "complete", "message": ""}
+    session = open_session(scenario, seed)
+    ground = ground_of(scenario, session.scene)
+    done: list[Document] = []
+    places: list[Places] = []
+    try:
+        for model in bridge(session.person, session.job, watcher.tick, watcher.begins):
+            places.append(model.places_of(0))
+            done.append(_of_model(model))
+    except DoesNotFit as trouble:
+        return document | {"status": "does not fit", "message": str(trouble), "bridged": {"models": done}}
+    document["bridged"] = {
+        "models": done,
+        "strip": _on_ground(bridged_strip(places), ground, scenario),
+        "hours": round(session.person.clock.now / 3600.0, 3),
+    }
+    alone = run(scenario, seed, watcher=watcher)
+    document |= {"status": alone["status"], "message": alone["message"]}
+    document["independent"] = {"strip": alone.get("strip", {}), "hours": alone["operator"]["hours"]}
+    return document
+
+
+def bridged_strip(places: Sequence[Places]) -> Model:
+    """Return all points of a bridged strip in mm, those of several models averaged."""
+    found: dict[str, list[tuple[float, float, float]]] = {}
+    for model in places:
+        for name, place in model.items():
+            found.setdefault(name, []).append(place)
+    return Model("bridge", tuple(found), np.array([np.mean(each, axis=0) for each in found.values()]).T)
+
+
+def _on_ground(strip: Model, ground: Ground, scenario: Scenario) -> Document:
+    try:
+        oriented = absolute_orientation(strip, ground)
+        document = of_absolute(oriented)
+        if scenario.strip.polynomial:
+            document["polynomial"] = of_adjustment(strip_adjustment(oriented.model, ground, scenario.strip.polynomial))
+    except (Mistake, Undetermined) as reason:
+        return {"message": str(reason)}
+    return document
+
+
+def _of_model(bridged: BridgedModels) -> Document:
+    orientation = bridged.orientation.of(0)
+    mm = [1.0, 1.0, 1.0 / bridged.z_units_per_mm]
+    common = {name: [round(v, 4) for v in each[:, 0] * mm] for name, each in bridged.common.items()}
+    return {
+        "model": bridged.model.name,
+        "left": bridged.model.left,
+        "right": bridged.model.right,
+        "base": bridged.model.base,
+        "elements": dict(orientation.elements),
+        "rms_parallax_mm": round(orientation.rms, 6),
+        "scale": round(float(bridged.scale[0]), 7),
+        "common_mm": {name: each for name, each in common.items() if np.isfinite(each).all()},
+    }
+
+
+def tables_of(document: Document) -> RenderableType:
+    """Return the tables of a bridged strip and of the independent models, for a terminal."""
+    said = f"{document['status']}: {document['message']}" if document["message"] else ""
+    parts: list[RenderableType] = [_models(document["bridged"]["models"])]
+    if "independent" in document:
+        parts += [Text(), _beside(document)]
+        parts.append(
+            Text(
+                f"{document['bridged']['hours']:.1f} hours at the instrument bridging, "
+                f"{document['independent']['hours']:.1f} with independent models and their perspective centres"
+            )
+        )
+    return Group(*parts, *([Text(said, style="bold")] if said else []))
+
+
+def _models(models: Sequence[Document]) -> RenderableType:
+    table = _table("model", "base", "bx, mm", "scale", "rms p, mm", "common X", "Y", "Z, mm")
+    for model in models:
+        common = np.array(list(model["common_mm"].values())).reshape(-1, 3)
+        rms = [f"{value:.3f}" for value in np.sqrt((common**2).mean(axis=0))] if common.size else ["", "", ""]
+        table.add_row(
+            model["model"],
+            model["base"],
+            f"{model['elements']['bx']:.2f}",
+            f"{model['scale']:.5f}",
+            f"{model['rms_parallax_mm']:.4f}",
+            *rms,
+        )
+    return Group(Text("Bridged models: scale carried by bx, rms of differences at common points", style="bold"), table)
+
+
+def _beside(document: Document) -> RenderableType:
+    table = _table("strip", "points", "X", "Y", "Z", "plan", "height")
+    for way in ("bridged", "independent"):
+        strip = document[way]["strip"]
+        for label, part in ((way, strip), (f"{way}, polynomial", strip.get("polynomial", {}))):
+            for on, each in part.get("accuracy_m", {}).items():
+                values = [*each["rms"].values(), each["plan"], each["height"]]
+                cells = ["" if value is None else f"{value:.3f}" for value in values]
+                table.add_row(label, f"{each['points']} {on}", *cells)
+        if "message" in strip:
+            table.add_row(way, strip["message"])
+    return Group(Text("On the ground, rms in m", style="bold"), table)
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "right")
+    return table

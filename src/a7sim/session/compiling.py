@@ -1,0 +1,230 @@
+"""Compiling a model: an operator draws contours and lines, and the session lays them beside the true ground."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+import a7sim
+from a7sim.documents import Document, as_json, head, of_absolute
+from a7sim.geometry import Array, length_of
+from a7sim.instrument.language import Listener
+from a7sim.mistakes import Mistake
+from a7sim.operator import DoesNotFit
+from a7sim.operator.compilation import CONTOUR, Errand, Traced, Tracing
+from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, plotted
+from a7sim.reduction import Ground
+from a7sim.scenario import Scenario
+from a7sim.scene import Scene
+from a7sim.session.folder import BOOK, GEOJSON, JOURNAL, RESULTS, SVG, prepare_folder, write_whole
+from a7sim.session.journal import Journal
+from a7sim.session.map_sheet import as_geojson, as_svg
+from a7sim.session.results import of_operator
+from a7sim.session.running import Session, Watcher, open_session
+from a7sim.session.strips import ground_of
+
+OLD_MAP_M = 5.0
+"""What an operator is told of a line comes from an old map, to the nearest so many metres."""
+
+_FURTHER_ON_M = 40.0
+
+WITHIN_HALF = 3.29
+"""A contour interval is good for a standard error if 90 % of the heights lie within half of it: 2 x 1.645 of them."""
+
+USUAL_C_FACTORS = (900.0, 2200.0)
+"""From conventional plotters to analytical ones: D. Light, C-factor for softcopy photogrammetry (PE&RS 1999)."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a user asks to be compiled."""
+
+    model: str
+    contours: tuple[float, ...] = ()
+    interval: float | None = None
+    lines: tuple[str, ...] = ()
+    map_scale: float | None = None
+    tremor_um: float | None = None
+
+
+def compile_model(
+    scenario: Scenario,
+    seed: int,
+    wanted: Wanted,
+    out: Path | None = None,
+    watcher: Watcher | None = None,
+    force: bool = False,
+) -> Document:
+    """Let the operator compile a model and return the document of results; with `out`, leave map and files there.
+
+    `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for what cannot be compiled.
+    """
+    watcher = watcher or Watcher()
+    _see_that_it_can_be(scenario, wanted)
+    heard: list[Listener] = []
+    session = open_session(scenario, seed, lambda event: heard[0](event))  # noqa: PLW0108 - the journal is opened later
+    order = _order(wanted, scenario, session.scene)
+    if out is not None:
+        prepare_folder(out, force)
+    document = head("compile") | {
+        "software": f"a7sim {a7sim.__version__}",
+        "scenario": scenario.title,
+        "seed": seed,
+        "model": wanted.model,
+        "status": "complete",
+        "message": "",
+    }
+    journalled = {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
+    with Journal(out / JOURNAL if out else None, journalled) as journal:
+        heard.append(journal.heard)
+        try:
+            sheet = _sheet(session, wanted, order, watcher)
+            document |= _of_sheet(sheet, session.scene, scenario)
+            if out is not None:
+                write_whole(out / GEOJSON, as_geojson(sheet))
+                write_whole(out / SVG, as_svg(sheet, scenario.title))
+        except DoesNotFit as trouble:
+            document |= {"status": "does not fit", "message": str(trouble)}
+        finally:
+            document["operator"] = of_operator(session.person, journal.events)
+            if out is not None:
+                write_whole(out / BOOK, session.person.book.as_csv())
+    if out is not None:
+        write_whole(out / RESULTS, as_json(document))
+    return document
+
+
+def _see_that_it_can_be(scenario: Scenario, wanted: Wanted) -> None:
+    if scenario.instrument.variant != "A7":
+        raise Mistake(f"instrument.variant: expected an A7 to compile with, got an {scenario.instrument.variant}")
+    if scenario.plan.plan_gear not in TABLE_GEARS:
+        known = ", ".join(TABLE_GEARS)
+        raise Mistake(f"plan.plan_gear: expected a gear to the plotting table ({known}), got {scenario.plan.plan_gear}")
+    models = {model.name: model for model in scenario.models}
+    if wanted.model not in models:
+        raise Mistake(f"model: expected one of {', '.join(models)}, got {wanted.model}")
+    flown = {photo.name for photo in scenario.photos if photo.position is not None}
+    model = models[wanted.model]
+    if not {model.left, model.right} <= flown:
+        raise Mistake(f"model {wanted.model}: expected photographs that show the ground, got measured points only")
+    known_lines = [line.name for line in scenario.lines]
+    for name in wanted.lines:
+        if name not in known_lines:
+            raise Mistake(
+                f"line: expected one of {', '.join(known_lines) or 'none, the scenario has no lines'}, got {name}"
+            )
+    if not (wanted.contours or wanted.interval or wanted.lines):
+        raise Mistake("expected something to compile: a contour, an interval or a line, got none")
+
+
+def _order(wanted: Wanted, scenario: Scenario, scene: Scene) -> Order:
+    errands = tuple(_errand(scene, name) for name in dict.fromkeys(wanted.lines))
+    tracing = Tracing.of(scenario.observer, wanted.tremor_um)
+    return Order(wanted.contours, wanted.interval, errands, tracing, wanted.map_scale)
+
+
+def _errand(scene: Scene, name: str) -> Errand:
+    """Return what an old map tells of a line: its two ends and which way it sets out, to some metres."""
+    line = scene.lines[name]
+    along = np.concatenate([[0.0], np.cumsum(length_of(np.diff(line.middle, axis=1)))])
+    further = line.middle[:, int(np.searchsorted(along, min(_FURTHER_ON_M, along[-1])))]
+
+    def on_the_map(place: Array) -> tuple[float, float]:
+        east, north = OLD_MAP_M * np.round(place / OLD_MAP_M)
+        return float(east), float(north)
+
+    return Errand(name, line.kind, on_the_map(line.middle[:, 0]), on_the_map(further), on_the_map(line.middle[:, -1]))
+
+
+def _sheet(session: Session, wanted: Wanted, order: Order, watcher: Watcher) -> Sheet:
+    models = tuple(model for model in session.job.models if model.name == wanted.model)
+    control = _control(ground_of(session.scenario, session.scene))
+    return plotted(session.person, replace(session.job, models=models), control, order, watcher.tick, watcher.begins)
+
+
+def _control(ground: Ground) -> Ground:
+    """Return the ground points whose coordinates an operator is given."""
+    given = [i for i, role in enumerate(ground.roles) if role != "check"]
+    return Ground(
+        tuple(ground.points[i] for i in given), ground.coordinates[:, given], tuple(ground.roles[i] for i in given)
+    )
+
+
+# --- the document ------------------------------------------------------------------------------------------
+
+
+def _of_sheet(sheet: Sheet, scene: Scene, scenario: Scenario) -> Document:
+    lines = [_of_line(each, sheet, scene) for each in sheet.lines]
+    errors = np.concatenate([np.zeros(0), *(_height_errors(t, sheet, scene) for t in sheet.lines if t.kind == CONTOUR)])
+    at = sheet.model.on_ground(sheet.spots.readings)
+    spot_errors = at[2] - scene.ground.height(at[0], at[1])
+    return {
+        "map_scale": sheet.map_scale,
+        "model_scale": sheet.model.scale_number,
+        "plan_gear": scenario.plan.plan_gear,
+        "levelling": {
+            "rounds": sheet.model.rounds,
+            "tilt_left_gon": round(sheet.model.tilt_gon, 5),
+            "scale_found": round(1e3 * sheet.model.metres_per_mm, 2),
+        }
+        | of_absolute(sheet.model.absolute),
+        "expected": {"sigma_height_m": round(sheet.sigma_height, 4), "sigma_plan_m": round(sheet.sigma_plan, 4)},
+        "spot_heights": int(np.isfinite(sheet.spots.heights).sum()),
+        "range_m": [round(each, 2) for each in sheet.spots.range],
+        "lines": lines,
+        "beside_the_truth": {
+            "spot_heights_rms_m": _rms(spot_errors[np.isfinite(spot_errors)]),
+            "contours": _accuracy(errors, sheet) if errors.size else None,
+        },
+    }
+
+
+def _accuracy(errors: Array, sheet: Sheet) -> Document:
+    """Return rms height error of contours, the interval it is good for, and the flying height by that (C-factor)."""
+    rms = float(np.sqrt((errors**2).mean()))
+    interval = WITHIN_HALF * rms
+    return {
+        "rms_height_m": round(rms, 4),
+        "mean_m": round(float(errors.mean()), 4),
+        "largest_m": round(float(np.abs(errors).max()), 4),
+        "per_mille_of_flying_height": round(1e3 * rms / sheet.height_above_ground, 4),
+        "flying_height_m": round(sheet.height_above_ground, 1),
+        "smallest_interval_m": round(interval, 3),
+        "c_factor": round(sheet.height_above_ground / interval) if interval > 0.0 else None,
+    }
+
+
+def _of_line(traced: Traced, sheet: Sheet, scene: Scene) -> Document:
+    at = sheet.model.on_ground(traced.readings)
+    errors = _height_errors(traced, sheet, scene)
+    document: Document = {
+        "name": traced.name,
+        "kind": traced.kind,
+        "height_m": traced.height,
+        "closed": traced.closed,
+        "endings": list(traced.endings),
+        "vertices": int(traced.readings.shape[1]),
+        "length_m": round(float(length_of(np.diff(at[:2], axis=1)).sum()), 1),
+        "rms_height_m": _rms(errors),
+        "largest_height_m": round(float(np.abs(errors).max()), 4) if errors.size else None,
+    }
+    if traced.kind != CONTOUR:
+        off = np.array([float(scene.lines[traced.name].distance(place[:, None])[0]) for place in at[:2].T])
+        document |= {"rms_off_m": _rms(off), "largest_off_m": round(float(off.max()), 4)}
+    return document
+
+
+def _height_errors(traced: Traced, sheet: Sheet, scene: Scene) -> Array:
+    """Return by how much a line is too high at its vertices ``(n,)``, m."""
+    east, north, height = sheet.model.on_ground(traced.readings)
+    drawn = height if traced.height is None else np.full_like(height, traced.height)
+    return np.asarray(drawn - scene.ground.height(east, north))
+
+
+def _rms(errors: Array | Sequence[float]) -> float | None:
+    values = np.asarray(errors, dtype=float)
+    if not values.size or not np.isfinite(values).all():
+        return None
+    return round(math.sqrt(float((values**2).mean())), 4)

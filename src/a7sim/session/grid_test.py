@@ -1,0 +1,274 @@
+"""Running a grid test, and the sheet of it: what was found of both projectors, the truth beside."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.rule import Rule
+from rich.table import Table
+from rich.text import Text
+
+import a7sim
+from a7sim.documents import Document, as_json, head, of_statistics
+from a7sim.files import csv_text
+from a7sim.geometry import GON, angles_of
+from a7sim.instrument import Autograph, build_autograph
+from a7sim.instrument.condition import condition_of
+from a7sim.instrument.language import Desk, Listener
+from a7sim.link.client import Client
+from a7sim.link.clock import Clock
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.mistakes import Mistake
+from a7sim.operator import DoesNotFit, Person
+from a7sim.operator.grid_test import GridTestOrder, ProjectorSheet, calibrate
+from a7sim.operator.seat import side, wrapped
+from a7sim.reduction import Adjustment, Undetermined
+from a7sim.reduction.grid_test import UNKNOWNS
+from a7sim.scenario import Condition, Scenario
+from a7sim.scene import build_scene
+from a7sim.session.folder import BOOK, JOURNAL, RESIDUALS, RESULTS, prepare_folder, write_whole
+from a7sim.session.journal import Journal
+from a7sim.session.results import of_operator, of_slips
+from a7sim.session.running import Watcher
+
+TESTED_VARIANT = "A7"
+"""An A8 has no by and bz to whose counters the centre could be referred."""
+
+SYMBOLS = {"omega": "ω", "phi": "φ", "kappa": "κ"}
+
+RESIDUAL_COLUMNS = ("projector", "level_mm", "cross", "x_mm", "y_mm", "vx_um", "vy_um")
+
+
+def run_grid_test(
+    scenario: Scenario,
+    seed: int,
+    order: GridTestOrder,
+    out: Path | None = None,
+    watcher: Watcher | None = None,
+    force: bool = False,
+) -> Document:
+    """Test both projectors of a scenario's instrument and return the document; with `out`, leave the files there.
+
+    `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for an order that the plate
+    or the instrument cannot fill and for a folder that cannot be used, before anything is written.
+    """
+    if scenario.instrument.variant != TESTED_VARIANT:
+        raise Mistake(f"instrument.variant: expected '{TESTED_VARIANT}', got '{scenario.instrument.variant}'")
+    watcher = watcher or Watcher()
+    heard: list[Listener] = []
+    autograph, person = _opened(scenario, seed, lambda event: heard[0](event))  # noqa: PLW0108 - the journal is opened later
+    document = _header(scenario, seed, order, autograph)
+    if out is not None:
+        prepare_folder(out, force)
+    sheets: list[ProjectorSheet] = []
+    about = {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant, "work": "grid test"}
+    with Journal(out / JOURNAL if out else None, about) as journal:
+        heard.append(journal.heard)
+        try:
+            for sheet in calibrate(person, order, watcher.tick, watcher.begins):
+                sheets.append(sheet)
+                truth = true_errors(autograph, condition_of(scenario.instrument, seed), sheet.projector)
+                document["projectors"][side(sheet.projector)] = of_projector(sheet, truth)
+            document["status"] = "complete"
+        except (DoesNotFit, Undetermined) as trouble:
+            document |= {"status": "does not fit", "message": str(trouble)}
+        except KeyboardInterrupt:
+            document |= {"status": "interrupted", "message": "the test was interrupted"}
+            raise
+        finally:
+            document |= {
+                "operator": of_operator(person, journal.events),
+                "truth": {"slips": of_slips(person)},
+            }
+            if out is not None:
+                write_whole(out / BOOK, person.book.as_csv())
+                write_whole(out / RESIDUALS, csv_text(RESIDUAL_COLUMNS, _residual_rows(sheets)))
+                write_whole(out / RESULTS, as_json(document))
+    return document
+
+
+def _opened(scenario: Scenario, seed: int, listener: Listener) -> tuple[Autograph, Person]:
+    autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
+    clock = Clock()
+    port = InProcessSerial(desk=Desk(autograph, listener), clock=clock, timeout=1.0)
+    return autograph, Person(Client(port), clock, scenario.observer, seed)
+
+
+def _header(scenario: Scenario, seed: int, order: GridTestOrder, autograph: Autograph) -> Document:
+    return head("calibrate") | {
+        "software": f"a7sim {a7sim.__version__}",
+        "scenario": scenario.title,
+        "seed": seed,
+        "variant": scenario.instrument.variant,
+        "serial": scenario.instrument.serial,
+        "plate": order.plate.name,
+        "crosses": len(order.chosen),
+        "levels_mm": order.heights(autograph.variant),
+        "pointings": order.pointings,
+        "status": "failed",
+        "message": "",
+        "projectors": {},
+    }
+
+
+# --- the document -------------------------------------------------------------------------------------
+
+
+def of_projector(sheet: ProjectorSheet, truth: Document) -> Document:
+    """Return a projector's sheet of one session, um at photo scale, with the truth and what is left of it."""
+    test = sheet.test
+    found = _found(sheet)
+    residuals = 1e3 * test.residuals[..., 0]
+    names = list(sheet.crosses)
+    worst = np.unravel_index(int(np.hypot(*residuals).argmax()), residuals.shape[1:])
+    observations = [f"{axis} {cross} at {z:g}" for axis in "XY" for z in sheet.heights for cross in names]
+    return {
+        "elements": found,
+        "held": [name for name in UNKNOWNS if name not in test.errors],
+        "s0_um": round(1e3 * float(test.s0[0]), 3),
+        "pointing_um": _known(1e3 * float(sheet.pointing[0])),
+        "largest_residual": {
+            "cross": names[worst[1]],
+            "level_mm": sheet.heights[worst[0]],
+            "um": round(float(np.hypot(*residuals)[worst]), 3),
+        },
+        "residuals_um": {
+            cross: [round(float(v), 3) for v in residuals.mean(axis=1)[:, i]] for i, cross in enumerate(names)
+        },
+        "statistics": of_statistics(_of_one(sheet), list(test.errors), observations),
+        "finished_at_s": round(float(sheet.finished_at[0]), 1),
+        "truth": truth
+        | {"differences": {name: round(found[name]["error"] - truth["errors"][name], 5) for name in test.errors}},
+    }
+
+
+def _of_one(sheet: ProjectorSheet) -> Adjustment:
+    """Return the adjustment without its axis of sessions."""
+    every = sheet.test.adjustment
+    unknowns, cofactors, residuals, s0, condition, design = (
+        each[..., 0]
+        for each in (every.unknowns, every.cofactors, every.residuals, every.s0, every.condition, every.design)
+    )
+    return Adjustment(unknowns, cofactors, residuals, every.redundancy, s0, condition, design)
+
+
+def _found(sheet: ProjectorSheet) -> Document:
+    elements = {}
+    for name, error in sheet.test.errors.items():
+        unit = "gon" if name in SYMBOLS else "mm"
+        scale = GON if unit == "gon" else 1.0
+        off = float(error[0]) / scale
+        sigma = float(sheet.test.sigmas[name][0]) / scale
+        entry: Document = {"error": round(off, 5), "sigma": round(sigma, 5), "unit": unit}
+        counter = sheet.counters.get("bx" if name == "bx" else f"{name}{sheet.projector}")
+        if counter is not None:
+            entry = {"counter": float(counter[0]), "found": round(float(counter[0]) + off, 5)} | entry
+        elements[name] = entry
+    return elements
+
+
+def _known(value: float) -> float | None:
+    return round(value, 3) if np.isfinite(value) else None
+
+
+def _residual_rows(sheets: list[ProjectorSheet]) -> Iterator[tuple[str, ...]]:
+    for sheet in sheets:
+        residuals = 1e3 * sheet.test.residuals[..., 0]
+        for k, height in enumerate(sheet.heights):
+            for i, (cross, place) in enumerate(sheet.crosses.items()):
+                yield (
+                    side(sheet.projector),
+                    f"{height:.2f}",
+                    cross,
+                    *(f"{at:.1f}" for at in place),
+                    *(f"{v:.2f}" for v in residuals[:, k, i]),
+                )
+
+
+# --- the truth ----------------------------------------------------------------------------------------
+
+
+def true_errors(autograph: Autograph, condition: Condition, projector: int) -> Document:
+    """Return what a grid test should find of a projector as it stands, mm and gon, and what of it the carriages do.
+
+    Scales and skews of the carriages look like errors of the projector: X = (1 + sx) Xr + xy Yr + xz Zr and so on make
+    of c c (1 + (sx + sy)/2 - sz), of the principal point -c (xz, yz), of kappa xy / 2.
+    """
+    centre, turned = autograph.pose(projector)
+    omega, phi, kappa = (float(angle) / GON for angle in angles_of(turned))
+    elements = autograph.variant.elements
+    of_projector = condition.left if projector == 1 else condition.right
+    shown = {name: autograph.element(f"{name}{projector}") for name in ("c", "omega", "phi", "kappa", "by", "bz")}
+    base = autograph.element("bx") if projector == 2 else 0.0
+    sx, sy, sz = (1e-6 * ppm for ppm in condition.carriage_scale_ppm)
+    xy, xz, yz = (1e-6 * ppm for ppm in condition.carriage_skew_ppm)
+    of_carriages = {
+        "c": shown["c"] * ((sx + sy) / 2.0 - sz),
+        "x0": -shown["c"] * xz,
+        "y0": -shown["c"] * yz,
+        "kappa": xy / 2.0 / GON,
+    }
+    of_elements = {
+        "c": of_projector.principal_distance_mm,
+        "x0": 1e-3 * of_projector.principal_point_um[0],
+        "y0": 1e-3 * of_projector.principal_point_um[1],
+        "omega": omega + elements[f"omega{projector}"].zero - shown["omega"],
+        "phi": phi + elements[f"phi{projector}"].zero - shown["phi"],
+        "kappa": float(wrapped(np.asarray(kappa - shown["kappa"]))),
+        "bx": float(centre[0]) - base,
+        "by": -float(centre[1]) - shown["by"],
+        "bz": float(centre[2]) - shown["bz"],
+    }
+    return {
+        "errors": {name: round(error + of_carriages.get(name, 0.0), 5) for name, error in of_elements.items()},
+        "of_the_carriages": {name: round(error, 5) for name, error in of_carriages.items() if error},
+    }
+
+
+# --- the sheet ----------------------------------------------------------------------------------------
+
+
+def sheet_of(document: Document) -> RenderableType:
+    """Return the sheet that a service engineer would file."""
+    parts: list[RenderableType] = [
+        Text(f"Grid test of Wild {document['variant']} no. {document['serial']}", style="bold"),
+        Text(
+            f"{document['crosses']} crosses of plate {document['plate']} at Z "
+            f"{' and '.join(f'{-z:g}' for z in document['levels_mm'])} mm below the centre, "
+            f"{document['pointings']} pointings each"
+        ),
+    ]
+    for projector, each in document["projectors"].items():
+        parts += [Rule(Text(f"{projector} projector"), align="left"), _element_table(each), *_in_words(each)]
+    if document["message"]:
+        parts.append(Text(f"{document['status']}: {document['message']}", style="bold"))
+    return Group(*parts)
+
+
+def _element_table(projector: Document) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    for column in ("", "counter", "found", "error", "±", "true", ""):
+        table.add_column(column, justify="left" if not column else "right")
+    for name, each in projector["elements"].items():
+        counter = f"{each['counter']:.2f}" if "counter" in each else ""
+        found = f"{each['found']:.4f}" if "found" in each else ""
+        true = f"{projector['truth']['errors'][name]:+.4f}"
+        table.add_row(
+            SYMBOLS.get(name, name), counter, found, f"{each['error']:+.4f}", f"{each['sigma']:.4f}", true, each["unit"]
+        )
+    return table
+
+
+def _in_words(projector: Document) -> Iterator[Text]:
+    largest = projector["largest_residual"]
+    pointing = projector["pointing_um"]
+    yield Text(
+        f"s0 {projector['s0_um']:.1f} µm at photo scale"
+        + (f", a pointing repeats to {pointing:.1f} µm" if pointing is not None else "")
+        + f"; largest residual {largest['um']:.1f} µm at {largest['cross']}, Z {-largest['level_mm']:g} mm"
+    )
+    if projector["held"]:
+        yield Text(f"held, since one level does not tell them from c, x0 and y0: {', '.join(projector['held'])}")
+    if projector["truth"]["of_the_carriages"]:
+        yield Text("true errors are as the carriages show them; their own scales and skews are in c, x0, y0 and κ")

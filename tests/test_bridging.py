@@ -1,0 +1,148 @@
+"""Bridging: what must go on from model to model does, and the strip closes as well as its counters allow."""
+
+from itertools import pairwise
+
+import msgspec
+import numpy as np
+import pytest
+
+from a7sim.instrument import fleet
+from a7sim.mistakes import Mistake
+from a7sim.operator import bridging, seat
+from a7sim.operator.bridging import bridged
+from a7sim.reduction import similarity_by_quaternion
+from a7sim.scenario import load_scenario
+from a7sim.session.bridge import bridged_strip, run_bridge, tables_of
+from a7sim.session.crowd import open_crowd
+from a7sim.session.fleet_hands import FleetHands
+from tests.sessions import without_errors
+
+CLOSES_MM = 0.05
+FINE = 1e-5
+
+
+def scenario_of(models, **overrides):
+    """The first so many models of the strip without signalised points, film and operator without errors: so that
+    nothing need be read twice."""
+    scenario = without_errors(load_scenario("bridge", {"plan.parallax_readings": "1", **overrides}))
+    return msgspec.structs.replace(scenario, models=scenario.models[:models], ground=[])
+
+
+def worked(scenario, seeds=(1,)):
+    crowd = open_crowd(scenario, seeds)
+    return crowd, list(bridged(crowd.bench))
+
+
+def misclosures(crowd, models, session=0):
+    """How far a strip ``(3, n)`` in mm lies from the true ground, carried onto it by a similarity."""
+    strip = bridged_strip([model.places_of(session) for model in models])
+    ground = np.array([crowd.scenes[session].ground_points[name] for name in strip.points]).T
+    return similarity_by_quaternion(ground, strip.coordinates).residuals
+
+
+@pytest.fixture(scope="module")
+def three():
+    return worked(scenario_of(3))
+
+
+def test_the_oriented_photograph_stays_as_it_is(three):
+    """Kappa, phi, omega, by and bz of the photograph that two models share are the same in both."""
+    _, models = three
+    for before, after in pairwise(models):
+        n = before.model.right_projector
+        assert after.model.left_projector == n
+        for name in ("kappa", "phi", "omega", "by", "bz"):
+            assert after.orientation.elements[f"{name}{n}"] == before.orientation.elements[f"{name}{n}"]
+
+
+def test_readings_go_on_from_model_to_model(three):
+    """Common points read the same again but for what counters of 0.01 gon leave: 0.06 mm in any coordinate."""
+    _, models = three
+    for model in models[1:]:
+        assert len(model.common) >= 3
+        for difference in model.common.values():
+            x, y, z = difference[:, 0]
+            assert max(abs(x), abs(y), abs(z / model.z_units_per_mm)) < 0.06
+
+
+def test_the_strip_runs_on_over_several_bases(three):
+    """X reads on by one base a model, though the carriage ends at 280 mm."""
+    _, models = three
+    first = models[0].points["2011"][0, 0]
+    assert models[-1].points["2041"][0, 0] - first == pytest.approx(3 * 194.4, abs=3.0)
+
+
+def test_three_models_close_within_what_is_asked_of_ten(three):
+    crowd, models = three
+    assert np.abs(misclosures(crowd, models)).max() < CLOSES_MM
+
+
+def test_the_scale_is_carried_by_the_heights_of_common_points(monkeypatch):
+    """The comparison can fail: without the carrying of scale the flying height's changes break the strip."""
+    monkeypatch.setattr(bridging, "_scaled", lambda bench, who, model, before: np.ones(bench.crew.sessions))
+    crowd, models = worked(scenario_of(2))
+    assert np.abs(misclosures(crowd, models)).max() > 10.0 * CLOSES_MM
+
+
+def test_by_and_bz_that_run_out_are_set_back_and_y_and_z_preset(monkeypatch):
+    """With every photograph set back to the zeros of by and bz the strip is the same strip."""
+    monkeypatch.setattr(bridging, "SHARE_OF_RANGE", 0.0)
+    crowd, models = worked(scenario_of(2))
+    for model in models[1:]:
+        n = model.model.left_projector
+        assert model.orientation.elements[f"by{n}"][0] == 0.0
+        assert model.orientation.elements[f"bz{n}"][0] == 0.0
+    assert np.abs(misclosures(crowd, models)).max() < CLOSES_MM
+
+
+def test_models_that_do_not_go_on_are_refused():
+    """Base inside twice running: the photograph to be kept would have to change its projector."""
+    scenario = scenario_of(2)
+    again = msgspec.structs.replace(scenario.models[1], base="inside")
+    crowd, models = worked(msgspec.structs.replace(scenario, models=[scenario.models[0], again]))
+    assert len(models) == 1
+    assert "does not go on from model 1" in crowd.bench.crew.reasons[0]
+
+
+@pytest.mark.slow
+def test_over_the_line_and_in_a_crowd_it_is_the_same_strip():
+    """One procedure, two benches: with errors too, every reading of a session is the same."""
+    scenario = load_scenario("bridge")
+    scenario = msgspec.structs.replace(scenario, models=scenario.models[:2])
+    document = run_bridge(scenario, 7)
+    _, models = worked(scenario, (7,))
+    for said, model in zip(document["bridged"]["models"], models, strict=True):
+        assert said["elements"] == {name: each[0] for name, each in model.orientation.elements.items()}
+        assert said["scale"] == pytest.approx(model.scale[0], abs=1e-7)
+    assert document["status"] == "complete"
+    assert {"bridged", "independent"} <= set(document)
+    assert document["bridged"]["strip"].keys() == document["independent"]["strip"].keys() - {"joins"}
+    tables_of(document)
+
+
+def test_a_strip_without_base_out_cannot_be_bridged():
+    with pytest.raises(Mistake, match="inside and outside in turn"):
+        run_bridge(msgspec.structs.replace(load_scenario("akwanga"), models=load_scenario("akwanga").models[:1]), 1)
+
+
+@pytest.mark.slow
+def test_ten_models_close_as_well_as_hundredths_of_a_gon_allow():
+    """Counters of 0.01 gon alone: rms 0.05 mm in any coordinate holds, the largest of some 200 points does not."""
+    crowd, models = worked(scenario_of(10), (4,))
+    assert len(models) == 10
+    off = misclosures(crowd, models)
+    assert np.sqrt((off**2).mean(axis=1)).max() < CLOSES_MM
+    assert np.abs(off).max() < 0.12
+
+
+@pytest.mark.slow
+def test_with_finer_counters_ten_models_close_on_the_truth(monkeypatch):
+    """The method itself: elements set to 0.00001 gon and mm, within 0.05 mm everywhere (it is 0.005)."""
+    monkeypatch.setattr(fleet, "LEAST_COUNT", FINE)
+    monkeypatch.setattr(fleet, "COUNTER_DECIMALS", 5)
+    monkeypatch.setattr(bridging, "LEAST_COUNT", FINE)
+    monkeypatch.setattr(FleetHands, "set_element", lambda self, who, name, v: self._fleet.set_element(who, name, v))
+    monkeypatch.setattr(seat, "counter_value", lambda name, v: v % 400.0 if name.startswith("kappa") else v)
+    crowd, models = worked(scenario_of(10))
+    assert len(models) == 10
+    assert np.abs(misclosures(crowd, models)).max() < 0.02

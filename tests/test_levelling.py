@@ -1,0 +1,181 @@
+"""Absolute orientation at the instrument: the model comes level and to scale, stays oriented, and is set back."""
+
+from importlib import import_module
+
+import msgspec
+import numpy as np
+import pytest
+
+from a7sim.geometry import GON, rotation
+from a7sim.instrument import fleet
+from a7sim.manual import A7, A8
+from a7sim.operator import absolute, bridging, floating_mark, seat
+from a7sim.operator.absolute import turned_by_common_phi, turned_together
+from a7sim.operator.job import ModelJob
+from a7sim.scenario import load_scenario
+from a7sim.session.crowd import open_crowd
+from a7sim.session.fleet_hands import FleetHands
+from a7sim.session.tables import of_session
+from a7sim.session.truth import Relative
+from tests.sessions import without_errors
+
+FINE = 1e-5
+A_COUNT_OF_HEIGHT_M = 0.01
+HALF_A_COUNT_GON = 0.005
+REACH_MM = 260.0
+"""From the middle of a model to its furthest control."""
+
+
+def scenario_of(**overrides):
+    """Akwanga's first model, levelled and scaled at the instrument."""
+    scenario = load_scenario("akwanga", {"plan.absolute_orientation": "true", **overrides})
+    return msgspec.structs.replace(scenario, models=scenario.models[:1])
+
+
+def levelled(scenario, seed=1):
+    crowd = open_crowd(scenario, [seed])
+    (record,) = crowd.worked()
+    return crowd, record.of(0)
+
+
+@pytest.fixture(scope="module")
+def without_any_error():
+    return levelled(without_errors(scenario_of()))
+
+
+def test_heights_at_control_agree_within_what_is_tolerated(without_any_error):
+    """0.02 % of the flying height, 0.24 m; counters of 0.01 gon alone leave a third of that at most."""
+    found = without_any_error[1].on_ground
+    assert found.agrees
+    assert found.tolerated == pytest.approx(2e-4 * 1221.4, rel=1e-3)
+    tilt_of_counts = 2.0 * HALF_A_COUNT_GON * GON * REACH_MM * found.scale_number * 1e-3
+    assert max(map(abs, found.heights.values())) < tilt_of_counts < found.tolerated
+
+
+def test_the_counter_reads_metres_at_the_scale_of_its_gear(without_any_error):
+    """Gear Cd at 1:3750, as the thesis has it; distances fit within a count of bx, 5e-5 of the length."""
+    found = without_any_error[1].on_ground
+    assert (found.scale_number, found.height_gear) == (3750.0, "Cd")
+    assert abs(found.distance) < 1200.0 * 5e-5
+
+
+def test_checks_can_then_be_read_in_ground_units(without_any_error):
+    crowd, record = without_any_error
+    checks = [name for name in record.on_ground.points if name.startswith("K")]
+    assert len(checks) >= 2
+    for name in checks:
+        assert record.on_ground.points[name][2] == pytest.approx(crowd.scenes[0].ground_points[name][2], abs=0.2)
+
+
+def test_the_relative_orientation_is_untouched_but_for_rounding(without_any_error):
+    """What the counters describe, before and while level: rotation and base the same within two counts."""
+    record = without_any_error[1]
+    before, meanwhile = (
+        Relative.of_counters(each, record.model, A7) for each in (record.on_ground.before, record.on_ground.elements)
+    )
+    assert max(before.differences_gon(meanwhile)) < 0.02
+    assert record.on_ground.elements["phi1"] != record.on_ground.before["phi1"]
+
+
+def test_afterwards_everything_stands_as_it_did(without_any_error):
+    """Elements, gear and counters: the instrument reads a point as it read it before."""
+    crowd, record = without_any_error
+    bench, who = crowd.bench, crowd.bench.crew.everybody
+    shown = bench.seat.elements(who, list(record.on_ground.before))
+    assert {name: each[0] for name, each in shown.items()} == record.on_ground.before
+    assert bench.seat.units_per_mm == record.z_units_per_mm == 8.0
+    again = bench.measure(who, ["K1"])[:, 0, 0]
+    assert again == pytest.approx(record.points["K1"], abs=0.015)
+
+
+def test_a_person_with_errors_comes_within_what_is_tolerated_too():
+    (document,) = open_crowd(scenario_of(), [7]).documents()
+    found = document["models"][0]["absolute_orientation"]
+    assert found["agrees"]
+    assert 2 <= len(found["rounds"]) <= absolute.MOST_ROUNDS + 1
+    assert found["rounds"][0]["height_rms_m"] > 10.0 * found["rounds"][-1]["height_rms_m"]
+    of_session(document)
+
+
+def test_an_a8_is_levelled_by_what_it_has():
+    """Common Phi, equal changes of omega, and the base; everything else stays."""
+    a8 = {"instrument.variant": '"A8"', "models.1.base": '"inside"', "plan.procedure": '"empirical"'}
+    found = levelled(without_errors(scenario_of(**a8)))[1].on_ground
+    assert found.agrees
+    changes = {name: value - found.before[name] for name, value in found.elements.items()}
+    assert {name for name, change in changes.items() if abs(change) > 1e-9} == {"common_phi", "omega1", "omega2", "bx"}
+    assert changes["omega1"] == pytest.approx(changes["omega2"])
+
+
+def test_too_little_control_is_left_alone():
+    """Two heights do not level a model: nothing is turned, and the day goes on."""
+    scenario = without_errors(scenario_of())
+    ground = [
+        msgspec.structs.replace(p, role="control" if p.point in ("C1", "C2") else "check") for p in scenario.ground
+    ]
+    crowd, record = levelled(msgspec.structs.replace(scenario, ground=ground))
+    assert record.on_ground is None
+    assert crowd.bench.crew.reasons == {}
+
+
+@pytest.mark.slow
+def test_with_finer_counters_heights_come_within_one_unit(monkeypatch):
+    """The method itself: elements set to 0.00001 gon and mm, the mark to 0.7 um, heights at control within 0.01 m."""
+    monkeypatch.setattr(floating_mark, "AT_REST_MM", 0.0007)
+    for module in (fleet, absolute, bridging):
+        monkeypatch.setattr(module, "LEAST_COUNT", FINE)
+    monkeypatch.setattr(fleet, "COUNTER_DECIMALS", 5)
+    monkeypatch.setattr(FleetHands, "set_element", lambda self, who, name, v: self._fleet.set_element(who, name, v))
+    monkeypatch.setattr(seat, "counter_value", lambda name, v: v % 400.0 if name.startswith("kappa") else v)
+    monkeypatch.setattr(
+        import_module("a7sim.operator.work"),
+        "oriented",
+        lambda bench, model: bridging._refined(bench, model, bridging._oriented(bench, model)),
+    )
+    _, record = levelled(without_errors(scenario_of(**{"plan.parallax_readings": "1"})))
+    assert max(map(abs, record.on_ground.heights.values())) <= A_COUNT_OF_HEIGHT_M
+
+
+SETTINGS = {
+    "kappa1": 1.2, "kappa2": 399.3, "phi1": 100.8, "phi2": 99.1, "omega1": 99.4, "omega2": 101.3,
+    "by1": 0.4, "by2": -1.3, "bz1": 0.7, "bz2": -2.1, "bx": 190.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("base", ["inside", "outside"])
+@pytest.mark.parametrize("lean", [(0.01, -0.02), (-0.05, 0.03)])
+def test_both_projectors_and_the_base_turn_together(base, lean):
+    """Before any rounding the relative orientation is the same to the last digits, and up is up within a count."""
+    model = ModelJob("1", "a", "b", base, "positive", {})
+    up = np.array([*lean, np.sqrt(1.0 - lean[0] ** 2 - lean[1] ** 2)])[:, None]
+    turned = turned_together({name: np.array([v]) for name, v in SETTINGS.items()}, model, A7, up, np.array([1.01]))
+    after = SETTINGS | {name: float(each[0]) for name, each in turned.items()}
+    rotations, bases = Relative.of_counters(SETTINGS, model, A7).differences_gon(Relative.of_counters(after, model, A7))
+    assert rotations < 1e-9
+    assert bases < HALF_A_COUNT_GON
+    n = model.left_projector
+    turn = _stand(after, n) @ _stand(SETTINGS, n).T @ up[:, 0]
+    assert np.hypot(turn[0], turn[1]) / GON < 2.0 * HALF_A_COUNT_GON
+
+
+def _stand(settings, n):
+    omega, phi = ((settings[f"{name}{n}"] - 100.0) * GON for name in ("omega", "phi"))
+    return rotation(omega, phi, settings[f"kappa{n}"] * GON)
+
+
+@pytest.mark.parametrize("common", [100.0, 101.5])
+def test_a_common_phi_and_equal_omegas_do_the_same(common):
+    """By what the manual lists: no bz there, but a common Phi about the Y axis outside of omega."""
+    settings = {"common_phi": common, "omega1": 100.3, "omega2": 99.6, "bx": 190.0}
+    model = ModelJob("1", "a", "b", "inside", "positive", {})
+    up = np.array([0.02, -0.03, np.sqrt(1.0 - 0.0013)])[:, None]
+    turned = turned_by_common_phi(
+        {name: np.array([v]) for name, v in settings.items()}, model, A8, up, np.array([1.01])
+    )
+    assert set(turned) <= set(A8.elements)
+    before, after = ((phi - 100.0) * GON for phi in (common, float(turned["common_phi"][0])))
+    omegas = [float(turned[name][0]) - settings[name] for name in ("omega1", "omega2")]
+    assert omegas[0] == pytest.approx(omegas[1])
+    whole = rotation(0.0, after, 0.0) @ rotation(omegas[0] * GON, 0.0, 0.0) @ rotation(0.0, -before, 0.0)
+    assert np.hypot(*(whole @ up[:, 0])[:2]) / GON < HALF_A_COUNT_GON + 1e-9
+    assert turned["bx"][0] == pytest.approx(191.9)

@@ -1,0 +1,361 @@
+"""The person in the chair: skill profiles, warm-up and fatigue, slips of seven kinds, and where the time went."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+from functools import cache
+
+import msgspec
+import numpy as np
+import pytest
+
+from a7sim.operator import DoesNotFit, work
+from a7sim.operator.skill import HOUR, acuity_factor, slip_factor
+from a7sim.operator.slips import neighbours, transpositions
+from a7sim.scenario import PROFILES, Observer, ScenarioError, load_scenario, observer_of_skill, scenario_schema
+from a7sim.scenario.schema import CertainSlip, Film
+from a7sim.session import open_session, run
+from a7sim.session.crowd import open_crowd
+
+WITHOUT_SLIPS = dict.fromkeys(
+    (
+        "last_digit_slip",
+        "blunder_rate",
+        "wrong_point_rate",
+        "wrong_sign_rate",
+        "transposed_rate",
+        "forgotten_lever_rate",
+        "not_reread_rate",
+    ),
+    0.0,
+)
+
+
+def one_model(observer=None, **changes):
+    """Akwanga's first model, by its default observer or another."""
+    scenario = load_scenario("akwanga")
+    observer = scenario.observer if observer is None else observer
+    return msgspec.structs.replace(scenario, models=scenario.models[:1], observer=observer, **changes)
+
+
+# --- the default observer ---------------------------------------------------------------------------
+
+
+def test_the_numbers_of_the_default_observer_are_those_of_before_there_were_profiles():
+    """Read from seed 1 of Akwanga before skill, warm-up and slips were there."""
+    session = open_session(load_scenario("akwanga"), 1)
+    record = next(iter(work(session.person, session.job)))
+    elements = record.orientation.elements
+    assert [elements[name] for name in ("kappa1", "kappa2", "phi1", "phi2", "omega1", "by1")] == [
+        399.47, 398.33, 100.28, 99.22, 99.04, -0.06,
+    ]  # fmt: skip
+    assert round(record.orientation.rms, 6) == 0.008389
+    assert round(float(record.centres[1].X0), 5) == 4997.52499
+    assert [round(value, 3) for value in record.points["1d"]] == [5096.12, 5177.26, 4972.94]
+    assert round(record.finished_at, 1) == 13579.5
+
+
+def test_a_plain_observer_neither_tires_nor_warms_up_nor_rests():
+    hours = np.linspace(0.0, 12.0, 25) * HOUR
+    assert (acuity_factor(Observer(), hours, hours) == 1.0).all()
+    assert (slip_factor(Observer(), hours) == 1.0).all()
+    assert not Observer().takes_breaks
+
+
+# --- profiles ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("skill", list(PROFILES))
+def test_a_skill_is_a_word_or_a_table_whose_own_words_stand(skill):
+    by_word = load_scenario("akwanga", {"observer": skill}).observer
+    assert by_word == load_scenario("akwanga", {"observer.skill": skill}).observer == observer_of_skill(skill)
+    changed = load_scenario("akwanga", {"observer.skill": skill, "observer.height_um": "9.5"}).observer
+    assert changed == msgspec.structs.replace(by_word, height_um=9.5)
+
+
+def test_from_novice_to_first_order_everything_gets_better():
+    novice, trained, first = (observer_of_skill(skill) for skill in ("novice", "trained", "first-order"))
+    for name in (*WITHOUT_SLIPS, "parallax_um", "monocular_um", "stereo_um", "height_um", "repeat_share", "pace"):
+        assert getattr(novice, name) > getattr(trained, name) > getattr(first, name), name
+
+
+@pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        ({"observer": "expert"}, "observer: expected 'novice', 'trained', 'first-order' or a table, got \"expert\""),
+        ({"observer.skill": "expert"}, "observer.skill: expected 'first-order' or 'novice' or 'trained'"),
+        ({"observer.skil": '"novice"'}, "observer.skil: unknown key; did you mean skill?"),
+        ({"observer.certain_slips": "[{ kind = 'fall asleep' }]"}, r"observer.certain_slips[0].kind: expected"),
+        (
+            {"observer.certain_slips": "[{ kind = 'gross', model = '9' }]"},
+            "observer.certain_slips[0].model: expected the name of a model (1, 2), got '9'",
+        ),
+    ],
+)
+def test_mistakes_about_the_observer_are_named(overrides, said):
+    with pytest.raises(ScenarioError) as trouble:
+        load_scenario("akwanga", overrides)
+    assert said in str(trouble.value)
+
+
+def test_the_schema_takes_the_word_and_the_table():
+    observer = scenario_schema()["$defs"]["Scenario"]["properties"]["observer"]
+    assert observer["anyOf"] == [{"enum": list(PROFILES)}, {"$ref": "#/$defs/Observer"}]
+
+
+def test_the_command_line_knows_the_skills():
+    done = subprocess.run(
+        [sys.executable, "-m", "a7sim", "run", "akwanga", "--skill", "expert"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert all(skill in done.stderr for skill in PROFILES)
+
+
+@cache
+def crowd_of(skill):
+    """Twelve persons of a skill on film without errors, none of whom slips."""
+    crowd = open_crowd(one_model(observer_of_skill(skill, **WITHOUT_SLIPS), film=Film()), range(12))
+    (records,) = crowd.worked()
+    return crowd, records
+
+
+@pytest.mark.slow
+def test_the_profiles_differ_in_residuals_in_centres_and_in_time():
+    found = {skill: crowd_of(skill) for skill in ("first-order", "trained", "novice")}
+    for measure in (
+        lambda crowd, records: np.median(records.orientation.rms),
+        lambda crowd, records: np.median([records.centres[hand].rms for hand in (1, 2)]),
+        lambda crowd, records: np.median(crowd.bench.crew.seconds),
+    ):
+        first, trained, novice = (measure(*each) for each in found.values())
+        assert first < trained < novice
+    assert [crowd.bench.crew.reasons for crowd, _ in found.values()] == [{}, {}, {}]
+
+
+@pytest.mark.slow
+def test_a_novice_in_a_crowd_is_the_novice_at_the_line():
+    scenario, seeds = one_model(observer_of_skill("novice")), (4, 5)
+    crowd = open_crowd(scenario, seeds)
+    (records,) = crowd.worked()
+    for i, seed in enumerate(seeds):
+        session = open_session(scenario, seed)
+        record = next(iter(work(session.person, session.job)))
+        assert record.orientation.elements == records.of(i).orientation.elements
+        assert [_told(slip) for slip in session.person.slips] == [_told(slip) for slip in crowd.bench.crew.slip_log[i]]
+        assert session.person.timesheet.acts_of(0) == crowd.bench.crew.timesheet.acts_of(i)
+
+
+def _told(slip):
+    return dataclasses.replace(slip, entry=0, round=0)
+
+
+# --- warm-up, fatigue, breaks -----------------------------------------------------------------------
+
+
+def test_warm_up_falls_evenly_to_nothing_and_fatigue_grows_once_no_longer_fresh():
+    person = Observer(warm_up=0.5, warm_up_minutes=30.0, fresh_hours=2.0, fatigue_per_hour=0.1)
+    at_work, since_rest = np.array([0.0, 0.25, 0.5, 2.0, 5.0]) * HOUR, np.array([0.0, 0.25, 0.5, 2.0, 4.0]) * HOUR
+    assert acuity_factor(person, at_work, since_rest) == pytest.approx([1.5, 1.25, 1.0, 1.0, 1.2])
+    assert slip_factor(Observer(slip_fatigue_per_hour=0.5), since_rest) == pytest.approx([1.0, 1.0, 1.0, 1.5, 2.5])
+
+
+def test_a_tired_persons_settings_scatter_more_and_a_break_restores_them():
+    """The same draws, larger by the factor of the hour; after a break as at the start."""
+    tired = open_crowd(one_model(Observer(fresh_hours=0.0, fatigue_per_hour=1.0, takes_breaks=True)), (1,)).bench.crew
+    fresh = open_crowd(one_model(Observer()), (1,)).bench.crew
+    who = tired.everybody
+    for crew in (tired, fresh):
+        crew.spend(who, 3.0 * HOUR)
+    assert tired.errors(who, 1.0, (50,)) == pytest.approx(4.0 * fresh.errors(who, 1.0, (50,)))
+    tired.begin_round(who, 2)
+    assert tired.errors(who, 1.0, (50,)) == pytest.approx(fresh.errors(who, 1.0, (50,)))
+    assert tired.timesheet.activities_of(0)["breaks"] == 900.0
+
+
+def test_breaks_are_taken_by_those_who_are_due_only():
+    crew = open_crowd(one_model(Observer(takes_breaks=True)), (1, 2)).bench.crew
+    crew.spend(crew.everybody[:1], 2.5 * HOUR)
+    crew.begin(crew.everybody, "1", "relative orientation")
+    assert crew.seconds.tolist() == [2.75 * HOUR, 0.0]
+
+
+# --- time -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("skill", ["trained", "novice"])
+def test_the_time_adds_up(skill):
+    session = open_session(one_model(observer_of_skill(skill, **WITHOUT_SLIPS)), 2)
+    next(iter(work(session.person, session.job)))
+    person = session.person
+    for column in (person.timesheet.activities_of(0), person.timesheet.acts_of(0)):
+        assert sum(column.values()) == pytest.approx(person.clock.now, rel=1e-12)
+        assert "other" not in column
+    assert {"mounting and interior orientation", "relative orientation", "model coordinates", "perspective centres",
+            "computing", "breaks"} == set(person.timesheet.activities_of(0))  # fmt: skip
+
+
+def test_pace_makes_everything_slower_but_breaks():
+    slow, usual = (open_crowd(one_model(Observer(pace=pace)), (1,)).bench.crew for pace in (1.5, 1.0))
+    for crew in (slow, usual):
+        crew.spend(crew.everybody, 10.0, "looking")
+    assert (slow.seconds[0], usual.seconds[0]) == (15.0, 10.0)
+
+
+# --- slips ------------------------------------------------------------------------------------------
+
+
+@cache
+def planted(kind, **place):
+    """A person who slips once, for certain, and never else, and how the model ended."""
+    slip = CertainSlip(kind=kind, model="1", **place)
+    session = open_session(one_model(msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=[slip])), 1)
+    try:
+        record = next(iter(work(session.person, session.job)))
+    except DoesNotFit as trouble:
+        return session.person, None, str(trouble)
+    return session.person, record, ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "form", "point"),
+    [
+        ("gross", "model coordinates", "C1"),
+        ("gross", "relative orientation", "1011"),
+        ("transposed digits", "left perspective centre", "1011"),
+        ("transposed digits", "model coordinates", "1d"),
+        ("wrong sign", "relative orientation", "1013"),
+    ],
+)
+def test_a_wrong_reading_stands_in_the_book_where_it_was_planted_and_is_struck_out(kind, form, point):
+    person, record, _ = planted(kind, form=form, point=point)
+    (slip,) = person.slips
+    entry = person.book.entries[slip.entry - 1]
+    assert (slip.kind, slip.model, slip.form, slip.point) == (kind, "1", form, point)
+    assert (entry.model, entry.form, entry.point) == ("1", form, point)
+    assert (entry.item, entry.reading) == (slip.item, slip.written)
+    assert slip.written != slip.right
+    assert entry.struck
+    assert record.orientation.rms < 0.03
+
+
+def test_a_last_digit_is_too_small_to_be_noticed_and_stays():
+    person, record, _ = planted("last digit", form="relative orientation", point="1011")
+    (slip,) = person.slips
+    assert float(slip.written) - float(slip.right) == pytest.approx(0.01)
+    assert person.book.entries[slip.entry - 1].struck == ""
+    assert record.orientation.rms < 0.03
+
+
+def test_a_wrong_point_among_the_model_coordinates_is_not_noticed_and_comes_out_wrong():
+    """Both pointings agree, on the neighbour."""
+    person, record, _ = planted("wrong point", form="model coordinates", point="1d")
+    (slip,) = person.slips
+    assert (slip.written, slip.right) == ("1d", "1a")
+    assert np.hypot(*np.subtract(record.points["1d"], record.points[slip.right])[:2]) < 0.05
+    book = [e for e in person.book.entries if e.form == "model coordinates" and e.point == "1d" and e.item == "X"]
+    assert [float(e.reading) for e in book] == pytest.approx([record.points[slip.right][0]] * len(book), abs=0.1)
+
+
+def test_a_wrong_point_at_one_level_of_a_centre_does_not_meet_the_others_and_is_struck_out():
+    person, record, _ = planted("wrong point", form="left perspective centre", point="1011")
+    (slip,) = person.slips
+    assert "two levels" in person.book.entries[slip.entry - 1].struck
+    assert record.centres[1].rms < 0.5
+
+
+def test_a_wrong_point_for_a_parallax_does_no_harm():
+    """A parallax is as good at a neighbour as at the point, since its place is read as well."""
+    person, record, _ = planted("wrong point", form="relative orientation", point="1011")
+    assert [slip.kind for slip in person.slips] == ["wrong point"]
+    assert record.orientation.rms < 0.03
+
+
+@pytest.mark.parametrize(
+    ("lever", "word"),
+    [
+        ("dove", "Dove prisms"),
+        ("triangulation", "triangulation lever"),
+        ("diapositive", "diapositive lever"),
+        ("xcollar", "X wheel turns the wrong way"),
+        ("ycollar", "Y wheel turns the wrong way"),
+    ],
+)
+def test_a_forgotten_lever_is_found_by_what_the_eye_sees(lever, word):
+    person, _, trouble = planted("forgotten lever", point=lever)
+    (slip,) = person.slips
+    assert (slip.form, slip.point) == ("interior orientation", lever)
+    assert word in trouble
+    assert person.book.remarks[-1] == f"does not fit: {trouble}"
+
+
+def test_an_element_not_reread_is_set_from_the_reading_before_and_leaves_the_model_worse():
+    person, record, _ = planted("element not re-read", point="kappa2")
+    (slip,) = person.slips
+    assert (slip.round, slip.written) == (2, "0.00")
+    entry = person.book.entries[slip.entry - 1]
+    assert (entry.round, entry.item) == (2, "set kappa2")
+    assert abs((float(entry.reading) + 200.0) % 400.0 - 200.0) < 0.1
+    _, faultless, _ = planted("element not re-read", point="no such element")
+    assert record.orientation.rms > 2.0 * faultless.orientation.rms
+    assert record.orientation.rounds[-1].rms > 1.0
+
+
+def test_a_planted_slip_happens_once_and_one_that_fits_nowhere_not_at_all():
+    assert planted("gross", point="nowhere")[0].slips == []
+    assert len(planted("transposed digits")[0].slips) == 1
+
+
+def test_slips_are_told_in_the_results_and_nowhere_else(tmp_path):
+    slip = CertainSlip(kind="transposed digits", form="model coordinates", point="C1")
+    observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=[slip])
+    document = run(one_model(observer), 1, tmp_path / "out")
+    (told,) = document["truth"]["slips"]
+    assert (told["kind"], told["form"], told["point"]) == ("transposed digits", "model coordinates", "C1")
+    assert told["struck"]
+    assert json.loads((tmp_path / "out" / "results.json").read_text())["truth"]["slips"] == [told]
+    for file in ("book.csv", "session.jsonl"):
+        text = (tmp_path / "out" / file).read_text()
+        assert not any(word in text for word in ("transposed", "slip", "planted"))
+    hours = document["operator"]["time_by_activity_h"]
+    assert sum(hours.values()) == pytest.approx(document["operator"]["hours"], abs=1e-3)
+    assert sum(document["operator"]["time_by_act_h"].values()) == pytest.approx(sum(hours.values()), abs=1e-3)
+
+
+def test_drawn_slips_come_as_often_as_their_rates_say():
+    """Of four persons who write a thousand readings of by each, with a rate of 5 % of either kind."""
+    slipping = Observer(**WITHOUT_SLIPS | {"wrong_sign_rate": 0.05, "transposed_rate": 0.05})
+    crew = open_crowd(one_model(slipping), range(4)).bench.crew
+    who, nothing = crew.everybody, np.zeros(4)
+    for _ in range(1000):
+        crew.write(who, "1", "by1", np.full(4, 3.12), nothing)
+    for kind in ("wrong sign", "transposed digits"):
+        assert sum(slip.kind == kind for log in crew.slip_log for slip in log) == pytest.approx(200, abs=45)
+    written = {slip.written for log in crew.slip_log for slip in log}
+    assert written == {"-3.12", "3.21"}
+
+
+def test_what_chance_misreads_is_told_too():
+    session = open_session(one_model(Observer(blunder_rate=0.05)), 1)
+    person = session.person
+    next(iter(work(person, session.job)))
+    assert {slip.kind for slip in person.slips} == {"gross", "last digit"}
+    for slip in person.slips:
+        if slip.entry:
+            assert person.book.entries[slip.entry - 1].reading == slip.written
+
+
+def test_transposed_digits_are_neighbours_and_nobody_writes_the_absurd():
+    assert transpositions(49.12) == [49.21]
+    assert transpositions(-0.13) == [-0.31]
+    assert transpositions(5047.36) == [5047.63]
+    assert transpositions(4956.33) == [4965.33]
+    assert transpositions(11.11) == []
+
+
+def test_the_neighbours_of_a_standard_point_are_those_beside_it():
+    points = {position: f"P{position}" for position in "123456abcdefghi"}
+    assert neighbours(points, "Pd") == ["Pa", "Pg"]
+    assert neighbours(points, "P3") == ["Pa", "Pd"]
+    assert neighbours(points, "C1") == []
