@@ -80,6 +80,12 @@ SCENARIOS = {
     "a worn instrument": load_scenario(
         "akwanga", {"instrument.condition.upkeep": '"worn"', "instrument.condition.counter_slip_share": "0.001"}
     ),
+    "empirical, swing-swing": load_scenario("akwanga", {"plan.procedure": '"empirical"', "plan.start_off_gon": "1.0"}),
+    "empirical, one projector": load_scenario(
+        "akwanga", {"plan.procedure": '"empirical"', "plan.method": '"dependent"'}
+    ),
+    "levelled and scaled at the instrument": load_scenario("akwanga", {"plan.absolute_orientation": "true"}),
+    "centres by grid plate": load_scenario("akwanga", {"plan.centre_method": '"grid plate"'}),
     "a real pair": load_scenario("dewitt-pair"),
 }
 

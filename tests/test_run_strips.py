@@ -25,7 +25,9 @@ def residuals(strip, role):
 @pytest.fixture(scope="module")
 def all_strips(tmp_path_factory):
     out = tmp_path_factory.mktemp("runs") / "all"
-    return run_combinations(load_scenario("akwanga"), 1985, out), out
+    done = a7sim("run", "akwanga", "--strips", "all", "--out", out)
+    assert done.returncode == 0, done.stderr
+    return json.loads((out / "results.json").read_text(encoding="utf-8")), out, done.stdout
 
 
 def test_without_errors_the_strip_returns_the_ground_within_what_the_counters_leave():
@@ -59,7 +61,7 @@ def test_checks_take_no_part_in_the_strip():
 
 
 def test_twenty_five_strips_are_numbered_as_in_the_thesis(all_strips):
-    document, out = all_strips
+    document, out, _ = all_strips
     cases = ["".join(strip["cases"]) for strip in document["strips"]]
     assert len(cases) == len(set(cases)) == 25
     assert (cases[0], cases[1], cases[5], cases[24]) == ("AA", "AB", "BA", "EE")
@@ -74,7 +76,7 @@ def test_twenty_five_strips_are_numbered_as_in_the_thesis(all_strips):
 
 
 def test_a_strip_of_equal_cases_is_the_one_that_a_run_of_that_case_gives(all_strips):
-    document, out = all_strips
+    document, out, _ = all_strips
     for number, case in ((1, "A"), (13, "C"), (25, "E")):
         alone = json.loads((out / f"case-{case}" / "results.json").read_text(encoding="utf-8"))["strip"]
         strip = document["strips"][number - 1]
@@ -90,7 +92,7 @@ def test_the_diagram_in_words_names_the_points_of_every_case_and_the_ties(all_st
 
 def test_cards_of_a_run_give_its_strip_again(all_strips):
     """The deck read back, joined and oriented is the strip of the session, as far as three decimals hold it."""
-    _, out = all_strips
+    _, out, _ = all_strips
     folder = out / "case-A"
     results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     deck = read_cards(folder / "strip.crd")
@@ -123,10 +125,8 @@ def test_a_scenario_without_control_or_of_too_many_models_is_refused():
         run_combinations(load_scenario("dewitt-pair"), 1)
 
 
-def test_strips_at_the_command_line_print_a_line_a_strip():
-    done = a7sim("run", "akwanga", "--strips", "all")
-    assert done.returncode == 0, done.stderr
-    lines = re.findall(r"^\d+ +[A-E] [A-E] .*$", done.stdout, re.M)
+def test_strips_at_the_command_line_print_a_line_a_strip(all_strips):
+    lines = re.findall(r"^\d+ +[A-E] [A-E] .*$", all_strips[2], re.M)
     assert len(lines) == 25
     assert lines[24].split()[1:3] == ["E", "E"]
     wrong = a7sim("run", "akwanga", "--strips", "all", "--case", "B")
