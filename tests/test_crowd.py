@@ -90,12 +90,18 @@ SCENARIOS = {
 }
 
 
+BOTH_MODELS = ("as it stands", "dependent, case D", "five gon of tilt", "a worn instrument", "centres by grid plate")
+"""Worked to the end; the others set up their first model only."""
+
+
 @pytest.mark.parametrize("name", list(SCENARIOS))
 def test_a_crowd_reads_and_sets_what_each_would_alone(name):
     scenario = SCENARIOS[name]
     if name == "out of true":
         instrument = msgspec.structs.replace(scenario.instrument, condition=OUT_OF_TRUE)
         scenario = msgspec.structs.replace(scenario, instrument=instrument)
+    if name not in BOTH_MODELS:
+        scenario = msgspec.structs.replace(scenario, models=scenario.models[:1])
     assert same_to_the_digit(scenario)
 
 
