@@ -99,7 +99,7 @@ class Drums:
     def shown(self, who: Who) -> Array:
         """Return what the counters show ``(m,)``."""
         shown = rounded(self.at[who], COUNTER_DECIMALS)
-        return np.asarray(shown % self.high if self.endless else shown + 0.0)
+        return rounded(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
 
     def allows(self, values: Array) -> Truths:
         """Return which values the drum can be turned to."""

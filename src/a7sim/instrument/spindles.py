@@ -73,7 +73,7 @@ class Spindle:
     def shown(self) -> float:
         """What the counter shows."""
         shown = round(self.at, COUNTER_DECIMALS)
-        return shown % self.high if self.endless else shown + 0.0
+        return round(shown % self.high, COUNTER_DECIMALS) if self.endless else shown + 0.0
 
     def allows(self, value: float) -> bool:
         """Whether the drum can be turned to a value."""
