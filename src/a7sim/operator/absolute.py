@@ -17,7 +17,6 @@ from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Who
 from a7sim.operator.hands import Truths
 from a7sim.operator.job import ModelJob
-from a7sim.operator.seat import wrapped
 from a7sim.reduction import Undetermined, adjusted
 
 TOLERATED_SHARE = 2e-4
@@ -260,7 +259,7 @@ class _Levelling:
                 break
             fit = self._fit(who, self._measured(who, number))
         everybody = crew.still(np.array(list(rounds), dtype=np.intp))
-        self._set_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
+        self.seat.set_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
         return rounds
 
     @property
@@ -269,19 +268,7 @@ class _Levelling:
 
     def _turn(self, who: Who, fit: _Fit) -> None:
         settings = {name: values[who] for name, values in self._settings(who).items()}
-        turned = turned_by_common_phi if "common_phi" in self.manual.elements else turned_together
-        self._set_changed(who, turned(settings, self.model, self.manual, fit.up, fit.factor))
-
-    def _set_changed(self, who: Who, settings: Settings) -> None:
-        """Set those elements whose counters have to show something else."""
-        for name, wanted in settings.items():
-            if not who.size:
-                return
-            off = wanted - self.seat.elements(who, [name])[name]
-            off = wrapped(off) if name.startswith("kappa") else off
-            changed = self.crew.goes_on(who) & (np.abs(off) > LEAST_COUNT / 2.0)
-            if changed.any():
-                self.seat.set_elements(who[changed], {name: wanted[changed]})
+        self.seat.set_changed(who, turned_upright(settings, self.model, self.manual, fit.up, fit.factor))
 
     # --- heights in metres ----------------------------------------------------------------------------
 
@@ -337,7 +324,7 @@ class _Levelling:
             self.seat.shift_counter(who, "Z", -shift[who])
             self.seat.drive(who, {"Z": start[who]})
             self.seat.engage(who, self.bench.job.plan.height_gear)
-            self._set_changed(who, {name: values[who] for name, values in before.items()})
+            self.seat.set_changed(who, {name: values[who] for name, values in before.items()})
 
 
 def _note(rounds: Mapping[int, list[LevellingRound]], who: Who, fit: _Fit) -> None:
@@ -345,10 +332,19 @@ def _note(rounds: Mapping[int, list[LevellingRound]], who: Who, fit: _Fit) -> No
         rounds[session].append(LevellingRound(float(rms), float(factor), (float(tilts[0]), float(tilts[1]))))
 
 
+def turned_upright(settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array) -> dict[str, Array]:
+    """Return the elements ``(m,)`` that set a whole model upright and larger by a factor, of those the plotter has.
+
+    `up` ``(3, m)`` is the direction in the frame that is to point upward.
+    """
+    turned = turned_by_common_phi if "common_phi" in manual.elements else turned_together
+    return turned(settings, model, manual, up, factor)
+
+
 def turned_together(settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array) -> dict[str, Array]:
     """Return the elements ``(m,)`` at which the whole model stands upright and is larger by a factor.
 
-    `up` ``(3, m)`` is the direction in the frame that is to point upward. The tilts are taken in whole counts, so that
+    The tilts are taken in whole counts, so that
     both projectors turn by the same; bz' and bz" share what the base rises.
     """
     left, right = model.left_projector, model.right_projector

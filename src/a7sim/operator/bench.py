@@ -41,6 +41,11 @@ class Parallaxes:
     places: Array
     apart: npt.NDArray[np.object_]
 
+    def parted(self, who: Who) -> Who:
+        """Return those for whom the images of a point could not be brought together."""
+        parted = np.array([self.apart[session] is not None for session in who], dtype=bool)
+        return np.asarray(who[parted])
+
 
 @dataclass(frozen=True)
 class Cleared:

@@ -5,12 +5,12 @@ and bx carries the scale on: it is changed until common points read the heights 
 The counters are preset so that readings go on in the system of the first model.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.geometry import GON, Array
+from a7sim.geometry import Array
 from a7sim.manual import LEAST_COUNT
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Crew, NobodyGoesOn, Who
@@ -21,12 +21,11 @@ from a7sim.operator.person import Person
 from a7sim.operator.relative import (
     RelativeOrientations,
     assessed,
+    corrections_of,
     relative_orientation,
     spread,
-    stand_of,
     unknowns_of,
 )
-from a7sim.operator.seat import wrapped
 from a7sim.operator.work import (
     begin_form,
     model_coordinates,
@@ -35,7 +34,6 @@ from a7sim.operator.work import (
     set_base_and_fittings,
     take_up_prints,
 )
-from a7sim.reduction import Undetermined, element_corrections
 
 MOST_SCALINGS = 4
 MOST_REFINEMENTS = 4
@@ -171,8 +169,7 @@ def _set_as_its_neighbour(bench: Bench, model: ModelJob) -> None:
 
 
 def _oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
-    plan, who = bench.job.plan, bench.crew.everybody
-    tolerated = 1e-3 * plan.tolerated_parallax_um * plan.projection_height / bench.job.certificate.c
+    plan, who, tolerated = bench.job.plan, bench.crew.everybody, bench.job.tolerated_parallax_mm
     return relative_orientation(bench, who, model, "dependent", plan.case, plan.parallax_readings, plan.bx, tolerated)
 
 
@@ -232,7 +229,7 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
         bench.begin_round(who, number)
         seen = bench.parallaxes_seen(who, points)
         who = crew.still(who)
-        who = who[seen.apart[who] == None]  # noqa: E711 - elementwise
+        who = np.setdiff1d(who, seen.parted(who))
         rms = np.sqrt((seen.p**2).mean(axis=0))
         now = spread(seat.elements(who, unknowns), who, crew.sessions)
         better = who[rms[who] < least[who]]
@@ -243,40 +240,13 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
         who = falling
         if not who.size or number == MOST_REFINEMENTS:
             break
-        corrections = _corrections(bench, who, model, seen.places[:, :, who], seen.p[:, who], unknowns)
-        seat.set_elements(who, {name: now[name][who] + corrections[name] for name in unknowns})
-    _set_changed(bench, crew.still(everybody), best)
-    plan = bench.job.plan
-    tolerated = 1e-3 * plan.tolerated_parallax_um * plan.projection_height / bench.job.certificate.c
+        corrections, _ = corrections_of(bench, who, model, seen.places, seen.p, unknowns, seat.bx(who))
+        who = crew.still(who)
+        seat.set_elements(who, {name: (now[name] + corrections[name])[who] for name in unknowns})
     everybody = crew.still(everybody)
+    seat.set_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
     bench.begin_round(everybody, MOST_REFINEMENTS + 1)
-    return assessed(bench, everybody, model, found, model.all_positions(), plan.parallax_readings, tolerated)
-
-
-def _corrections(
-    bench: Bench, who: Who, model: ModelJob, places: Array, parallaxes: Array, unknowns: Sequence[str]
-) -> dict[str, Array]:
-    """Return corrections ``(m,)`` of the new photograph's elements, gon and mm."""
-    hands = [f"{name[:-1]}2" for name in unknowns]
-    left = stand_of(bench, who, model.left_projector, np.zeros(who.size))
-    right = stand_of(bench, who, model.right_projector, bench.seat.elements(who, ["bx"])["bx"])
-    bench.compute(who)
-    try:
-        found = element_corrections(parallaxes, places * np.array([1.0, 1.0, -1.0])[:, None, None], left, right, hands)
-    except Undetermined as undetermined:
-        bench.crew.give_up(who, f"{model.name}: {undetermined}")
-        return {name: np.zeros(who.size) for name in unknowns}
-    return {
-        name: values if name[:2] in ("by", "bz") else values / GON
-        for name, values in zip(unknowns, found.unknowns, strict=True)
-    }
-
-
-def _set_changed(bench: Bench, who: Who, wanted: Mapping[str, Array]) -> None:
-    for name, values in wanted.items():
-        if not who.size:
-            return
-        off = values[who] - bench.seat.elements(who, [name])[name]
-        changed = who[np.abs(wrapped(off) if name.startswith("kappa") else off) > LEAST_COUNT / 2.0]
-        if changed.size:
-            bench.seat.set_elements(changed, {name: values[changed]})
+    job = bench.job
+    return assessed(
+        bench, everybody, model, found, model.all_positions(), job.plan.parallax_readings, job.tolerated_parallax_mm
+    )

@@ -372,7 +372,7 @@ class _Clearing:
         for label in self.checks:
             seen = self.bench.parallaxes_seen(who, [self.model.standard_points[label]])
             together = self.crew.still(who)
-            apart = together[seen.apart[together] != None]  # noqa: E711 - elementwise
+            apart = seen.parted(together)
             self._found[label][together] = seen.p[0, together]
             self._found[label][apart] = np.nan
 

@@ -53,3 +53,8 @@ class Job:
     grid_plate: GridPlate = field(default_factory=GridPlate)
     control: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     """X, Y, Z in m of ground control, nan for what is not given, where models are levelled at the instrument."""
+
+    @property
+    def tolerated_parallax_mm(self) -> float:
+        """Rms of the residual y-parallaxes at the scale of the model beyond which a model does not fit."""
+        return 1e-3 * self.plan.tolerated_parallax_um * self.plan.projection_height / self.certificate.c

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.geometry import GON, Array, angles_of, length_of, mxm, mxv
+from a7sim.geometry import GON, Array
+from a7sim.operator.absolute import turned_upright
 from a7sim.operator.bench import Bench
 from a7sim.operator.stereo_view import StereoView
 from a7sim.reduction import AbsoluteOrientation, Ground, Model, Undetermined, absolute_orientation
@@ -80,8 +81,7 @@ def levelled(
             return found
         bench.begin_round(who, number)
         bench.compute(who)
-        settings = _settings(view, bench, absolute, scale_number)
-        bench.seat.set_elements(who, {name: np.full(who.size, value) for name, value in settings.items()})
+        bench.seat.set_changed(who, _settings(bench, absolute, scale_number))
         view.learn()
         points = _measured(bench, wanted)
     raise AssertionError
@@ -117,29 +117,10 @@ def _plumb(absolute: AbsoluteOrientation) -> Array:
     return np.asarray(absolute.similarity.rotation[2])
 
 
-def _settings(view: StereoView, bench: Bench, absolute: AbsoluteOrientation, scale_number: float) -> dict[str, float]:
+def _settings(bench: Bench, absolute: AbsoluteOrientation, scale_number: float) -> dict[str, Array]:
     """Return what the elements must show for the model to be level and to scale."""
     seat = bench.seat
-    cameras = {hand: view.camera(hand) for hand in (1, 2)}
-    turn = _turn_upright(_plumb(absolute))
-    stretch = float(absolute.similarity.scale) * 1e3 / scale_number
-    base = stretch * mxv(turn, cameras[2][0] - cameras[1][0])
-    settings = {}
-    for hand, (_, turned) in cameras.items():
-        n = seat.projector(hand)
-        for name, angle in zip(("omega", "phi", "kappa"), angles_of(mxm(turn, turned)), strict=True):
-            settings[f"{name}{n}"] = float(angle) / GON + seat.manual.elements[f"{name}{n}"].zero
-    right = seat.projector(2)
-    settings["bx"] = float(base[0])
-    settings[f"by{right}"] = -float(cameras[1][0][1] + base[1])
-    settings[f"bz{right}"] = float(cameras[1][0][2] + base[2])
-    return settings
-
-
-def _turn_upright(up: Array) -> Array:
-    """Return the smallest rotation ``(3, 3)`` that turns a unit vector ``(3,)`` near the Z axis upright."""
-    axis = np.array([up[1], -up[0], 0.0])
-    x, y, z = axis
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    cosine = float(up[2]) / float(length_of(up))
-    return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + cosine))
+    names = [name for name in seat.manual.elements if name not in ("c1", "c2")]
+    larger = float(absolute.similarity.scale) * 1e3 / scale_number
+    settings = seat.elements(bench.crew.everybody, names)
+    return turned_upright(settings, seat.model, seat.manual, _plumb(absolute)[:, None], np.array([larger]))

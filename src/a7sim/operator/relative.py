@@ -176,7 +176,7 @@ def relative_orientation(
         bench.begin_round(measuring, int(done[measuring].max()) + 1)
         seen = bench.parallaxes(measuring, points, readings, measured_with)
         measuring = crew.still(measuring)
-        apart = measuring[seen.apart[measuring] != None]  # noqa: E711 - elementwise
+        apart = seen.parted(measuring)
         together = np.setdiff1d(measuring, apart)
         rough_rounds[apart] += 1
         _bring_together(bench, apart, model, points, unknowns, base, seen.apart, rough_rounds)
@@ -185,7 +185,9 @@ def relative_orientation(
         falling = together[rms[together] < STILL_FALLING * best.rms[together]]
         best.see(together, settings, mean, rms)
         to_clear = seen.p - mean if method == "independent" else seen.p
-        corrections, sigmas = _corrections(bench, falling, model, labels, seen.places, to_clear, unknowns, base)
+        corrections, sigmas = corrections_of(
+            bench, falling, model, seen.places, to_clear, unknowns, np.full(falling.size, base), labels
+        )
         falling = crew.still(falling)
         rounds.append(Rounds(together, settings, dict(zip(labels, seen.p, strict=True)), mean, rms, falling, sigmas))
         if falling.size:
@@ -194,7 +196,7 @@ def relative_orientation(
         measuring = crew.still(np.sort(np.concatenate([falling, apart])))
         measuring = measuring[done[measuring] < MOST_ROUNDS]
     who = crew.still(who)
-    _restore(bench, who, best)
+    seat.set_changed(who, {name: kept[who] for name, kept in best.settings.items()})
     _set_mean_on_by(bench, who, model, "by1" if method == "independent" else unknowns[3], best.mean)
     bench.begin_round(who, int(done[who].max(initial=0)) + 1)
     found = RelativeOrientations(method, case, rounds, rough_rounds, {}, {}, {})
@@ -241,7 +243,7 @@ def assessed(
     measured = bench.seat.measures_parallax
     left = bench.parallaxes(who, names, readings) if measured else bench.parallaxes_seen(who, names)
     who = crew.still(who)
-    apart = who[left.apart[who] != None]  # noqa: E711 - elementwise
+    apart = left.parted(who)
     crew.give_up(apart, lambda session: f"{model.name}: the images of {left.apart[session]} cannot be fused any more")
     who = crew.still(who)
     there = [name for name in ALL_ELEMENTS if name in bench.seat.manual.elements]
@@ -277,13 +279,6 @@ def _set_mean_on_by(bench: Bench, who: Who, model: ModelJob, by: str, mean: Arra
         bench.seat.set_elements(who, {by: bench.seat.elements(who, [by])[by] + sense * mean[who]})
 
 
-def _restore(bench: Bench, who: Who, best: _Best) -> None:
-    for name, wanted in best.settings.items():
-        changed = who[bench.seat.elements(who, [name])[name] != wanted[who]] if who.size else who
-        if changed.size:
-            bench.seat.set_elements(changed, {name: wanted[changed]})
-
-
 def _bring_together(
     bench: Bench,
     who: Who,
@@ -316,28 +311,32 @@ def _bring_together(
         parallaxes[:, one] = (left[1] - right[1]) * where_they_meet
         places[:, :, one] = left * where_they_meet
         settings = seat.elements(one, unknowns)
-        corrections, _ = _corrections(bench, one, model, (), places, parallaxes, unknowns, base)
+        corrections, _ = corrections_of(bench, one, model, places, parallaxes, unknowns, np.array([base]))
         if crew.still(one).size:
             seat.set_elements(one, {name: settings[name] + corrections[name][one] for name in unknowns})
 
 
-def _corrections(
+def corrections_of(
     bench: Bench,
     who: Who,
     model: ModelJob,
-    labels: Sequence[str],
     places: Array,
     parallaxes: Array,
     unknowns: Sequence[str],
-    base: float,
+    base: Array,
+    labels: Sequence[str] = (),
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Return corrections and their standard deviations ``(sessions,)`` by element, gon and mm."""
+    """Return corrections and their standard deviations ``(sessions,)`` by element, gon and mm.
+
+    Places ``(3, n, sessions)`` and parallaxes ``(n, sessions)`` in mm, bases ``(m,)``; labels are the positions, which
+    a closed form asks for. Those whose points do not determine the elements give up.
+    """
     nothing = {name: np.zeros(bench.crew.sessions) for name in unknowns}
     if not who.size:
         return nothing, nothing
     hands = [f"{name[:-1]}{model.hand_of(int(name[-1]))}" for name in unknowns]
     left = stand_of(bench, who, model.left_projector, np.zeros(who.size))
-    right = stand_of(bench, who, model.right_projector, np.full(who.size, base))
+    right = stand_of(bench, who, model.right_projector, base)
     bench.compute(who)
     in_frame = places[:, :, who] * np.array([1.0, 1.0, -1.0])[:, None, None]
     try:
@@ -349,7 +348,7 @@ def _corrections(
     found = np.array([solution.unknowns, solution.sigmas])
     if bench.job.plan.solution == "hallert":
         on_pattern = _on_pattern(bench, who, labels, places[:, :, who], base)
-        b, d, h = _pattern(places[:, :, who[on_pattern]], base)
+        b, d, h = _pattern(places[:, :, who[on_pattern]], base[on_pattern])
         found[:, :, on_pattern] = regular_corrections(parallaxes[:, who[on_pattern]], b, d, h, hands)
     values, sigmas = (
         spread(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.sessions) for each in found
@@ -357,14 +356,14 @@ def _corrections(
     return values, sigmas
 
 
-def _pattern(places: Array, base: float) -> tuple[Array, Array, Array]:
+def _pattern(places: Array, base: Array) -> tuple[Array, Array, Array]:
     """Return b, the mean half width d and the mean depth h ``(m,)`` of points ``(3, n, m)`` in the order of a case."""
     _, y, z = places
     rows = np.array(REGULAR_POINTS[1][: len(y)])
-    return np.full(y.shape[-1], base), (rows @ y) / np.abs(rows).sum(), z.mean(axis=0)
+    return base, (rows @ y) / np.abs(rows).sum(), z.mean(axis=0)
 
 
-def _on_pattern(bench: Bench, who: Who, labels: Sequence[str], places: Array, base: float) -> Truths:
+def _on_pattern(bench: Bench, who: Who, labels: Sequence[str], places: Array, base: Array) -> Truths:
     """Return whose points ``(3, n, m)`` lie near enough to the pattern of six or nine for the closed form."""
     if "".join(labels) not in (CASES["A"], CASES["D"]):
         return np.zeros(who.size, dtype=bool)

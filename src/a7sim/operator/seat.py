@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from a7sim.geometry import GON, Array, mxv, plane_rotation
-from a7sim.manual import VARIANTS, Variant
+from a7sim.manual import LEAST_COUNT, VARIANTS, Variant
 from a7sim.operator.crew import Crew, Who
 from a7sim.operator.hands import Hands, Truths
 from a7sim.operator.job import Job, ModelJob
@@ -126,6 +126,17 @@ class Seat:
             self.see_that_it_obeyed(who, f"setting {name}")
             self.crew.enter(who, "", f"set {name}", counts)
         self.learn_settings(self.crew.still(who))
+
+    def set_changed(self, who: Who, settings: Mapping[str, Array]) -> None:
+        """Set those elements whose counters do not yet show the values ``(m,)`` that they have to."""
+        for name, wanted in settings.items():
+            if not who.size:
+                return
+            off = counter_value(name, wanted) - self.elements(who, [name])[name]
+            off = wrapped(off) if name.startswith("kappa") else off
+            changed = self.crew.goes_on(who) & (np.abs(off) > LEAST_COUNT / 2.0)
+            if changed.any():
+                self.set_elements(who[changed], {name: wanted[changed]})
 
     def learn_settings(self, who: Who) -> None:
         """Read off what the places of images depend on."""

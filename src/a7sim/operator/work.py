@@ -166,8 +166,7 @@ def begin_form(bench: Bench, model: ModelJob, form: str, begins: Callable[[str],
 
 def oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
     """Orient a model by the procedure on the job sheet."""
-    plan, who = bench.job.plan, bench.crew.everybody
-    tolerated = 1e-3 * plan.tolerated_parallax_um * plan.projection_height / bench.job.certificate.c
+    plan, who, tolerated = bench.job.plan, bench.crew.everybody, bench.job.tolerated_parallax_mm
     if plan.start_off_gon:
         set_off(bench, who, model, plan.method, plan.start_off_gon)
     if plan.procedure == "empirical":

@@ -10,7 +10,6 @@ import numpy as np
 import a7sim
 from a7sim.documents import Document, as_json, head, of_absolute
 from a7sim.geometry import Array, length_of
-from a7sim.instrument.language import Listener
 from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit
 from a7sim.operator.compilation import CONTOUR, Errand, Traced, Tracing
@@ -63,8 +62,8 @@ def compile_model(
     """
     watcher = watcher or Watcher()
     _see_that_it_can_be(scenario, wanted)
-    heard: list[Listener] = []
-    session = open_session(scenario, seed, lambda event: heard[0](event))  # noqa: PLW0108 - the journal is opened later
+    journal = Journal()
+    session = open_session(scenario, seed, journal.heard)
     order = _order(wanted, scenario, session.scene)
     if out is not None:
         prepare_folder(out, force)
@@ -77,8 +76,7 @@ def compile_model(
         "message": "",
     }
     journalled = {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
-    with Journal(out / JOURNAL if out else None, journalled) as journal:
-        heard.append(journal.heard)
+    with journal.opened(out / JOURNAL if out else None, journalled):
         try:
             sheet = _sheet(session, wanted, order, watcher)
             document |= _of_sheet(sheet, session.scene, scenario)

@@ -56,15 +56,14 @@ def run_grid_test(
     if scenario.instrument.variant != TESTED_VARIANT:
         raise Mistake(f"instrument.variant: expected '{TESTED_VARIANT}', got '{scenario.instrument.variant}'")
     watcher = watcher or Watcher()
-    heard: list[Listener] = []
-    autograph, person = _opened(scenario, seed, lambda event: heard[0](event))  # noqa: PLW0108 - the journal is opened later
+    journal = Journal()
+    autograph, person = _opened(scenario, seed, journal.heard)
     document = _header(scenario, seed, order, autograph)
     if out is not None:
         prepare_folder(out, force)
     sheets: list[ProjectorSheet] = []
     about = {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant, "work": "grid test"}
-    with Journal(out / JOURNAL if out else None, about) as journal:
-        heard.append(journal.heard)
+    with journal.opened(out / JOURNAL if out else None, about):
         try:
             for sheet in calibrate(person, order, watcher.tick, watcher.begins):
                 sheets.append(sheet)

@@ -13,14 +13,21 @@ SCHEMA_VERSION = 1
 
 
 class Journal:
-    """A file of JSON lines: a header, then an event a line, each whole on disk before the next."""
+    """A file of JSON lines: a header, then an event a line, each whole on disk before the next.
 
-    def __init__(self, path: Path | None, header: dict[str, Any]) -> None:
+    It counts from the beginning what it hears, and writes from when it is opened, as a context.
+    """
+
+    def __init__(self) -> None:
         self._file: TextIO | None = None
         self.events = 0
+
+    def opened(self, path: Path | None, header: dict[str, Any]) -> "Journal":
+        """Begin to write, where there is a path; nothing must have been heard before."""
         if path is not None:
             self._file = path.open("w", encoding="utf-8", buffering=1)
             self._write({"schema_version": SCHEMA_VERSION, "software": f"a7sim {a7sim.__version__}", **header})
+        return self
 
     def heard(self, event: LinkEvent) -> None:
         """Write an event."""

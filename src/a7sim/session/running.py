@@ -108,14 +108,13 @@ def run(
     measurements or a folder that cannot be used, before anything is written.
     """
     watcher = watcher or Watcher()
-    heard: list[Listener] = []
-    session = open_session(scenario, seed, lambda event: heard[0](event))  # noqa: PLW0108 - the journal is opened after the session
+    journal = Journal()
+    session = open_session(scenario, seed, journal.heard)
     if out is not None:
         prepare_folder(out, force)
     document = results.header(scenario, seed) | {"status": "failed", "message": ""}
     done: list[Document] = []
-    with Journal(out / JOURNAL if out else None, _journal_header(scenario, seed)) as journal:
-        heard.append(journal.heard)
+    with journal.opened(out / JOURNAL if out else None, _journal_header(scenario, seed)):
         try:
             for record in work(session.person, session.job, watcher.tick, watcher.begins):
                 plan = next(model for model in scenario.models if model.name == record.model.name)

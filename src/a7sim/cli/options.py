@@ -1,0 +1,103 @@
+"""What the commands that seat an operator share: options, the scenario that they choose, and how they end."""
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+import msgspec
+from rich.console import Console, RenderableType
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from a7sim.cli import EXIT_DOES_NOT_FIT
+from a7sim.documents import Document, as_json
+from a7sim.mistakes import Mistake
+from a7sim.scenario import PROFILES, Observer, Scenario, load_scenario
+from a7sim.session import Watcher
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+_OF_A_SCENARIO = (
+    click.option("--seed", type=click.IntRange(min=0), help="Draws film, instrument and operator."),
+    click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario."),
+    click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
+    click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error."),
+)
+_OF_A_FOLDER = (
+    click.option("--out", type=click.Path(path_type=Path), help="Folder for journal, book, tables and results."),
+    click.option("--force", is_flag=True, help="Write into a folder that exists."),
+)
+_OF_RESULTS = (
+    click.option("--json", "as_document", is_flag=True, help="Print the results as one JSON document."),
+    click.option("--quiet", is_flag=True, help="Print nothing."),
+)
+
+
+def _with(options: tuple[Callable[[Command], Command], ...]) -> Callable[[Command], Command]:
+    def decorated(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorated
+
+
+of_a_scenario = _with(_OF_A_SCENARIO)
+"""--seed, --set, --skill, --perfect-observer: what `chosen` takes."""
+
+of_a_folder = _with(_OF_A_FOLDER)
+"""--out, --force."""
+
+of_results = _with(_OF_RESULTS)
+"""--json, --quiet: what `ended` takes."""
+
+
+def chosen(
+    scenario: str,
+    seed: int | None,
+    settings: tuple[str, ...],
+    skill: str | None,
+    perfect_observer: bool,
+    others: Mapping[str, str | None] | None = None,
+) -> tuple[Scenario, int]:
+    """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
+    loaded = load_scenario(scenario, _overrides(settings, {**(others or {}), "observer.skill": skill}))
+    if perfect_observer:
+        loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
+    return loaded, loaded.seed if seed is None else seed
+
+
+def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> dict[str, str]:
+    overrides = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not equals or not key:
+            raise Mistake(f"--set: expected PATH=VALUE such as plan.bx=190.0, got {setting!r}")
+        overrides[key] = value
+    return overrides | {key: f'"{value}"' for key, value in texts.items() if value is not None}
+
+
+@contextmanager
+def watched(points: int, as_document: bool, quiet: bool) -> Iterator[Watcher]:
+    """Show on a terminal how the operator gets on with about so many points."""
+    columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
+    unwatched = quiet or as_document or not sys.stderr.isatty()
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
+        task = progress.add_task("sitting down", total=points)
+        yield Watcher(
+            lambda activity: progress.update(task, description=activity),
+            lambda: progress.advance(task),
+        )
+
+
+def ended(document: Document, as_document: bool, quiet: bool, tables: Callable[[Document], RenderableType]) -> None:
+    """Show the results, and end with exit code 1 where the operator gave up."""
+    if as_document:
+        click.echo(as_json(document), nl=False)
+    elif not quiet:
+        Console().print(tables(document))
+    if document["status"] != "complete":
+        click.echo(f"a7sim: the operator gave up: {document['message']}", err=True)
+        raise click.exceptions.Exit(EXIT_DOES_NOT_FIT)
