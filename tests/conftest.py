@@ -4,6 +4,10 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("steady", derandomize=True, deadline=None)
+settings.load_profile("steady")
 
 BESIDE_THE_PROJECT = Path(__file__).parents[2] / "shared" / "reference"
 

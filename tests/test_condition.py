@@ -361,4 +361,9 @@ def test_nothing_but_the_view_differs_between_a_faulty_instrument_and_a_faultles
     )
     for line in lines:
         assert faulty.say(line) == faultless.say(line)
-    assert faulty.say('EYEP1? "P"') != faultless.say('EYEP1? "P"') or faulty.say('EYEP1? "P"').startswith("9.91E37")
+    to_the_point = {"A7": "DRIV:X -2;Y 5", "A8": "DRIV:X 150;Y 202"}[variant]
+    for door in (faulty, faultless):
+        door.say(to_the_point)
+    seen = [door.say('EYEP1? "P"') for door in (faulty, faultless)]
+    assert "9.91E37" not in seen[0] + seen[1]
+    assert seen[0] != seen[1]

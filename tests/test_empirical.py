@@ -39,7 +39,7 @@ from tests.sessions import tilted_flight, without_errors
 METHODS = pytest.mark.parametrize("method", ["independent", "dependent"])
 EMPIRICAL = {"plan.procedure": '"empirical"'}
 TWO_GON_OFF = EMPIRICAL | {"plan.start_off_gon": "2"}
-SEEDS = range(25)
+SEEDS = range(50)
 
 
 class _IsReady(Exception):
@@ -148,19 +148,20 @@ def _cleared(seeds, method, **overrides):
 
 @cache
 def sweep():
-    """Akwanga with its default operator from up to 2 gon, both methods, 25 seeds each."""
+    """Akwanga with its default operator from up to 2 gon, both methods, 50 seeds each."""
     return np.concatenate([_cleared(SEEDS, method) for method in ELEMENTS])
 
 
 @pytest.mark.slow
 def test_from_two_gon_both_methods_leave_what_the_issue_asks_for_within_six_rounds():
-    rounds, rms, points, _ = sweep().T
-    assert len(rms) == 50
-    assert (points == 15).all()
-    assert np.median(rms) < 0.03
-    assert rms.max() < 0.08
-    assert rounds.max() <= 6
-    assert np.median(rounds) <= 3
+    for of_method in np.split(sweep(), len(ELEMENTS)):
+        rounds, rms, points, _ = of_method.T
+        assert len(rms) == 50
+        assert (points == 15).all()
+        assert np.median(rms) < 0.03
+        assert rms.max() < 0.08
+        assert rounds.max() <= 6
+        assert np.median(rounds) <= 3
 
 
 @pytest.mark.slow
@@ -384,7 +385,11 @@ def images_of(found, labels, c):
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("procedure", ["numerical", "empirical"])
 def test_same_observations_four_methods_one_orientation(procedure, seed):
-    """The parallaxes left at the six points of a model: least squares, Hallert, coplanarity and Schut; 3 sigmas."""
+    """The parallaxes left at the six points of a model: least squares, Hallert, coplanarity and Schut.
+
+    They differ by a tenth of what one parallax's error makes of the elements (0.14 sigma measured), and each says that
+    the settings as they stand are off by more than a sigma.
+    """
     scenario = load_scenario("akwanga", {"plan.method": '"dependent"', "plan.procedure": f'"{procedure}"'})
     found, _ = orient(scenario, seed)
     labels, c = list(CASES["A"]), scenario.camera.c
@@ -414,9 +419,9 @@ def test_same_observations_four_methods_one_orientation(procedure, seed):
     turn_sigma, base_sigma = np.hypot.reduce(sigmas[2:]), np.hypot(*sigmas[:2]) / bx
     for first in orientations.values():
         for other in orientations.values():
-            assert turn_of(mxm(transposed(first[0]), other[0])) < 3.0 * turn_sigma
-            assert angle_between(first[1], other[1]) < 3.0 * base_sigma
-    assert turn_of(mxm(transposed(orientations["coplanarity"][0]), relative_of(e)[0])) > 1e-6
+            assert turn_of(mxm(transposed(first[0]), other[0])) < 0.3 * turn_sigma
+            assert angle_between(first[1], other[1]) < 0.3 * base_sigma
+        assert turn_of(mxm(transposed(first[0]), relative_of(e)[0])) > 1.0 * turn_sigma
 
 
 @METHODS

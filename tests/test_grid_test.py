@@ -289,8 +289,7 @@ def test_s0_is_that_of_the_mean_of_the_pointings(pointings):
 def test_a_serviced_instrument_gives_four_to_seven_um():
     scenario = load_scenario("grid-test")
     s0 = [each["s0_um"] for seed in range(5) for each in sheets_of(scenario, seed).values()]
-    assert 4.0 < min(s0) <= max(s0) < 7.5
-    assert np.median(s0) < 7.0
+    assert 4.0 < min(s0) <= max(s0) < 7.0
 
 
 def test_slips_are_struck_out_and_do_not_spoil_the_test():
@@ -344,22 +343,29 @@ METHODS = {
     "grid plate": {},
 }
 
-SEEDS = range(2)
+SEEDS = range(6)
 
 
 @cache
 def centres_by(method, seed):
-    document = run(load_scenario("akwanga", {"plan.centre_method": f'"{method}"', **METHODS[method]}), seed)
-    assert document["message"] == ""
+    documents, hours = sessions_by(method)
     return {
         (model["model"], side): (
             model["perspective_centres"][side],
             model["truth"]["centre_differences"][side],
-            document["operator"]["hours"],
+            hours[seed],
         )
-        for model in document["models"]
+        for model in documents[seed]["models"]
         for side in ("left", "right")
     }
+
+
+@cache
+def sessions_by(method):
+    crowd = open_crowd(load_scenario("akwanga", {"plan.centre_method": f'"{method}"', **METHODS[method]}), SEEDS)
+    documents = crowd.documents()
+    assert crowd.bench.crew.reasons == {}
+    return documents, crowd.bench.crew.seconds / 3600.0
 
 
 @pytest.mark.slow
@@ -371,17 +377,9 @@ def test_centres_are_true_within_three_sigmas_by_every_method(method):
         for centre, difference, _ in centres_by(method, seed).values()
         for name in ("X0", "Y0", "Z0")
     ]
-    assert np.mean(np.abs(shares) <= 3.0) >= 0.9
+    assert np.mean(np.abs(shares) <= 3.0) >= 0.95
     assert np.abs(shares).max() < 5.0
-
-
-@pytest.mark.slow
-def test_a_crowd_finds_the_centres_by_grid_plate_that_each_finds_at_its_line():
-    scenario = load_scenario("akwanga", {"plan.centre_method": '"grid plate"'})
-    for session, document in enumerate(open_crowd(scenario, SEEDS).documents()):
-        for model in document["models"]:
-            for side, centre in model["perspective_centres"].items():
-                assert centre == centres_by("grid plate", session)[model["model"], side][0]
+    assert 0.7 < np.std(shares) < 1.4
 
 
 @pytest.mark.slow
@@ -396,6 +394,7 @@ def test_the_three_methods_agree_within_three_sigmas():
                     sigma = np.hypot(centre[f"sigma_{name}"], beside[f"sigma_{name}"])
                     shares.append((difference[name] - its_difference[name]) / sigma)
     assert np.mean(np.abs(shares) <= 3.0) >= 0.95
+    assert 0.7 < np.std(shares) < 1.4
 
 
 @pytest.mark.slow
@@ -404,7 +403,7 @@ def test_levels_and_plate_are_more_exact_and_take_longer():
         return np.median([what(each) for seed in SEEDS for each in centres_by(method, seed).values()])
 
     for name in ("sigma_X0", "sigma_Z0"):
-        two, more, plate = (typical(method, lambda each: each[0][name]) for method in METHODS)  # noqa: B023
+        two, more, plate = (typical(method, lambda each, name=name: each[0][name]) for method in METHODS)
         assert more < 0.7 * two
         assert plate < 0.8 * two
     two, more, plate = (typical(method, lambda each: each[2]) for method in METHODS)
