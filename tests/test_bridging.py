@@ -9,6 +9,7 @@ import pytest
 from a7sim.instrument import fleet
 from a7sim.mistakes import Mistake
 from a7sim.operator import bridging, seat
+from a7sim.operator.bench import Bench, Parallaxes
 from a7sim.operator.bridging import bridged
 from a7sim.reduction import similarity_by_quaternion
 from a7sim.scenario import load_scenario
@@ -158,3 +159,25 @@ def test_with_finer_counters_ten_models_close_on_the_truth(monkeypatch):
     crowd, models = worked(scenario_of(10))
     assert len(models) == 10
     assert np.abs(misclosures(crowd, models)).max() < 0.01
+
+
+def test_what_cannot_be_looked_at_again_stays_as_it_was_oriented(monkeypatch):
+    """Where no image can be fused at the last look nothing is corrected and nothing set to zero."""
+
+    def all_apart(bench, who, points):
+        nothing = np.zeros((len(points), bench.crew.sessions))
+        apart = np.full(bench.crew.sessions, points[0], dtype=object)
+        return Parallaxes(nothing, np.zeros((3, *nothing.shape)), apart)
+
+    monkeypatch.setattr(Bench, "parallaxes_seen", all_apart)
+    _, models = worked(scenario_of(1))
+    assert abs(models[0].orientation.elements["omega2"][0] - 100.0) < 5.0
+    assert abs(models[0].orientation.elements["phi2"][0] - 100.0) < 5.0
+
+
+def test_a_model_without_a_common_point_on_its_left_is_refused(monkeypatch):
+    scenario = scenario_of(2)
+    monkeypatch.setattr(bridging, "model_coordinates", lambda bench, model, prints: {})
+    crowd, models = worked(scenario)
+    assert len(models) == 1
+    assert "none of its points 1, 3 and 5 was measured before" in crowd.bench.crew.reasons[0]

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from a7sim.cli import cli
 from a7sim.mistakes import Mistake
 from a7sim.operator.bench import Bench
-from a7sim.operator.compilation import Area, Compilation, Errand, Spots, Tracing
+from a7sim.operator.compilation import Area, Compilation, Errand, Spots, Tracing, _chain
 from a7sim.operator.crew import Crew
 from a7sim.operator.levelling import levelled
 from a7sim.operator.line_hands import LineHands
@@ -17,10 +19,11 @@ from a7sim.operator.plotting import Order, Sheet, _heights
 from a7sim.operator.stereo_view import FINE_MM, StereoView
 from a7sim.operator.work import worked
 from a7sim.scenario import load_scenario
+from a7sim.scene import build_scene
 from a7sim.session import open_session
 from a7sim.session.compiling import Wanted, compile_model
 from a7sim.session.map_sheet import as_geojson, as_svg, index_heights
-from a7sim.session.strips import ground_of
+from a7sim.session.strips import given_control, ground_of
 from tests.sessions import without_errors
 from tests.test_cli import a7sim
 
@@ -234,3 +237,25 @@ def test_a_height_outside_the_model_ends_with_one_sentence_and_exit_code_2(tmp_p
     assert done.returncode == 2
     assert done.stderr.startswith("a7sim: contour 900: expected a height within the model")
     assert done.stderr.count("\n") == 1
+
+
+def test_an_operator_is_given_no_coordinate_that_a_points_role_leaves_out():
+    """Plan control without a height, height control without a plan, no checks: nan, not what the terrain has there."""
+    scenario = load_scenario("schut-1956")
+    given = given_control(scenario, build_scene(scenario, 1))
+    at = dict(zip(given.points, given.coordinates.T, strict=True))
+    assert set(at) == {"P1", "P2", "H1", "H2", "H3"}
+    assert np.isnan(at["P1"]).tolist() == [False, False, True]
+    assert np.isnan(at["H1"]).tolist() == [True, True, False]
+
+
+def test_a_contour_that_ends_where_it_begins_is_an_empty_chain():
+    assert _chain([]).shape == (3, 0)
+    assert _chain([np.array([1.0, 2.0, 3.0])]).shape == (3, 1)
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "0", "-5", "ten"])
+def test_an_interval_that_is_no_distance_is_refused(value):
+    done = CliRunner().invoke(cli, ["compile", "akwanga", "--interval", value])
+    assert done.exit_code == 2
+    assert f"expected a number above 0, got '{value}'" in done.output

@@ -479,3 +479,10 @@ def test_results_and_tables_tell_how_a_model_was_cleared(capsys):
 def test_a_plan_that_cannot_be_is_a_mistake(key, value):
     with pytest.raises(Mistake, match=key):
         load_scenario("akwanga", {key: value})
+
+
+def test_hallerts_forms_are_for_six_and_nine_points_and_fifteen_go_by_least_squares():
+    plan = {"plan.solution": '"hallert"', "plan.case": '"E"'}
+    found, _ = orient(load_scenario("akwanga", plan), 2)
+    by_squares, _ = orient(load_scenario("akwanga", plan | {"plan.solution": '"least squares"'}), 2)
+    assert found.elements == by_squares.elements

@@ -99,3 +99,13 @@ def test_the_sheet_at_the_door():
     assert done.exit_code == 0
     for number in ("1:2492.7", "1:3750", "325.709 mm", "194.13 mm", "Cd", "1-2-1"):
         assert number in done.output
+
+
+@pytest.mark.parametrize("option", ["--c", "--flying-height", "--photo-base", "--map-scale"])
+@pytest.mark.parametrize("value", ["0", "nan", "-1"])
+def test_what_is_not_above_zero_is_refused_with_one_sentence(option, value):
+    flight = {"--c": "152", "--flying-height": "1200", "--photo-base": "91", "--map-scale": "2500"} | {option: value}
+    words = [word for pair in flight.items() for word in pair]
+    done = CliRunner().invoke(cli, ["prepare", *words, "--heights", "400", "500"])
+    assert done.exit_code == 2
+    assert f"expected a number above 0, got '{value}'" in done.output

@@ -4,24 +4,22 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli.options import chosen, ended, of_a_folder, of_a_scenario, of_results, watched
+from a7sim.cli.options import Above, chosen, ended, of_a_folder, of_a_scenario, of_results, watched
 from a7sim.session.compiled_tables import of_compilation
 from a7sim.session.compiling import Wanted, compile_model
 
 _POINTS = 400
 """About how many points and vertices an operator works on; the bar only needs the order of it."""
 
-_ABOVE_ZERO = click.FloatRange(min=0.0, min_open=True)
-
 
 @click.command("compile")
 @click.argument("scenario")
 @click.option("--model", "name", default="1", show_default=True, help="Model to be compiled.")
-@click.option("--contour", "contours", multiple=True, type=float, metavar="M", help="Height of a contour in m.")
-@click.option("--interval", type=_ABOVE_ZERO, metavar="M", help="All contours whose height is a multiple of this.")
+@click.option("--contour", "contours", multiple=True, type=Above(-1e6), metavar="M", help="Height of a contour in m.")
+@click.option("--interval", type=Above(), metavar="M", help="All contours whose height is a multiple of this.")
 @click.option("--line", "lines", multiple=True, metavar="NAME", help="Road or track of the scenario.")
-@click.option("--map-scale", type=click.FloatRange(min=100.0), metavar="N", help="Scale number of the map.")
-@click.option("--tremor", type=click.FloatRange(min=0.0, max=500.0), metavar="UM", help="Tremor at photo scale.")
+@click.option("--map-scale", type=Above(99.0), metavar="N", help="Scale number of the map.")
+@click.option("--tremor", type=click.IntRange(0, 500), metavar="UM", help="Tremor at photo scale.")
 @of_a_scenario
 @of_a_folder
 @of_results
@@ -32,7 +30,7 @@ def command(
     interval: float | None,
     lines: tuple[str, ...],
     map_scale: float | None,
-    tremor: float | None,
+    tremor: int | None,
     seed: int | None,
     settings: tuple[str, ...],
     skill: str | None,

@@ -1,5 +1,6 @@
 """What the commands that seat an operator share: options, the scenario that they choose, and how they end."""
 
+import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -18,6 +19,26 @@ from a7sim.scenario import PROFILES, Observer, Scenario, load_scenario
 from a7sim.session import Watcher
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class Above(click.ParamType[float]):
+    """A finite number above a bound."""
+
+    name = "number"
+
+    def __init__(self, bound: float = 0.0) -> None:
+        self._bound = bound
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number, or fail with a sentence."""
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not (math.isfinite(number) and number > self._bound):
+            self.fail(f"expected a number above {self._bound:g}, got {value!r}", param, ctx)
+        return number
+
 
 _OF_A_SCENARIO = (
     click.option("--seed", type=click.IntRange(min=0), help="Draws film, instrument and operator."),

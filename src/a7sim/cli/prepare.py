@@ -8,18 +8,19 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from a7sim.cli.options import Above
 from a7sim.documents import as_json, head
 from a7sim.manual import VARIANTS
 from a7sim.operator.preparation import Flight, ModelScale, Preparation, preparation
 
 
 @click.command("prepare")
-@click.option("--c", "c", type=float, required=True, help="Principal distance of the camera, mm.")
-@click.option("--photo-scale", type=float, help="Scale number of the photographs at the mean ground.")
-@click.option("--flying-height", type=float, help="Above the mean ground, m, in place of the photo scale.")
-@click.option("--photo-base", type=float, required=True, help="Base in the photograph, mm.")
-@click.option("--heights", type=float, nargs=2, required=True, help="Lowest and highest ground, m.")
-@click.option("--map-scale", type=float, help="Scale number of the map that is drawn.")
+@click.option("--c", "c", type=Above(), required=True, help="Principal distance of the camera, mm.")
+@click.option("--photo-scale", type=Above(), help="Scale number of the photographs at the mean ground.")
+@click.option("--flying-height", type=Above(), help="Above the mean ground, m, in place of the photo scale.")
+@click.option("--photo-base", type=Above(), required=True, help="Base in the photograph, mm.")
+@click.option("--heights", type=Above(-1e6), nargs=2, required=True, help="Lowest and highest ground, m.")
+@click.option("--map-scale", type=Above(), help="Scale number of the map that is drawn.")
 @click.option("--variant", type=click.Choice(list(VARIANTS)), default="A7", show_default=True)
 @click.option("--json", "as_document", is_flag=True, help="Print the sheet as one JSON document.")
 def command(

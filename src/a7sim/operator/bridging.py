@@ -100,7 +100,7 @@ def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedMod
         if last is not None:
             _see_that_it_follows(bench, last, model)
             _carry_on(bench, model)
-        set_base_and_fittings(bench, model)
+        set_base_and_fittings(bench, model.base, model.polarity)
         mount(bench, model, interior)
         prints = take_up_prints(bench, model)
         see_that_somebody_goes_on(bench)
@@ -185,6 +185,9 @@ def _scaled(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]
     left, right = model.left_projector, model.right_projector
     factor = np.ones(crew.sessions)
     names = [name for name in map(model.standard_points.get, "135") if name is not None and name in before]
+    if not names:
+        crew.give_up(who, f"{model.name}: none of its points 1, 3 and 5 was measured before, to carry the scale on")
+        see_that_somebody_goes_on(bench)
     for number in range(1, MOST_SCALINGS + 1):
         bench.begin_round(who, number)
         readings = bench.measure(who, names)[:, :, who]
@@ -222,9 +225,9 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
     crew, seat = bench.crew, bench.seat
     unknowns = unknowns_of("dependent", model)
     points = [model.standard_points[label] for label in model.all_positions()]
-    best = {name: np.zeros(crew.sessions) for name in unknowns}
-    least = np.full(crew.sessions, np.inf)
     everybody = who = crew.everybody
+    best = spread(seat.elements(who, unknowns), who, crew.sessions)
+    least = np.full(crew.sessions, np.inf)
     for number in range(1, MOST_REFINEMENTS + 1):
         bench.begin_round(who, number)
         seen = bench.parallaxes_seen(who, points)

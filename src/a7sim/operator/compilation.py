@@ -291,10 +291,9 @@ class Compilation:
             if start is None or any(_distance(line.readings[:2], start.place) < _SAME_LINE_MM for line in lines):
                 continue
             found = self._both_ways(name, height, start, z, lines)
-            if "joined" in found.endings and _length(found.readings[:2]) < _STUB_MM:
-                self._person.client.send(
-                    f'NOTE "{name}: {found.readings.shape[1]} vertices more of a line drawn before"'
-                )
+            vertices = found.readings.shape[1]
+            if vertices < 2 or ("joined" in found.endings and _length(found.readings[:2]) < _STUB_MM):
+                self._person.client.send(f'NOTE "{name}: {vertices} vertices, no line or more of one drawn before"')
             else:
                 lines.append(found)
         return lines
@@ -302,10 +301,10 @@ class Compilation:
     def _both_ways(self, name: str, height: float, start: _Vertex, z: float, drawn: Sequence[Traced]) -> Traced:
         there, ending = self._followed(name, start, drawn)
         if ending == "closed":
-            return Traced(name, CONTOUR, height, np.array([*there, there[0]]).T, ("closed", "closed"))
+            return Traced(name, CONTOUR, height, _chain([*there, there[0]]), ("closed", "closed"))
         self._drive(start.place, z)
         back, other = self._followed(name, _Vertex(start.place, -start.heading, start.surface), drawn)
-        return Traced(name, CONTOUR, height, np.array([*back[::-1], *there]).T, (other, ending))
+        return Traced(name, CONTOUR, height, _chain([*back[::-1], *there]), (other, ending))
 
     def _followed(self, name: str, start: _Vertex, drawn: Sequence[Traced]) -> tuple[list[Array], Ending]:
         """Follow a contour from a place on it; return its vertices and how it ended."""
@@ -533,6 +532,11 @@ def _crosses(chain: Array, begin: Array, end: Array) -> bool:
     of_begin = sides(starts, parts, np.broadcast_to(begin[:, None], starts.shape))
     of_end = sides(starts, parts, np.broadcast_to(end[:, None], starts.shape))
     return bool(((of_chain[:-1] * of_chain[1:] <= 0.0) & (of_begin * of_end <= 0.0)).any())
+
+
+def _chain(vertices: Sequence[Array]) -> Array:
+    """Return vertices ``(3,)`` as a chain ``(3, n)``."""
+    return np.array(vertices).reshape(-1, 3).T
 
 
 def _length(chain: Array) -> float:

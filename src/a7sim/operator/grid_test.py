@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from a7sim.geometry import GON, Array
-from a7sim.manual import RIGHT_FITTINGS, Variant
+from a7sim.manual import Variant
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Crew, Who
 from a7sim.operator.interior import centre_picture
@@ -16,6 +16,7 @@ from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
 from a7sim.operator.plate import Crosses, lie_of_plate, places_of, point_at_crosses, prints_of
 from a7sim.operator.seat import side, wrapped
+from a7sim.operator.work import set_base_and_fittings
 from a7sim.reduction import Elements, PlateLie, ProjectorTest, grid_test
 from a7sim.scenario import Camera, GridPlate, Plan
 
@@ -109,7 +110,7 @@ def calibrated(
     crew = bench.crew
     crew.begin(crew.everybody, "", "preparation")
     bench.seat.prepare(crew.everybody)
-    _set_fittings(bench, order.polarity)
+    set_base_and_fittings(bench, "inside", order.polarity)
     for hand in (1, 2):
         form = f"grid test, {side(hand)} projector"
         begins(form)
@@ -117,18 +118,6 @@ def calibrated(
         bench.hands.note(crew.everybody, form)
         yield _tested(bench, order, hand)
         bench.hands.unload(crew.everybody, hand)
-
-
-def _set_fittings(bench: Bench, polarity: str) -> None:
-    seat, who = bench.seat, bench.crew.everybody
-    right = {
-        name: put for name, put in RIGHT_FITTINGS[polarity, "inside"].as_words().items() if name in seat.manual.fittings
-    }
-    seat.spend_setting(who, 1 + len(right))
-    bench.hands.set_base_mode(who, "inside")
-    for name, position in right.items():
-        bench.hands.set_fitting(who, name, position)
-    seat.see_that_it_obeyed(who, "setting base inside and its fittings")
 
 
 def _tested(bench: Bench, order: GridTestOrder, hand: int) -> ProjectorSheet:

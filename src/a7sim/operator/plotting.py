@@ -18,7 +18,7 @@ from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
 from a7sim.operator.preparation import PLAN_GEARS
 from a7sim.operator.stereo_view import StereoView
-from a7sim.operator.work import ModelRecord, worked
+from a7sim.operator.work import ModelRecord, begin_form, worked
 from a7sim.reduction import Ground
 
 TABLE_GEARS: Mapping[str, float] = MappingProxyType({"1-1-1": 1.0, **PLAN_GEARS})
@@ -93,7 +93,7 @@ def plotted(
     bench = Bench(Crew.of_one(person), LineHands(person), job, tick)
     record = next(worked(bench, begins)).of(0)
     view = StereoView(bench, person)
-    _begin(bench, "absolute orientation", begins)
+    begin_form(bench, bench.seat.model, "absolute orientation", begins)
     gear = TABLE_GEARS[job.plan.plan_gear]
     corners = [record.model.standard_points[label] for label in "3456" if label in record.model.standard_points]
     first = oriented(bench, record.points, control, record.z_units_per_mm)
@@ -105,16 +105,16 @@ def plotted(
         )
     area = Area.within(record.model.standard_points, model.points)
     work = Compilation(bench, person, view, model, area, order.tracing)
-    _begin(bench, "spot heights", begins)
+    begin_form(bench, bench.seat.model, "spot heights", begins)
     spots = work.spot_heights()
     heights = _heights(order, spots)
     lines: list[Traced] = []
     for height in heights:
-        _begin(bench, f"contour {height:g}", begins)
+        begin_form(bench, bench.seat.model, f"contour {height:g}", begins)
         lines += work.contour(height, spots)
         tick()
     for errand in order.errands:
-        _begin(bench, f"line {errand.name}", begins)
+        begin_form(bench, bench.seat.model, f"line {errand.name}", begins)
         lines.append(work.line(errand, spots))
         tick()
     above, sigma_height, sigma_plan = _expected(bench, view, model, spots, order.tracing)
@@ -122,13 +122,6 @@ def plotted(
         replace(record, finished_at=float(bench.crew.seconds[0])),
         model, area, spots, tuple(lines), heights, gear, above, sigma_height, sigma_plan,
     )  # fmt: skip
-
-
-def _begin(bench: Bench, form: str, begins: Callable[[str], None]) -> None:
-    name = bench.seat.model.name
-    begins(f"model {name}: {form}")
-    bench.crew.begin(bench.crew.everybody, name, form)
-    bench.hands.note(bench.crew.everybody, f"{name}: {form}")
 
 
 def _round_scale(number: float) -> float:

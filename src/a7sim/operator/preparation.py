@@ -47,6 +47,8 @@ class Flight:
         """
         if (photo_scale is None) == (flying_height is None):
             raise Mistake("expected a photo scale or a flying height, one of the two")
+        if not c > 0.0:
+            raise Mistake(f"expected a principal distance above zero, got {c:g}")
         if photo_scale is None:
             photo_scale = 1e3 * (flying_height or 0.0) / c
         flight = cls(c, photo_scale, photo_base, min(heights), max(heights))

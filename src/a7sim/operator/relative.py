@@ -348,8 +348,9 @@ def corrections_of(
     found = np.array([solution.unknowns, solution.sigmas])
     if bench.job.plan.solution == "hallert":
         on_pattern = _on_pattern(bench, who, labels, places[:, :, who], base)
-        b, d, h = _pattern(places[:, :, who[on_pattern]], base[on_pattern])
-        found[:, :, on_pattern] = regular_corrections(parallaxes[:, who[on_pattern]], b, d, h, hands)
+        if on_pattern.any():
+            b, d, h = _pattern(places[:, :, who[on_pattern]], base[on_pattern])
+            found[:, :, on_pattern] = regular_corrections(parallaxes[:, who[on_pattern]], b, d, h, hands)
     values, sigmas = (
         spread(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.sessions) for each in found
     )

@@ -17,6 +17,7 @@ from a7sim.operator.interior import InteriorOrientation, InteriorOrientations, i
 from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
+from a7sim.operator.plate import prints_of
 from a7sim.operator.relative import RelativeOrientation, RelativeOrientations, relative_orientation
 from a7sim.reduction import PerspectiveCentre
 
@@ -102,7 +103,7 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
     bench.seat.prepare(crew.everybody)
     for model in job.models:
         begin_form(bench, model, "interior orientation", begins)
-        set_base_and_fittings(bench, model)
+        set_base_and_fittings(bench, model.base, model.polarity)
         mount(bench, model, interior)
         prints = take_up_prints(bench, model)
         see_that_somebody_goes_on(bench)
@@ -176,17 +177,17 @@ def oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
     return relative_orientation(bench, who, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated)
 
 
-def set_base_and_fittings(bench: Bench, model: ModelJob) -> None:
+def set_base_and_fittings(bench: Bench, base: str, polarity: str) -> None:
     """Set base in or out, and the fittings that belong to it and to the pictures."""
     who, hands = bench.crew.everybody, bench.hands
-    words = RIGHT_FITTINGS[model.polarity, model.base].as_words()
+    words = RIGHT_FITTINGS[polarity, base].as_words()
     right = {name: position for name, position in words.items() if name in bench.seat.manual.fittings}
     bench.seat.spend_setting(who, 1 + len(right))
-    hands.set_base_mode(who, model.base)
+    hands.set_base_mode(who, base)
     for name, position in right.items():
         for them, put in bench.crew.puts(who, name, position):
             hands.set_fitting(them, name, put)
-    bench.seat.see_that_it_obeyed(who, f"{model.name}: setting base {model.base} and its fittings")
+    bench.seat.see_that_it_obeyed(who, f"setting base {base} and its fittings")
 
 
 def mount(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientations]) -> None:
@@ -215,9 +216,7 @@ def take_up_prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]
     who = crew.everybody
     prints = {}
     for hand, projector in ((1, model.left_projector), (2, model.right_projector)):
-        prints[hand] = {
-            name: _spread(place, who, crew.sessions) for name, place in bench.hands.prints(who, projector).items()
-        }
+        prints[hand] = prints_of(bench, who, projector)
     common = [name for name in prints[1] if name in prints[2]]
     shifts = np.array([prints[1][name][0] - prints[2][name][0] for name in common]).reshape(-1, crew.sessions)
     shift = np.nanmean(shifts[:, who], axis=0) if common else np.zeros(who.size)
@@ -227,9 +226,3 @@ def take_up_prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]
         "photographs have changed places, or one lies upside down",
     )
     return prints
-
-
-def _spread(place: Array, who: Who, sessions: int) -> Array:
-    every = np.full((2, sessions), np.nan)
-    every[:, who] = place
-    return every

@@ -14,15 +14,14 @@ from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit
 from a7sim.operator.compilation import CONTOUR, Errand, Traced, Tracing
 from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, plotted
-from a7sim.reduction import Ground
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
 from a7sim.session.folder import BOOK, GEOJSON, JOURNAL, RESULTS, SVG, prepare_folder, write_whole
 from a7sim.session.journal import Journal
 from a7sim.session.map_sheet import as_geojson, as_svg
-from a7sim.session.results import of_operator
+from a7sim.session.results import of_operator, of_slips
 from a7sim.session.running import Session, Watcher, open_session
-from a7sim.session.strips import ground_of
+from a7sim.session.strips import given_control
 
 OLD_MAP_M = 5.0
 """What an operator is told of a line comes from an old map, to the nearest so many metres."""
@@ -86,7 +85,10 @@ def compile_model(
         except DoesNotFit as trouble:
             document |= {"status": "does not fit", "message": str(trouble)}
         finally:
-            document["operator"] = of_operator(session.person, journal.events)
+            document |= {
+                "operator": of_operator(session.person, journal.events),
+                "truth": {"slips": of_slips(session.person)},
+            }
             if out is not None:
                 write_whole(out / BOOK, session.person.book.as_csv())
     if out is not None:
@@ -138,15 +140,9 @@ def _errand(scene: Scene, name: str) -> Errand:
 
 def _sheet(session: Session, wanted: Wanted, order: Order, watcher: Watcher) -> Sheet:
     models = tuple(model for model in session.job.models if model.name == wanted.model)
-    control = _control(ground_of(session.scenario, session.scene))
-    return plotted(session.person, replace(session.job, models=models), control, order, watcher.tick, watcher.begins)
-
-
-def _control(ground: Ground) -> Ground:
-    """Return the ground points whose coordinates an operator is given."""
-    given = [i for i, role in enumerate(ground.roles) if role != "check"]
-    return Ground(
-        tuple(ground.points[i] for i in given), ground.coordinates[:, given], tuple(ground.roles[i] for i in given)
+    control = given_control(session.scenario, session.scene)
+    return plotted(
+        session.person, replace(session.job, models=models, control={}), control, order, watcher.tick, watcher.begins
     )
 
 

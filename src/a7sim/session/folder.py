@@ -9,7 +9,23 @@ CARDS, OUTPUT_CARDS, CARD_KEY = "strip.crd", "strip-output.crd", "strip-numbers.
 STRIPS = "strips.csv"
 GEOJSON, SVG = "map.geojson", "map.svg"
 RESIDUALS = "residuals.csv"
-FILES = (JOURNAL, BOOK, MODELS, STRIP, CARDS, OUTPUT_CARDS, CARD_KEY, STRIPS, RESIDUALS, GEOJSON, SVG, RESULTS)
+MODELS_OF_WAY, STRIP_OF_WAY = "{}-models.csv", "{}-strip.csv"
+WAYS = ("comparator", "A8")
+FILES = (
+    JOURNAL,
+    BOOK,
+    MODELS,
+    STRIP,
+    CARDS,
+    OUTPUT_CARDS,
+    CARD_KEY,
+    STRIPS,
+    RESIDUALS,
+    GEOJSON,
+    SVG,
+    RESULTS,
+    *(name.format(way.lower()) for way in WAYS for name in (MODELS_OF_WAY, STRIP_OF_WAY)),
+)
 
 
 def prepare_folder(out: Path, force: bool) -> None:

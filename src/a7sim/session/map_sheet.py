@@ -278,6 +278,8 @@ def _grid(paper: _Paper) -> Iterator[str]:
     )
     left, right = _MARGIN_MM, paper.size[0] - _MARGIN_MM
     top, bottom = _HEAD_MM, paper.size[1] - _FOOT_MM
+    if not (easts.size and norths.size):
+        return
     yield '<g id="grid">'
     for east in easts:
         xs, ys = paper.of_ground(np.array([np.full(norths.size, east), norths, np.full(norths.size, level)]))

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from a7sim.documents import Document, as_json
 from a7sim.files import csv_text
 from a7sim.instrument import Autograph, build_autograph
@@ -33,7 +31,7 @@ from a7sim.session.folder import (
     write_whole,
 )
 from a7sim.session.journal import Journal
-from a7sim.session.strips import GroundedStrip, cards_of, ground_of, grounded, models_of, of_grounded
+from a7sim.session.strips import GroundedStrip, cards_of, given_control, ground_of, grounded, models_of, of_grounded
 
 
 @dataclass
@@ -77,13 +75,8 @@ def job_of(scenario: Scenario, scene: Scene) -> Job:
 
 
 def _control_of(scenario: Scenario, scene: Scene) -> dict[str, tuple[float, float, float]]:
-    ground = ground_of(scenario, scene)
-    known = np.where(ground.used > 0.0, ground.coordinates, np.nan)
-    return {
-        name: (x, y, z)
-        for name, (x, y, z), used in zip(ground.points, known.T.tolist(), ground.used.T, strict=True)
-        if used.any()
-    }
+    given = given_control(scenario, scene)
+    return {name: (x, y, z) for name, (x, y, z) in zip(given.points, given.coordinates.T.tolist(), strict=True)}
 
 
 @dataclass(frozen=True)

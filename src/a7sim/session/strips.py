@@ -63,6 +63,14 @@ def ground_of(scenario: Scenario, scene: Scene) -> Ground:
     return Ground(names, coordinates, tuple(point.role for point in scenario.ground))
 
 
+def given_control(scenario: Scenario, scene: Scene) -> Ground:
+    """Return the ground control as an operator is given it: no checks, and nan for what a point's role leaves out."""
+    ground = ground_of(scenario, scene)
+    known = np.where(ground.used > 0.0, ground.coordinates, np.nan)
+    given = np.flatnonzero(ground.used.any(axis=0))
+    return Ground(tuple(ground.points[i] for i in given), known[:, given], tuple(ground.roles[i] for i in given))
+
+
 def grounded(
     models: Sequence[Model], ground: Ground, method: JoinMethod = "points", degree: Degree | None = None
 ) -> GroundedStrip:

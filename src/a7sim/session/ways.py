@@ -10,7 +10,7 @@ from a7sim.scene import Scene, build_scene
 from a7sim.session import results
 from a7sim.session.a8_strip import strip_on_a8
 from a7sim.session.analytical import StripResult, strip_by_comparator
-from a7sim.session.folder import RESULTS, prepare_folder, write_whole
+from a7sim.session.folder import MODELS_OF_WAY, RESULTS, STRIP_OF_WAY, prepare_folder, write_whole
 from a7sim.session.running import Watcher, run
 from a7sim.session.strips import of_grounded
 from a7sim.session.two_ways import differences
@@ -38,8 +38,8 @@ def run_all_ways(
         document["a8_minus_comparator_m"] = of_differences(differences(strips["comparator"], strips["A8"]))
     if out is not None and strips:
         for name, each in strips.items():
-            write_whole(out / f"{name.lower()}-models.csv", results.models_csv(each.models))
-            write_whole(out / f"{name.lower()}-strip.csv", results.points_csv(each.strip.points))
+            write_whole(out / MODELS_OF_WAY.format(name.lower()), results.models_csv(each.models))
+            write_whole(out / STRIP_OF_WAY.format(name.lower()), results.points_csv(each.strip.points))
         write_whole(out / RESULTS, as_json(document))
     return document
 
