@@ -82,6 +82,10 @@ class Variant:
     centring_gon: float = 20.0
     """How far a picture can be shifted and turned on its carrier [assumption; no source at hand]."""
 
+    def lacks(self, *elements: str) -> list[str]:
+        """Return those of the elements that the plotter does not have."""
+        return [name for name in elements if name not in self.elements]
+
 
 @dataclass(frozen=True, slots=True)
 class Fittings:
@@ -118,6 +122,10 @@ RIGHT_FITTINGS: Mapping[tuple[str, str], Fittings] = MappingProxyType(
     }
 )
 """The thesis's table: the fittings that belong to a picture and a base."""
+
+
+BASE_COMPONENTS = ("by1", "by2", "bz1", "bz2")
+"""Elements that shift single centres across the base and in height."""
 
 
 def _both(name: str, element: Element) -> dict[str, Element]:

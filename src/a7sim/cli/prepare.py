@@ -5,13 +5,13 @@ from typing import Any
 import click
 import msgspec
 from rich.console import Console, Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from a7sim.cli.options import Above
 from a7sim.documents import as_json, head
 from a7sim.manual import VARIANTS
 from a7sim.operator.preparation import Flight, ModelScale, Preparation, preparation
+from a7sim.sheets import sheet
 
 
 @click.command("prepare")
@@ -72,10 +72,7 @@ def _of_scale(scale: ModelScale) -> dict[str, Any]:
 
 def _sheet(found: Preparation, variant: str, map_scale: float | None) -> RenderableType:
     flight, chosen = found.flight, found.chosen
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in ("model scale", "gear", "last digit, m", "plan", "Z, mm", "bx, mm"):
-        table.add_column(column, justify="left" if column == "model scale" else "right")
-    table.add_column("", overflow="fold")
+    table = sheet("model scale", "gear", "last digit, m", "plan", "Z, mm", "bx, mm", "", left=(0, 6), fold=(6,))
     for scale in found.scales:
         table.add_row(
             f"1:{scale.number:.0f}",

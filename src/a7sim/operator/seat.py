@@ -115,7 +115,7 @@ class Seat:
     @property
     def measures_parallax(self) -> bool:
         """Whether y-parallaxes can be measured: with by' and by", which not every plotter has."""
-        return {"by1", "by2"} <= set(self.manual.elements)
+        return not self.manual.lacks("by1", "by2")
 
     def set_elements(self, who: Who, settings: Mapping[str, Array]) -> None:
         """Set elements through their counters to values ``(m,)``, and enter them in the book."""

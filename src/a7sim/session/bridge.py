@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from a7sim.documents import Document, head, of_absolute, of_adjustment
@@ -15,6 +14,7 @@ from a7sim.reduction import Ground, Model, Undetermined, absolute_orientation, s
 from a7sim.scenario import Scenario
 from a7sim.session.running import Watcher, open_session, run
 from a7sim.session.strips import ground_of
+from a7sim.sheets import sheet
 
 Places = dict[str, tuple[float, float, float]]
 
@@ -102,7 +102,7 @@ def tables_of(document: Document) -> RenderableType:
 
 
 def _models(models: Sequence[Document]) -> RenderableType:
-    table = _table("model", "base", "bx, mm", "scale", "rms p, mm", "common X", "Y", "Z, mm")
+    table = sheet("model", "base", "bx, mm", "scale", "rms p, mm", "common X", "Y", "Z, mm")
     for model in models:
         common = np.array(list(model["common_mm"].values())).reshape(-1, 3)
         rms = [f"{value:.3f}" for value in np.sqrt((common**2).mean(axis=0))] if common.size else ["", "", ""]
@@ -118,7 +118,7 @@ def _models(models: Sequence[Document]) -> RenderableType:
 
 
 def _beside(document: Document) -> RenderableType:
-    table = _table("strip", "points", "X", "Y", "Z", "plan", "height")
+    table = sheet("strip", "points", "X", "Y", "Z", "plan", "height", fold=(1,))
     for way in ("bridged", "independent"):
         strip = document[way]["strip"]
         for label, part in ((way, strip), (f"{way}, polynomial", strip.get("polynomial", {}))):
@@ -129,10 +129,3 @@ def _beside(document: Document) -> RenderableType:
         if "message" in strip:
             table.add_row(way, strip["message"])
     return Group(Text("On the ground, rms in m", style="bold"), table)
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="left" if i == 0 else "right")
-    return table

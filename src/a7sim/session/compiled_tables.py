@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from a7sim.session.compiling import USUAL_C_FACTORS
+from a7sim.sheets import sheet
 
 
 def of_compilation(document: dict[str, Any]) -> RenderableType:
@@ -34,9 +35,8 @@ def of_compilation(document: dict[str, Any]) -> RenderableType:
 
 
 def _lines(lines: list[dict[str, Any]]) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in ("line", "ends", "vertices", "length, m", "rms height, m", "largest", "rms off, m", "largest"):
-        table.add_column(column, justify="left" if column in ("line", "ends") else "right")
+    columns = ("line", "ends", "vertices", "m", "rms z, m", "largest", "rms off", "largest")
+    table = sheet(*columns, left=(0, 1))
     for each in lines:
         off = (each.get("rms_off_m"), each.get("largest_off_m"))
         values = (each["rms_height_m"], each["largest_height_m"], *off)

@@ -10,6 +10,7 @@ import numpy as np
 import a7sim
 from a7sim.documents import Document, as_json, head, of_absolute
 from a7sim.geometry import Array, length_of
+from a7sim.manual import BASE_COMPONENTS, VARIANTS
 from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit
 from a7sim.operator.compilation import CONTOUR, Errand, Traced, Tracing
@@ -32,7 +33,7 @@ WITHIN_HALF = 3.29
 """A contour interval is good for a standard error if 90 % of the heights lie within half of it: 2 x 1.645 of them."""
 
 USUAL_C_FACTORS = (900.0, 2200.0)
-"""From conventional plotters to analytical ones: D. Light, C-factor for softcopy photogrammetry (PE&RS 1999)."""
+"""From conventional plotters to analytical ones; general knowledge of the trade, no source at hand."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +98,11 @@ def compile_model(
 
 
 def _see_that_it_can_be(scenario: Scenario, wanted: Wanted) -> None:
-    if scenario.instrument.variant != "A7":
-        raise Mistake(f"instrument.variant: expected an A7 to compile with, got an {scenario.instrument.variant}")
+    if VARIANTS[scenario.instrument.variant].lacks(*BASE_COMPONENTS):
+        raise Mistake(
+            "instrument.variant: expected a plotter with by and bz, whose cameras the stereo view knows, "
+            f"got an {scenario.instrument.variant}"
+        )
     if scenario.plan.plan_gear not in TABLE_GEARS:
         known = ", ".join(TABLE_GEARS)
         raise Mistake(f"plan.plan_gear: expected a gear to the plotting table ({known}), got {scenario.plan.plan_gear}")

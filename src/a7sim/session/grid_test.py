@@ -19,6 +19,7 @@ from a7sim.instrument.language import Desk, Listener
 from a7sim.link.client import Client
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
+from a7sim.manual import BASE_COMPONENTS, VARIANTS
 from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit, Person
 from a7sim.operator.grid_test import GridTestOrder, ProjectorSheet, calibrate
@@ -31,9 +32,7 @@ from a7sim.session.folder import BOOK, JOURNAL, RESIDUALS, RESULTS, prepare_fold
 from a7sim.session.journal import Journal
 from a7sim.session.results import of_operator, of_slips
 from a7sim.session.running import Watcher
-
-TESTED_VARIANT = "A7"
-"""An A8 has no by and bz to whose counters the centre could be referred."""
+from a7sim.sheets import sheet
 
 SYMBOLS = {"omega": "ω", "phi": "φ", "kappa": "κ"}
 
@@ -53,8 +52,11 @@ def run_grid_test(
     `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for an order that the plate
     or the instrument cannot fill and for a folder that cannot be used, before anything is written.
     """
-    if scenario.instrument.variant != TESTED_VARIANT:
-        raise Mistake(f"instrument.variant: expected '{TESTED_VARIANT}', got '{scenario.instrument.variant}'")
+    if VARIANTS[scenario.instrument.variant].lacks(*BASE_COMPONENTS):
+        raise Mistake(
+            "instrument.variant: expected a plotter with by and bz, to whose counters its centres are referred, "
+            f"got an {scenario.instrument.variant}"
+        )
     watcher = watcher or Watcher()
     journal = Journal()
     autograph, person = _opened(scenario, seed, journal.heard)
@@ -172,12 +174,12 @@ def _known(value: float) -> float | None:
 
 
 def _residual_rows(sheets: list[ProjectorSheet]) -> Iterator[tuple[str, ...]]:
-    for sheet in sheets:
-        residuals = 1e3 * sheet.test.residuals[..., 0]
-        for k, height in enumerate(sheet.heights):
-            for i, (cross, place) in enumerate(sheet.crosses.items()):
+    for each in sheets:
+        residuals = 1e3 * each.test.residuals[..., 0]
+        for k, height in enumerate(each.heights):
+            for i, (cross, place) in enumerate(each.crosses.items()):
                 yield (
-                    side(sheet.projector),
+                    side(each.projector),
                     f"{height:.2f}",
                     cross,
                     *(f"{at:.1f}" for at in place),
@@ -246,9 +248,7 @@ def sheet_of(document: Document) -> RenderableType:
 
 
 def _element_table(projector: Document) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in ("", "counter", "found", "error", "±", "true", ""):
-        table.add_column(column, justify="left" if not column else "right")
+    table = sheet("", "counter", "found", "error", "±", "true", "", left=(0, 6))
     for name, each in projector["elements"].items():
         counter = f"{each['counter']:.2f}" if "counter" in each else ""
         found = f"{each['found']:.4f}" if "found" in each else ""

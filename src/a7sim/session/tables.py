@@ -8,6 +8,7 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
+from a7sim.sheets import sheet
 from a7sim.standard_points import FIGURE_4_1, POSITIONS
 
 _ELEMENTS = (
@@ -31,7 +32,7 @@ def of_session(document: dict[str, Any]) -> RenderableType:
         parts += [Rule(Text(f"Strip, {name}"), align="left"), *_of_strip(strip), Text()]
     if "a8_minus_comparator_m" in document:
         each = document["a8_minus_comparator_m"]
-        parts += [_accuracy({"points, A8 minus comparator": each}), Text()]
+        parts += [_titled("A8 minus comparator", _accuracy({"points": each})), Text()]
     if "operator" in document:
         parts.append(_hours(document["operator"]))
     if document["message"]:
@@ -50,7 +51,7 @@ def _hours(operator: dict[str, Any]) -> Text:
 
 def of_strips(document: dict[str, Any]) -> RenderableType:
     """Return the table of all strips that the cases make, with the diagram of the first in words."""
-    table = _table("strip", "cases", "join, mm", "control plan", "height", "checks plan", "height")
+    table = sheet("strip", "cases", "join, mm", "control plan", "height", "checks plan", "height")
     for strip in document["strips"]:
         accuracy = strip["accuracy_m"]
         cells = [f"{accuracy[on][what]:.3f}" if on in accuracy else "" for on in ON for what in WHAT]
@@ -83,7 +84,7 @@ def _of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
             f"closing within {join['max_residual_mm']:.3f} mm"
         )
     yield Text(f"On the ground at 1:{1e3 * strip['absolute']['scale']:.0f}")
-    residuals = _table("point", "role", "X", "Y", "Z")
+    residuals = sheet("point", "role", "X", "Y", "Z")
     last = strip.get("polynomial", strip)
     for point, each in last["residuals_m"].items():
         residuals.add_row(point, each["role"], *("" if each[axis] is None else f"{each[axis]:+.3f}" for axis in "XYZ"))
@@ -102,7 +103,7 @@ def _of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
 
 
 def _accuracy(sets: dict[str, Any]) -> Table:
-    accuracy = _table("rms, m", "X", "Y", "Z", "plan", "height", "largest X", "Y", "Z")
+    accuracy = sheet("rms, m", "X", "Y", "Z", "plan", "height", "largest X", "Y", "Z")
     for on, each in sets.items():
         values = [*each["rms"].values(), each["plan"], each["height"], *each["largest"].values()]
         accuracy.add_row(f"{each['points']} {on}", *("" if value is None else f"{value:.3f}" for value in values))
@@ -123,14 +124,6 @@ def _of_model(model: dict[str, Any]) -> Iterator[RenderableType]:
     yield Text()
 
 
-def _table(*columns: str) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    table.add_column(columns[0])
-    for column in columns[1:]:
-        table.add_column(column, justify="right")
-    return table
-
-
 def _titled(title: str, table: Table) -> RenderableType:
     return Group(Text(), Text(title, style="bold"), table)
 
@@ -138,7 +131,7 @@ def _titled(title: str, table: Table) -> RenderableType:
 def _rounds(orientation: dict[str, Any]) -> RenderableType:
     if orientation["procedure"] == "empirical":
         return _cleared_rounds(orientation)
-    table = _table("iteration", "mean p, mm", "rms, mm")
+    table = sheet("iteration", "mean p, mm", "rms, mm")
     for number, each in enumerate(orientation["rounds"], start=1):
         table.add_row(str(number), f"{each['mean_mm']:.4f}", f"{each['rms_mm']:.4f}")
     title = f"Numerical relative orientation, {orientation['method']}, case {orientation['case']}"
@@ -148,17 +141,19 @@ def _rounds(orientation: dict[str, Any]) -> RenderableType:
 def _cleared_rounds(orientation: dict[str, Any]) -> RenderableType:
     """Return what was seen at the points before omega was turned, round by round, and how many times it was."""
     labels = [label for label in POSITIONS if any(label in each["parallax_mm"] for each in orientation["rounds"])]
-    table = _table("iteration", *labels, "rms, mm", "omega turned n times")
+    table = sheet("iteration", *labels, "rms, mm", "n")
     for number, each in enumerate(orientation["rounds"], start=1):
         seen = [f"{each['parallax_mm'][label]:+.3f}" if label in each["parallax_mm"] else "" for label in labels]
         n = each["over_correction"]
         table.add_row(str(number), *seen, f"{each['rms_mm']:.4f}", f"{n:.2f}" if n else "")
     method = "one projector" if orientation["method"] == "dependent" else "swing-swing"
-    return _titled(f"Empirical relative orientation, {method}: y-parallaxes seen before omega is turned, mm", table)
+    return _titled(
+        f"Empirical relative orientation, {method}: y-parallaxes in mm before omega is turned n times", table
+    )
 
 
 def _elements(elements: dict[str, float], true: dict[str, float]) -> RenderableType:
-    table = _table("", "left '", "true", 'right "', "true", "")
+    table = sheet("", "left '", "true", 'right "', "true", "")
 
     def cells(name: str) -> list[str]:
         return [f"{elements[name]:.2f}", f"{true[name]:.3f}" if name in true else ""]
@@ -174,7 +169,7 @@ def _elements(elements: dict[str, float], true: dict[str, float]) -> RenderableT
 def _residuals(orientation: dict[str, Any]) -> RenderableType:
     residuals = orientation["residual_parallax_mm"]
     rms = orientation["rms_parallax_mm"]
-    table = _table(*[""] * 5)
+    table = sheet(*[""] * 5)
     table.show_header = False
     for row in FIGURE_4_1:
         present = [label for label in row if label in residuals]
@@ -183,7 +178,7 @@ def _residuals(orientation: dict[str, Any]) -> RenderableType:
 
 
 def _centres(model: dict[str, Any]) -> RenderableType:
-    table = _table("", "left", "±", "true", "right", "±", "true")
+    table = sheet("", "left", "±", "true", "right", "±", "true")
     sides = ("left", "right")
     centres, truth = model["perspective_centres"], model["truth"]["centres"]
     for name in ("X0", "Y0", "Z0", "T0"):
@@ -197,7 +192,7 @@ def _centres(model: dict[str, Any]) -> RenderableType:
 
 
 def _on_ground(found: dict[str, Any]) -> RenderableType:
-    table = _table("round", "heights, rms m", "scale", "along, gon", "across, gon")
+    table = sheet("round", "heights, rms m", "scale", "along, gon", "across, gon")
     for number, each in enumerate(found["rounds"], start=1):
         tilts = (f"{tilt:+.3f}" for tilt in each["tilts_gon"])
         table.add_row(str(number), f"{each['height_rms_m']:.3f}", f"{each['scale']:.5f}", *tilts)

@@ -7,6 +7,7 @@ from typing import Any
 from rich.table import Table
 
 from a7sim.documents import Document
+from a7sim.sheets import sheet
 
 ANGLES = ("omega", "phi", "kappa")
 SHIFTS = ("Tx", "Ty", "Tz")
@@ -275,9 +276,7 @@ def _metres(value: float | None) -> str:
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[Any]], decimals: int = 4) -> Table:
     """Return a table, its first column to the left, numbers to the right, a dash where nothing is known."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for i, name in enumerate(header):
-        table.add_column(name, justify="right" if i else "left", no_wrap=bool(i), overflow="fold")
+    table = sheet(*header, fold=(0,))
     for row in rows:
         table.add_row(*(_cell(value, decimals) for value in row))
     return table

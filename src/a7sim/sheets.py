@@ -1,0 +1,13 @@
+"""Tables on a terminal, as a surveyor files them: no borders, names to the left, numbers to the right."""
+
+from collections.abc import Collection
+
+from rich.table import Table
+
+
+def sheet(*columns: str, left: Collection[int] = (0,), fold: Collection[int] = ()) -> Table:
+    """Return an empty table of these columns; names to the `left`; none breaks its lines unless in `fold`."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i in left else "right", no_wrap=i not in fold, overflow="fold")
+    return table
