@@ -6,20 +6,17 @@ import msgspec
 import numpy as np
 import pytest
 
-from a7sim.instrument import fleet
 from a7sim.mistakes import Mistake
-from a7sim.operator import bridging, seat
+from a7sim.operator import bridging
 from a7sim.operator.bench import Bench, Parallaxes
 from a7sim.operator.bridging import bridged
 from a7sim.reduction import similarity_by_quaternion
 from a7sim.scenario import load_scenario
 from a7sim.session.bridge import bridged_strip, run_bridge, tables_of
 from a7sim.session.crowd import open_crowd
-from a7sim.session.fleet_hands import FleetHands
 from tests.sessions import without_errors
 
 CLOSES_MM = 0.05
-FINE = 1e-5
 
 
 def scenario_of(models, **overrides):
@@ -57,13 +54,13 @@ def test_the_oriented_photograph_stays_as_it_is(three):
 
 
 def test_readings_go_on_from_model_to_model(three):
-    """Common points read the same again but for what counters of 0.01 gon leave: 0.06 mm in any coordinate."""
+    """Common points read the same again, within a count or two in any coordinate."""
     _, models = three
     for model in models[1:]:
         assert len(model.common) >= 3
         for difference in model.common.values():
             x, y, z = difference[:, 0]
-            assert max(abs(x), abs(y), abs(z / model.z_units_per_mm)) < 0.06
+            assert max(abs(x), abs(y), abs(z / model.z_units_per_mm)) < 0.02
 
 
 def test_the_strip_runs_on_over_several_bases(three):
@@ -129,13 +126,11 @@ def test_a_strip_without_base_out_cannot_be_bridged():
 
 
 @pytest.mark.slow
-def test_ten_models_close_as_well_as_hundredths_of_a_gon_allow():
-    """Counters of 0.01 gon alone: rms 0.05 mm in any coordinate holds, the largest of some 200 points does not."""
-    crowd, models = worked(scenario_of(10), (4,))
+def test_ten_models_close_on_the_truth():
+    """Within 0.05 mm at every point is asked; drums that are turned by eye between two counts leave 0.01."""
+    crowd, models = worked(scenario_of(10))
     assert len(models) == 10
-    off = misclosures(crowd, models)
-    assert np.sqrt((off**2).mean(axis=1)).max() < 0.04
-    assert np.abs(off).max() < 0.12
+    assert np.abs(misclosures(crowd, models)).max() < CLOSES_MM / 3.0
 
 
 @pytest.mark.slow
@@ -146,19 +141,6 @@ def test_the_shipped_strip_is_bridged_and_worked_as_independent_models_to_its_en
         assert document[way]["strip"]["accuracy_m"]["checks"]["points"] == 20
         assert document[way]["strip"]["accuracy_m"]["checks"]["plan"] < 1.5
     assert len(document["bridged"]["models"]) == 10
-
-
-@pytest.mark.slow
-def test_with_finer_counters_ten_models_close_on_the_truth(monkeypatch):
-    """The method itself: elements set to 0.00001 gon and mm, within a hundredth of a mm everywhere."""
-    monkeypatch.setattr(fleet, "LEAST_COUNT", FINE)
-    monkeypatch.setattr(fleet, "COUNTER_DECIMALS", 5)
-    monkeypatch.setattr(bridging, "LEAST_COUNT", FINE)
-    monkeypatch.setattr(FleetHands, "set_element", lambda self, who, name, v: self._fleet.set_element(who, name, v))
-    monkeypatch.setattr(seat, "counter_value", lambda name, v: v % 400.0 if name.startswith("kappa") else v)
-    crowd, models = worked(scenario_of(10))
-    assert len(models) == 10
-    assert np.abs(misclosures(crowd, models)).max() < 0.01
 
 
 def test_what_cannot_be_looked_at_again_stays_as_it_was_oriented(monkeypatch):

@@ -13,7 +13,7 @@ from a7sim.mistakes import Mistake
 from a7sim.operator.bench import Bench
 from a7sim.operator.compilation import Area, Compilation, Errand, Spots, Tracing, _chain
 from a7sim.operator.crew import Crew
-from a7sim.operator.levelling import levelled
+from a7sim.operator.level_model import levelled
 from a7sim.operator.line_hands import LineHands
 from a7sim.operator.plotting import Order, Sheet, _heights
 from a7sim.operator.stereo_view import FINE_MM, StereoView

@@ -241,6 +241,42 @@ def test_with_base_out_and_its_fittings_the_left_eye_sees_the_left_hand_photogra
     assert a7.stereo("P") == pytest.approx((0.0, 0.0), abs=1e-6)
 
 
+def test_a_drum_turned_by_hand_stops_between_two_counts_and_the_counter_rounds():
+    """geometry.md: a spindle has a continuous position; only a setting through the counter lands on a count."""
+    a7 = plotter()
+    a7.drive("X", 60.0)
+    a7.drive("Y", 40.0)
+    before = a7.stereo("P")[1]
+    for _ in range(2):
+        a7.turn_element("by1", 0.004)
+    assert a7.element("by1") == 0.01
+    assert a7.stereo("P")[1] - before == pytest.approx(-1e3 * 0.008 * 150.0 / 300.0)
+    a7.set_element("by1", 0.0)
+    assert a7.stereo("P")[1] == pytest.approx(before)
+
+
+def test_only_a_setting_through_the_counter_draws_a_new_setting_error():
+    a7 = plotter(condition=Condition(setting_sigma_mm=0.01))
+    a7.drive("X", 60.0)
+    a7.drive("Y", 40.0)
+    a7.set_element("by1", 1.0)
+    stands = a7.stereo("P")[1]
+    a7.turn_element("by1", 0.5)
+    a7.turn_element("by1", -0.5)
+    assert a7.stereo("P")[1] == pytest.approx(stands, abs=1e-9)
+    a7.set_element("by1", 1.0)
+    assert a7.stereo("P")[1] != pytest.approx(stands, abs=1e-3)
+
+
+def test_a_swing_is_turned_through_its_zero_and_a_tilt_not_beyond_its_end():
+    a7 = plotter()
+    a7.turn_element("kappa1", -0.25)
+    assert a7.element("kappa1") == 399.75
+    with pytest.raises(OutOfRange):
+        a7.turn_element("phi1", 6.5)
+    assert a7.element("phi1") == 100.0
+
+
 def test_a_swung_picture_is_seen_swung():
     a7 = plotter()
     a7.set_element("kappa1", 100.0)

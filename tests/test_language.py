@@ -43,22 +43,30 @@ EXAMPLES = {
     "STATus:PRESet": "",
     "PROJector<n>:KAPPa": "1",
     "PROJector<n>:KAPPa?": "",
+    "PROJector<n>:KAPPa:TURN": "0.004",
     "PROJector<n>:PHI": "101",
     "PROJector<n>:PHI?": "",
+    "PROJector<n>:PHI:TURN": "-0.004",
     "PROJector<n>:OMEGa": "101",
     "PROJector<n>:OMEGa?": "",
+    "PROJector<n>:OMEGa:TURN": "0.004",
     "PROJector<n>:BY": "1",
     "PROJector<n>:BY?": "",
+    "PROJector<n>:BY:TURN": "0.004",
     "PROJector<n>:BZ": "1",
     "PROJector<n>:BZ?": "",
+    "PROJector<n>:BZ:TURN": "0.004",
     "PROJector<n>:PDIStance": "151",
     "PROJector<n>:PDIStance?": "",
+    "PROJector<n>:PDIStance:TURN": "0.004",
     "BASE:BX": "190",
     "BASE:BX?": "",
+    "BASE:BX:TURN": "0.004",
     "BASE:MODE": "OUTside",
     "BASE:MODE?": "",
     "COMMon:PHI": "101",
     "COMMon:PHI?": "",
+    "COMMon:PHI:TURN": "0.004",
     "FITTing:DOVE": "INside",
     "FITTing:DOVE?": "",
     "FITTing:TRIangulation": "FRONt",
@@ -103,9 +111,9 @@ EXAMPLES = {
     "RECord:STRike": '1,"wrong point"',
     "NOTE": '"coffee"',
 }
-"""Every header of protocol.md with parameters that a mounted model takes."""
+"""Every header of protocol.md, and what came to it, with parameters that a mounted model takes."""
 
-NOT_ON_AN_A7 = {"COMMon:PHI", "COMMon:PHI?"}
+NOT_ON_AN_A7 = {"COMMon:PHI", "COMMon:PHI?", "COMMon:PHI:TURN"}
 
 ELEMENTS = {
     **{

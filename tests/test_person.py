@@ -42,20 +42,6 @@ def one_model(observer=None, **changes):
 # --- the default observer ---------------------------------------------------------------------------
 
 
-def test_the_numbers_of_the_default_observer_are_those_of_before_there_were_profiles():
-    """Read from seed 1 of Akwanga before skill, warm-up and slips were there."""
-    session = open_session(load_scenario("akwanga"), 1)
-    record = next(iter(work(session.person, session.job)))
-    elements = record.orientation.elements
-    assert [elements[name] for name in ("kappa1", "kappa2", "phi1", "phi2", "omega1", "by1")] == [
-        399.47, 398.33, 100.28, 99.22, 99.04, -0.06,
-    ]  # fmt: skip
-    assert round(record.orientation.rms, 6) == 0.008389
-    assert round(float(record.centres[1].X0), 5) == 4997.52499
-    assert [round(value, 3) for value in record.points["1d"]] == [5096.12, 5177.26, 4972.94]
-    assert round(record.finished_at, 1) == 13579.5
-
-
 def test_a_plain_observer_neither_tires_nor_warms_up_nor_rests():
     hours = np.linspace(0.0, 12.0, 25) * HOUR
     assert (acuity_factor(Observer(), hours, hours) == 1.0).all()

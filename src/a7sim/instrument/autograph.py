@@ -97,11 +97,17 @@ class Autograph:
 
     def set_element(self, name: str, value: float) -> None:
         """Set an element through its counter, to the least count."""
+        self._run_element(name, round(value / LEAST_COUNT) * LEAST_COUNT, self._rng)
+
+    def turn_element(self, name: str, amount: float) -> None:
+        """Turn the drum of an element by so much of its counter, to wherever between two counts that is."""
+        self._run_element(name, self._spindle(name).after(amount))
+
+    def _run_element(self, name: str, target: float, rng: np.random.Generator | None = None) -> None:
         spindle = self._spindle(name)
-        target = round(value / LEAST_COUNT) * LEAST_COUNT
         if name in MOVE_CENTRES and spindle.allows(target):
             self._refuse_if_rods_cannot(elements={name: target})
-        spindle.turn_to(target, self._rng)
+        spindle.turn_to(target, rng)
         self._poses.clear()
 
     def _spindle(self, name: str) -> Spindle:
@@ -200,7 +206,7 @@ class Autograph:
             raise OutOfRange(f"{axis} expected {low:.2f} to {high:.2f} on its counter, got {got:.10g}")
         self._refuse_if_rods_cannot(carriages={axis: position})
         before = spindle.at
-        spindle.turn_to(position, self._rng)
+        spindle.turn_to(position)
         self._counters[axis].passed(before, position, self._rng)
 
     def set_height_gear(self, gear: str | float) -> None:

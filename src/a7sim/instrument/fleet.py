@@ -105,14 +105,19 @@ class Drums:
         """Return which values the drum can be turned to."""
         return np.asarray((values >= self.low - 1e-9) & (values <= self.high + 1e-9))
 
-    def turn_to(self, who: Who, values: Array, rngs: Sequence[np.random.Generator]) -> None:
-        """Turn the drums to values ``(m,)`` that they allow."""
+    def after(self, who: Who, amounts: Array) -> Array:
+        """Return to what values ``(m,)`` the drums come when they are turned by so much."""
+        values = self.at[who] + amounts
+        return np.asarray(values % self.high if self.endless else values)
+
+    def turn_to(self, who: Who, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
+        """Turn the drums to values ``(m,)`` that they allow; with dice, by their counters (see `Spindle.turn_to`)."""
         if self.endless:
             values = values + self.high * np.round((self.at[who] - values) / self.high)
         self.at[who] = values
         half = self._half_play[who]
         self._shaft[who] = np.minimum(np.maximum(self._shaft[who], values - half), values + half)
-        for session in who[self._sigma[who] > 0.0]:
+        for session in who[self._sigma[who] > 0.0] if rngs else ():
             self._error[session] = self._sigma[session] * rngs[session].standard_normal()
 
 
@@ -270,17 +275,23 @@ class Fleet:
 
     def set_element(self, who: Who, name: str, values: Array) -> None:
         """Set an element through its counters to values ``(m,)``, to the least count."""
+        self._run_element(who, name, np.round(values / LEAST_COUNT) * LEAST_COUNT, self._rngs)
+
+    def turn_element(self, who: Who, name: str, amounts: Array) -> None:
+        """Turn the drums of an element by so much ``(m,)``, to wherever between two counts that is."""
+        self._run_element(who, name, self._drums[name].after(who, amounts) if name in self._drums else amounts)
+
+    def _run_element(self, who: Who, name: str, targets: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
         if name not in self._drums:
             self._refuse(who, f"an {self.variant.name} has no {name}", -221)
             return
         drums = self._drums[name]
-        targets = np.round(values / LEAST_COUNT) * LEAST_COUNT
         allowed = drums.allows(targets)
         if name in MOVE_CENTRES:
             allowed &= self._rods_can(who, elements={name: targets})
         self._refuse(who[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
         who, targets = who[allowed], targets[allowed]
-        drums.turn_to(who, targets, self._rngs)
+        drums.turn_to(who, targets, rngs)
         for n in (1, 2):
             if name in ("bx", "common_phi") or name.endswith(str(n)):
                 self._stand(who, n)
@@ -373,7 +384,7 @@ class Fleet:
             self._refuse(who[~allowed], f"Data out of range;{axis}: beyond its range or that of the rods")
         who, positions = who[allowed], positions[allowed]
         self._slip(who, axis, drums.at[who], positions)
-        drums.turn_to(who, positions, self._rngs)
+        drums.turn_to(who, positions)
         return np.asarray(allowed)
 
     def _slip(self, who: Who, axis: str, before: Array, after: Array) -> None:

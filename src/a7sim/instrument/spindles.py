@@ -79,8 +79,15 @@ class Spindle:
         """Whether the drum can be turned to a value."""
         return self.low - 1e-9 <= value <= self.high + 1e-9
 
-    def turn_to(self, value: float, rng: np.random.Generator) -> None:
-        """Turn the drum to a value. Raises OutOfRange; then nothing has moved."""
+    def after(self, amount: float) -> float:
+        """Return to what value the drum comes when it is turned by so much."""
+        return (self.at + amount) % self.high if self.endless else self.at + amount
+
+    def turn_to(self, value: float, rng: np.random.Generator | None = None) -> None:
+        """Turn the drum to a value; with dice it is set by its counter, with a new setting error.
+
+        Raises OutOfRange; then nothing has moved.
+        """
         if not self.allows(value):
             raise OutOfRange(f"expected {self.low:.2f} to {self.high:.2f}, got {value:.10g}")
         if self.endless:
@@ -88,7 +95,7 @@ class Spindle:
         self.at = value
         half = self.play / 2.0
         self._shaft = min(max(self._shaft, value - half), value + half)
-        if self.setting_sigma:
+        if self.setting_sigma and rng is not None:
             self._error = self.setting_sigma * rng.standard_normal()
 
 

@@ -59,12 +59,8 @@ class Cleared:
     """The y-parallax in mm as it seemed on arriving."""
     place: Array
     """Where ``(3, sessions)``: x from the left-hand centre, y from the base line, z below the centres, mm."""
-    gain: Array
-    """What one unit of the element's counter adds to the parallax there, mm."""
-    before: Array
-    """What the element showed on arriving, gon or mm."""
     turn: Array
-    """The turn that just clears the point: counts turned, and the part of one that the eye says is missing."""
+    """The turn that cleared the point, gon or mm, as it is written down."""
 
 
 class Bench:
@@ -217,7 +213,7 @@ class Bench:
     def _turn_back(self, who: Who, names: Sequence[str], rest: Mapping[str, Array]) -> None:
         self.crew.spend(who, self.crew.observer.seconds_to_turn, "turning")
         for name in names:
-            self.hands.set_element(who, name, rest[name][who])
+            self.seat.run_element(who, name, rest[name][who])
 
     def _parallax(
         self,
@@ -325,20 +321,19 @@ class Bench:
         `gain_at` tells what one unit of the element's counter adds to the parallax ``(m,)`` in mm at places
         ``(3, m)``. What is found and what the element then shows goes into the book.
         """
-        crew, seat = self.crew, self.seat
+        crew = self.crew
         judgement, error = self._judgement(who)
-        found, before, turn, gain = np.zeros((4, crew.sessions))
+        found, turn, gain = np.zeros((3, crew.sessions))
         place = np.zeros((3, crew.sessions))
         fused = self._arrive(who, point, judgement, error, place, found)
         apart = np.setdiff1d(crew.still(who), fused)
         if not fused.size:
-            return Cleared(fused, apart, found, place, gain, before, turn)
-        before[fused] = seat.elements(fused, [element])[element]
+            return Cleared(fused, apart, found, place, turn)
         gain[fused] = gain_at(fused, place[:, fused])
         turning = fused[np.abs(found[fused]) > unless_within]
-        turned = self._turn_until_clear(turning, point, judgement, Clearing(element, gain, error), before, turn)
+        turned = self._turn_until_clear(turning, point, judgement, Clearing(element, gain, error), turn)
         self._tick()
-        return Cleared(np.setdiff1d(fused, np.setdiff1d(turning, turned)), apart, found, place, gain, before, turn)
+        return Cleared(np.setdiff1d(fused, np.setdiff1d(turning, turned)), apart, found, place, turn)
 
     def parallaxes_seen(self, who: Who, points: Sequence[str]) -> Parallaxes:
         """Look at what y-parallax is left at points, without turning anything but the handwheels."""
@@ -380,21 +375,21 @@ class Bench:
         seen = self.mark.looked(who, point)[3] + error[who]
         return np.asarray(1e-3 * seen * self.seat.z[who] / self.seat.c)
 
-    def _turn_until_clear(
-        self, who: Who, point: str, judgement: Judgement, clearing: Clearing, before: Array, turn: Array
-    ) -> Who:
+    def _turn_until_clear(self, who: Who, point: str, judgement: Judgement, clearing: Clearing, turn: Array) -> Who:
         """Turn an element until a point is clear, enter what it shows, and put the turn into place."""
         crew, seat, element = self.crew, self.seat, clearing.element
         slips = crew.slips(who, (1,))[0]
+        before = np.zeros(crew.sessions)
+        before[who] = seat.standing(who, [element])[element] if who.size else 0.0
         who = self.mark.settle(who, point, judgement, clearing) if who.size else who
         if not who.size:
             return who
         crew.spend(who, crew.observer.seconds_to_read, "reading")
-        counts = crew.write(who, point, element, seat.elements(who, [element])[element], slips)
-        crew.enter(who, point, element, counts)
-        turned = counts - before[who]
-        turned = wrapped(turned) if seat.manual.elements[element].endless else turned
-        turn[who] = turned - self._seen_parallax(who, point, clearing.error) / clearing.gain[who]
+        shown = seat.elements(who, [element])[element]
+        written = crew.write(who, point, element, shown, slips)
+        crew.enter(who, point, element, written)
+        turned = seat.in_hand(who, element) - before[who]
+        turn[who] = (wrapped(turned) if seat.manual.elements[element].endless else turned) + written - shown
         seat.learn_settings(who)
         seat.see_that_it_obeyed(who, f"{seat.model.name}: clearing {point} with {element}")
         return crew.still(who)

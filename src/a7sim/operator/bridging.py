@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.manual import LEAST_COUNT
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Crew, NobodyGoesOn, Who
 from a7sim.operator.interior import InteriorOrientations
@@ -38,7 +37,7 @@ from a7sim.operator.work import (
 MOST_SCALINGS = 4
 MOST_REFINEMENTS = 4
 STILL_FALLING = 0.95
-"""Residual parallaxes go on falling while their rms is below this share of the best so far."""
+"""Residual parallaxes, or changes of the base, go on falling while they are below this share of the best so far."""
 
 SHARE_OF_RANGE = 0.5
 """Of the range of by or bz, beyond which the strip is brought back to their zeros and Y or Z preset."""
@@ -183,7 +182,7 @@ def _scaled(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]
     """
     crew, seat = bench.crew, bench.seat
     left, right = model.left_projector, model.right_projector
-    factor = np.ones(crew.sessions)
+    factor, least = np.ones(crew.sessions), np.full(crew.sessions, np.inf)
     names = [name for name in map(model.standard_points.get, "135") if name is not None and name in before]
     if not names:
         crew.give_up(who, f"{model.name}: none of its points 1, 3 and 5 was measured before, to carry the scale on")
@@ -193,13 +192,15 @@ def _scaled(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]
         readings = bench.measure(who, names)[:, :, who]
         wanted = np.stack([before[name][:, who] for name in names], axis=1)
         bench.compute(who)
-        settings = seat.elements(who, ["bx", *(f"{name}{n}" for name in ("by", "bz") for n in (left, right))])
+        settings = seat.standing(who, ["bx", *(f"{name}{n}" for name in ("by", "bz") for n in (left, right))])
         depths = [
             settings[f"bz{left}"] + np.stack([seat.place(who, each[:, i])[2] for i in range(len(names))])
             for each in (readings, wanted)
         ]
         larger = np.nanmean(depths[1] / depths[0], axis=0)
-        turning = np.abs(larger - 1.0) * np.abs(settings["bx"]) > LEAST_COUNT / 2.0
+        change = np.abs(larger - 1.0) * np.abs(settings["bx"])
+        turning = (change > bench.eyes.finest_mm) & (change < STILL_FALLING * least[who])
+        least[who] = change
         crew.give_up(who[~np.isfinite(larger)], f"{model.name}: no common point carries the scale on")
         turning &= crew.goes_on(who)
         if not turning.any():
@@ -209,7 +210,7 @@ def _scaled(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]
             fixed = settings[f"{name}{left}"]
             new[f"{name}{right}"] = fixed + larger * (settings[f"{name}{right}"] - fixed)
         who = who[turning]
-        seat.set_elements(who, {name: values[turning] for name, values in new.items()})
+        seat.turn_elements(who, {name: values[turning] for name, values in new.items()})
         factor[who] *= larger[turning]
     return factor
 
@@ -220,13 +221,14 @@ def _scaled(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]
 def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> RelativeOrientations:
     """Look at what is left at all standard points and correct the new photograph while it falls.
 
-    The eye sees finer than by counts; the settings with the smallest residual parallaxes stand.
+    The eye sees finer than by counts, and a drum turns finer than it shows; the settings with the smallest residual
+    parallaxes stand.
     """
     crew, seat = bench.crew, bench.seat
     unknowns = unknowns_of("dependent", model)
     points = [model.standard_points[label] for label in model.all_positions()]
     everybody = who = crew.everybody
-    best = spread(seat.elements(who, unknowns), who, crew.sessions)
+    best = spread(seat.standing(who, unknowns), who, crew.sessions)
     least = np.full(crew.sessions, np.inf)
     for number in range(1, MOST_REFINEMENTS + 1):
         bench.begin_round(who, number)
@@ -234,7 +236,7 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
         who = crew.still(who)
         who = np.setdiff1d(who, seen.parted(who))
         rms = np.sqrt((seen.p**2).mean(axis=0))
-        now = spread(seat.elements(who, unknowns), who, crew.sessions)
+        now = spread(seat.standing(who, unknowns), who, crew.sessions)
         better = who[rms[who] < least[who]]
         falling = who[rms[who] < STILL_FALLING * least[who]]
         least[better] = rms[better]
@@ -245,9 +247,9 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
             break
         corrections, _ = corrections_of(bench, who, model, seen.places, seen.p, unknowns, seat.bx(who))
         who = crew.still(who)
-        seat.set_elements(who, {name: (now[name] + corrections[name])[who] for name in unknowns})
+        seat.turn_elements(who, {name: (now[name] + corrections[name])[who] for name in unknowns})
     everybody = crew.still(everybody)
-    seat.set_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
+    seat.turn_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
     bench.begin_round(everybody, MOST_REFINEMENTS + 1)
     job = bench.job
     return assessed(

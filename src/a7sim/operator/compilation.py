@@ -14,7 +14,7 @@ import numpy as np
 
 from a7sim.geometry import Array, length_of
 from a7sim.operator.bench import Bench
-from a7sim.operator.levelling import LevelModel
+from a7sim.operator.level_model import LevelModel
 from a7sim.operator.person import Person
 from a7sim.operator.stereo_view import COARSE_MM, FINE_MM, MIDDLING_MM, Look, StereoView, Surface, rectified
 from a7sim.scenario import Observer

@@ -15,7 +15,6 @@ from functools import partial
 import numpy as np
 
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, parallax_coefficients, rotation
-from a7sim.manual import COUNTER_DECIMALS, LEAST_COUNT
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Who
 from a7sim.operator.job import ModelJob
@@ -30,14 +29,11 @@ MOST_PASSES = 5
 VISIBLE_SIGMAS = 2.5
 """What is smaller than so many standard deviations of one setting is not seen as a parallax."""
 
-VISIBLE_SIGMAS_AT_LAST = 1.5 * 6.0**0.5
+VISIBLE_SIGMAS_AT_LAST = 2.0 * 6.0**0.5
 """At the last point the errors of all five come together: twice those of 1 and 2, or of 2, once the others'."""
 
 LARGEST_OVER_CORRECTION = 10.0
 """Beyond it the last point says next to nothing of omega."""
-
-SMALL_COUNTS = 3.0
-"""A turn of omega, n times as far as would clear, that is smaller than so many counts is made once."""
 
 TRIES = 4
 """At a point whose images are too far apart, or part while a long turn is made."""
@@ -271,10 +267,10 @@ class _Clearing:
         self.lost: list[tuple[Who, str]] = []
         """Who could not bring the images together, and at which position."""
         self._over_corrected = over_corrected
-        self._small_before = np.zeros(self.crew.sessions, dtype=bool)
         self._found = {label: np.full(self.crew.sessions, np.nan) for label in self._labels()}
         self._places = np.zeros((3, len(steps), self.crew.sessions))
-        self._visible = 1e-3 * self.crew.observer.parallax_um * bench.job.plan.projection_height / bench.seat.c
+        acuity = 1e-3 * self.crew.observer.parallax_um * bench.job.plan.projection_height / bench.seat.c
+        self._visible = max(acuity, bench.eyes.finest_mm)
 
     def run(self, who: Who) -> Who:
         """Go round until the last point is found clear; return those who came to an end."""
@@ -316,10 +312,9 @@ class _Clearing:
         for _ in range(MOST_PASSES):
             again = clearing[:0]
             for place, step in enumerate(self.steps[:4]):
-                cleared, gain = self._clear(self._going(clearing), place, step)
+                cleared = self._clear(self._going(clearing), place, step)
                 seen = np.abs(self._found[step.position][cleared])
-                unclear = seen > VISIBLE_SIGMAS * self._visible + 0.5 * LEAST_COUNT * np.abs(gain[cleared])
-                again = np.union1d(again, cleared[unclear])
+                again = np.union1d(again, cleared[seen > VISIBLE_SIGMAS * self._visible])
             clearing = self._going(again)
             if not clearing.size:
                 break
@@ -327,33 +322,16 @@ class _Clearing:
 
     def _over_correct(self, who: Who) -> tuple[Who, Who, Array]:
         """Turn omega n times as far as clears the last point; return who is there, who had to turn, and n."""
-        step, threshold = self.steps[-1], VISIBLE_SIGMAS_AT_LAST * self._visible
-        turns = np.zeros((2, self.crew.sessions))
-        who, _ = self._clear(who, len(self.steps) - 1, step, threshold, turns)
-        n = np.zeros(self.crew.sessions)
-        if not who.size:
-            return who, who, n
-        n[who] = self._times(who)
-        who = self._going(who)
-        before, turn = turns
-        n[self._near_enough(who, np.abs(n * turn))] = 0.0
-        wanted = np.round(before + n * turn, COUNTER_DECIMALS)
-        off = who[self.bench.seat.elements(who, [step.element])[step.element] != wanted[who]] if who.size else who
-        if off.size:
-            self.bench.seat.set_elements(off, {step.element: wanted[off]})
-        turning = who[wanted[who] != np.round(before[who], COUNTER_DECIMALS)]
-        n[np.setdiff1d(np.arange(self.crew.sessions), turning)] = 0.0
+        seat, step, threshold = self.bench.seat, self.steps[-1], VISIBLE_SIGMAS_AT_LAST * self._visible
+        turn, n = np.zeros((2, self.crew.sessions))
+        who = self._clear(who, len(self.steps) - 1, step, threshold, turn)
+        turning = who[turn[who] != 0.0]
+        if turning.size:
+            n[turning] = self._times(turning)
+            turning = self._going(turning)
+            stands = seat.standing(turning, [step.element])[step.element]
+            seat.turn_elements(turning, {step.element: stands + ((n - 1.0) * turn)[turning]})
         return self._going(who), self._going(turning), n
-
-    def _near_enough(self, who: Who, turns: Array) -> Who:
-        """Return for whom another turn ``(sessions,)`` of omega is of no use: so small a one was made before.
-
-        The counts of the other elements leave at the last point what a turn or two of the last drum would clear.
-        """
-        small = who[turns[who] <= SMALL_COUNTS * LEAST_COUNT]
-        again = small[self._small_before[small]]
-        self._small_before[small] = True
-        return again
 
     def _times(self, who: Who) -> Array:
         """Return the over-correction ``(m,)``: as given, or from the places of the five points."""
@@ -385,21 +363,20 @@ class _Clearing:
 
     # --- a point --------------------------------------------------------------------------------------
 
-    def _clear(
-        self, who: Who, place: int, step: Step, unless_within: float = 0.0, turns: Array | None = None
-    ) -> tuple[Who, Array]:
-        """Clear a point, its images brought together first where they are too far apart; return who did, and gains."""
-        point, cleared, gain = self.model.standard_points[step.position], who[:0], np.zeros(self.crew.sessions)
-        parted = who[:0]
+    def _clear(self, who: Who, place: int, step: Step, unless_within: float = 0.0, turn: Array | None = None) -> Who:
+        """Clear a point, its images brought together first where they are too far apart; return who did.
+
+        Put the turns that did it into place.
+        """
+        point, cleared, parted = self.model.standard_points[step.position], who[:0], who[:0]
         for tries_left in reversed(range(TRIES)):
             if not who.size:
                 break
             done = self.bench.clear(who, point, step.element, partial(self._gain, step.element), unless_within)
             self._found[step.position][done.who] = done.found[done.who]
             self._places[:, place, done.who] = done.place[:, done.who]
-            gain[done.who] = done.gain[done.who]
-            if turns is not None:
-                turns[:, done.who] = [done.before[done.who], done.turn[done.who]]
+            if turn is not None:
+                turn[done.who] = done.turn[done.who]
             cleared = np.union1d(cleared, done.who)
             who = np.setdiff1d(self.crew.still(who), done.who)
             parted = np.setdiff1d(who, done.apart)
@@ -415,7 +392,7 @@ class _Clearing:
         if who.size:
             self.crew.remark(who, f"{self.model.name}: the images of {point} cannot be fused: done without it")
             self.lost.append((who, step.position))
-        return self.crew.still(np.asarray(cleared, dtype=np.intp)), gain
+        return self.crew.still(np.asarray(cleared, dtype=np.intp))
 
     def _bring_together(self, one: Who, point: str, step: Step) -> None:
         """Turn an element by what the Y readings of each eye alone differ by."""

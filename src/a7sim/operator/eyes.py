@@ -12,8 +12,11 @@ from a7sim.operator.seat import Seat, side
 MOST_LOOKS = 40
 """At one setting of the mark."""
 
-AT_REST_MM = 0.0015
-"""A handwheel is let go when it would have to be turned by less than this."""
+FINEST_MM, FINEST_SHARE = 0.0003, 0.15
+"""A handwheel, or a drum, is let go when the image would move by less than this, or this share of what the eye sees."""
+
+PATIENT_LOOKS, IMPATIENT_MM = 12, 0.0015
+"""Where play keeps the mark from coming to rest, more is borne with after so many looks."""
 
 SEARCH_RINGS = 3
 SEARCH_STEP_MM = 14.0
@@ -30,6 +33,10 @@ class Eyes:
     def __init__(self, seat: Seat) -> None:
         self.seat = seat
         self.crew = seat.crew
+        observer = seat.crew.observer
+        eye = min(observer.monocular_um, observer.stereo_um, observer.height_um, observer.parallax_um)
+        self.finest_mm = max(FINEST_MM, FINEST_SHARE * 1e-3 * eye * seat.job.plan.projection_height / seat.c)
+        """What handwheels and drums are not turned by any more."""
         self._prints: Mapping[int, Mapping[str, Array]] = {}
         self._strayed = np.zeros((3, 2, seat.crew.sessions))
         self._seen_from = np.zeros((2, seat.crew.sessions))
@@ -69,6 +76,10 @@ class Eyes:
             "setting does not belong to this model",
         )
 
+    def at_rest_mm(self, looks: int) -> float:
+        """Return what is not turned any more after so many looks, mm."""
+        return self.finest_mm if looks < PATIENT_LOOKS else max(self.finest_mm, IMPATIENT_MM)
+
     def learn_straying(self, who: Who, hand: int, point: str, readings: Array) -> None:
         """Bear in mind how far from where the print showed it a point was found, by its readings ``(2 or 3, m)``."""
         seat = self.seat
@@ -85,14 +96,14 @@ class Eyes:
         """Turn X and Y until the image seems to lie at the mark; errors ``(2, sessions)`` in um."""
         seat = self.seat
         watch = Watch(2, self.crew.sessions)
-        for _ in range(MOST_LOOKS):
+        for looks in range(MOST_LOOKS):
             seen = self.seen(who, hand, point)
             lost = np.isnan(seen[0]) | watch.running_away(who, seen).any(axis=0)
             if lost.any():
                 self._ran_away(who[lost], hand, point)
                 who, seen = who[~lost], seen[:, ~lost]
             steps = (seen + errors[:, who]) * (1e-3 * seat.z[who] / seat.c)
-            moving = ~(np.abs(steps) < AT_REST_MM).all(axis=0)
+            moving = ~(np.abs(steps) < self.at_rest_mm(looks)).all(axis=0)
             who = who[moving]
             if not who.size:
                 return

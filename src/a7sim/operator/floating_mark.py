@@ -6,14 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.manual import LEAST_COUNT
 from a7sim.operator.crew import Who
-from a7sim.operator.eyes import AT_REST_MM, MOST_LOOKS, Eyes, Watch
+from a7sim.operator.eyes import MOST_LOOKS, Eyes, Watch
 from a7sim.operator.hands import Truths
-
-CONTENT = 0.45
-"""With this many counts of the element left, just below a half, no other count can be nearer; beyond it the next is
-tried."""
 
 LONGEST_RISE_MM = 20.0
 """The foot disc is not turned further than this between two looks."""
@@ -83,11 +78,11 @@ class FloatingMark:
 
         Return those for whom it does; the others have given up, lost the point or come to the element's end.
         """
-        seat, crew = self.seat, self.crew
-        counts = _Counts(self, who, clearing) if clearing is not None else None
+        seat, eyes, crew = self.seat, self.eyes, self.crew
+        drum = _Drum(self, who, clearing) if clearing is not None else None
         watch = Watch(4, crew.sessions)
         settled: list[Who] = []
-        for _ in range(MOST_LOOKS):
+        for looks in range(MOST_LOOKS):
             seen = self.looked(who, point)
             lost = np.isnan(seen).any(axis=0)
             self._see_that_it_fuses(who, point, watch.running_away(who, np.nan_to_num(seen)), clearing)
@@ -101,14 +96,15 @@ class FloatingMark:
             rise = np.clip(rise, -LONGEST_RISE_MM, LONGEST_RISE_MM)
             along_the_rays = -rise / seat.z[who] * np.array([x - seat.bx(who) / 2.0, y])
             steps = (seen[:2] + judgement.plan[:, who]) * scale + along_the_rays
-            moving = np.maximum(np.abs(steps).max(axis=0), np.abs(rise)) >= AT_REST_MM
+            at_rest = eyes.at_rest_mm(looks)
+            moving = np.maximum(np.abs(steps).max(axis=0), np.abs(rise)) >= at_rest
             wheels = np.concatenate([seat.in_units(steps), [rise * seat.units_per_mm]])
-            following: Array | None = None
-            if counts is not None:
-                following, at_end = counts.after(who, seen[3] * scale, scale)
-                moving |= ~np.isnan(following)
+            amounts: Array | None = None
+            if drum is not None:
+                amounts, at_end = drum.to_turn(who, seen[3] * scale, scale, at_rest)
+                moving |= amounts != 0.0
                 on = ~at_end
-                who, wheels, following, moving = who[on], wheels[:, on], following[on], moving[on]
+                who, wheels, amounts, moving = who[on], wheels[:, on], amounts[on], moving[on]
             settled.append(who[~moving])
             who = who[moving]
             if not who.size:
@@ -117,7 +113,7 @@ class FloatingMark:
                 who,
                 wheels[:, moving],
                 clearing.element if clearing else None,
-                following[moving] if following is not None else None,
+                amounts[moving] if amounts is not None else None,
             )
         seat.see_that_it_obeyed(who, f"{seat.model.name}: setting the mark on {point}")
         crew.give_up(
@@ -151,35 +147,20 @@ def _together(parts: Sequence[Who]) -> Who:
     return np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *parts]))
 
 
-class _Counts:
-    """The counts of an element that is being turned: where it stands, and what was left where it stood before."""
+class _Drum:
+    """The drum of an element that is being turned."""
 
     def __init__(self, mark: FloatingMark, who: Who, clearing: Clearing) -> None:
-        sessions = mark.crew.sessions
+        self._seat = mark.seat
         self._clearing = clearing
         self._element = mark.seat.manual.elements[clearing.element]
-        self._now = np.zeros(sessions)
-        self._now[who] = mark.seat.elements(who, [clearing.element])[clearing.element]
-        self._before = np.full(sessions, np.nan)
-        self._left_before = np.full(sessions, np.nan)
+        mark.seat.take_hold(who, clearing.element)
 
-    def after(self, who: Who, parallax: Array, scale: Array) -> tuple[Array, Truths]:
-        """Return the counts ``(m,)`` to go to, nan where content with the present, and where these are out of range.
-
-        One goes to the nearest count; where that is the one just left, the better of the two stands.
-        """
-        step = -(parallax + self._clearing.error[who] * scale) / self._clearing.gain[who]
-        now, left = self._now[who], np.abs(step)
-        wanted = np.round(now + np.copysign(np.maximum(left, LEAST_COUNT), step), 2)
+    def to_turn(self, who: Who, parallax: Array, scale: Array, at_rest: float) -> tuple[Array, Truths]:
+        """Return by how much to turn, nothing where it is clear, and where that is out of range ``(m,)``."""
+        left = parallax + self._clearing.error[who] * scale
+        amounts = np.where(np.abs(left) < at_rest, 0.0, -left / self._clearing.gain[who])
         if self._element.endless:
-            wanted = np.round(wanted % self._element.high, 2)
-            at_end = np.zeros(who.size, dtype=bool)
-        else:
-            at_end = (wanted < self._element.low) | (wanted > self._element.high)
-        content = left < CONTENT * LEAST_COUNT
-        just_left = (wanted == self._before[who]) & (left < 1.5 * LEAST_COUNT)
-        content |= just_left & (left <= self._left_before[who])
-        moving = ~content & ~at_end
-        self._before[who[moving]], self._left_before[who[moving]] = now[moving], left[moving]
-        self._now[who[moving]] = wanted[moving]
-        return np.where(content, np.nan, wanted), at_end & ~content
+            return amounts, np.zeros(who.size, dtype=bool)
+        wanted = self._seat.in_hand(who, self._clearing.element) + amounts
+        return amounts, (wanted < self._element.low) | (wanted > self._element.high)

@@ -36,6 +36,9 @@ class Hands(Protocol):
     def set_element(self, who: Who, name: str, values: Array) -> None:
         """Set an element through its counter to values ``(m,)``, gon or mm, two decimals."""
 
+    def turn_element(self, who: Who, name: str, amounts: Array) -> None:
+        """Turn the drum of an element by amounts ``(m,)``, gon or mm, five decimals."""
+
     def preset(self, who: Who, readings: Mapping[str, float]) -> None:
         """Make counters show these readings, by axis."""
 
@@ -75,10 +78,10 @@ class Hands(Protocol):
     def drive(self, who: Who, readings: Mapping[str, Array]) -> Truths:
         """Run carriages to readings ``(m,)`` by axis, two decimals; return which went ``(m,)``."""
 
-    def turn(self, who: Who, wheels: Array, element: str | None = None, counts: Array | None = None) -> None:
-        """Turn the handwheels of X, Y and perhaps Z by ``(2 or 3, m)``, three decimals, and with them an element.
+    def turn(self, who: Who, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
+        """Turn the handwheels of X, Y and perhaps Z by ``(2 or 3, m)``, four decimals, and with them an element.
 
-        The element is set to its counts ``(m,)`` where these are no nan.
+        The drum of the element is turned by amounts ``(m,)``, five decimals.
         """
 
     def seen(self, who: Who, eye: int, point: str) -> Array:

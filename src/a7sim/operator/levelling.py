@@ -1,126 +1,252 @@
-"""A model levelled and brought to scale at the instrument, by computed changes of its elements (thesis 3.5).
+"""Levelling and scaling a model at the instrument, by computed changes of its elements (thesis 3.5).
 
-The control measured in the model gives a similarity to the ground. Both cameras and the base are turned together until
-the ground's plumb line is the instrument's, and the base is stretched to the model scale; relative orientation stays.
+Scale by the base against a known distance, levelling by the tilts against known heights. Both projectors and the base
+are turned together, so that the relative orientation stays: on a plotter with bz by omega, phi, bz and bx of both, to
+second order also by kappa and by; on one with a common Phi by that, by equal changes of omega, and by the base. The
+elements that the manual lists decide which.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
-from a7sim.geometry import GON, Array
-from a7sim.operator.absolute import turned_upright
+from a7sim.geometry import GON, Array, angles_of, length_of, mxm, mxv, rotation
+from a7sim.manual import Variant
 from a7sim.operator.bench import Bench
-from a7sim.operator.stereo_view import StereoView
-from a7sim.reduction import AbsoluteOrientation, Ground, Model, Undetermined, absolute_orientation
+from a7sim.operator.crew import Who
+from a7sim.operator.hands import Truths
+from a7sim.operator.job import ModelJob
+from a7sim.operator.relative import spread
+from a7sim.reduction import Ground, Undetermined, adjusted
 
-MOST_ROUNDS = 3
+MOST_ROUNDS = 6
+STILL_FALLING = 0.8
+FEWEST_PLAN, FEWEST_HEIGHTS = 2, 3
 
-LEVEL_GON, TO_SCALE = 0.02, 2e-4
-"""A model is level, and to scale, when what is left is less: two counts of an element, 1 in 5000."""
-
-Place = tuple[float, float, float]
+Settings = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
-class LevelModel:
-    """A level model to scale: its orientation to the ground, and what was measured in it by point, in readings."""
+class LevellingRound:
+    """A round of a session: what was read at control, and how far model and ground were apart."""
 
-    absolute: AbsoluteOrientation
-    points: Mapping[str, Place]
-    scale_number: float
-    """Of the model as ordered: 3750 for 1:3750."""
-    tilt_gon: float
-    """What is left of its tilt."""
-    units_per_mm: float
-    rounds: int
+    height_rms: float
+    """Of the heights about their mean, m."""
+    scale: float
+    """By what factor the model was too small."""
+    tilts: tuple[float, float]
+    """How the plumb line leans in the model, along the base and across it, gon."""
 
-    def on_ground(self, readings: Array) -> Array:
-        """Return readings ``(3, ...)`` of the counters as places on the ground ``(3, ...)`` in m."""
-        places = (readings.reshape(3, -1).T / self._units).T
-        return self.absolute.similarity.applied_to(places).reshape(readings.shape)
 
-    def readings_of(self, ground: Array) -> Array:
-        """Return the readings ``(3, ...)`` at which places on the ground ``(3, ...)`` in m stand in the model."""
-        places = self.absolute.similarity.inverted(ground.reshape(3, -1))
-        return np.asarray((places.T * self._units).T.reshape(ground.shape))
+@dataclass(frozen=True)
+class Control:
+    """Control that a model shows: names, ground ``(3, n)`` in m with nan for what is not known."""
 
-    @property
-    def _units(self) -> Array:
-        return np.array([1.0, 1.0, self.units_per_mm])
+    names: tuple[str, ...]
+    ground: Array
+
+    @classmethod
+    def of(cls, ground: Ground, names: Sequence[str]) -> "Control":
+        """Return what is known of these points."""
+        return cls(tuple(names), ground.coordinates[:, [ground.points.index(name) for name in names]])
 
     @property
-    def metres_per_mm(self) -> float:
-        """Of the ground, a mm of the model as it came out."""
-        return float(self.absolute.similarity.scale)
+    def with_height(self) -> list[int]:
+        """Which have a height."""
+        return np.flatnonzero(np.isfinite(self.ground[2])).tolist()
+
+    @property
+    def in_plan(self) -> list[int]:
+        """Which have plan coordinates."""
+        return np.flatnonzero(np.isfinite(self.ground[:2]).all(axis=0)).tolist()
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether there is enough for scale and levelling."""
+        return len(self.in_plan) >= FEWEST_PLAN and len(self.with_height) >= FEWEST_HEIGHTS
+
+    @property
+    def ends(self) -> tuple[int, int]:
+        """The two points furthest apart in plan."""
+        return max(combinations(self.in_plan, 2), key=lambda pair: float(length_of(self.between(*pair)[:2])))
+
+    def between(self, first: int, last: int) -> Array:
+        """Return the vector ``(3,)`` from one point to another, m."""
+        return np.asarray(self.ground[:, last] - self.ground[:, first])
 
 
-def levelled(
-    bench: Bench,
-    view: StereoView,
-    points: Mapping[str, Place],
-    control: Ground,
-    scale_number: float,
-    also: Sequence[str] = (),
-) -> LevelModel:
-    """Level a relatively oriented model of one person and bring it to scale; `points` are readings measured in it.
+@dataclass(frozen=True)
+class Fit:
+    """How models of m sessions stand to the ground."""
 
-    The control in the model, and the points of `also`, are measured anew after every round. Gives up where the control
-    does not determine the orientation.
+    up: Array
+    """The direction in the frame that points upward on the ground ``(3, m)``."""
+    metres: Array
+    """On the ground, a mm of the model ``(m,)``."""
+    heights: Array
+    """Of the control in the model, mm, and on the ground, m ``(2, n, m)``."""
+
+    @property
+    def tilts(self) -> Array:
+        """How the plumb line leans along the base and across it ``(2, m)``, gon."""
+        return np.asarray(np.arctan2(self.up[:2], self.up[2]) / GON)
+
+    def factor(self, number: float) -> Array:
+        """Return the factor ``(m,)`` from the model to a scale number."""
+        return np.asarray(1e3 * self.metres / number)
+
+    def rms(self, number: float) -> Array:
+        """Return the rms ``(m,)`` of heights about their mean, model minus ground, m."""
+        in_model, on_ground = self.heights
+        return np.asarray((1e-3 * number * in_model - on_ground).std(axis=0))
+
+    def of(self, keep: Truths) -> "Fit":
+        """Return the fit of some of the sessions."""
+        return Fit(self.up[:, keep], self.metres[keep], self.heights[:, :, keep])
+
+
+class Levelling:
+    """Sessions with the same control at work on one model."""
+
+    def __init__(self, bench: Bench, model: ModelJob, control: Control) -> None:
+        self.bench, self.crew, self.seat = bench, bench.crew, bench.seat
+        self.model, self.control = model, control
+        self.names = [name for name in bench.seat.manual.elements if name not in ("c1", "c2")]
+
+    def settings(self, who: Who) -> dict[str, Array]:
+        """Return where all elements stand ``(sessions,)``."""
+        return spread(self.seat.standing(who, self.names), who, self.crew.sessions)
+
+    def measured(self, who: Who, number: int) -> Array:
+        """Return places ``(3, n, m)`` of the control in the frame as a round measures them, mm, Z up."""
+        self.bench.begin_round(who, number)
+        readings = self.bench.measure(who, self.control.names)[:, :, who]
+        x, y, z = np.stack([self.seat.place(who, each) for each in np.moveaxis(readings, 1, 0)], axis=1)
+        return np.array([x, y, -z])
+
+    def compared(self, who: Who, at: Array) -> Fit:
+        """Compare places ``(3, n, m)`` with the control: the scale by its two ends, the tilts by its heights."""
+        self.bench.compute(who)
+        first, last = self.control.ends
+        across = self.control.between(first, last)
+        vector = at[:, last] - at[:, first]
+        given = self.control.ground[2, self.control.with_height][:, None]
+        has_height = bool(np.isfinite(across[2]))
+        metres = length_of(across if has_height else across[:2]) / length_of(vector)
+        up = self._up(who, at[:, self.control.with_height], given / metres)
+        if not has_height:
+            metres = length_of(across[:2]) / length_of(vector - up * (up * vector).sum(axis=0))
+        in_model = at[2, self.control.with_height]
+        return Fit(up, metres, np.array([in_model, np.broadcast_to(given, in_model.shape)]))
+
+    def _up(self, who: Who, at: Array, given: Array) -> Array:
+        """Return the up directions ``(3, m)`` from places ``(3, n, m)`` and heights at their scale ``(n, m)``, mm."""
+        slopes = np.zeros((2, who.size))
+        design = np.moveaxis(np.array([at[0], at[1], np.ones_like(at[0])]), 0, 1)
+        for _ in range(5):
+            try:
+                slopes = adjusted(design, given - np.sqrt(1.0 - (slopes**2).sum(axis=0)) * at[2]).unknowns[:2]
+            except Undetermined as undetermined:
+                self.crew.give_up(who, f"{self.model.name}: the height control does not level it: {undetermined}")
+                break
+        return np.array([*slopes, np.sqrt(1.0 - (slopes**2).sum(axis=0))])
+
+    def turned_until_level(self, who: Who, fit: Fit, number: float) -> dict[int, list[LevellingRound]]:
+        """Turn and measure until it gets no better, the model to a scale number; the best settings stand.
+
+        Return the rounds by session.
+        """
+        crew = self.crew
+        rounds: dict[int, list[LevellingRound]] = {int(session): [] for session in who}
+        least = np.full(crew.sessions, np.inf)
+        best = self.settings(who)
+        height = 1e-3 * number * self.bench.job.plan.projection_height
+        for round_number in range(2, MOST_ROUNDS + 2):
+            _note(rounds, who, fit, number)
+            misfit = np.hypot(fit.rms(number), np.abs(fit.factor(number) - 1.0) * height)
+            now, better = self.settings(who), misfit < least[who]
+            falling = misfit < STILL_FALLING * least[who]
+            for name, kept in best.items():
+                kept[who[better]] = now[name][who[better]]
+            least[who[better]] = misfit[better]
+            who, fit = who[falling], fit.of(falling)
+            if not who.size or round_number > MOST_ROUNDS:
+                break
+            settings = {name: values[who] for name, values in now.items()}
+            upright = turned_upright(settings, self.model, self.seat.manual, fit.up, fit.factor(number))
+            self.seat.turn_changed(who, upright)
+            who = crew.still(who)
+            if not who.size:
+                break
+            fit = self.compared(who, self.measured(who, round_number))
+        everybody = crew.still(np.array(list(rounds), dtype=np.intp))
+        self.seat.turn_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
+        return rounds
+
+
+def _note(rounds: Mapping[int, list[LevellingRound]], who: Who, fit: Fit, number: float) -> None:
+    for session, rms, factor, tilts in zip(who.tolist(), fit.rms(number), fit.factor(number), fit.tilts.T, strict=True):
+        rounds[session].append(LevellingRound(float(rms), float(factor), (float(tilts[0]), float(tilts[1]))))
+
+
+def turned_upright(settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array) -> dict[str, Array]:
+    """Return the elements ``(m,)`` that set a whole model upright and larger by a factor, of those the plotter has.
+
+    `up` ``(3, m)`` is the direction in the frame that is to point upward.
     """
-    who = bench.crew.everybody
-    units = bench.seat.units_per_mm
-    wanted = [name for name in points if name in control.points or name in also]
-    for number in range(1, MOST_ROUNDS + 2):
-        absolute = oriented(bench, points, control, units)
-        found = LevelModel(absolute, points, scale_number, _tilt(absolute), units, number - 1)
-        to_scale = abs(found.metres_per_mm * 1e3 / scale_number - 1.0) < TO_SCALE
-        if (found.tilt_gon < LEVEL_GON and to_scale) or number > MOST_ROUNDS:
-            return found
-        bench.begin_round(who, number)
-        bench.compute(who)
-        bench.seat.set_changed(who, _settings(bench, absolute, scale_number))
-        view.learn()
-        points = _measured(bench, wanted)
-    raise AssertionError
+    turned = turned_by_common_phi if "common_phi" in manual.elements else turned_together
+    return turned(settings, model, manual, up, factor)
 
 
-def _measured(bench: Bench, names: Sequence[str]) -> dict[str, Place]:
-    readings = bench.measure(bench.crew.everybody, names)[:, :, 0].T
-    return {
-        name: (float(X), float(Y), float(Z))
-        for name, (X, Y, Z) in zip(names, readings, strict=True)
-        if not math.isnan(X)
+def turned_together(settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array) -> dict[str, Array]:
+    """Return the elements ``(m,)`` at which the whole model stands upright and is larger by a factor.
+
+    bz' and bz" share what the base rises.
+    """
+    left, right = model.left_projector, model.right_projector
+    about_y = -np.arctan2(up[0], up[2])
+    about_x = np.arctan2(up[1], np.hypot(up[0], up[2]))
+    zero = np.zeros_like(about_x)
+    whole = mxm(rotation(about_x, zero, zero), rotation(zero, about_y, zero))
+    found = {}
+    for n in (left, right):
+        angles = angles_of(mxm(whole, _stand(settings, manual, n)))
+        for name, radians in zip(("omega", "phi", "kappa"), angles, strict=True):
+            found[f"{name}{n}"] = radians / GON + manual.elements[f"{name}{n}"].zero
+    base = np.array(
+        [
+            settings["bx"],
+            settings[f"by{left}"] - settings[f"by{right}"],
+            settings[f"bz{right}"] - settings[f"bz{left}"],
+        ]
+    )
+    bx, across, rise = factor * mxv(whole, base)
+    half = (rise - base[2]) / 2.0
+    return found | {
+        f"bz{left}": settings[f"bz{left}"] - half,
+        f"bz{right}": settings[f"bz{right}"] + half,
+        f"by{right}": settings[f"by{left}"] - across,
+        "bx": bx,
     }
 
 
-def oriented(bench: Bench, points: Mapping[str, Place], control: Ground, units: float) -> AbsoluteOrientation:
-    """Return the orientation to the ground of a model in which the control was measured, gives up where it has none."""
-    names = tuple(name for name in points if name in control.points)
-    coordinates = np.array([points[name] for name in names]).reshape(-1, 3).T / np.array([[1.0], [1.0], [units]])
-    try:
-        return absolute_orientation(Model(bench.seat.model.name, names, coordinates), control)
-    except Undetermined as reason:
-        bench.crew.give_up(bench.crew.everybody, f"{bench.seat.model.name}: absolute orientation: {reason}")
-        raise
+def turned_by_common_phi(
+    settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array
+) -> dict[str, Array]:
+    """Return the elements ``(m,)`` that do the same where a common Phi tilts the whole along the base."""
+    zero = manual.elements["common_phi"].zero
+    common = (settings["common_phi"] - zero) * GON
+    x, y, z = mxv(rotation(np.zeros_like(common), -common, np.zeros_like(common)), up)
+    about_x = np.arctan2(y, z)
+    upright = y * np.sin(about_x) + z * np.cos(about_x)
+    omegas = {name: settings[name] + about_x / GON for name in ("omega1", "omega2")}
+    return omegas | {"common_phi": zero - np.arctan2(x, upright) / GON, "bx": factor * settings["bx"]}
 
 
-def _tilt(absolute: AbsoluteOrientation) -> float:
-    x, y, _ = _plumb(absolute)
-    return math.hypot(x, y) / GON
-
-
-def _plumb(absolute: AbsoluteOrientation) -> Array:
-    """Return the ground's upward plumb line ``(3,)`` in the model."""
-    return np.asarray(absolute.similarity.rotation[2])
-
-
-def _settings(bench: Bench, absolute: AbsoluteOrientation, scale_number: float) -> dict[str, Array]:
-    """Return what the elements must show for the model to be level and to scale."""
-    seat = bench.seat
-    names = [name for name in seat.manual.elements if name not in ("c1", "c2")]
-    larger = float(absolute.similarity.scale) * 1e3 / scale_number
-    settings = seat.elements(bench.crew.everybody, names)
-    return turned_upright(settings, seat.model, seat.manual, _plumb(absolute)[:, None], np.array([larger]))
+def _stand(settings: Settings, manual: Variant, n: int) -> Array:
+    omega, phi, kappa = (
+        (settings[f"{name}{n}"] - manual.elements[f"{name}{n}"].zero) * GON for name in ("omega", "phi", "kappa")
+    )
+    return rotation(omega, phi, kappa)

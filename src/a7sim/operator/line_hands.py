@@ -60,6 +60,9 @@ class LineHands:
     def set_element(self, who: Who, name: str, values: Array) -> None:
         self._send(f"{header(name)} {values[0]:.2f}")
 
+    def turn_element(self, who: Who, name: str, amounts: Array) -> None:
+        self._send(f"{header(name)}:TURN {amounts[0]:.5f}")
+
     def preset(self, who: Who, readings: Mapping[str, float]) -> None:
         self._send(";:".join(f"COUN:{axis}:PRES {reading:.2f}" for axis, reading in readings.items()))
 
@@ -105,11 +108,11 @@ class LineHands:
         before, after = self._numbers(f"SYST:ERR:COUN?;:DRIV:{line};:SYST:ERR:COUN?")
         return np.array([before == after])
 
-    def turn(self, who: Who, wheels: Array, element: str | None = None, counts: Array | None = None) -> None:
-        turned = ";".join(f"{axis} {amount:.3f}" for axis, amount in zip("XYZ", wheels[:, 0], strict=False))
+    def turn(self, who: Who, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
+        turned = ";".join(f"{axis} {amount:.4f}" for axis, amount in zip("XYZ", wheels[:, 0], strict=False))
         line = f"WHE:{turned}"
-        if element is not None and counts is not None and not np.isnan(counts[0]):
-            line += f";:{header(element)} {counts[0]:.2f}"
+        if element is not None and amounts is not None:
+            line += f";:{header(element)}:TURN {amounts[0]:.5f}"
         self._send(line)
 
     def seen(self, who: Who, eye: int, point: str) -> Array:

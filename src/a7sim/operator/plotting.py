@@ -13,7 +13,7 @@ from a7sim.operator.bench import Bench
 from a7sim.operator.compilation import Area, Compilation, Errand, Spots, Traced, Tracing
 from a7sim.operator.crew import Crew
 from a7sim.operator.job import Job
-from a7sim.operator.levelling import LevelModel, levelled, oriented
+from a7sim.operator.level_model import LevelModel, levelled, oriented
 from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
 from a7sim.operator.preparation import PLAN_GEARS

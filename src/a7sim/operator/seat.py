@@ -13,6 +13,12 @@ from a7sim.operator.job import Job, ModelJob
 STEADY = ("kappa1", "kappa2", "by1", "by2", "bx")
 """Elements on which the places of images depend to first order."""
 
+ROUNDED_AWAY = 0.51
+"""Of a count: by no more can a counter and the drum beneath it differ."""
+
+TURNED_DECIMALS = 5
+"""With which a drum is turned."""
+
 
 class Seat:
     """The hands of a crew on their instruments. Lengths in mm at instrument scale, readings as counters show them.
@@ -35,6 +41,8 @@ class Seat:
         self._plane = np.ones(2)
         """Units of the X and Y counters a mm."""
         self._settings = {name: np.zeros(crew.sessions) for name in STEADY}
+        self._left_at: dict[str, Array] = {}
+        """Where drums were left by these hands ``(sessions,)``, between two counts too; nan where that is not known."""
         self._offset = np.zeros((3, crew.sessions))
 
     def prepare(self, who: Who) -> None:
@@ -46,7 +54,8 @@ class Seat:
         hands.engage(who, 1.0, plan.plan_gear)
         hands.reset(who)
         self.spend_setting(who, 6)
-        hands.set_element(who, "bx", np.full(who.size, plan.bx))
+        self._left_at.clear()
+        self.run_element(who, "bx", np.full(who.size, plan.bx))
         hands.drive(who, {"Z": np.full(who.size, -plan.projection_height)})
         self._plane = np.array([self.manual.scales[axis].units_per_mm for axis in "XY"])
         for row, axis in enumerate("XY"):
@@ -122,7 +131,7 @@ class Seat:
         for name, value in settings.items():
             counts = counter_value(name, value)
             self.spend_setting(who)
-            self.hands.set_element(who, name, counts)
+            self.run_element(who, name, counts)
             self.see_that_it_obeyed(who, f"setting {name}")
             self.crew.enter(who, "", f"set {name}", counts)
         self.learn_settings(self.crew.still(who))
@@ -132,11 +141,61 @@ class Seat:
         for name, wanted in settings.items():
             if not who.size:
                 return
-            off = counter_value(name, wanted) - self.elements(who, [name])[name]
-            off = wrapped(off) if name.startswith("kappa") else off
+            off = _difference(name, counter_value(name, wanted), self.elements(who, [name])[name])
             changed = self.crew.goes_on(who) & (np.abs(off) > LEAST_COUNT / 2.0)
             if changed.any():
                 self.set_elements(who[changed], {name: wanted[changed]})
+
+    def run_element(self, who: Who, name: str, counts: Array) -> None:
+        """Run an element to counts ``(m,)``, and bear in mind that it stands there."""
+        self.hands.set_element(who, name, counts)
+        self._leave(who, name, counts)
+
+    def standing(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
+        """Read where elements stand ``(m,)``, between two counts too where these hands have left them there."""
+        found = {}
+        for name, shown in self.elements(who, names).items():
+            left = self._left_at.get(name, np.full(self.crew.sessions, np.nan))[who]
+            near = np.abs(_difference(name, left, shown)) <= ROUNDED_AWAY * LEAST_COUNT
+            found[name] = np.where(near, left, shown)
+        return found
+
+    def turn_elements(self, who: Who, settings: Mapping[str, Array]) -> None:
+        """Turn elements until they stand at values ``(m,)``, between two counts too, and enter what they show."""
+        for name, wanted in settings.items():
+            amounts = _difference(name, wanted, self.take_hold(who, name))
+            self.spend_setting(who)
+            self.hands.turn_element(who, name, amounts)
+            self._turned(who, name, amounts)
+            self.see_that_it_obeyed(who, f"turning {name}")
+            self.crew.enter(who, "", f"set {name}", self.elements(who, [name])[name])
+        self.learn_settings(self.crew.still(who))
+
+    def turn_changed(self, who: Who, settings: Mapping[str, Array]) -> None:
+        """Turn those elements that do not yet stand at the values ``(m,)`` at which they have to."""
+        for name, wanted in settings.items():
+            if not who.size:
+                return
+            off = np.abs(_difference(name, wanted, self.standing(who, [name])[name]))
+            changed = self.crew.goes_on(who) & (off >= 10.0**-TURNED_DECIMALS)
+            if changed.any():
+                self.turn_elements(who[changed], {name: wanted[changed]})
+
+    def take_hold(self, who: Who, name: str) -> Array:
+        """Take a drum in hand to turn it; return where it stands ``(m,)``."""
+        stands = self.standing(who, [name])[name]
+        self._leave(who, name, stands)
+        return stands
+
+    def in_hand(self, who: Who, name: str) -> Array:
+        """Return where a drum that these hands have turned stands ``(m,)``."""
+        return self._left_at[name][who]
+
+    def _leave(self, who: Who, name: str, at: Array) -> None:
+        self._left_at.setdefault(name, np.full(self.crew.sessions, np.nan))[who] = at
+
+    def _turned(self, who: Who, name: str, amounts: Array) -> None:
+        self._left_at[name][who] += np.round(amounts, TURNED_DECIMALS)
 
     def learn_settings(self, who: Who) -> None:
         """Read off what the places of images depend on."""
@@ -177,10 +236,12 @@ class Seat:
         """Run the mark to heights ``(m,)`` above the base line, mm, hence negative."""
         return self.drive(who, {"Z": self._offset[2, who] + height * self.units_per_mm})
 
-    def turn(self, who: Who, wheels: Array, element: str | None = None, counts: Array | None = None) -> None:
-        """Turn the handwheels ``(2 or 3, m)`` in counter units and an element with them (see `Hands`)."""
+    def turn(self, who: Who, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
+        """Turn the handwheels ``(2 or 3, m)`` in counter units and with them an element that is in hand."""
         self.crew.spend(who, self.crew.observer.seconds_to_turn, "turning")
-        self.hands.turn(who, wheels, element, counts)
+        self.hands.turn(who, wheels, element, amounts)
+        if element is not None and amounts is not None:
+            self._turned(who, element, amounts)
 
     def see_that_it_obeyed(self, who: Who, doing: str) -> None:
         """Give up where an instrument has refused anything since the last look."""
@@ -246,6 +307,11 @@ def wrapped(gon: Array) -> Array:
 def counter_value(name: str, value: Array) -> Array:
     """Return what the counter of an element must show, kappa brought to 0..400."""
     return np.asarray(np.round(value % 400.0, 2) % 400.0 if name.startswith("kappa") else np.round(value, 2))
+
+
+def _difference(name: str, value: Array, other: Array) -> Array:
+    """Return one value of an element minus another, the shorter way round for kappa."""
+    return wrapped(value - other) if name.startswith("kappa") else np.asarray(value - other)
 
 
 def side(hand: int) -> str:

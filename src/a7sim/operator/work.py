@@ -203,7 +203,7 @@ def mount(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientation
         seat.spend_setting(who)
         for name, element in seat.manual.elements.items():
             if name.endswith(str(projector)) and not name.startswith("c"):
-                hands.set_element(who, name, np.full(who.size, element.zero))
+                seat.run_element(who, name, np.full(who.size, element.zero))
         seat.see_that_it_obeyed(who, f"setting projector {projector} to its zeros")
         interior[photograph] = interior_orientation(
             bench, bench.crew.everybody, projector, photograph, bench.job.certificate

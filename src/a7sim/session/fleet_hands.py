@@ -34,6 +34,9 @@ class FleetHands:
     def set_element(self, who: Who, name: str, values: Array) -> None:
         self._fleet.set_element(who, name, np.round(values, 2))
 
+    def turn_element(self, who: Who, name: str, amounts: Array) -> None:
+        self._fleet.turn_element(who, name, np.round(amounts, 5))
+
     def preset(self, who: Who, readings: Mapping[str, float]) -> None:
         for axis, reading in readings.items():
             self._fleet.preset(who, axis, round(reading, 2))
@@ -78,12 +81,11 @@ class FleetHands:
         went = [self._fleet.drive(who, axis, np.round(each, 2)) for axis, each in readings.items()]
         return np.asarray(np.all(went, axis=0))
 
-    def turn(self, who: Who, wheels: Array, element: str | None = None, counts: Array | None = None) -> None:
-        for axis, amounts in zip("XYZ", np.round(wheels, 3), strict=False):
-            self._fleet.wheel(who, axis, amounts)
-        if element is not None and counts is not None:
-            turned = ~np.isnan(counts)
-            self._fleet.set_element(who[turned], element, np.round(counts[turned], 2))
+    def turn(self, who: Who, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
+        for axis, turned in zip("XYZ", np.round(wheels, 4), strict=False):
+            self._fleet.wheel(who, axis, turned)
+        if element is not None and amounts is not None:
+            self.turn_element(who, element, amounts)
 
     def seen(self, who: Who, eye: int, point: str) -> Array:
         return np.round(self._fleet.eyepiece(who, eye, point), 2)

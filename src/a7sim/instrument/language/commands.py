@@ -175,6 +175,14 @@ def _element(header: str, name_of: Callable[[int], str], unit: str, about: str) 
     def move(engine: "Engine", call: Call) -> None:
         _autograph(engine).set_element(name_of(call.suffix), call.arguments[0])
 
+    def turn(engine: "Engine", call: Call) -> None:
+        _autograph(engine).turn_element(name_of(call.suffix), call.arguments[0])
+
+    def to_the_ends(engine: "Engine", suffix: int) -> Limits:
+        low, high, _ = limits(engine, suffix)
+        here = _autograph(engine).element(name_of(suffix))
+        return low - here, high - here, 0.0
+
     def show(engine: "Engine", call: Call) -> str:
         shown = _autograph(engine).element(name_of(call.suffix))
         if call.arguments:
@@ -184,6 +192,13 @@ def _element(header: str, name_of: Callable[[int], str], unit: str, about: str) 
     return [
         Command(header, move, (Quantity(unit, limits),), turns=True, about=about),
         Command(f"{header}?", show, (_LIMIT,)),
+        Command(
+            f"{header}:TURN",
+            turn,
+            (Quantity(unit, to_the_ends, name="amount"),),
+            turns=True,
+            about="turn its drum by so much, signed, between two counts too",
+        ),
     ]
 
 
