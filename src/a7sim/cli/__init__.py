@@ -19,6 +19,9 @@ _VERBS = {
     "scenario": "a7sim.cli.scenario",
     "prepare": "a7sim.cli.prepare",
     "bridge": "a7sim.cli.bridge",
+    "report": "a7sim.cli.report",
+    "export": "a7sim.cli.export",
+    "compare": "a7sim.cli.compare",
 }
 
 

@@ -2,6 +2,7 @@
 
 from a7sim.scenario.loading import (
     ScenarioError,
+    bare_name,
     find_scenario,
     load_scenario,
     scenario_of,
@@ -19,8 +20,11 @@ from a7sim.scenario.schema import (
     Photo,
     Plan,
     ProjectorCondition,
+    Request,
+    RequestedScenario,
     Scenario,
     StripPlan,
+    requested,
 )
 from a7sim.scenario.schema import Model as ModelPlan
 from a7sim.scenario.skills import PROFILES, observer_of_skill
@@ -39,12 +43,16 @@ __all__ = [
     "Photo",
     "Plan",
     "ProjectorCondition",
+    "Request",
+    "RequestedScenario",
     "Scenario",
     "ScenarioError",
     "StripPlan",
+    "bare_name",
     "find_scenario",
     "load_scenario",
     "observer_of_skill",
+    "requested",
     "scenario_of",
     "scenario_schema",
 ]

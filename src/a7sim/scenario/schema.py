@@ -523,3 +523,23 @@ class Scenario(_Data, frozen=True, kw_only=True):
     def half_width(self) -> float:
         """Distance of the outer rows of standard points from the base, mm in the photograph."""
         return HALF_WIDTH_MM if self.plotting is None else self.plotting.half_width
+
+
+class Request(_Data, frozen=True):
+    """How somebody asked for a session: the command that gives it again, and what it changed in the scenario's file."""
+
+    command_line: str
+    settings: dict[str, str]
+    """Changed values by their path."""
+
+
+class RequestedScenario(Scenario, frozen=True, kw_only=True):
+    """A scenario as somebody asked for it; files know nothing of the request."""
+
+    request: Request
+
+
+def requested(scenario: Scenario, request: Request) -> RequestedScenario:
+    """Return a scenario with the request that chose it."""
+    values = {name: getattr(scenario, name) for name in Scenario.__struct_fields__}
+    return RequestedScenario(**values, request=request)

@@ -20,7 +20,7 @@ from a7sim.scene import Scene
 from a7sim.session.folder import BOOK, GEOJSON, JOURNAL, RESULTS, SVG, prepare_folder, write_whole
 from a7sim.session.journal import Journal
 from a7sim.session.map_sheet import as_geojson, as_svg
-from a7sim.session.results import of_operator, of_slips
+from a7sim.session.results import of_operator, of_request, of_slips
 from a7sim.session.running import Session, Watcher, open_session
 from a7sim.session.strips import given_control
 
@@ -67,14 +67,18 @@ def compile_model(
     order = _order(wanted, scenario, session.scene)
     if out is not None:
         prepare_folder(out, force)
-    document = head("compile") | {
-        "software": f"a7sim {a7sim.__version__}",
-        "scenario": scenario.title,
-        "seed": seed,
-        "model": wanted.model,
-        "status": "complete",
-        "message": "",
-    }
+    document = (
+        head("compile")
+        | of_request(scenario)
+        | {
+            "software": f"a7sim {a7sim.__version__}",
+            "scenario": scenario.title,
+            "seed": seed,
+            "model": wanted.model,
+            "status": "complete",
+            "message": "",
+        }
+    )
     journalled = {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
     with journal.opened(out / JOURNAL if out else None, journalled):
         try:

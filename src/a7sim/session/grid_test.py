@@ -30,7 +30,7 @@ from a7sim.scenario import Condition, Scenario
 from a7sim.scene import build_scene
 from a7sim.session.folder import BOOK, JOURNAL, RESIDUALS, RESULTS, prepare_folder, write_whole
 from a7sim.session.journal import Journal
-from a7sim.session.results import of_operator, of_slips
+from a7sim.session.results import of_operator, of_request, of_slips
 from a7sim.session.running import Watcher
 from a7sim.sheets import sheet
 
@@ -97,20 +97,24 @@ def _opened(scenario: Scenario, seed: int, listener: Listener) -> tuple[Autograp
 
 
 def _header(scenario: Scenario, seed: int, order: GridTestOrder, autograph: Autograph) -> Document:
-    return head("calibrate") | {
-        "software": f"a7sim {a7sim.__version__}",
-        "scenario": scenario.title,
-        "seed": seed,
-        "variant": scenario.instrument.variant,
-        "serial": scenario.instrument.serial,
-        "plate": order.plate.name,
-        "crosses": len(order.chosen),
-        "levels_mm": order.heights(autograph.variant),
-        "pointings": order.pointings,
-        "status": "failed",
-        "message": "",
-        "projectors": {},
-    }
+    return (
+        head("calibrate")
+        | of_request(scenario)
+        | {
+            "software": f"a7sim {a7sim.__version__}",
+            "scenario": scenario.title,
+            "seed": seed,
+            "variant": scenario.instrument.variant,
+            "serial": scenario.instrument.serial,
+            "plate": order.plate.name,
+            "crosses": len(order.chosen),
+            "levels_mm": order.heights(autograph.variant),
+            "pointings": order.pointings,
+            "status": "failed",
+            "message": "",
+            "projectors": {},
+        }
+    )
 
 
 # --- the document -------------------------------------------------------------------------------------
