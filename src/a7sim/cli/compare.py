@@ -27,4 +27,5 @@ def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> N
     if as_document:
         click.echo(as_json(of_comparison(sessions, rows)), nl=False)
     else:
-        Console().print(table_of(sessions, rows))
+        console = Console()
+        console.print(table_of(sessions, rows, console.width))

@@ -71,8 +71,7 @@ def _lines(kept: Kept) -> Iterator[Line]:
             "got a session with neither"
         )
     yield from notes
-    said = {note.marker for note in notes} | {""}
-    yield from (_reading(entry) for entry in kept.book if entry.reading or f"{entry.model}: {entry.remark}" not in said)
+    yield from (_reading(entry) for entry in kept.book if entry.reading or not notes)
     for model in document.get("models", ()):
         yield Line(model["finished_at_s"], _printed(Group(*tables.of_model(model))))
     yield Line(3600.0 * document["operator"]["hours"], _printed(_end(kept)))
@@ -80,12 +79,12 @@ def _lines(kept: Kept) -> Iterator[Line]:
 
 def _notes(kept: Kept) -> Iterator[Line]:
     """Yield what the operator noted in the journal: forms that begin, and remarks."""
-    forms = {f"{entry.model}: {entry.form}" for entry in kept.book}
+    models, forms, remarks = ({getattr(entry, name) for entry in kept.book} for name in ("model", "form", "remark"))
     for event in journal_of(kept):
         text = event.get("text", "")
         if event.get("dir") == ">" and text.startswith(_NOTE):
             note = text.removeprefix(_NOTE).removesuffix('"').replace('""', '"')
-            begins = note.partition(", round ")[0] in forms
+            begins = note in forms or (note.partition(": ")[0] in models and note not in remarks)
             yield Line(float(event["t"]), f"\x1b[1m{_clock(event['t'])} {note}\x1b[0m\n", note if begins else "")
 
 

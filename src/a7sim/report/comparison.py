@@ -44,8 +44,8 @@ _NAMED_BY = ("model", "photo", "models", "name", "number")
 
 ABSENT = "-"
 
-WIDEST = 34
-"""Characters of a value on one line of the terminal."""
+NARROWEST = 8
+"""Characters of a value on one line of a terminal, however many sessions stand side by side."""
 
 
 @dataclass(frozen=True)
@@ -129,18 +129,17 @@ def of_comparison(sessions: Sequence[Kept], rows: Sequence[Row]) -> Document:
     }
 
 
-def table_of(sessions: Sequence[Kept], rows: Sequence[Row]) -> RenderableType:
-    """Return a comparison for a terminal."""
+def table_of(sessions: Sequence[Kept], rows: Sequence[Row], width: int) -> RenderableType:
+    """Return a comparison for a terminal of so many columns."""
     if not rows:
         return Text(f"{len(sessions)} sessions of a7sim {sessions[0].command}, all the same")
     leaves = max(len(row.fact.rpartition(".")[2]) for row in rows)
-    columns = zip(*(row.values for row in rows), strict=True)
-    widths = [min(WIDEST, max(map(len, column))) for column in columns]
+    each_value = max(NARROWEST, (width - leaves - 2) // len(sessions) - 2)
     parts: list[RenderableType] = [Text(f"{i}: {kept.folder}") for i, kept in enumerate(sessions, start=1)]
     for group, members in groupby(rows, key=lambda row: row.fact.rpartition(".")[0]):
         table = sheet("", *map(str, range(1, len(sessions) + 1)), left=range(len(sessions) + 1), fold=range(1, 99))
-        for column, width in zip(table.columns, (leaves, *widths), strict=True):
-            column.min_width = width
+        for column, wide in zip(table.columns, (leaves, *[each_value] * len(sessions)), strict=True):
+            column.width = wide
         for row in members:
             table.add_row(row.fact.rpartition(".")[2], *row.values)
         parts += [Text(), Text(group.replace(".", " ") or "session", style="bold"), table]

@@ -108,12 +108,16 @@ def arrows(
     """Draw arrows of these lengths, all in the units of the axes."""
     shape: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "zorder": 3}
     axes.quiver(x, y, dx, dy, color=colour, width=width, label=label or None, **shape)
+    axes.update_datalim([(at[0] + at[2], at[1] + at[3]) for at in zip(x, y, dx, dy, strict=True)])
+    axes.autoscale_view()
 
 
-def scale_arrow(axes: "Axes", at: tuple[float, float], length: tuple[float, float], text: str, colour: str) -> None:
+def scale_arrow(
+    axes: "Axes", at: tuple[float, float], length: tuple[float, float], text: str, colour: str, width: float = 0.008
+) -> None:
     """Draw the arrow that tells the scale of the others."""
     (x, y), (dx, dy) = at, length
-    arrows(axes, [x], [y], [dx], [dy], colour)
+    arrows(axes, [x], [y], [dx], [dy], colour, width)
     axes.annotate(text, (x + dx, y + dy / 2.0), (8, 0), textcoords="offset points", va="center")
 
 

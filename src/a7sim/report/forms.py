@@ -24,6 +24,11 @@ TITLES = {
     "right perspective centre": "FORM FOR PERSPECTIVE-CENTRE POSITION DETERMINATION",
 }
 
+EMPIRICAL = "FORM FOR EMPIRICAL RELATIVE ORIENTATION"
+
+REPEATED = {"by1", "by2"}
+"""What is read several times over in numerical relative orientation."""
+
 ROMAN = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X")
 
 SIGNS = {"1": "′", "2": "″"}
@@ -85,20 +90,17 @@ def forms_of(kept: Kept) -> Iterator[Form]:
 def _filled(document: Document, model: str, form: str, number: int, entries: Sequence[Entry]) -> Form:
     found = next((each for each in document.get("models", ()) if each["model"] == model), None)
     round_of = f", round {number}" if number else ""
-    title = TITLES.get(form, f"FORM FOR {form.upper() or 'REMARKS'}")
-    head = (
-        [f"{document['scenario']}    model {model}    {form}{round_of}"]
-        if model
-        else [f"{document['scenario']}    {form}"]
-    )
+    observed = [entry for entry in entries if entry.point and entry.reading]
+    in_order = {entry.item for entry in observed} - REPEATED if form == "relative orientation" else set()
+    title = EMPIRICAL if in_order else TITLES.get(form, f"FORM FOR {form.upper() or 'REMARKS'}")
+    name = f"model {model}, {form}{round_of}" if model else form
+    head = [f"{document['scenario']}    {name}"]
     if found is not None:
         head.append(f"photographs {found['left']} and {found['right']}    base {found['base']}")
     head.append(f"begun {_clock(entries[0].time)}    ended {_clock(entries[-1].time)}    hours of the session")
-    observed = [entry for entry in entries if entry.point and entry.reading]
     parallaxes = _parallaxes(found, form, number) if found is not None else {}
-    caption = f"Model {model}, {form}{round_of}" if model else form.capitalize()
-    columns = list(_columns(observed, parallaxes)) if observed else []
-    return Form(title, caption, head, columns, [*_below(entries), *_result(found, form)])
+    columns = list(_as_it_went(observed) if in_order else _columns(observed, parallaxes)) if observed else []
+    return Form(title, name[:1].upper() + name[1:], head, columns, [*_below(entries), *_result(found, form)])
 
 
 def _clock(seconds: float) -> str:
@@ -113,6 +115,14 @@ def _parallaxes(model: Document, form: str, number: int) -> dict[str, float]:
     rounds = orientation["rounds"]
     by_label = rounds[number - 1]["parallax_mm"] if number <= len(rounds) else orientation["residual_parallax_mm"]
     return {model["standard_points"].get(label, label): p for label, p in by_label.items()}
+
+
+def _as_it_went(observed: Sequence[Entry]) -> Iterator[Column]:
+    """Yield readings in their order: each is of a model that the one before has changed."""
+    yield Column("point", "", [entry.point for entry in observed])
+    yield Column("time", "", [_clock(entry.time) for entry in observed])
+    yield Column("item", "", [_shown(entry.item) for entry in observed])
+    yield Column("reading", "", [entry.reading for entry in observed])
 
 
 def _columns(observed: Sequence[Entry], parallaxes: Mapping[str, float]) -> Iterator[Column]:
@@ -185,16 +195,17 @@ def _lines(columns: Sequence[Column]) -> Iterator[str]:
     groups = [list(group) for _, group in groupby(columns, key=lambda column: column.item)]
     widths = [column.width for column in columns]
     yield "  ".join(_over(group) for group in groups).rstrip()
-    rows = [[column.which for column in columns], *zip(*(column.cells for column in columns), strict=True)]
     rule = "-" * (sum(widths) + 2 * len(widths) - 2)
-    for i, row in enumerate(rows):
-        first, *others = (
-            cell.ljust(w) if j == 0 else cell.rjust(w) for j, (cell, w) in enumerate(zip(row, widths, strict=True))
-        )
-        yield "  ".join([first, *others]).rstrip()
-        if i == 0:
-            yield rule
+    if any(column.which for column in columns):
+        yield _row([column.which for column in columns], widths)
     yield rule
+    yield from (_row(cells, widths) for cells in zip(*(column.cells for column in columns), strict=True))
+    yield rule
+
+
+def _row(cells: Sequence[str], widths: Sequence[int]) -> str:
+    first, *others = zip(cells, widths, strict=True)
+    return "  ".join([first[0].ljust(first[1]), *(cell.rjust(width) for cell, width in others)]).rstrip()
 
 
 def _over(group: Sequence[Column]) -> str:

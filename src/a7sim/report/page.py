@@ -110,7 +110,12 @@ def _one(part: Part) -> str:
 
 
 def _figure(picture: Picture) -> str:
-    return f"<figure>{picture.markup}<figcaption>{escape(picture.caption)}</figcaption></figure>\n"
+    if picture.wide:
+        label = escape(picture.caption)
+        drawn = f'<div class="wide" tabindex="0" role="region" aria-label="{label}">{picture.markup}</div>'
+    else:
+        drawn = picture.markup
+    return f"<figure>{drawn}<figcaption>{escape(picture.caption)}</figcaption></figure>\n"
 
 
 def _table(sheet: Sheet) -> str:

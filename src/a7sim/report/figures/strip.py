@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 Places = Mapping[str, tuple[float, float, float]]
 """East, north and height of points, m."""
 
+FAR_M = 20_000.0
+"""Coordinates above this are shown without their kilometres."""
+
 MANY = 20
 """Above so many ground points a figure takes the whole width."""
 
@@ -38,7 +41,7 @@ def residuals_in_plan(strip: Document, places: Places, name: str, of: str) -> Pi
     step, length = nice(largest or 1e-3), 0.13 * extent / (largest or 1e-3)
     said = f"Arrows computed minus given at {len(residuals)} ground points; the longest is {largest:.3f} m."
     long = len(residuals) > MANY
-    size = (8.0, 4.2) if long else (WIDTH_IN, 4.8)
+    size, width = ((8.0, 4.2), 0.004) if long else ((WIDTH_IN, 4.8), 0.008)
     with drawing(name, f"{of}: residuals in plan", said, size=size, wide=long) as drawn:
         axes = drawn.axes[0]
         for check in (False, True):
@@ -48,11 +51,11 @@ def residuals_in_plan(strip: Document, places: Places, name: str, of: str) -> Pi
                 continue
             x, y = zip(*(at[point] for point in chosen), strict=True)
             dx, dy = ([length * residuals[point][axis] for point in chosen] for axis in "XY")
-            arrows(axes, x, y, dx, dy, edge)
+            arrows(axes, x, y, dx, dy, edge, width)
             axes.plot(x, y, marker, color=edge, markerfacecolor=face, markersize=7, label=word, zorder=4)
         _label_all(axes, at)
         low, left = min(y for _, y in at.values()), min(x for x, _ in at.values())
-        scale_arrow(axes, (left, low - 0.2 * extent), (length * step, 0.0), f"{step:g} m", INK)
+        scale_arrow(axes, (left, low - 0.15 * extent), (length * step, 0.0), f"{step:g} m", INK, width)
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.16)
         _axes_of_ground(axes, origin)
@@ -142,8 +145,9 @@ def _is(role: str | None, check: bool | None) -> bool:
 
 
 def _origin(places: Places) -> tuple[float, float]:
-    """Return whole kilometres that may be left off east and north."""
-    east, north = (1000.0 * math.floor(min(at[axis] for at in places.values()) / 1000.0) for axis in (0, 1))
+    """Return whole kilometres that may be left off east and north, none where they are few."""
+    least = (min(at[axis] for at in places.values()) for axis in (0, 1))
+    east, north = (1000.0 * math.floor(metres / 1000.0) if metres > FAR_M else 0.0 for metres in least)
     return east, north
 
 
@@ -168,8 +172,8 @@ def _shared(one: tuple[float, float], other: tuple[float, float]) -> tuple[float
 
 
 def _axes_of_ground(axes: "Axes", origin: tuple[float, float]) -> None:
-    east, north = (f"{int(metres / 1000):d} km, m" for metres in origin)
-    axes.set(xlabel=f"X beyond {east}", ylabel=f"Y beyond {north}")
+    east, north = (f" beyond {metres / 1000.0:.0f} km" if metres else "" for metres in origin)
+    axes.set(xlabel=f"X{east}, m", ylabel=f"Y{north}, m")
     axes.locator_params(nbins=5)
     axes.grid()
 
