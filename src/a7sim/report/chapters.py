@@ -139,7 +139,13 @@ def _of_operator(kept: Kept) -> Chapters:
         if operator[key]:
             parts.append(hours(operator[key], key, title))
     for key, title in (("time_by_activity_h", "Hours by activity"), ("time_by_act_h", "Hours by act")):
-        parts.append(Sheet(title, ("", "hours"), [(what, f"{each:.4f}") for what, each in operator[key].items()]))
+        parts.append(
+            Sheet(
+                title,
+                (title.removeprefix("Hours by "), "hours"),
+                [(what, f"{each:.4f}") for what, each in operator[key].items()],
+            )
+        )
     parts += parts_of(tables.of_hours(operator))
     parts += parts_of(*(Text(remark) for remark in operator["remarks"]))
     slips = kept.document["truth"]["slips"]
@@ -178,7 +184,7 @@ def _of_settings(kept: Kept) -> Chapter:
     document = kept.document
     rows = [(key.replace("_", " "), _words(document[key])) for key in _SETTINGS if key in document]
     changed = [(path, value) for path, value in document.get("settings", {}).items()]
-    parts: list[Part] = [Sheet("What gives this session again", ("", "value"), rows, frozenset({0, 1}))]
+    parts: list[Part] = [Sheet("What gives this session again", ("what", "value"), rows, frozenset({0, 1}))]
     if changed:
         parts.append(Sheet("Changed in the scenario's file", ("setting", "value"), changed, frozenset({0, 1})))
     files = sorted(path.name for path in Path(kept.folder).iterdir())
