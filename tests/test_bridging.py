@@ -135,7 +135,7 @@ def test_ten_models_close_on_the_truth():
 
 @pytest.mark.slow
 def test_the_shipped_strip_is_bridged_and_worked_as_independent_models_to_its_end():
-    document = run_bridge(load_scenario("bridge"), 2)
+    document = run_bridge(load_scenario("bridge", {"plan.parallax_readings": "1"}), 2)
     assert (document["status"], document["message"]) == ("complete", "")
     for way in ("bridged", "independent"):
         assert document[way]["strip"]["accuracy_m"]["checks"]["points"] == 20
