@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.manual import RIGHT_FITTINGS
 from a7sim.operator.absolute import OnGround, absolute_orientation_at
 from a7sim.operator.bench import Bench
 from a7sim.operator.centres import centre_of, observe_centre
@@ -15,6 +14,7 @@ from a7sim.operator.crew import Crew, NobodyGoesOn, Who
 from a7sim.operator.empirical import empirical_orientation, set_off
 from a7sim.operator.interior import InteriorOrientation, InteriorOrientations, interior_orientation
 from a7sim.operator.job import Job, ModelJob
+from a7sim.operator.levers import right_fittings
 from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
 from a7sim.operator.plate import prints_of
@@ -210,8 +210,7 @@ def oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
 def set_base_and_fittings(bench: Bench, base: str, polarity: str) -> None:
     """Set base in or out, and the fittings that belong to it and to the pictures."""
     who, hands = bench.crew.everybody, bench.hands
-    words = RIGHT_FITTINGS[polarity, base].as_words()
-    right = {name: position for name, position in words.items() if name in bench.seat.manual.fittings}
+    right = right_fittings(bench.seat.manual, polarity, base)
     bench.seat.spend_setting(who, 1 + len(right))
     hands.set_base_mode(who, base)
     for name, position in right.items():
