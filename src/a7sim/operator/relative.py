@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import GON, Array
+from a7sim.manual import TILTS
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import NobodyGoesOn, Who
 from a7sim.operator.hands import Truths
@@ -426,6 +427,7 @@ def _on_pattern(bench: Bench, who: Who, labels: Sequence[str], places: Array, ba
 
 def stand_of(bench: Bench, who: Who, projector: int, x: Array) -> Stand:
     """Return how projectors stand by their counters, the centres at x ``(m,)`` of the instrument frame."""
-    names = [f"{name}{projector}" for name in ("omega", "phi", "kappa", "by", "bz")]
-    omega, phi, kappa, by, bz = bench.seat.from_zero(who, names).values()
+    counts = bench.seat.elements(who, [f"{name}{projector}" for name in (*TILTS, "by", "bz")])
+    omega, phi, kappa = bench.seat.manual.tilts(counts, projector)
+    by, bz = counts[f"by{projector}"], counts[f"bz{projector}"]
     return Stand(np.array([x, -by, bz]), GON * np.array([omega, phi, wrapped(kappa)]))
