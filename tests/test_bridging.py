@@ -1,5 +1,6 @@
 """Bridging: what must go on from model to model does, and the strip closes as well as its counters allow."""
 
+import json
 from itertools import pairwise
 
 import msgspec
@@ -105,12 +106,18 @@ def test_models_that_do_not_go_on_are_refused():
 
 
 @pytest.mark.slow
-def test_over_the_line_and_in_a_crowd_it_is_the_same_strip():
-    """One procedure, two benches: with errors too, every reading of a session is the same."""
+def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(tmp_path):
+    """One procedure, two benches: with errors too, every reading of a session is the same. The line leaves files."""
     scenario = load_scenario("bridge")
     scenario = msgspec.structs.replace(scenario, models=scenario.models[:2])
-    document = run_bridge(scenario, 7)
+    out = tmp_path / "out"
+    document = run_bridge(scenario, 7, out)
+    assert json.loads((out / "results.json").read_text()) == json.loads(json.dumps(document))
+    assert {"independent", "book.csv", "models.csv", "session.jsonl", "results.json"} == {p.name for p in out.iterdir()}
+    assert json.loads((out / "independent" / "results.json").read_text())["strip"] == document["independent"]["strip"]
     _, models = worked(scenario, (7,))
+    rows = [row.split(",")[:2] for row in (out / "models.csv").read_text().splitlines()[2:]]
+    assert rows == [[model.model.name, point] for model in models for point in model.places_of(0)]
     for said, model in zip(document["bridged"]["models"], models, strict=True):
         assert said["elements"] == {name: each[0] for name, each in model.orientation.elements.items()}
         assert said["scale"] == pytest.approx(model.scale[0], abs=1e-7)

@@ -7,6 +7,15 @@ tables 3.2, 3.3 and 3.7 and section 3.2.3.6 (geometry.md, Counters and ranges, G
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+_Counts = TypeVar("_Counts", float, npt.NDArray[np.float64])
+
+TILTS = ("omega", "phi", "kappa")
+"""Elements that turn a projector, from the primary axis inward."""
 
 LEAST_COUNT = 0.01
 """mm and gon, of every counter of the elements and of X and Y (thesis table 3.7)."""
@@ -85,6 +94,13 @@ class Variant:
     def lacks(self, *elements: str) -> list[str]:
         """Return those of the elements that the plotter does not have."""
         return [name for name in elements if name not in self.elements]
+
+    def tilts(self, counts: Mapping[str, _Counts], projector: int) -> tuple[_Counts, _Counts, _Counts]:
+        """Return omega, phi and kappa of a projector in gon from their zeros, by what the counters of elements show."""
+        omega, phi, kappa = (
+            counts[name] - self.elements[name].zero for name in (f"{name}{projector}" for name in TILTS)
+        )
+        return omega, phi, kappa
 
 
 @dataclass(frozen=True, slots=True)
