@@ -173,14 +173,15 @@ def _counters(bench: Bench, who: Who, projector: int) -> Mapping[str, Array]:
 def _elements(manual: Variant, counters: Mapping[str, Array], projector: int) -> Elements:
     """Return what the counters say of a projector, in mm and radians from the zeros; base in."""
     omega, phi, kappa = manual.tilts(counters, projector)
+    nothing = np.zeros_like(counters["bx"])
     return Elements(
         c=counters[f"c{projector}"],
         omega=omega * GON,
         phi=phi * GON,
         kappa=wrapped(kappa) * GON,
-        bx=np.zeros_like(counters["bx"]) if projector == 1 else counters["bx"],
-        by=counters[f"by{projector}"],
-        bz=counters[f"bz{projector}"],
+        bx=nothing if projector == 1 else counters["bx"],
+        by=counters.get(f"by{projector}", nothing),
+        bz=counters.get(f"bz{projector}", nothing),
     )
 
 

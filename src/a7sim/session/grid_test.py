@@ -15,8 +15,6 @@ from a7sim.files import csv_text
 from a7sim.geometry import GON, angles_of
 from a7sim.instrument import Autograph
 from a7sim.instrument.condition import condition_of
-from a7sim.manual import BASE_COMPONENTS, VARIANTS
-from a7sim.mistakes import Mistake
 from a7sim.operator.grid_test import GridTestOrder, ProjectorSheet, calibrate
 from a7sim.operator.seat import side, wrapped
 from a7sim.reduction import Adjustment
@@ -46,11 +44,6 @@ def run_grid_test(
     `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for an order that the plate
     or the instrument cannot fill and for a folder that cannot be used, before anything is written.
     """
-    if VARIANTS[scenario.instrument.variant].lacks(*BASE_COMPONENTS):
-        raise Mistake(
-            "instrument.variant: expected a plotter with by and bz, to whose counters its centres are referred, "
-            f"got an {scenario.instrument.variant}"
-        )
     watcher = watcher or Watcher()
     journal = Journal()
     session = open_session(scenario, seed, journal.heard)
@@ -176,7 +169,8 @@ def true_errors(autograph: Autograph, condition: Condition, projector: int) -> D
     omega, phi, kappa = (float(angle) / GON for angle in angles_of(turned))
     elements = autograph.variant.elements
     of_projector = condition.left if projector == 1 else condition.right
-    shown = {name: autograph.element(f"{name}{projector}") for name in ("c", "omega", "phi", "kappa", "by", "bz")}
+    counted = {name: f"{name}{projector}" for name in ("c", "omega", "phi", "kappa", "by", "bz")}
+    shown = {name: autograph.element(n) if n in elements else 0.0 for name, n in counted.items()}
     base = autograph.element("bx") if projector == 2 else 0.0
     sx, sy, sz = (1e-6 * ppm for ppm in condition.carriage_scale_ppm)
     xy, xz, yz = (1e-6 * ppm for ppm in condition.carriage_skew_ppm)
