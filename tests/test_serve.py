@@ -18,7 +18,7 @@ from a7sim.link.conversation import Terms
 from a7sim.link.serving import MOST_TURNED_AWAY
 from a7sim.link.wires import LARGEST_READ, MOST_UNREAD
 from a7sim.manual import VARIANTS
-from tests.served import Line, Served
+from tests.served import PATIENCE, Line, Served
 
 IDENTITY = f"WILD HEERBRUGG,A7,0,{a7sim.__version__}"
 
@@ -251,7 +251,9 @@ def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
         flood = b"SYST:HELP:HEAD?\n" * 10_000
         kept = [(0, 0)]
         gone = False
+        until = time.monotonic() + PATIENCE
         while not gone:
+            assert time.monotonic() < until
             try:
                 slow.socket.send(flood)
             except BlockingIOError:
