@@ -15,10 +15,10 @@ from a7sim.instrument.language import LARGEST_REPLY, LONGEST_LINE, Desk
 from a7sim.instrument.language.status import QUEUE_LENGTH
 from a7sim.instrument.language.syntax import LONGEST_NUMBER
 from a7sim.link.conversation import Terms
-from a7sim.link.serving import MOST_TURNED_AWAY
-from a7sim.link.wires import LARGEST_READ, MOST_UNREAD
+from a7sim.link.serving import MOST_TURNED_AWAY, Doors
+from a7sim.link.wires import LARGEST_READ, MOST_UNREAD, QUICK_ACKNOWLEDGEMENT
 from a7sim.manual import VARIANTS
-from tests.served import PATIENCE, Line, Served
+from tests.served import ANYWHERE, PATIENCE, Line, Served
 
 IDENTITY = f"WILD HEERBRUGG,A7,0,{a7sim.__version__}"
 
@@ -77,6 +77,22 @@ def test_whatever_bytes_come_in_whatever_pieces(served, sent, replies):
             line.send(sent[start : start + size])
         assert [line.read() for _ in replies] == replies
         assert line.ask("*IDN?") == IDENTITY
+
+
+@pytest.mark.skipif(QUICK_ACKNOWLEDGEMENT is None, reason="an option of Linux")
+@pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
+def test_a_client_with_nagles_algorithm_waits_for_no_late_acknowledgement(kind):
+    """Commands have no reply that could carry the acknowledgement, without which the client keeps its next line."""
+    with Served(doors=Doors(**{kind: [ANYWHERE]})) as served:
+        line = served.line()
+        if kind == "rfc2217":
+            line.socket.recv(64)
+        line.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 0)
+        began = time.monotonic()
+        for _ in range(100):
+            line.send(b"*CLS\n")
+            assert line.ask("*TST?") == "0"
+        assert time.monotonic() - began < 100 * 0.02
 
 
 # --- movement ------------------------------------------------------------------------------------------

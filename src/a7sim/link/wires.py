@@ -1,6 +1,7 @@
 """TCP as a wire, bare or with telnet and RFC 2217 on it: asyncio protocols that call the conversation directly."""
 
 import asyncio
+import socket
 from contextlib import suppress
 from typing import Protocol, cast
 
@@ -12,6 +13,9 @@ LARGEST_READ = 16 * 1024
 
 MOST_UNREAD = 64 * 1024
 """Bytes of replies that may wait for a client to read them before it is obeyed no more."""
+
+QUICK_ACKNOWLEDGEMENT: int | None = getattr(socket, "TCP_QUICKACK", None)
+"""An option of Linux."""
 
 FAREWELL = 1.0
 """s that a client has to hear why it is turned away."""
@@ -37,12 +41,14 @@ class TcpWire(asyncio.BufferedProtocol):
         self._buffer = buffer
         self._transport: asyncio.Transport
         self._conversation: Conversation | None = None
+        self._answered = False
 
     # --- what asyncio tells ---------------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin a conversation, or turn the client away."""
         self._transport = cast(asyncio.Transport, transport)
+        self._socket = self._transport.get_extra_info("socket")
         self._transport.set_write_buffer_limits(high=MOST_UNREAD)
         welcomed = self._host.welcome(self, self.serial)
         if isinstance(welcomed, Conversation):
@@ -62,8 +68,22 @@ class TcpWire(asyncio.BufferedProtocol):
 
     def buffer_updated(self, nbytes: int) -> None:
         """Hand on what was read."""
+        self._take(bytes(memoryview(self._buffer)[:nbytes]))
+
+    def _take(self, data: bytes) -> None:
         if self._conversation is not None:
-            self._conversation.received(bytes(memoryview(self._buffer)[:nbytes]))
+            self._answered = False
+            self._conversation.received(data)
+            if not self._answered:
+                self._acknowledge()
+
+    def _acknowledge(self) -> None:
+        """Let the client know at once that a command has come, since no reply says so.
+
+        Otherwise one that sends small pieces by Nagle's algorithm, as pyserial's does, waits 40 ms with the next.
+        """
+        if QUICK_ACKNOWLEDGEMENT is not None and not self._transport.is_closing():
+            self._socket.setsockopt(socket.IPPROTO_TCP, QUICK_ACKNOWLEDGEMENT, 1)
 
     def eof_received(self) -> bool:
         """Keep the line until all is answered."""
@@ -94,6 +114,7 @@ class TcpWire(asyncio.BufferedProtocol):
     def write(self, data: bytes) -> None:
         """Send bytes, unless the line is cut."""
         if not self._transport.is_closing():
+            self._answered = True
             self._transport.write(data)
 
     def pause_reading(self) -> None:
@@ -134,8 +155,8 @@ class TelnetWire(TcpWire):
         data, answer = self._telnet.received(bytes(memoryview(self._buffer)[:nbytes]))
         if answer:
             super().write(answer)
-        if data and self._conversation is not None:
-            self._conversation.received(data)
+        if data:
+            self._take(data)
 
     def write(self, data: bytes) -> None:
         """Send bytes as telnet sends them."""
