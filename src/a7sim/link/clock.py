@@ -12,3 +12,7 @@ class Clock:
     def spend(self, seconds: float) -> None:
         """Let time pass."""
         self.now += seconds
+
+    def pass_to(self, time: float) -> None:
+        """Let time pass until it is so late, if it is not yet."""
+        self.now = max(self.now, time)
