@@ -7,9 +7,10 @@ import pytest
 import serial
 
 import a7sim
+from a7sim.instrument.language import Desk
 from a7sim.link.client import Client, Identity, InstrumentRefused
 from a7sim.link.completion import completions
-from a7sim.link.exchange import Conversation
+from a7sim.link.exchange import say
 from a7sim.link.opening import open_port, told
 from a7sim.link.replies import NotAReply, whole_reply
 from a7sim.mistakes import Mistake
@@ -256,7 +257,7 @@ def test_a_client_reads_a_picture_behind_other_answers(client):
     ],
 )
 def test_an_exchange_is_the_reply_to_a_line_and_the_errors_of_it(client, line, shown, numbers):
-    exchange = Conversation(client).say(line)
+    exchange = say(client, line)
     assert exchange.shown == shown
     assert [int(error.split(",")[0]) for error in exchange.errors] == numbers
     assert client.ask("*OPC?") == "1"
@@ -265,7 +266,7 @@ def test_an_exchange_is_the_reply_to_a_line_and_the_errors_of_it(client, line, s
 def test_a_line_that_nobody_answers_is_one_clear_sentence(pair):
     port, _ = pair
     with pytest.raises(Mistake, match=r"\*OPC\?: expected an answer in time, got none"):
-        Conversation(Client(port)).say("*OPC?")
+        say(Client(port), "*OPC?")
 
 
 # --- completion ----------------------------------------------------------------------------------------
@@ -310,3 +311,13 @@ def test_whatever_is_completed_is_a_header_of_the_instrument(client):
     for header in completions("", list(EXAMPLES)):
         client.send(header)
     assert not [error for error in client.errors() if error.startswith("-113")]
+
+
+def test_who_has_not_logged_in_is_told_of_the_token(desk):
+    guarded = Desk(desk.autograph)
+    guarded.token = "secret"
+    with served("tcp", guarded) as url:
+        with Client.open(url, timeout=SHORT) as stranger, pytest.raises(Mistake, match="asks for a token"):
+            say(stranger, "BASE:BX?")
+        with Client.open(url, timeout=SHORT, token="secret") as friend:
+            assert say(friend, "BASE:BX?").shown == "0.00"

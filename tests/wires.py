@@ -11,7 +11,9 @@ from serial import rfc2217
 
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk
+from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
+from a7sim.link.waiting import obeyed
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 
@@ -22,10 +24,10 @@ def new_desk(scenario="akwanga", seed=7):
 
 
 def tcp_talk(desk, connection):
-    engine = desk.open(cr_ends_line=False)
+    engine, clock = desk.open(cr_ends_line=False), Clock()
     with connection, suppress(OSError):
         while received := connection.recv(65536):
-            connection.sendall(engine.feed(received, 0.0))
+            connection.sendall(obeyed(engine, received, clock))
     desk.close(engine.client)
 
 
@@ -78,10 +80,10 @@ def on_a_pty(desk):
     stopping, stop = os.pipe()
 
     def talk():
-        engine = desk.open()
+        engine, clock = desk.open(), Clock()
         with suppress(OSError):
             while master in select.select([master, stopping], [], [])[0]:
-                os.write(master, engine.feed(os.read(master, 65536), 0.0))
+                os.write(master, obeyed(engine, os.read(master, 65536), clock))
 
     thread = threading.Thread(target=talk, daemon=True)
     thread.start()

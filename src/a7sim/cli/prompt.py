@@ -9,8 +9,9 @@ from pathlib import Path
 
 import click
 
+from a7sim.link.client import Client
 from a7sim.link.completion import completions
-from a7sim.link.exchange import Conversation
+from a7sim.link.exchange import say
 
 HISTORY = "send-history"
 
@@ -20,10 +21,10 @@ LONGEST_HISTORY = 1000
 _LEAVING = ("exit", "quit", "bye")
 
 
-def prompted(url: str, conversation: Conversation) -> None:
+def prompted(url: str, client: Client) -> None:
     """Ask for lines and show what comes of each, until the end of input or `exit`."""
-    identity = conversation.say("*IDN?").shown or "an instrument that does not say what it is"
-    headers = _headers(conversation)
+    identity = say(client, "*IDN?").shown or "an instrument that does not say what it is"
+    headers = _headers(client)
     click.echo(f"{url}: {identity}. Tab completes, help lists the headers, exit leaves.")
     with _editing(headers):
         while True:
@@ -40,11 +41,11 @@ def prompted(url: str, conversation: Conversation) -> None:
             if line.lower() in ("help", "?"):
                 click.echo("\n".join(headers))
             elif line:
-                _shown(conversation, line)
+                _shown(client, line)
 
 
-def _shown(conversation: Conversation, line: str) -> None:
-    exchange = conversation.say(line)
+def _shown(client: Client, line: str) -> None:
+    exchange = say(client, line)
     if exchange.shown is not None:
         click.echo(exchange.shown)
     for error in exchange.errors:
@@ -52,8 +53,8 @@ def _shown(conversation: Conversation, line: str) -> None:
         click.secho(f"{number}: {text.strip(chr(34)).replace(';', ': ', 1)}", fg="red")
 
 
-def _headers(conversation: Conversation) -> list[str]:
-    listed = conversation.say("SYST:HELP:HEAD?").shown
+def _headers(client: Client) -> list[str]:
+    listed = say(client, "SYST:HELP:HEAD?").shown
     return next(csv.reader([listed])) if listed else []
 
 

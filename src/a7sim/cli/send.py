@@ -10,7 +10,7 @@ import msgspec
 
 from a7sim.cli.links import of_a_link, token_from
 from a7sim.link.client import Client
-from a7sim.link.exchange import Conversation, Exchange
+from a7sim.link.exchange import Exchange, say
 from a7sim.link.opening import told
 
 EXIT_REFUSED = 1
@@ -33,15 +33,14 @@ def command(
     Example: a7sim send a7sim://akwanga '*IDN?' 'BASE:BX 194.99;BX?'
     """
     with told(url), Client.open(url, timeout, token_from(token_file)) as client:
-        conversation = Conversation(client)
         if not lines and not as_document and sys.stdin.isatty():
             from a7sim.cli.prompt import prompted  # noqa: PLC0415 # readline takes hold of the terminal
 
-            prompted(url, conversation)
+            prompted(url, client)
             return
         exchanges = []
         for line in _given(lines):
-            exchange = conversation.say(line)
+            exchange = say(client, line)
             exchanges.append(exchange)
             if not as_document and exchange.shown is not None:
                 click.echo(exchange.shown)

@@ -25,38 +25,38 @@ class Exchange:
         return None if self.reply is None else ";".join(map(as_text, self.reply))
 
 
-class Conversation:
-    """Lines to an instrument, one after the other."""
+def say(client: Client, line: str) -> Exchange:
+    """Send a line and return what came of it. Raises Mistake when the instrument does not answer at all."""
+    client.send(line)
+    client.send(_MARKER)
+    first = _expected(client, line)
+    if not _is_marker(first):
+        return Exchange(line, first, _errors(client, _marker(client, line)))
+    second = client.reply() if "VERS" in line.upper() else None
+    if second is None:
+        return Exchange(line, None, _errors(client, first))
+    return Exchange(line, first, _errors(client, second))
 
-    def __init__(self, client: Client) -> None:
-        self._client = client
 
-    def say(self, line: str) -> Exchange:
-        """Send a line and return what came of it. Raises Mistake when the instrument does not answer at all."""
-        self._client.send(line)
-        self._client.send(_MARKER)
-        first = self._reply(line)
-        if not _is_marker(first):
-            return Exchange(line, first, self._errors(self._marker(line)))
-        second = self._client.reply() if "VERS" in line.upper() else None
-        if second is None:
-            return Exchange(line, None, self._errors(first))
-        return Exchange(line, first, self._errors(second))
+def _marker(client: Client, line: str) -> tuple[Part, ...]:
+    marker = _expected(client, line)
+    if not _is_marker(marker):
+        raise Mistake(f"{line}: expected one reply to a line, got another: {';'.join(map(as_text, marker))}")
+    return marker
 
-    def _marker(self, line: str) -> tuple[Part, ...]:
-        marker = self._reply(line)
-        if not _is_marker(marker):
-            raise Mistake(f"{line}: expected one reply to a line, got another: {';'.join(map(as_text, marker))}")
-        return marker
 
-    def _reply(self, line: str) -> tuple[Part, ...]:
-        reply = self._client.reply()
-        if reply is None:
-            raise Mistake(f"{line}: expected an answer in time, got none")
+def _expected(client: Client, line: str) -> tuple[Part, ...]:
+    reply = client.reply()
+    if reply is not None:
         return reply
+    client.send("*IDN?")
+    if client.reply() is None:
+        raise Mistake(f"{line}: expected an answer in time, got none")
+    raise Mistake(f"{line}: expected an answer, got none but to *IDN?: the server asks for a token, or lost the reply")
 
-    def _errors(self, marker: tuple[Part, ...]) -> tuple[str, ...]:
-        return tuple(self._client.errors()) if marker[0] != "0" else ()
+
+def _errors(client: Client, marker: tuple[Part, ...]) -> tuple[str, ...]:
+    return tuple(client.errors()) if marker[0] != "0" else ()
 
 
 def _is_marker(reply: tuple[Part, ...]) -> bool:
