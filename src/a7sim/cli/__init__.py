@@ -21,6 +21,7 @@ _VERBS = {
     "scenario": "a7sim.cli.scenario",
     "prepare": "a7sim.cli.prepare",
     "bridge": "a7sim.cli.bridge",
+    "serve": "a7sim.cli.serve",
 }
 
 

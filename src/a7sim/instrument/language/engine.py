@@ -3,12 +3,10 @@
 import hmac
 import re
 import zlib
-from collections.abc import Iterator
-from itertools import chain
 from typing import TYPE_CHECKING
 
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
-from a7sim.instrument.language.program import Fault, Step, program_of
+from a7sim.instrument.language.program import Fault, Program, Step, program_of, text_of
 from a7sim.instrument.language.status import OPERATION_COMPLETE, SETTLING, Status
 from a7sim.instrument.refusals import OutOfRange, Refusal, SettingsConflict, UnknownName
 
@@ -52,11 +50,12 @@ class Engine:
         self._time = 0.0
         self._movement_seen = desk.busy_since
         self._completes_at: float | None = None
+        self._cr_ends_line = cr_ends_line
         self._ends = re.compile(rb"[\r\n]" if cr_ends_line else rb"\n")
         self._pending = bytearray()
         self._kept_back = bytearray()
         self._overrun = False
-        self._units: Iterator[Step | Fault] = iter(())
+        self._rest: Program = ()
         self._waited = False
         self._replies: list[str | bytes] = []
         self._reply_size = 0
@@ -69,6 +68,9 @@ class Engine:
         """Take bytes that arrived at a simulated time in s; return the reply to each line that has one."""
         self._time = time
         replies: list[bytes] = []
+        if self.waits_until is None and not self._pending and self._one_line(received):
+            self._obey_line(received, replies)
+            return replies
         if self.waits_until is not None:
             if time < self.waits_until:
                 self._keep_back(received)
@@ -82,15 +84,21 @@ class Engine:
                 return replies
             self._keep(received[start : end.start()])
             start = end.end()
-            self._begin_line()
-            self._obey_units(replies)
+            line = bytes(self._pending)
+            self._pending.clear()
+            self._obey_line(line, replies)
         self._keep_back(received[start:])
         return replies
+
+    def _one_line(self, received: bytes) -> bool:
+        """Whether there is one whole line, as there mostly is."""
+        length = len(received)
+        return received.find(b"\n") == length - 1 <= LONGEST_LINE and (not self._cr_ends_line or b"\r" not in received)
 
     def _resume(self, replies: list[bytes]) -> bytes:
         """Obey the rest of the line that waited; return the input that waited behind it."""
         self.waits_until = None
-        self._obey_units(replies)
+        self._obey_rest(replies)
         if self.waits_until is not None:
             return b""
         kept = bytes(self._kept_back)
@@ -108,31 +116,35 @@ class Engine:
     def _keep(self, part: bytes) -> None:
         self._pending += part[: _LONGEST_PENDING - len(self._pending)]
 
-    def _begin_line(self) -> None:
-        line = bytes(self._pending).removesuffix(b"\r")
-        self._pending.clear()
-        if len(line) > LONGEST_LINE:
+    def _obey_line(self, line: bytes, replies: list[bytes]) -> None:
+        if len(line) > LONGEST_LINE and len(text_of(line)) > LONGEST_LINE:
             self._heard(f"(a line of more than {LONGEST_LINE} bytes, dropped)")
             self._status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {LONGEST_LINE} bytes a line")
             return
-        text = line.decode("latin-1")
-        if not text.strip(" \t"):
-            return
-        secret = self.desk.token is not None and _LOGIN.search(text)
-        self._heard("(a line with a login)" if secret else text)
-        self._units = iter(program_of(text))
+        if self.desk.listener is not None:
+            self._tell(text_of(line))
+        self._rest = program_of(line)
+        self._obey_rest(replies)
+
+    def _tell(self, text: str) -> None:
+        if text.strip(" \t"):
+            secret = self.desk.token is not None and _LOGIN.search(text)
+            self._heard("(a line with a login)" if secret else text)
 
     def _heard(self, text: str) -> None:
         self.desk.heard(self._time, self.client, ">", text)
 
-    def _obey_units(self, replies: list[bytes]) -> None:
+    def _obey_rest(self, replies: list[bytes]) -> None:
         """Obey the units of a line that are left, up to one that waits; at its end, add its reply if it has one."""
-        for unit in self._units:
+        program = self._rest
+        for place, unit in enumerate(program):
             try:
-                self._obey(unit)
+                done = self._obey(unit)
             except LanguageError as error:
                 self._status.report(error.number, error.detail)
+                continue
             if self.waits_until is not None:
+                self._rest = program[place + done :]
                 return
         if self._replies:
             if self.desk.listener is not None:
@@ -141,28 +153,31 @@ class Engine:
             self._replies.clear()
             self._reply_size = 0
 
-    def _obey(self, unit: Step | Fault) -> None:
+    def _obey(self, unit: Step | Fault) -> bool:
+        """Obey a unit; return whether it is done, or is still to come after a wait. Raises LanguageError."""
         if not self._admitted and (isinstance(unit, Fault) or not unit.command.open_to_all):
             raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "expected SYSTem:LOGin first")
         if isinstance(unit, Fault):
             raise LanguageError(unit.number, unit.detail)
         command = unit.command
         try:
-            call = unit.call(self)
+            call = unit.bare or unit.call(self)
             if command.turns and not self.desk.may_turn(self.client):
                 raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "another client holds the lock")
             if command.waits and self._has_to_wait():
-                self._units = chain((unit,), self._units)
-                return
-            self._answered(command.handler(self, call))
+                return False
+            reply = command.handler(self, call)
         except Refusal as refusal:
             number = _NUMBER_OF.get(type(refusal), ErrorNumber.EXECUTION_ERROR)
             raise LanguageError(number, f"{unit.text[:60]}: {refusal}") from refusal
         finally:
             if command.turns:
                 self.desk.moved(self._time)
+        if reply is not None:
+            self._answered(reply)
         if command.polls and self._time < self.desk.busy_until:
             self.waits_until = self.desk.polled(self._time)
+        return True
 
     def _has_to_wait(self) -> bool:
         """Wait for the movement that is going on, and once only: what others begin meanwhile is theirs to wait for."""
@@ -173,9 +188,7 @@ class Engine:
             self._waited = True
         return self._waited
 
-    def _answered(self, reply: str | bytes | None) -> None:
-        if reply is None:
-            return
+    def _answered(self, reply: str | bytes) -> None:
         self._reply_size += len(reply)
         if self._reply_size > LARGEST_REPLY:
             self._reply_size -= len(reply)

@@ -9,7 +9,7 @@ from a7sim.instrument.language.syntax import Parameter, Unit, unit_of, units_of
 from a7sim.instrument.language.table import Call, Command
 
 LONGEST_KEPT_LINE = 100
-"""Characters of a line that is kept taken apart; longer ones seldom come twice."""
+"""Bytes of a line that is kept taken apart; longer ones seldom come twice."""
 
 LINES_KEPT = 256
 
@@ -38,18 +38,23 @@ class Fault:
     detail: str
 
 
+def text_of(line: bytes) -> str:
+    """Return the text of a line without its line end."""
+    return line.removesuffix(b"\n").removesuffix(b"\r").decode("latin-1")
+
+
 Program = tuple[Step | Fault, ...]
 
 
-def program_of(line: str) -> Program:
-    """Return the units of a line in order. Every line begins at the root."""
+def program_of(line: bytes) -> Program:
+    """Return the units of a line in order, with or without its line end. Every line begins at the root."""
     return _kept(line) if len(line) <= LONGEST_KEPT_LINE else _taken_apart(line)
 
 
-def _taken_apart(line: str) -> Program:
+def _taken_apart(line: bytes) -> Program:
     program: list[Step | Fault] = []
     level: tuple[tuple[str, int | None], ...] = ()
-    for text in units_of(line):
+    for text in units_of(text_of(line)):
         try:
             unit = unit_of(text)
             path = unit.mnemonics if unit.common or unit.rooted else level + unit.mnemonics
