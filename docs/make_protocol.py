@@ -130,7 +130,7 @@ ALSO = {
     "GEAR:HEIGht": (-224,),
     "RECord": (-221, -222, -224),
     "RECord:LAST?": (-200,),
-    "RECord:STRike": (-222,),
+    "RECord:STRike": (-221, -222),
     "NOTE": (-222,),
     "SYSTem:LOGin": (-203,),
     "EYEPiece<n>:PICTure?": (-430,),

@@ -10,7 +10,7 @@ import pytest
 
 from tests.door import with_model
 from tests.test_language import REFUSED
-from tests.wires import new_desk, served
+from tests.wires import everywhere, new_desk
 
 ROOT = Path(__file__).parents[1]
 PAGES = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("docs/protocol.md", "README.md")}
@@ -59,23 +59,16 @@ def header_of(maker, line):
 
 
 @pytest.fixture(scope="module")
-def everywhere():
-    """One instrument on every wire: the words of the page and what stands for them here."""
-    desk = new_desk()
-    with (
-        served("tcp", desk) as tcp,
-        served("rfc2217", desk) as rfc2217,
-        served("pty", desk) as path,
-    ):
-        yield path, {"5025": tcp.rpartition(":")[2], "2217": rfc2217.rpartition(":")[2]}
+def urls():
+    with everywhere(new_desk()) as opened:
+        yield opened
 
 
 @pytest.mark.parametrize(("page", "code"), EXAMPLES, ids=[f"{name}-{i}" for i, (name, _) in enumerate(EXAMPLES)])
-def test_every_python_example_prints_what_it_says(everywhere, page, code, tmp_path, monkeypatch):
-    device, numbers = everywhere
+def test_every_python_example_prints_what_it_says(urls, page, code, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("a7.tty").symlink_to(device)
-    here = code.replace(":2217", ":" + numbers["2217"]).replace("5025", numbers["5025"])
+    Path("a7.tty").symlink_to(urls["pty"])
+    here = code.replace("rfc2217://127.0.0.1:2217", urls["rfc2217"]).replace("5025", urls["tcp"].rpartition(":")[2])
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(compile(here, page, "exec"), {})

@@ -7,6 +7,7 @@ from typing import Any
 from a7sim.link.client import Client, Port
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import open_port, told
+from a7sim.link.replies import as_text
 from a7sim.mistakes import Mistake
 
 
@@ -73,7 +74,11 @@ def served_at(url: str, timeout: float, token: str | None = None) -> Iterator[An
             granted = client.reply()
             if granted is None:
                 raise Mistake(f"{url}: expected an answer in {timeout:g} s, got none")
-            if granted != ("1",):
+            if granted not in (("0",), ("1",)):
+                raise Mistake(
+                    f"{url}: expected 1 or 0 in answer to SYST:LOCK:REQ?, got {';'.join(map(as_text, granted))}"
+                )
+            if granted == ("0",):
                 raise Mistake(f"{url}: expected the instrument to be free, but another client holds its lock")
             yield port
             client.send("SYST:LOCK:REL;*OPC?")
