@@ -17,6 +17,9 @@ from a7sim.mistakes import Mistake
 MOST_TURNED_AWAY = 64
 """Clients at a time that are told why they are turned away; the others are just turned away."""
 
+ACCEPTED_AT_ONCE = 512
+"""Connections that may wait to be taken in, and are taken in before the clients have their turn."""
+
 
 @dataclass(frozen=True)
 class Doors:
@@ -56,7 +59,7 @@ class Server:
         loop = asyncio.get_running_loop()
         try:
             listener = await loop.create_server(
-                lambda: wire(self, self._buffer), address.host, address.port, backlog=1024
+                lambda: wire(self, self._buffer), address.host, address.port, backlog=ACCEPTED_AT_ONCE
             )
         except OSError as error:
             why = error.strerror or str(error)

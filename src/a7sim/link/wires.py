@@ -1,6 +1,7 @@
 """TCP as a wire, bare or with telnet and RFC 2217 on it: asyncio protocols that call the conversation directly."""
 
 import asyncio
+from contextlib import suppress
 from typing import Protocol, cast
 
 from a7sim.link.conversation import Conversation, Wire
@@ -51,7 +52,8 @@ class TcpWire(asyncio.BufferedProtocol):
 
     def _turn_away(self, why: bytes) -> None:
         self.write(why)
-        self._transport.write_eof()
+        with suppress(OSError):
+            self._transport.write_eof()
         asyncio.get_running_loop().call_later(FAREWELL, self._transport.abort)
 
     def get_buffer(self, sizehint: int) -> bytearray:
@@ -90,8 +92,9 @@ class TcpWire(asyncio.BufferedProtocol):
     # --- what the conversation asks -------------------------------------------------------------------
 
     def write(self, data: bytes) -> None:
-        """Send bytes."""
-        self._transport.write(data)
+        """Send bytes, unless the line is cut."""
+        if not self._transport.is_closing():
+            self._transport.write(data)
 
     def pause_reading(self) -> None:
         """Receive nothing more for the time being."""
@@ -130,10 +133,10 @@ class TelnetWire(TcpWire):
         """Hand on what of it is data, and answer the rest."""
         data, answer = self._telnet.received(bytes(memoryview(self._buffer)[:nbytes]))
         if answer:
-            self._transport.write(answer)
+            super().write(answer)
         if data and self._conversation is not None:
             self._conversation.received(data)
 
     def write(self, data: bytes) -> None:
         """Send bytes as telnet sends them."""
-        self._transport.write(self._telnet.escaped(data))
+        super().write(self._telnet.escaped(data))
