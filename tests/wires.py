@@ -1,20 +1,15 @@
-"""An instrument served to the tests, in a thread of this process, on every kind of wire at once."""
+"""One instrument served to the tests on every kind of wire at once."""
 
-import asyncio
 import tempfile
-import threading
 from contextlib import contextmanager
 from pathlib import Path
-from queue import Queue
 
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk
-from a7sim.link.addresses import Address
-from a7sim.link.clock import Clock
-from a7sim.link.conversation import Terms
-from a7sim.link.serving import Doors, Server
+from a7sim.link.serving import Doors
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
+from tests.served import ANYWHERE, Served
 
 
 def new_desk(scenario="akwanga", seed=7):
@@ -25,28 +20,11 @@ def new_desk(scenario="akwanga", seed=7):
 @contextmanager
 def everywhere(desk):
     """Serve a desk; yield its URLs by kind."""
-    opened = Queue()
     with tempfile.TemporaryDirectory() as folder:
-        any_port = Address("127.0.0.1", 0)
-
-        async def serve():
-            server = Server(desk, Clock(), Terms())
-            stop = asyncio.Event()
-            doors = await server.open(Doors([any_port], [any_port], [Path(folder) / "pty"]))
-            opened.put(({door["kind"]: door["url"] for door in doors}, asyncio.get_running_loop(), stop))
-            try:
-                await stop.wait()
-            finally:
-                await server.close()
-
-        thread = threading.Thread(target=asyncio.run, args=(serve(),), daemon=True)
-        thread.start()
-        urls, loop, stop = opened.get(timeout=10.0)
-        try:
+        doors = Doors([ANYWHERE], [ANYWHERE], [Path(folder) / "pty"])
+        with Served(desk, doors=doors) as opened:
+            urls = {door["kind"]: door["url"] for door in opened.opened}
             yield urls | {"socket": urls["tcp"], "tcp": urls["tcp"].replace("socket://", "tcp://")}
-        finally:
-            loop.call_soon_threadsafe(stop.set)
-            thread.join(10.0)
 
 
 @contextmanager
