@@ -213,7 +213,11 @@ def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
 @pytest.mark.parametrize(
     ("scenario", "seed", "sentence"),
     [
-        ("akwanga", 8, "is not a new one of this scenario and seed; expected .* in answer to PHOT1:FID"),
+        (
+            "akwanga",
+            8,
+            r"is not a new one of this scenario and seed \(serve it anew\); expected .* in answer to PHOT1:FID",
+        ),
         ("akwanga-a8", 7, r"is not a new one .* expected WILD HEERBRUGG,A7.* in answer to \*IDN\?, got .*A8"),
     ],
 )

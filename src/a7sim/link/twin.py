@@ -5,9 +5,9 @@ from contextlib import contextmanager
 from typing import Any
 
 from a7sim.link.client import Client, Port
+from a7sim.link.exchange import say
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import open_port, told
-from a7sim.link.replies import as_text
 from a7sim.mistakes import Mistake
 
 
@@ -48,7 +48,7 @@ def _difference(sent: bytes, served: bytes, due: bytes) -> str:
         i for i, (of_served, of_twin) in enumerate(zip(served, due + b"\0", strict=False)) if of_served != of_twin
     )
     return (
-        "the instrument served is not a new one of this scenario and seed; "
+        "the instrument served is not a new one of this scenario and seed (serve it anew); "
         f"expected {_shown(due, same)} in answer to {_shown(sent)}, got {_shown(served, same)}"
     )
 
@@ -69,16 +69,7 @@ def served_at(url: str, timeout: float, token: str | None = None) -> Iterator[An
             client = Client(port)
             if token is not None:
                 client.log_in(token)
-            client.send("*CLS")
-            client.send("SYST:LOCK:REQ?")
-            granted = client.reply()
-            if granted is None:
-                raise Mistake(f"{url}: expected an answer in {timeout:g} s, got none")
-            if granted not in (("0",), ("1",)):
-                raise Mistake(
-                    f"{url}: expected 1 or 0 in answer to SYST:LOCK:REQ?, got {';'.join(map(as_text, granted))}"
-                )
-            if granted == ("0",):
+            if say(client, "SYST:LOCK:REQ?").shown != "1":
                 raise Mistake(f"{url}: expected the instrument to be free, but another client holds its lock")
             yield port
             client.send("SYST:LOCK:REL;*OPC?")
