@@ -222,6 +222,31 @@ def test_a_line_is_not_lost_behind_a_wait_that_keeps_less_than_the_bound(engine)
     assert engine.feed(b"X?;:SYST:ERR?\n", 5.0) == b'50.00;0,"No error"\n'
 
 
+@pytest.mark.parametrize("line", [b"*RST;" * 200, b"EYEP:PICT? 300,300,1;" + b"PICT? 300,300,1;" * 10])
+def test_within_a_long_line_others_have_their_turn(engine, line):
+    """The engine gives way after so many units or bytes, and says so by waiting until the present time."""
+    assert engine.feed(line + b":COUN:X?\n*TST?\n", 3.0) == b""
+    turns, replies = 1, b""
+    while engine.waits_until is not None:
+        assert engine.waits_until == 3.0
+        replies += engine.feed(b"", 3.0)
+        turns += 1
+    assert turns >= 4
+    assert replies.endswith(b"0.00\n0\n")
+
+
+def test_what_a_line_cannot_reply_is_not_worked_out(engine):
+    """Thirty pictures in a line cost no more than the four that are begun; every one left out is an error."""
+    door = Door(engine.desk)
+    picture = engine.desk.autograph.picture
+    asked = []
+    engine.desk.autograph.picture = lambda *what: asked.append(what) or picture(*what)
+    reply = door.feed(b"EYEP:PICT? 1024,1024,1;" + b"PICT? 1024,1024,1;" * 29 + b"*ESR?\n")
+    assert len(reply) == 3 * (9 + 1024 * 1024) + 3
+    assert len(asked) == 4
+    assert door.say("SYST:ERR:COUN?;*ESR?") == "28;132"
+
+
 @given(
     parts=st.lists(
         st.sampled_from([b"DRIV:X 50", b"DRIV:X 0", b"*WAI", b"*OPC?", b"COUN:X?", b"FOO", b"\n"]), max_size=20

@@ -170,7 +170,7 @@ def one_model():
 def test_an_operator_at_a_served_instrument_leaves_the_same_results(one_model, kind, tmp_path):
     scenario, results = one_model
     with served(kind, new_desk(scenario)) as url, served_at(url, timeout=5.0) as port:
-        run(scenario, 7, tmp_path / "out", wire=lambda twin: BesideTwin(port, twin, url))
+        run(scenario, 7, tmp_path / "out", cable=lambda twin: BesideTwin(port, twin, url))
     assert (tmp_path / "out" / "results.json").read_text(encoding="utf-8") == results
 
 
@@ -205,7 +205,7 @@ def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
             self.given += b"\n"
             return self.given
 
-    run(scenario, 7, wire=lambda twin: Eavesdropper(Served(new_desk(scenario).open()), twin, "url"))
+    run(scenario, 7, cable=lambda twin: Eavesdropper(Served(new_desk(scenario).open()), twin, "url"))
     assert len(read) > 1000
     assert all(line is given for line, given in read if line)
 
@@ -227,7 +227,7 @@ def test_an_instrument_of_another_scenario_or_seed_is_refused_in_one_sentence(on
         pytest.raises(Mistake, match=f"{url}: the instrument served {sentence}"),
         served_at(url, timeout=1.0) as port,
     ):
-        run(one_model[0], 7, wire=lambda twin: BesideTwin(port, twin, url))
+        run(one_model[0], 7, cable=lambda twin: BesideTwin(port, twin, url))
 
 
 def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
@@ -239,7 +239,7 @@ def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
             return b""
 
     with pytest.raises(Mistake, match=r"url: expected an answer to \*IDN\? in time, got none"):
-        run(one_model[0], 7, wire=lambda twin: BesideTwin(Silent(), twin, "url"))
+        run(one_model[0], 7, cable=lambda twin: BesideTwin(Silent(), twin, "url"))
 
 
 def test_operate_holds_the_lock_and_gives_it_back():

@@ -293,6 +293,7 @@ def test_who_says_nothing_is_told_and_let_go_and_who_speaks_stays():
         assert speaking.ask("SYST:LOCK:REQ?") == "1"
 
 
+@pytest.mark.slow
 def test_ten_thousand_connections_opened_and_dropped_leave_nothing(served):
     steady = served.line()
     assert steady.ask("*TST?") == "0"
@@ -315,11 +316,11 @@ def test_ten_thousand_connections_opened_and_dropped_leave_nothing(served):
 
 def test_a_burst_starves_nobody(served):
     bursting, other = served.line(), served.line()
-    burst = (b"*RST;" * 100 + b":COUN:X?\n") * 300
+    burst = (b"*RST;" * 100 + b":COUN:X?\n") * 150
     stop = threading.Event()
 
     def drain():
-        left = 300
+        left = 150
         while left:
             left -= bursting.socket.recv(1 << 20).count(b"\n")
         stop.set()
@@ -331,7 +332,7 @@ def test_a_burst_starves_nobody(served):
         began = time.monotonic()
         assert other.ask("*TST?") == "0"
         took.append(time.monotonic() - began)
-    assert len(took) > 30
+    assert len(took) > 20
     assert median(took) < 0.1
 
 

@@ -89,7 +89,6 @@ class Conversation:
             if replies:
                 self._wire.write(b"".join(replies))
             if self._engine.waits_until is not None:
-                self._feed(b"")
                 self._go_on_soon()
         elif self._incoming is not None:
             self._incoming.put(data)
@@ -142,11 +141,7 @@ class Conversation:
         return self._clogged or on_the_way or self._engine.waits_until is not None
 
     def _feed(self, data: bytes) -> None:
-        engine, clock = self._engine, self._clock
-        replies = engine.replies_to(data, clock.now)
-        while engine.waits_until is not None and clock.pass_to(engine.waits_until):
-            replies += engine.replies_to(b"", clock.now)
-        for reply in replies:
+        for reply in self._engine.replies_to(data, self._clock.now):
             self._send(reply)
 
     def _go_on_soon(self) -> None:
@@ -156,7 +151,10 @@ class Conversation:
         waits_until = self._engine.waits_until
         if waits_until is not None and not self._clogged:
             self._pause()
-            self._next = self._loop.call_later(max(0.0, waits_until - self._clock.now), self._go_on)
+            if self._clock.pass_to(waits_until):
+                self._next = self._loop.call_soon(self._go_on)
+            else:
+                self._next = self._loop.call_later(waits_until - self._clock.now, self._go_on)
         elif self._holds_back():
             self._pause()
         elif self._backlog:

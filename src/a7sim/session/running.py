@@ -33,12 +33,12 @@ from a7sim.session.folder import (
 from a7sim.session.journal import Journal
 from a7sim.session.strips import GroundedStrip, cards_of, given_control, ground_of, grounded, models_of, of_grounded
 
-Wire = Callable[[InProcessSerial], Port]
+Cable = Callable[[InProcessSerial], Port]
 """What lies between instrument and operator: it takes the instrument's end and returns the operator's."""
 
 
 def straight(port: InProcessSerial) -> Port:
-    """Return the instrument's end itself: a wire without length."""
+    """Return the instrument's end itself: a cable without length."""
     return port
 
 
@@ -54,13 +54,13 @@ class Session:
     job: Job
 
 
-def open_session(scenario: Scenario, seed: int, listener: Listener | None = None, wire: Wire = straight) -> Session:
+def open_session(scenario: Scenario, seed: int, listener: Listener | None = None, cable: Cable = straight) -> Session:
     """Return a session ready to begin. Raises Mistake when a file of measurements is bad."""
     scene = build_scene(scenario, seed)
     autograph = build_autograph(scenario.instrument, scene.drawer, seed)
     clock = Clock()
     port = InProcessSerial(desk=Desk(autograph, listener), clock=clock, timeout=1.0)
-    person = Person(Client(wire(port)), clock, scenario.observer, seed)
+    person = Person(Client(cable(port)), clock, scenario.observer, seed)
     return Session(scenario, seed, scene, autograph, person, job_of(scenario, scene))
 
 
@@ -101,7 +101,7 @@ def run(
     out: Path | None = None,
     watcher: Watcher | None = None,
     force: bool = False,
-    wire: Wire = straight,
+    cable: Cable = straight,
 ) -> Document:
     """Work through a scenario up to its strip and return the document of results; with `out`, leave the files there.
 
@@ -111,7 +111,7 @@ def run(
     """
     watcher = watcher or Watcher()
     journal = Journal()
-    session = open_session(scenario, seed, journal.heard, wire)
+    session = open_session(scenario, seed, journal.heard, cable)
     if out is not None:
         prepare_folder(out, force)
     document = results.header(scenario, seed) | {"status": "failed", "message": ""}

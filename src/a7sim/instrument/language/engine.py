@@ -19,11 +19,16 @@ LONGEST_LINE = 4096
 LARGEST_REPLY = 4 * 1024 * 1024
 """Bytes of the replies to one line."""
 
+UNITS_AT_ONCE, REPLY_AT_ONCE = 50, 64 * 1024
+"""Units of a line that are obeyed, and bytes that they reply, before other clients may have their turn."""
+
 MOST_KEPT_BACK = 64 * 1024
 """Bytes of input that wait behind a unit that waits for movement."""
 
 _LONGEST_PENDING = LONGEST_LINE + 2
 """A line, the CR of its end, and one byte that shows a line to be too long."""
+
+_TOO_MUCH = f"expected replies of at most {LARGEST_REPLY} bytes a line"
 
 _LOGIN = re.compile(r"LOG(IN)?\s", re.IGNORECASE)
 
@@ -38,7 +43,8 @@ class Engine:
     """A client's conversation with the instrument.
 
     `waits_until` is the simulated time in s up to which the client's input waits for movement to end, None where it
-    does not. Until something is fed at that time or later, input is kept and nothing of it is obeyed.
+    does not. Until something is fed at that time or later, be it nothing, input is kept and nothing of it is obeyed.
+    Within a long line it is the present time now and then, so that others may have their turn.
     """
 
     def __init__(self, desk: "Desk", client: str, cr_ends_line: bool = True) -> None:
@@ -59,6 +65,7 @@ class Engine:
         self._waited = False
         self._replies: list[str | bytes] = []
         self._reply_size = 0
+        self._overflowed = False
 
     def feed(self, received: bytes, time: float) -> bytes:
         """Take bytes that arrived at a simulated time in s; return the bytes of the replies."""
@@ -137,12 +144,15 @@ class Engine:
     def _obey_rest(self, replies: list[bytes]) -> None:
         """Obey the units of a line that are left, up to one that waits; at its end, add its reply if it has one."""
         program = self._rest
+        breath = self._reply_size + REPLY_AT_ONCE
         for place, unit in enumerate(program):
             try:
                 done = self._obey(unit)
             except LanguageError as error:
                 self._status.report(error.number, error.detail)
-                continue
+                done = True
+            if (place >= UNITS_AT_ONCE or self._reply_size > breath) and self.waits_until is None:
+                self.waits_until = self._time
             if self.waits_until is not None:
                 self._rest = program[place + done :]
                 return
@@ -152,6 +162,7 @@ class Engine:
             replies.append(b";".join(map(_as_bytes, self._replies)) + b"\n")
             self._replies.clear()
             self._reply_size = 0
+            self._overflowed = False
 
     def _obey(self, unit: Step | Fault) -> bool:
         """Obey a unit; return whether it is done, or is still to come after a wait. Raises LanguageError."""
@@ -166,6 +177,8 @@ class Engine:
                 raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "another client holds the lock")
             if command.waits and self._has_to_wait():
                 return False
+            if self._overflowed and command.query:
+                raise LanguageError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
             reply = command.handler(self, call)
         except Refusal as refusal:
             number = _NUMBER_OF.get(type(refusal), ErrorNumber.EXECUTION_ERROR)
@@ -189,12 +202,10 @@ class Engine:
         return self._waited
 
     def _answered(self, reply: str | bytes) -> None:
+        self._overflowed = self._reply_size + len(reply) > LARGEST_REPLY
+        if self._overflowed:
+            raise LanguageError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
         self._reply_size += len(reply)
-        if self._reply_size > LARGEST_REPLY:
-            self._reply_size -= len(reply)
-            raise LanguageError(
-                ErrorNumber.QUERY_DEADLOCKED, f"expected replies of at most {LARGEST_REPLY} bytes a line"
-            )
         self._replies.append(reply)
 
     # --- what handlers ask of the conversation --------------------------------------------------------
