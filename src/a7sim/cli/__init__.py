@@ -13,6 +13,8 @@ EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_INTERRUPTED = 1, 2, 130
 
 _VERBS = {
     "run": "a7sim.cli.run",
+    "operate": "a7sim.cli.operate",
+    "send": "a7sim.cli.send",
     "compile": "a7sim.cli.compile",
     "calibrate": "a7sim.cli.calibrate",
     "reduce": "a7sim.cli.reduce",

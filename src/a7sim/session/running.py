@@ -9,7 +9,7 @@ from a7sim.documents import Document, as_json
 from a7sim.files import csv_text
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Desk, Listener
-from a7sim.link.client import Client
+from a7sim.link.client import Client, Port
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.mistakes import Mistake
@@ -32,6 +32,14 @@ from a7sim.session.journal import Journal
 from a7sim.session.sitting import journal_header, sitting
 from a7sim.session.strips import GroundedStrip, cards_of, given_control, ground_of, grounded, models_of, of_grounded
 
+Cable = Callable[[InProcessSerial], Port]
+"""What lies between instrument and operator: it takes the instrument's end and returns the operator's."""
+
+
+def straight(port: InProcessSerial) -> Port:
+    """Return the instrument's end itself: a cable without length."""
+    return port
+
 
 @dataclass
 class Session:
@@ -49,13 +57,13 @@ class Session:
         return job_of(self.scenario, self.scene)
 
 
-def open_session(scenario: Scenario, seed: int, listener: Listener | None = None) -> Session:
+def open_session(scenario: Scenario, seed: int, listener: Listener | None = None, cable: Cable = straight) -> Session:
     """Return a session ready to begin. Raises Mistake when a file of measurements is bad."""
     scene = build_scene(scenario, seed)
     autograph = build_autograph(scenario.instrument, scene.drawer, seed)
     clock = Clock()
     port = InProcessSerial(desk=Desk(autograph, listener), clock=clock, timeout=1.0)
-    person = Person(Client(port), clock, scenario.observer, seed)
+    person = Person(Client(cable(port)), clock, scenario.observer, seed)
     return Session(scenario, seed, scene, autograph, person)
 
 
@@ -96,6 +104,7 @@ def run(
     out: Path | None = None,
     watcher: Watcher | None = None,
     force: bool = False,
+    cable: Cable = straight,
 ) -> Document:
     """Work through a scenario up to its strip and return the document of results; with `out`, leave the files there.
 
@@ -105,7 +114,7 @@ def run(
     """
     watcher = watcher or Watcher()
     journal = Journal()
-    session = open_session(scenario, seed, journal.heard)
+    session = open_session(scenario, seed, journal.heard, cable)
     job = session.job
     if out is not None:
         prepare_folder(out, force)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from a7sim.documents import Document, as_json
+from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit, Person
 from a7sim.reduction import Undetermined
 from a7sim.scenario import Scenario
@@ -42,6 +43,9 @@ def sitting(
             document["status"] = "complete"
         except (DoesNotFit, Undetermined) as trouble:
             document |= {"status": "does not fit", "message": str(trouble)}
+        except Mistake as mistake:
+            document["message"] = str(mistake)
+            raise
         except KeyboardInterrupt:
             document |= {"status": "interrupted", "message": f"the {called} was interrupted"}
             raise
