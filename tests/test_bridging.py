@@ -166,7 +166,7 @@ def test_what_cannot_be_looked_at_again_stays_as_it_was_oriented(monkeypatch):
 
 def test_a_model_without_a_common_point_on_its_left_is_refused(monkeypatch):
     scenario = scenario_of(2)
-    monkeypatch.setattr(bridging, "model_coordinates", lambda bench, model, prints: {})
+    monkeypatch.setattr(bridging, "model_coordinates", lambda bench, model: {})
     crowd, models = worked(scenario)
     assert len(models) == 1
     assert "none of its points 1, 3 and 5 was measured before" in crowd.bench.crew.reasons[0]

@@ -114,7 +114,7 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
         begin_form(bench, model, "relative orientation", begins)
         orientation = oriented(bench, model)
         begin_form(bench, model, "model coordinates", begins)
-        points = model_coordinates(bench, model, prints)
+        points = model_coordinates(bench, model)
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
             begin_form(bench, model, f"{side} perspective centre", begins)
@@ -172,19 +172,15 @@ def preset_counters(bench: Bench, model: ModelJob) -> None:
     crew.give_up(waiting, f"{model.name}: no standard point is pricked on both prints")
 
 
-def model_coordinates(bench: Bench, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> dict[str, Array]:
+def model_coordinates(bench: Bench, model: ModelJob) -> dict[str, Array]:
     """Measure all points that both prints show; sessions whose prints show the same do it together."""
     crew = bench.crew
-    wanted = dict.fromkeys([*model.standard_points.values(), *model.other_points])
-    on_both = [name for name in wanted if name in prints[1] and name in prints[2]]
-    shown = np.array([~np.isnan(prints[1][name] + prints[2][name])[0] for name in on_both])
-    points = {name: np.full((3, crew.sessions), np.nan) for name in on_both}
-    for pattern in np.unique(shown[:, crew.everybody], axis=1).T:
-        alike = crew.everybody[(shown[:, crew.everybody] == pattern[:, None]).all(axis=0)]
-        names = [name for name, is_shown in zip(on_both, pattern, strict=True) if is_shown]
+    wanted = list(dict.fromkeys([*model.standard_points.values(), *model.other_points]))
+    points: dict[str, Array] = {}
+    for alike, names in bench.alike(crew.everybody, wanted):
         for name, measured in zip(names, np.moveaxis(bench.measure(alike, names), 1, 0), strict=True):
-            points[name][:, alike] = measured[:, alike]
-    return {name: points[name] for name in on_both}
+            points.setdefault(name, np.full((3, crew.sessions), np.nan))[:, alike] = measured[:, alike]
+    return {name: points[name] for name in wanted if name in points}
 
 
 def begin_form(bench: Bench, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
