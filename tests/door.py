@@ -4,6 +4,8 @@ from functools import cache
 
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Desk, Listener
+from a7sim.link.clock import Clock
+from a7sim.link.waiting import obeyed
 from a7sim.manual import VARIANTS
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
@@ -24,9 +26,10 @@ class Door:
     def __init__(self, desk: Desk | None = None, cr_ends_line: bool = True) -> None:
         self.desk = desk or Desk(Autograph(VARIANTS["A7"]))
         self.engine = self.desk.open(cr_ends_line=cr_ends_line)
+        self.clock = Clock()
 
     def feed(self, received: bytes) -> bytes:
-        return self.engine.feed(received, 0.0)
+        return obeyed(self.engine, received, self.clock)
 
     def say(self, line: str) -> str:
         """Return the reply to a line without its LF, '' where there is none."""

@@ -1,5 +1,6 @@
 """Bridging: what must go on from model to model does, and the strip closes as well as its counters allow."""
 
+import json
 from itertools import pairwise
 
 import msgspec
@@ -105,12 +106,18 @@ def test_models_that_do_not_go_on_are_refused():
 
 
 @pytest.mark.slow
-def test_over_the_line_and_in_a_crowd_it_is_the_same_strip():
-    """One procedure, two benches: with errors too, every reading of a session is the same."""
+def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(tmp_path):
+    """One procedure, two benches: with errors too, every reading of a session is the same. The line leaves files."""
     scenario = load_scenario("bridge")
     scenario = msgspec.structs.replace(scenario, models=scenario.models[:2])
-    document = run_bridge(scenario, 7)
+    out = tmp_path / "out"
+    document = run_bridge(scenario, 7, out)
+    assert json.loads((out / "results.json").read_text()) == json.loads(json.dumps(document))
+    assert {"independent", "book.csv", "models.csv", "session.jsonl", "results.json"} == {p.name for p in out.iterdir()}
+    assert json.loads((out / "independent" / "results.json").read_text())["strip"] == document["independent"]["strip"]
     _, models = worked(scenario, (7,))
+    rows = [row.split(",")[:2] for row in (out / "models.csv").read_text().splitlines()[2:]]
+    assert rows == [[model.model.name, point] for model in models for point in model.places_of(0)]
     for said, model in zip(document["bridged"]["models"], models, strict=True):
         assert said["elements"] == {name: each[0] for name, each in model.orientation.elements.items()}
         assert said["scale"] == pytest.approx(model.scale[0], abs=1e-7)
@@ -135,7 +142,7 @@ def test_ten_models_close_on_the_truth():
 
 @pytest.mark.slow
 def test_the_shipped_strip_is_bridged_and_worked_as_independent_models_to_its_end():
-    document = run_bridge(load_scenario("bridge"), 2)
+    document = run_bridge(load_scenario("bridge", {"plan.parallax_readings": "1"}), 2)
     assert (document["status"], document["message"]) == ("complete", "")
     for way in ("bridged", "independent"):
         assert document[way]["strip"]["accuracy_m"]["checks"]["points"] == 20
@@ -159,7 +166,7 @@ def test_what_cannot_be_looked_at_again_stays_as_it_was_oriented(monkeypatch):
 
 def test_a_model_without_a_common_point_on_its_left_is_refused(monkeypatch):
     scenario = scenario_of(2)
-    monkeypatch.setattr(bridging, "model_coordinates", lambda bench, model, prints: {})
+    monkeypatch.setattr(bridging, "model_coordinates", lambda bench, model: {})
     crowd, models = worked(scenario)
     assert len(models) == 1
     assert "none of its points 1, 3 and 5 was measured before" in crowd.bench.crew.reasons[0]

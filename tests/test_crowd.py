@@ -70,6 +70,7 @@ SCENARIOS = {
     "no errors at all": without_errors(load_scenario("akwanga")),
     "five gon of tilt": tilted_flight([(5.0, -2.0, 3.0), (1.0, 3.0, 5.0), (-3.0, -2.0, -5.0)]),
     "many slips": load_scenario("akwanga", {"observer.blunder_rate": "0.05", "observer.last_digit_slip": "0.05"}),
+    "forgotten levers": load_scenario("akwanga", {"observer.forgotten_lever_rate": "0.4"}),
     "out of true": load_scenario("akwanga"),
     "play and setting errors": load_scenario(
         "akwanga",

@@ -6,7 +6,7 @@ from click.testing import CliRunner
 from a7sim.cli import cli
 from a7sim.manual import A7, A8
 from a7sim.mistakes import Mistake
-from a7sim.operator.preparation import Flight, base_of_clearings, preparation
+from a7sim.operator.preparation import Flight, preparation
 
 AKWANGA = Flight.of_heights(152.676, 91.0, (430.24, 487.92), photo_scale=8000.0)
 
@@ -30,9 +30,8 @@ def test_the_theses_settings_come_out():
     assert found.chosen.projection_height == pytest.approx(325.709, abs=5e-4)
 
 
-def test_the_theses_base_is_the_mean_of_two_clearings():
-    """T: 195.312 at point 1 and 194.670 at point 2; the photo base of 91 mm promises 0.9 mm less."""
-    assert base_of_clearings([195.312, 194.670]) == pytest.approx(194.991)
+def test_the_base_is_what_the_photo_base_promises_at_the_scale():
+    """The photo base of 91 mm promises 0.9 mm less than T cleared at points 1 and 2."""
     assert preparation(AKWANGA, A7, 2500.0).chosen.bx == pytest.approx(91.0 * 8000.0 / 3750.0)
 
 

@@ -86,7 +86,7 @@ def test_every_mistake_is_named_at_once_with_its_path():
         (lambda raw: raw["models"][0].update(right="101"), "models[0]: expected two photographs, got '101' on both"),
         (
             lambda raw: raw["models"][0].update(standard_points={"7": "x"}),
-            "models[0].standard_points: expected all of the positions 1 to 6",
+            "models[0].standard_points: expected a point in each of the three rows",
         ),
         (lambda raw: raw["plan"].update(height_gear="Xy"), "plan.height_gear: expected counter units a mm"),
         (lambda raw: raw.update(schema_version=2), "schema_version: expected 1, got 2"),

@@ -7,6 +7,15 @@ tables 3.2, 3.3 and 3.7 and section 3.2.3.6 (geometry.md, Counters and ranges, G
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+_Counts = TypeVar("_Counts", float, npt.NDArray[np.float64])
+
+TILTS = ("omega", "phi", "kappa")
+"""Elements that turn a projector, from the primary axis inward."""
 
 LEAST_COUNT = 0.01
 """mm and gon, of every counter of the elements and of X and Y (thesis table 3.7)."""
@@ -53,6 +62,28 @@ MILLIMETRES = Scale()
 GEARED = Scale(unit="")
 
 
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """How fast the parts of a plotter go [assumption of this project: no source gives any of it]."""
+
+    carriage: float = 10.0
+    """mm/s of the X, Y and Z carriages."""
+    length: float = 2.0
+    """mm/s of base components, principal distances and pictures on their carriers."""
+    angle: float = 1.0
+    """gon/s of tilts, swings and pictures on their carriers."""
+    lever: float = 2.0
+    """s to put over a fitting or the Zeiss parallelogram."""
+    gear: float = 10.0
+    """s to exchange the wheels of a height gear."""
+    laying: float = 15.0
+    """s to lay a picture on its carrier or to take it off."""
+
+    def of(self, unit: str) -> float:
+        """Return how far an element that counts in mm or gon goes in a second."""
+        return self.angle if unit == "gon" else self.length
+
+
 @dataclass(frozen=True)
 class Variant:
     """A type of plotter. An element or fitting that is not listed is one the instrument does not have."""
@@ -81,10 +112,18 @@ class Variant:
     centring_mm: float = 15.0
     centring_gon: float = 20.0
     """How far a picture can be shifted and turned on its carrier [assumption; no source at hand]."""
+    rates: Rates = Rates()
 
     def lacks(self, *elements: str) -> list[str]:
         """Return those of the elements that the plotter does not have."""
         return [name for name in elements if name not in self.elements]
+
+    def tilts(self, counts: Mapping[str, _Counts], projector: int) -> tuple[_Counts, _Counts, _Counts]:
+        """Return omega, phi and kappa of a projector in gon from their zeros, by what the counters of elements show."""
+        omega, phi, kappa = (
+            counts[name] - self.elements[name].zero for name in (f"{name}{projector}" for name in TILTS)
+        )
+        return omega, phi, kappa
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """The standard points of a model (thesis fig. 4.1) and the cases of numerical relative orientation (thesis 3.4.2)."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
 FIGURE_4_1 = ("3adg4", "1beh2", "5cfi6")
@@ -12,6 +12,21 @@ PLACES: Mapping[str, tuple[float, float]] = MappingProxyType(
     {label: (column / 4.0, 1.0 - row) for row, labels in enumerate(FIGURE_4_1) for column, label in enumerate(labels)}
 )
 """Position to its share of the base along it, and its row: 1 away from the operator, 0 on the base, -1 towards."""
+
+
+def determine_orientation(positions: Collection[str]) -> bool:
+    """Return whether y-parallaxes at positions determine the five elements of a relative orientation.
+
+    A point in every row tells what goes with y and its square, two that are apart in two of the rows what goes with x.
+    """
+    apart = [_extent([label for label in row if label in positions]) for row in FIGURE_4_1]
+    return min(apart) >= 0.0 and sum(extent > 0.0 for extent in apart) >= 2
+
+
+def _extent(row: Sequence[str]) -> float:
+    """Return how far apart the outermost of some positions in a row are, in bases; less than nothing for none."""
+    return PLACES[row[-1]][0] - PLACES[row[0]][0] if row else -1.0
+
 
 CASES: Mapping[str, str] = MappingProxyType(
     {

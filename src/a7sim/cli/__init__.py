@@ -13,12 +13,15 @@ EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_INTERRUPTED = 1, 2, 130
 
 _VERBS = {
     "run": "a7sim.cli.run",
+    "operate": "a7sim.cli.operate",
+    "send": "a7sim.cli.send",
     "compile": "a7sim.cli.compile",
     "calibrate": "a7sim.cli.calibrate",
     "reduce": "a7sim.cli.reduce",
     "scenario": "a7sim.cli.scenario",
     "prepare": "a7sim.cli.prepare",
     "bridge": "a7sim.cli.bridge",
+    "serve": "a7sim.cli.serve",
     "report": "a7sim.cli.report",
     "export": "a7sim.cli.export",
     "compare": "a7sim.cli.compare",

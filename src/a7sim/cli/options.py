@@ -48,6 +48,12 @@ _OF_A_SCENARIO = (
     click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
     click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error."),
 )
+_OF_AN_ORIENTATION = (
+    click.option(
+        "--case", type=click.Choice(list("ABCDE"), case_sensitive=False), help="Standard points used (thesis)."
+    ),
+    click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one."),
+)
 _OF_A_FOLDER = (
     click.option("--out", type=click.Path(path_type=Path), help="Folder for journal, book, tables and results."),
     click.option("--force", is_flag=True, help="Write into a folder that exists."),
@@ -72,6 +78,9 @@ _NOT_OF_THE_RESULTS = {"seed", "out", "force", "as_document", "quiet"}
 of_a_scenario = _with(_OF_A_SCENARIO)
 """--seed, --set, --skill, --perfect-observer: what `chosen` takes."""
 
+of_an_orientation = _with(_OF_AN_ORIENTATION)
+"""--case, --method."""
+
 of_a_folder = _with(_OF_A_FOLDER)
 """--out, --force."""
 
@@ -94,7 +103,7 @@ def chosen(
         loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
         overrides["observer"] = "perfect"
     seed = loaded.seed if seed is None else seed
-    return requested(loaded, Request(_command_line(bare_name(scenario), seed), overrides)), seed
+    return requested(loaded, Request(command_line=_command_line(bare_name(scenario), seed), settings=overrides)), seed
 
 
 def _command_line(scenario: str, seed: int) -> str:
@@ -120,6 +129,10 @@ def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> di
             raise Mistake(f"--set: expected PATH=VALUE such as plan.bx=190.0, got {setting!r}")
         overrides[key] = value
     return overrides | {key: f'"{value}"' for key, value in texts.items() if value is not None}
+
+
+POINTS_A_MODEL = 130
+"""About how many points an operator works on in a model; the bar only needs the order of it."""
 
 
 @contextmanager

@@ -4,21 +4,26 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli.options import chosen, ended, of_a_folder, of_a_scenario, of_results, watched
+from a7sim.cli.options import (
+    POINTS_A_MODEL,
+    chosen,
+    ended,
+    of_a_folder,
+    of_a_scenario,
+    of_an_orientation,
+    of_results,
+    watched,
+)
 from a7sim.mistakes import Mistake
 from a7sim.session.combinations import run_combinations
 from a7sim.session.tables import of_session, of_strips
 from a7sim.session.ways import run_all_ways
 from a7sim.standard_points import CASES
 
-_POINTS_A_MODEL = 130
-"""About how many points an operator works on in a model; the bar only needs the order of it."""
-
 
 @click.command("run")
 @click.argument("scenario")
-@click.option("--case", type=click.Choice(list("ABCDE"), case_sensitive=False), help="Standard points used (thesis).")
-@click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one.")
+@of_an_orientation
 @click.option(
     "--strips",
     type=click.Choice(["one", "all"]),
@@ -52,6 +57,6 @@ def command(
     if strips == "all" and case is not None:
         raise Mistake("--strips all: expected no --case beside it, since every case is worked")
     sessions = len(CASES) if strips == "all" else 1
-    with watched(_POINTS_A_MODEL * sessions * len(loaded.models), as_document, quiet) as watcher:
+    with watched(POINTS_A_MODEL * sessions * len(loaded.models), as_document, quiet) as watcher:
         document = (run_combinations if strips == "all" else run_all_ways)(loaded, seed, out, watcher, force)
     ended(document, as_document, quiet, of_strips if strips == "all" else of_session)

@@ -15,7 +15,7 @@ from a7sim.instrument.projection import place_of_centre, place_on_carrier, pose
 from a7sim.instrument.recorder import Recorder
 from a7sim.instrument.refusals import OutOfRange, SettingsConflict, UnknownName
 from a7sim.instrument.spindles import Counter, Runout, Spindle
-from a7sim.manual import LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element, Fittings, Variant
+from a7sim.manual import LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element, Fittings, Gear, Variant
 from a7sim.scenario.schema import FORMAT_MM, Condition, Instrument, ProjectorCondition
 from a7sim.scene.photograph import Photograph
 
@@ -45,6 +45,7 @@ class Autograph:
         self.variant = variant
         self.serial = serial
         self.recorder = Recorder()
+        self._taken: dict[str, float] = {}
         self.plan_gear = "1-1-1"
         self.height_gear = "1"
         self._condition = condition or Condition()
@@ -107,8 +108,14 @@ class Autograph:
         spindle = self._spindle(name)
         if name in MOVE_CENTRES and spindle.allows(target):
             self._refuse_if_rods_cannot(elements={name: target})
-        spindle.turn_to(target, rng)
+        self._turn(name, target, rng)
         self._poses.clear()
+
+    def _turn(self, name: str, target: float, rng: np.random.Generator | None) -> None:
+        spindle = self._spindles[name]
+        before = spindle.at
+        spindle.turn_to(target, rng)
+        self._takes(name, abs(spindle.at - before) / self.variant.rates.of(self.variant.elements[name].unit))
 
     def _spindle(self, name: str) -> Spindle:
         if name not in self._spindles:
@@ -125,6 +132,8 @@ class Autograph:
         if mode not in self.variant.base_modes:
             raise SettingsConflict(f"an {self.variant.name} has no base {mode}")
         self._refuse_if_rods_cannot(base_mode=mode)
+        if mode != self.base_mode:
+            self._takes("base mode", self.variant.rates.lever)
         self.base_mode = mode
         self._poses.clear()
 
@@ -139,18 +148,39 @@ class Autograph:
         self.fitting(name)
         if position not in POSITIONS_OF[name]:
             raise UnknownName(f"expected {' or '.join(POSITIONS_OF[name])}, got {position}")
-        self.fittings = replace(self.fittings, **{name: position})
+        self._fit(replace(self.fittings, **{name: position}))
+
+    def _fit(self, fittings: Fittings) -> None:
+        before, after = self.fittings.as_words(), fittings.as_words()
+        for name in before:
+            if before[name] != after[name]:
+                self._takes(name, self.variant.rates.lever)
+        self.fittings = fittings
 
     def reset(self) -> None:
         """Run every element that has a counter zero to it, base inside, fittings for a positive, presets off."""
-        for name, spindle in self._spindles.items():
+        for name in self._spindles:
             if name not in ("c1", "c2"):
-                spindle.turn_to(self.variant.elements[name].zero, self._rng)
+                self._turn(name, self.variant.elements[name].zero, self._rng)
+        if self.base_mode != self.variant.base_modes[0]:
+            self._takes("base mode", self.variant.rates.lever)
         self.base_mode = self.variant.base_modes[0]
-        self.fittings = RIGHT_FITTINGS["positive", self.base_mode]
+        self._fit(RIGHT_FITTINGS["positive", self.base_mode])
         for counter in self._counters.values():
             counter.clear()
         self._poses.clear()
+
+    def _takes(self, part: str, seconds: float) -> None:
+        if seconds > 0.0:
+            self._taken[part] = self._taken.get(part, 0.0) + seconds
+
+    def time_taken(self) -> dict[str, float]:
+        """Return how many seconds each part has moved since this was last asked, those that did not left out.
+
+        State changes at once: what is read meanwhile is what stands at the end of the movement.
+        """
+        taken, self._taken = self._taken, {}
+        return taken
 
     # --- carriages, counters, gears -------------------------------------------------------------------
 
@@ -207,6 +237,7 @@ class Autograph:
         self._refuse_if_rods_cannot(carriages={axis: position})
         before = spindle.at
         spindle.turn_to(position)
+        self._takes(axis, abs(position - before) / self.variant.rates.carriage)
         self._counters[axis].passed(before, position, self._rng)
 
     def set_height_gear(self, gear: str | float) -> None:
@@ -215,13 +246,15 @@ class Autograph:
             if gear not in self.variant.height_gears:
                 known = ", ".join(self.variant.height_gears)
                 raise UnknownName(f"expected one of the combinations {known}, got {gear}")
-            engaged = self.variant.height_gears[gear]
-            units, decimals, self.height_gear = engaged.units_per_mm, engaged.decimals, gear
+            engaged, name = self.variant.height_gears[gear], gear
         else:
             if not 0.0 < gear <= 100.0:
                 raise OutOfRange(f"expected more than 0 to 100 units a mm, got {gear:.10g}")
-            units, decimals, self.height_gear = gear, 2, f"{gear:.10g}"
-        self._counters["Z"].engage(units, decimals, self._carriages["Z"].at)
+            engaged, name = Gear(gear), f"{gear:.10g}"
+        if name != self.height_gear:
+            self._takes("height gear", self.variant.rates.gear)
+        self.height_gear = name
+        self._counters["Z"].engage(engaged.units_per_mm, engaged.decimals, self._carriages["Z"].at)
 
     def _refuse_if_rods_cannot(
         self,
@@ -285,11 +318,13 @@ class Autograph:
         dx, dy, dkappa = self._rng.standard_normal(3) * (shift, shift, turn)
         upside_down = 200.0 if photograph.laid == "upside down" else 0.0
         self._carriers[projector] = Carrier(photograph, (float(dx), float(dy), float(dkappa) + upside_down))
+        self._takes(f"carrier {projector}", self.variant.rates.laying)
 
     def unload(self, projector: int) -> None:
         """Take the photograph off a carrier."""
         self.carrier(projector)
         del self._carriers[projector]
+        self._takes(f"carrier {projector}", self.variant.rates.laying)
 
     def loaded(self, projector: int) -> str | None:
         """Return the name of the photograph in a projector, or None."""
@@ -308,7 +343,11 @@ class Autograph:
         for value, limit in zip((dx, dy, dkappa), limits, strict=True):
             if not abs(value) <= limit:
                 raise OutOfRange(f"expected a shift or turn of -{limit:g} to {limit:g}, got {value:.10g}")
-        self.carrier(projector).centre(dx, dy, dkappa)
+        carrier = self.carrier(projector)
+        x, y, kappa = (abs(new - old) for new, old in zip((dx, dy, dkappa), carrier.centring, strict=True))
+        rates = self.variant.rates
+        self._takes(f"carrier {projector}", max(math.hypot(x, y) / rates.length, kappa / rates.angle))
+        carrier.centre(dx, dy, dkappa)
 
     def _polarity(self) -> str:
         for carrier in self._carriers.values():

@@ -305,6 +305,10 @@ class Fleet:
         for n in (1, 2):
             self._stand(who, n)
 
+    def fitting(self, who: Who, name: str) -> npt.NDArray[np.str_]:
+        """Return the positions ``(m,)`` in which a fitting stands."""
+        return np.array(POSITIONS_OF[name])[self._fittings[name][who]]
+
     def set_fitting(self, who: Who, name: str, position: str) -> None:
         """Put a fitting into one of its two positions."""
         self._fittings[name][who] = POSITIONS_OF[name].index(position)

@@ -1,5 +1,7 @@
 """Simulated time."""
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 
@@ -12,3 +14,25 @@ class Clock:
     def spend(self, seconds: float) -> None:
         """Let time pass."""
         self.now += seconds
+
+    def pass_to(self, time: float) -> bool:
+        """Let time pass until it is so late, if it is not yet; return whether it is."""
+        self.now = max(self.now, time)
+        return True
+
+
+class WallClock:
+    """Simulated time that is the wall's: it goes by itself."""
+
+    def __init__(self, wall: Callable[[], float] = time.monotonic) -> None:
+        self._wall = wall
+        self._began = wall()
+
+    @property
+    def now(self) -> float:
+        """Seconds since the clock was made."""
+        return self._wall() - self._began
+
+    def pass_to(self, time: float) -> bool:
+        """Return whether it is so late; it does not hurry."""
+        return self.now >= time

@@ -5,14 +5,16 @@ from typing import Any
 
 from serial import PortNotOpenError, SerialBase, SerialException, to_bytes
 
-from a7sim.instrument.language import Desk, Engine
+from a7sim.instrument.language import MOST_KEPT_BACK, Desk, Engine
 from a7sim.link.clock import Clock
+from a7sim.link.waiting import obeyed
 
 
 class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
     """A pyserial port whose other end is an engine on a desk.
 
-    Whatever is written is obeyed before `write` returns; its replies wait to be read. Line settings
+    Whatever is written is obeyed before `write` returns; its replies wait to be read. What waits for movement lets
+    simulated time pass on the clock, and nothing blocks. Line settings
     (baud rate, parity ...) are taken and change nothing. Several ports may share one desk.
     """
 
@@ -67,7 +69,9 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         """Send bytes and return how many."""
         received = to_bytes(data)
         with self._arrived:
-            self._replies += self._opened().feed(received, self.clock.now)
+            engine = self._opened()
+            for start in range(0, len(received), MOST_KEPT_BACK):
+                self._replies += obeyed(engine, received[start : start + MOST_KEPT_BACK], self.clock)
             self._arrived.notify_all()
         return len(received)
 

@@ -1,7 +1,7 @@
 """Absolute orientation at the instrument: a model levelled and to scale, its heights indexed, read, set back."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +53,7 @@ def absolute_orientation_at(
     """
     found: dict[int, OnGround] = {}
     crew = bench.crew
-    for who, names in _alike(bench, crew.everybody, [*control]):
+    for who, names in bench.alike(crew.everybody, [*control]):
         known = Control(tuple(names), np.array([control[name] for name in names]).reshape(-1, 3).T)
         if not known.is_enough:
             crew.remark(who, f"{model.name}: too little control to level and scale it ({', '.join(names) or 'none'})")
@@ -77,14 +77,6 @@ def _gear(bench: Bench, metres: float) -> str:
     if isinstance(planned, str):
         return planned
     return min(gears, key=lambda name: abs(math.log(gears[name].units_per_mm / metres)))
-
-
-def _alike(bench: Bench, who: Who, names: Sequence[str]) -> Iterator[tuple[Who, list[str]]]:
-    """Yield sessions that find the same points on their prints, and these points."""
-    shown = np.array([bench.pricked(who, name) for name in names])
-    for pattern in np.unique(shown, axis=1).T:
-        alike = who[(shown == pattern[:, None]).all(axis=0)]
-        yield alike, [name for name, there in zip(names, pattern, strict=True) if there]
 
 
 class _InMetres:

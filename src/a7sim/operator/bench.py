@@ -4,7 +4,7 @@ The same code works one real link (`LineHands`) and a batch of instruments held 
 have all sessions as their last axis; `who` are the indices of those that act, and those who give up act no more.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,12 +105,25 @@ class Bench:
         """Spend the time of one computation."""
         self.crew.spend(who, self.crew.observer.seconds_to_compute, "computing")
 
-    def pricked(self, who: Who, point: str) -> Truths:
-        """Return which of those who act find a point pricked on both prints."""
-        prints = [self._prints[hand].get(point) for hand in (1, 2)]
+    def pricked(self, who: Who, point: str, hands: Sequence[int] = (1, 2)) -> Truths:
+        """Return which of those who act find a point pricked on both prints, or on that of one photograph."""
+        prints = [self._prints[hand].get(point) for hand in hands]
         if any(each is None for each in prints):
             return np.zeros(who.size, dtype=bool)
         return np.asarray(~np.isnan([each[0, who] for each in prints if each is not None]).any(axis=0))
+
+    def alike(self, who: Who, points: Sequence[str], hands: Sequence[int] = (1, 2)) -> Iterator[tuple[Who, list[str]]]:
+        """Yield those who find the same of some points pricked, on the prints of these photographs, and what they find.
+
+        Everybody who acts comes once, the list in the order of `points` and perhaps empty.
+        """
+        if not points:
+            yield who, []
+            return
+        shown = np.array([self.pricked(who, point, hands) for point in points])
+        for pattern in np.unique(shown, axis=1).T:
+            them = who[(shown == pattern[:, None]).all(axis=0)]
+            yield them, [point for point, there in zip(points, pattern, strict=True) if there]
 
     def _come_to(self, who: Who, point: str) -> None:
         """Go to a point, or by mistake to a standard point near it."""

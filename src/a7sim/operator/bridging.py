@@ -29,6 +29,7 @@ from a7sim.operator.work import (
     begin_form,
     model_coordinates,
     mount,
+    preset_counters,
     see_that_somebody_goes_on,
     set_base_and_fittings,
     take_up_prints,
@@ -105,7 +106,7 @@ def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedMod
         see_that_somebody_goes_on(bench)
         bench.begin(crew.everybody, model, prints)
         if last is None:
-            bench.preset(crew.everybody, model.standard_points["1"])
+            preset_counters(bench, model)
         else:
             _set_as_its_neighbour(bench, model)
         begin_form(bench, model, "relative orientation", begins)
@@ -118,7 +119,7 @@ def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedMod
         if last is not None:
             scale *= _scaled(bench, crew.everybody, model, before)
         begin_form(bench, model, "model coordinates", begins)
-        points = model_coordinates(bench, model, prints)
+        points = model_coordinates(bench, model)
         see_that_somebody_goes_on(bench)
         common = {name: points[name] - before[name] for name in points if name in before}
         yield BridgedModels(model, crew.everybody, orientation, points, common, scale, seat.units_per_mm)

@@ -14,6 +14,7 @@ from a7sim.operator.crew import Who
 from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import ModelJob
 from a7sim.operator.plate import Crosses, lie_of_plate, places_of, point_at_crosses, prints_of
+from a7sim.operator.seat import side
 from a7sim.reduction import (
     PerspectiveCentre,
     PlateLie,
@@ -36,6 +37,9 @@ FEWEST_CROSSES = 9
 
 BESIDE_THE_MODEL = 0.1
 """Crosses are pointed at so far beside the base, as a share of it: further out carriages and rods may not go."""
+
+FEWEST_POINTS = 3
+"""For a centre by levels: one that does not fit two others can still be told, if not which."""
 
 Levels = npt.NDArray[np.float64]
 
@@ -122,11 +126,52 @@ def _by_scales(bench: Bench, who: Who, hand: int, levels: Sequence[float]) -> Pe
 def _by_levels(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Levels) -> PerspectiveCentre:
     """Point monocularly at points 1 to 6 at every level and compute the centres ``(sessions,)``.
 
+    Those that the print does not show are done without; with fewer than three of them all standard points serve, and
+    whose prints do not show three of these give up.
+    """
+    crew = bench.crew
+    points = [model.standard_points[label] for label in model.all_positions()]
+    corners_and_nadirs = {model.standard_points[label] for label in model.points_of_case("A")}
+    groups = []
+    for them, there in bench.alike(who, points, (hand,)):
+        usual = [name for name in there if name in corners_and_nadirs]
+        chosen = usual if len(usual) >= FEWEST_POINTS else there
+        if len(chosen) >= FEWEST_POINTS:
+            found = _of_points(bench, them, model, hand, chosen, levels)
+            groups.append((crew.still(them), chosen, found))
+        else:
+            crew.give_up(
+                them,
+                f"{model.name}: {len(chosen)} of the standard points are pricked on the print of the {side(hand)} "
+                f"photograph: there must be {FEWEST_POINTS} for its perspective centre",
+            )
+    return _gathered(groups, crew.sessions)
+
+
+def _gathered(groups: Sequence[tuple[Who, Sequence[str], PerspectiveCentre]], sessions: int) -> PerspectiveCentre:
+    """Return the centres of groups, each from points of its own, among all sessions, nan where there is nothing."""
+    points = list(dict.fromkeys(name for _, names, _ in groups for name in names))
+    every: dict[str, Array] = {}
+    for who, names, centres in groups:
+        slots = [points.index(name) for name in names]
+        for name, values in ((field.name, getattr(centres, field.name)) for field in fields(centres)):
+            if name == "residuals":
+                residuals = every.setdefault(name, np.full((3, len(points), sessions), np.nan))
+                residuals[:, np.array(slots)[:, None], who] = values
+            elif values is not None:
+                every.setdefault(name, np.full(sessions, np.nan))[who] = values
+    return PerspectiveCentre(**every) if every else _nowhere(sessions)
+
+
+def _of_points(
+    bench: Bench, who: Who, model: ModelJob, hand: int, points: Sequence[str], levels: Levels
+) -> PerspectiveCentre:
+    """Return the centres ``(m,)`` of those who go on, from points at every level.
+
     A point that does not fit the others is struck out and pointed at again; when the rms stays suspicious though no
     point stands out, a second set is observed and the mean of both is taken.
     """
     crew = bench.crew
-    points = [model.standard_points[label] for label in model.points_of_case("A")]
     pointings = _one_set(bench, who, hand, points, levels)
     who = crew.still(who)
     doubtful = who[_rms(pointings[..., who], levels) > SUSPICIOUS_RMS]
@@ -135,7 +180,7 @@ def _by_levels(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Level
         again = _one_set(bench, doubtful, hand, points, levels)
         pointings[..., doubtful] = (pointings[..., doubtful] + again[..., doubtful]) / 2.0
         who = crew.still(who)
-    return _among_all(_centre(pointings[..., who], levels), who, crew.sessions)
+    return _centre(pointings[..., who], levels)
 
 
 def _centre(pointings: Array, levels: Levels) -> PerspectiveCentre:

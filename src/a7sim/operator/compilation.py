@@ -123,10 +123,17 @@ class Area:
 
     @classmethod
     def within(cls, standard_points: Mapping[str, str], places: Mapping[str, tuple[float, float, float]]) -> "Area":
-        """Return the rectangle between the outer standard points 3, 4, 5 and 6."""
-        x, y = ({label: places[standard_points[label]][axis] for label in "3456"} for axis in (0, 1))
-        low = [max(x["3"], x["5"]), max(y["5"], y["6"])]
-        high = [min(x["4"], x["6"]), min(y["3"], y["4"])]
+        """Return the rectangle between the outer standard points 3, 4, 5 and 6, or what there is of them.
+
+        Every side must have one.
+        """
+
+        def along(axis: int, corners: str) -> list[float]:
+            there = [standard_points[label] for label in corners if label in standard_points]
+            return [places[name][axis] for name in there if name in places]
+
+        low = [max(along(0, "35")), max(along(1, "56"))]
+        high = [min(along(0, "46")), min(along(1, "34"))]
         return cls(np.array(low), np.array(high))
 
     def holds(self, place: Array) -> bool:

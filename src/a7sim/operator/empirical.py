@@ -18,7 +18,7 @@ from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, parallax_coefficients,
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Who
 from a7sim.operator.job import ModelJob
-from a7sim.operator.relative import RelativeOrientations, Rounds, assessed, spread, stand_of, unknowns_of
+from a7sim.operator.relative import RelativeOrientations, Rounds, assessed, merged, spread, stand_of, unknowns_of
 from a7sim.reduction import Stand
 from a7sim.standard_points import CASES, FIGURE_4_1, PLACES, POSITIONS
 
@@ -186,7 +186,7 @@ def empirical_orientation(
             waiting[missing | {label}] = np.union1d(waiting.get(missing | {label}, lost), lost)
         found = RelativeOrientations(method, case, clearing.rounds, clearing.rough, {}, {}, {}, "empirical")
         done.append((ended, _assessed(bench, ended, model, found, missing, readings, tolerated_rms)))
-    return _merged(done, method, case, crew.sessions)
+    return merged(done, method, case, crew.sessions, "empirical")
 
 
 def _checks(usable: Sequence[str], steps: Sequence[Step]) -> list[str]:
@@ -226,28 +226,6 @@ def _too_few(model: ModelJob, missing: frozenset[str]) -> str:
     return (
         f"{model.name}: {', '.join(sorted(missing))} of the standard points cannot be used: there must be two points "
         "on the base line, two in one of the outer rows and one in the other to clear a model"
-    )
-
-
-def _merged(
-    groups: Sequence[tuple[Who, RelativeOrientations]], method: str, case: str, sessions: int
-) -> RelativeOrientations:
-    """Return the orientations of all groups in one."""
-    elements: dict[str, Array] = {}
-    residuals: dict[str, Array] = {}
-    places: dict[str, Array] = {}
-    for who, found in groups:
-        for into, values, empty in (
-            (elements, found.elements, np.zeros(sessions)),
-            (residuals, found.residuals, np.full(sessions, np.nan)),
-            (places, found.places, np.full((3, sessions), np.nan)),
-        ):
-            for name, each in values.items():
-                into.setdefault(name, empty.copy())[..., who] = each[..., who]
-    rounds = [each for _, found in groups for each in found.rounds]
-    rough = np.sum([found.rough_rounds for _, found in groups], axis=0, dtype=np.intp)
-    return RelativeOrientations(
-        method, case, rounds, np.broadcast_to(rough, sessions), elements, residuals, places, "empirical"
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from a7sim.geometry import Array
 from a7sim.operator.crew import Who
 from a7sim.operator.hands import Truths
+from a7sim.operator.levers import put_levers_right
 from a7sim.operator.seat import Seat, side
 
 MOST_LOOKS = 40
@@ -68,6 +69,11 @@ class Eyes:
             looking = np.setdiff1d(looking, found)
             if not looking.size:
                 return
+        looking_on = who[looking]
+        again = put_levers_right(seat, looking_on)
+        if again.any():
+            self.bring_into_view(looking_on[again], hand, point)
+            looking = looking[~again]
         seat.see_that_it_obeyed(who[looking], f"{seat.model.name}: looking for point {point}")
         self.crew.give_up(
             self.crew.still(who[looking]),
@@ -100,6 +106,7 @@ class Eyes:
             seen = self.seen(who, hand, point)
             lost = np.isnan(seen[0]) | watch.running_away(who, seen).any(axis=0)
             if lost.any():
+                self._look_again_with_levers_right(who, hand, point, seen, lost)
                 self._ran_away(who[lost], hand, point)
                 who, seen = who[~lost], seen[:, ~lost]
             steps = (seen + errors[:, who]) * (1e-3 * seat.z[who] / seat.c)
@@ -112,6 +119,18 @@ class Eyes:
         self.crew.give_up(
             self.crew.still(who), f"{seat.model.name}: point {point}: the mark cannot be brought to rest on the image"
         )
+
+    def _look_again_with_levers_right(self, who: Who, hand: int, point: str, seen: Array, lost: Truths) -> None:
+        """Put right the levers of those from whom a point ran away, go back to where it was seen and look, in place."""
+        away = np.flatnonzero(lost)
+        mended = away[put_levers_right(self.seat, who[away])]
+        if mended.size:
+            self._go_back(who[mended])
+            seen[:, mended] = self.seen(who[mended], hand, point)
+            lost[mended] = np.isnan(seen[0, mended])
+
+    def _go_back(self, who: Who) -> None:
+        self.seat.drive(who, {"X": self._seen_from[0, who], "Y": self._seen_from[1, who]})
 
     def _ran_away(self, who: Who, hand: int, point: str) -> None:
         for session in who:
@@ -130,7 +149,7 @@ class Eyes:
             (0, "left to right", "diapositive lever"),
             (1, "top to bottom", "Dove prisms"),
         ):
-            seat.drive(one, {"X": self._seen_from[0, one], "Y": self._seen_from[1, one]})
+            self._go_back(one)
             counters, seen = seat.counters(one), self.seen(one, hand, point)
             seat.turn(one, np.eye(2)[:, [axis]])
             counters_then, seen_then = seat.counters(one), self.seen(one, hand, point)
@@ -147,6 +166,10 @@ class Watch:
     def __init__(self, displacements: int, sessions: int) -> None:
         self._before = np.full((displacements, sessions), np.inf)
         self._times = np.zeros((displacements, sessions), dtype=int)
+
+    def growing(self, who: Who) -> Truths:
+        """Return which of the displacements ``(k, m)`` had grown when they were last seen."""
+        return np.asarray(self._times[:, who] > 0)
 
     def running_away(self, who: Who, seen: Array) -> Truths:
         """Return which of the displacements ``(k, m)`` in um have grown in look after look."""

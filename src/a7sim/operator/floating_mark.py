@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from a7sim.geometry import Array
 from a7sim.operator.crew import Who
 from a7sim.operator.eyes import MOST_LOOKS, Eyes, Watch
 from a7sim.operator.hands import Truths
+from a7sim.operator.levers import put_levers_right
 
 LONGEST_RISE_MM = 20.0
 """The foot disc is not turned further than this between two looks."""
@@ -82,15 +84,23 @@ class FloatingMark:
         drum = _Drum(self, who, clearing) if clearing is not None else None
         watch = Watch(4, crew.sessions)
         settled: list[Who] = []
+        begun = np.full((3, crew.sessions), np.nan)
         for looks in range(MOST_LOOKS):
             seen = self.looked(who, point)
+            vanished = watch.growing(who) & np.isnan(seen).any(axis=0)
+            running_away = watch.running_away(who, np.nan_to_num(seen))
+            running_away[3] &= clearing is not None
+            mended = self._look_again_with_levers_right(who, point, seen, (vanished | running_away)[2:], begun)
+            running_away[:, mended] = False
             lost = np.isnan(seen).any(axis=0)
-            self._see_that_it_fuses(who, point, watch.running_away(who, np.nan_to_num(seen)), clearing)
+            self._see_that_it_fuses(who, point, running_away, clearing)
             keep = ~lost & crew.goes_on(who)
             who, seen = who[keep], seen[:, keep]
             if not who.size:
                 return _together(settled)
-            x, y, _ = seat.place(who, seat.counters(who))
+            readings = seat.counters(who)
+            begun[:, who] = np.where(np.isnan(begun[:, who]), readings, begun[:, who])
+            x, y, _ = seat.place(who, readings)
             scale = 1e-3 * seat.z[who] / seat.c
             rise = (seen[2] + judgement.height[who]) * scale * seat.z[who] / np.abs(seat.bx(who))
             rise = np.clip(rise, -LONGEST_RISE_MM, LONGEST_RISE_MM)
@@ -127,6 +137,20 @@ class FloatingMark:
         self.crew.spend(who, self.crew.observer.seconds_to_look, "looking")
         lx, ly, rx, ry = self.crew.looked_at(who, point, self.seat.hands.seen_by_both)
         return np.array([(lx + rx) / 2.0, (ly + ry) / 2.0, lx - rx, ly - ry])
+
+    def _look_again_with_levers_right(
+        self, who: Who, point: str, seen: Array, parallaxes_grow: Truths, begun: Array
+    ) -> npt.NDArray[np.intp]:
+        """Put right the levers of those whose parallaxes grow, go back to where it began and look again, in place.
+
+        Return whose levers were put right, as indices into `who`.
+        """
+        away = np.flatnonzero(parallaxes_grow.any(axis=0))
+        mended = away[put_levers_right(self.seat, who[away])] if away.size else away
+        if mended.size:
+            self.seat.drive(who[mended], dict(zip("XYZ", begun[:, who[mended]], strict=True)))
+            seen[:, mended] = self.looked(who[mended], point)
+        return mended
 
     def _see_that_it_fuses(self, who: Who, point: str, running_away: Truths, clearing: Clearing | None) -> None:
         model = self.seat.model.name

@@ -172,18 +172,16 @@ def _counters(bench: Bench, who: Who, projector: int) -> Mapping[str, Array]:
 
 def _elements(manual: Variant, counters: Mapping[str, Array], projector: int) -> Elements:
     """Return what the counters say of a projector, in mm and radians from the zeros; base in."""
-
-    def tilt(name: str) -> Array:
-        return (counters[f"{name}{projector}"] - manual.elements[f"{name}{projector}"].zero) * GON
-
+    omega, phi, kappa = manual.tilts(counters, projector)
+    nothing = np.zeros_like(counters["bx"])
     return Elements(
         c=counters[f"c{projector}"],
-        omega=tilt("omega"),
-        phi=tilt("phi"),
-        kappa=wrapped(counters[f"kappa{projector}"]) * GON,
-        bx=np.zeros_like(counters["bx"]) if projector == 1 else counters["bx"],
-        by=counters[f"by{projector}"],
-        bz=counters[f"bz{projector}"],
+        omega=omega * GON,
+        phi=phi * GON,
+        kappa=wrapped(kappa) * GON,
+        bx=nothing if projector == 1 else counters["bx"],
+        by=counters.get(f"by{projector}", nothing),
+        bz=counters.get(f"bz{projector}", nothing),
     )
 
 

@@ -33,6 +33,9 @@ class Hands(Protocol):
     def set_fitting(self, who: Who, name: str, position: str) -> None:
         """Put a fitting into a position."""
 
+    def fitting(self, who: Who, name: str) -> npt.NDArray[np.str_]:
+        """Return the positions ``(m,)`` in which a fitting stands."""
+
     def set_element(self, who: Who, name: str, values: Array) -> None:
         """Set an element through its counter to values ``(m,)``, gon or mm, two decimals."""
 

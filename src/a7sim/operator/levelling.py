@@ -212,7 +212,7 @@ def turned_together(settings: Settings, model: ModelJob, manual: Variant, up: Ar
     whole = mxm(rotation(about_x, zero, zero), rotation(zero, about_y, zero))
     found = {}
     for n in (left, right):
-        angles = angles_of(mxm(whole, _stand(settings, manual, n)))
+        angles = angles_of(mxm(whole, rotation(*(GON * tilt for tilt in manual.tilts(settings, n)))))
         for name, radians in zip(("omega", "phi", "kappa"), angles, strict=True):
             found[f"{name}{n}"] = radians / GON + manual.elements[f"{name}{n}"].zero
     base = np.array(
@@ -243,10 +243,3 @@ def turned_by_common_phi(
     upright = y * np.sin(about_x) + z * np.cos(about_x)
     omegas = {name: settings[name] + about_x / GON for name in ("omega1", "omega2")}
     return omegas | {"common_phi": zero - np.arctan2(x, upright) / GON, "bx": factor * settings["bx"]}
-
-
-def _stand(settings: Settings, manual: Variant, n: int) -> Array:
-    omega, phi, kappa = (
-        (settings[f"{name}{n}"] - manual.elements[f"{name}{n}"].zero) * GON for name in ("omega", "phi", "kappa")
-    )
-    return rotation(omega, phi, kappa)

@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from a7sim.geometry import Array
-from a7sim.manual import NOT_VISIBLE
+from a7sim.manual import NOT_VISIBLE, POSITIONS_OF
 from a7sim.operator.crew import Who
 from a7sim.operator.hands import Truths
 from a7sim.operator.person import Person
@@ -27,6 +28,11 @@ _FITTING_NODES: Mapping[str, str] = {
     "ycollar": "YCOL",
 }
 _SHORT = {"inside": "IN", "outside": "OUT", "front": "FRON", "right": "RIGH"}
+
+
+def _short(position: str) -> str:
+    """Return the short form of a position, as it is said and shown."""
+    return _SHORT.get(position, position.upper())
 
 
 class LineHands:
@@ -55,7 +61,11 @@ class LineHands:
         self._send(f"BASE:MODE {_SHORT[mode]}")
 
     def set_fitting(self, who: Who, name: str, position: str) -> None:
-        self._send(f"FITT:{_FITTING_NODES[name]} {_SHORT.get(position, position.upper())}")
+        self._send(f"FITT:{_FITTING_NODES[name]} {_short(position)}")
+
+    def fitting(self, who: Who, name: str) -> npt.NDArray[np.str_]:
+        shown = self._person.client.ask(f"FITT:{_FITTING_NODES[name]}?")
+        return np.array([each for each in POSITIONS_OF[name] if _short(each) == shown])
 
     def set_element(self, who: Who, name: str, values: Array) -> None:
         self._send(f"{header(name)} {values[0]:.2f}")

@@ -95,13 +95,16 @@ def plotted(
     view = StereoView(bench, person)
     begin_form(bench, bench.seat.model, "absolute orientation", begins)
     gear = TABLE_GEARS[job.plan.plan_gear]
-    corners = [record.model.standard_points[label] for label in "3456" if label in record.model.standard_points]
+    corners = {label: record.model.standard_points.get(label, "") for label in "3456"}
     first = oriented(bench, record.points, control, record.z_units_per_mm)
     number = gear * (order.map_scale or _round_scale(1e3 * float(first.similarity.scale) / gear))
-    model = levelled(bench, view, record.points, control, number, corners)
-    if len(corners) < 4 or not all(name in model.points for name in corners):
+    model = levelled(bench, view, record.points, control, number, list(corners.values()))
+    seen = [label for label, name in corners.items() if name in model.points]
+    if not all(any(label in seen for label in border) for border in ("34", "56", "35", "46")):
         bench.crew.give_up(
-            bench.crew.everybody, f"{record.model.name}: standard points 3 to 6, the corners of the model, are not seen"
+            bench.crew.everybody,
+            f"{record.model.name}: of standard points 3 to 6, the corners of the model, only "
+            f"{', '.join(seen) or 'none'} can be seen: they leave a side of it open",
         )
     area = Area.within(record.model.standard_points, model.points)
     work = Compilation(bench, person, view, model, area, order.tracing)

@@ -140,13 +140,6 @@ def preparation(flight: Flight, variant: Variant, map_scale: float | None = None
     return Preparation(flight, optimum, _base(flight, optimum), scales, chosen, _reason(chosen, possible))
 
 
-def base_of_clearings(readings: Sequence[float]) -> float:
-    """Return bx in mm as the mean of those at which the x-parallax of single points vanishes (thesis 3.2.3.5)."""
-    if not readings:
-        raise Mistake("expected readings of bx, got none")
-    return math.fsum(readings) / len(readings)
-
-
 def _longest(variant: Variant) -> float:
     return -variant.carriages["Z"][0]
 

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import GON, Array
+from a7sim.manual import TILTS
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import NobodyGoesOn, Who
 from a7sim.operator.hands import Truths
@@ -14,7 +15,7 @@ from a7sim.operator.job import ModelJob
 from a7sim.operator.seat import wrapped
 from a7sim.reduction import Stand, Undetermined, element_corrections
 from a7sim.reduction.hallert import REGULAR_POINTS, regular_corrections
-from a7sim.standard_points import CASES
+from a7sim.standard_points import CASES, POSITIONS, determine_orientation
 
 MOST_ROUNDS = 12
 MOST_ROUGH_ROUNDS = 3
@@ -154,7 +155,7 @@ def relative_orientation(
     Once the parallaxes of a round are no longer gross their mean is taken off; in the dependent method, where by is
     itself unknown, only to see whether they fall. When they no longer do, the best settings stand and their
     mean goes on by' (dependent: on the by that was turned). Those whose residual parallaxes at all standard points
-    then have a larger rms than tolerated, in mm, give up.
+    then have a larger rms than tolerated, in mm, give up, and so do those whose prints show too few of the points.
     """
     crew, seat = bench.crew, bench.seat
     if not seat.measures_parallax:
@@ -162,8 +163,31 @@ def relative_orientation(
             who, f"an {seat.manual.name} has no by' and by\" to measure parallaxes with: it is oriented empirically"
         )
         raise NobodyGoesOn
-    plan = bench.job.plan
-    labels = model.points_of_case(case)
+    done = []
+    positions = {model.standard_points[label]: label for label in model.all_positions()}
+    for them, points in bench.alike(who, list(positions)):
+        there = [positions[point] for point in points]
+        labels = [label for label in there if label in CASES[case]]
+        if determine_orientation(labels):
+            found = _oriented(bench, them, model, method, case, labels, readings, base)
+            done.append((them, assessed(bench, crew.still(them), model, found, there, readings, tolerated_rms)))
+        else:
+            crew.give_up(them, _too_few(model, case, labels))
+    return merged(done, method, case, crew.sessions, "numerical")
+
+
+def _too_few(model: ModelJob, case: str, labels: Sequence[str]) -> str:
+    return (
+        f"{model.name}: of the points of case {case} only {', '.join(labels) or 'none'} can be used: there must be one "
+        "in each of the three rows, and two or more in two of them, to orient a model"
+    )
+
+
+def _oriented(
+    bench: Bench, who: Who, model: ModelJob, method: str, case: str, labels: Sequence[str], readings: int, base: float
+) -> RelativeOrientations:
+    """Return what came of the rounds on the points at some positions, the best settings standing."""
+    crew, seat, plan = bench.crew, bench.seat, bench.job.plan
     unknowns = unknowns_of(method, model)
     measured_with = {"both": (1, 2), "by1": (1,), "by2": (2,)}[plan.measure_with]
     points = [model.standard_points[label] for label in labels]
@@ -199,8 +223,28 @@ def relative_orientation(
     seat.set_changed(who, {name: kept[who] for name, kept in best.settings.items()})
     _set_mean_on_by(bench, who, model, "by1" if method == "independent" else unknowns[3], best.mean)
     bench.begin_round(who, int(done[who].max(initial=0)) + 1)
-    found = RelativeOrientations(method, case, rounds, rough_rounds, {}, {}, {})
-    return assessed(bench, who, model, found, model.all_positions(), readings, tolerated_rms)
+    return RelativeOrientations(method, case, rounds, rough_rounds, {}, {}, {})
+
+
+def merged(
+    groups: Sequence[tuple[Who, RelativeOrientations]], method: str, case: str, sessions: int, procedure: str
+) -> RelativeOrientations:
+    """Return the orientations of all groups in one."""
+    labels = [label for label in POSITIONS if any(label in found.residuals for _, found in groups)]
+    elements: dict[str, Array] = {}
+    residuals = {label: np.full(sessions, np.nan) for label in labels}
+    places = {label: np.full((3, sessions), np.nan) for label in labels}
+    for who, found in groups:
+        for name, counts in found.elements.items():
+            elements.setdefault(name, np.zeros(sessions))[who] = counts[who]
+        for label in found.residuals:
+            residuals[label][who] = found.residuals[label][who]
+            places[label][:, who] = found.places[label][:, who]
+    rounds = [each for _, found in groups for each in found.rounds]
+    rough = np.sum([found.rough_rounds for _, found in groups], axis=0, dtype=np.intp)
+    return RelativeOrientations(
+        method, case, rounds, np.broadcast_to(rough, sessions), elements, residuals, places, procedure
+    )
 
 
 class _Best:
@@ -366,7 +410,12 @@ def _pattern(places: Array, base: Array) -> tuple[Array, Array, Array]:
 
 def _on_pattern(bench: Bench, who: Who, labels: Sequence[str], places: Array, base: Array) -> Truths:
     """Return whose points ``(3, n, m)`` lie near enough to the pattern of six or nine for the closed form."""
+    if not labels:
+        return np.zeros(who.size, dtype=bool)
     if "".join(labels) not in (CASES["A"], CASES["D"]):
+        bench.crew.remark(
+            who, f"{bench.seat.model.name}: no closed form for the points {' '.join(labels)}, so by least squares"
+        )
         return np.zeros(who.size, dtype=bool)
     pattern = np.array(_pattern(places, base))
     x, y = np.array(REGULAR_POINTS)[:, : len(labels), None]
@@ -378,6 +427,7 @@ def _on_pattern(bench: Bench, who: Who, labels: Sequence[str], places: Array, ba
 
 def stand_of(bench: Bench, who: Who, projector: int, x: Array) -> Stand:
     """Return how projectors stand by their counters, the centres at x ``(m,)`` of the instrument frame."""
-    names = [f"{name}{projector}" for name in ("omega", "phi", "kappa", "by", "bz")]
-    omega, phi, kappa, by, bz = bench.seat.from_zero(who, names).values()
+    counts = bench.seat.elements(who, [f"{name}{projector}" for name in (*TILTS, "by", "bz")])
+    omega, phi, kappa = bench.seat.manual.tilts(counts, projector)
+    by, bz = counts[f"by{projector}"], counts[f"bz{projector}"]
     return Stand(np.array([x, -by, bz]), GON * np.array([omega, phi, wrapped(kappa)]))

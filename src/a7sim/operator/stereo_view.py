@@ -81,13 +81,25 @@ class Look:
         """Size in the model by size in the photographs."""
         return self.spacing / self.pitch
 
+    def patch(self, side: int) -> Array:
+        """Return displacements in plan ``(2, n)`` over so many picture elements each way, mm in the model."""
+        at = self.spacing * (np.arange(side) - (side - 1) / 2.0)
+        return np.array(np.meshgrid(at, at)).reshape(2, -1)
+
+    def elements_at(self, seen: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+        """Return columns and rows ``(..., n)`` of places ``(..., 2, n)``, and which are seen free of the mark."""
+        columns = seen[..., 0, :] / self.pitch + (SIDE - 1) / 2.0
+        rows = -seen[..., 1, :] / self.pitch + (SIDE - 1) / 2.0
+        inside = (columns >= 0) & (columns < SIDE - 1) & (rows >= 0) & (rows < SIDE - 1)
+        uncovered = np.hypot(seen[..., 0, :], seen[..., 1, :]) > _MARK_RADIUS * self.pitch
+        return columns, rows, inside & uncovered
+
     def places(self, surface: Array) -> tuple[Array, Array]:
         """Return displacements ``(2, n)`` over the patch and where either eye sees them on a surface ``(2, 2, n)``.
 
         `surface` is height, slope in X, slope in Y in the model, and y-parallax at photo scale.
         """
-        at = self.spacing * (np.arange(_PATCH) - (_PATCH - 1) / 2.0)
-        plan = np.array(np.meshgrid(at, at)).reshape(2, -1)
+        plan = self.patch(_PATCH)
         raised = np.concatenate([plan, [surface[0] + surface[1:3] @ plan]])
         seen = self.shown @ raised
         seen[0, 1] += surface[3] / 2.0
@@ -113,13 +125,11 @@ class StereoView:
 
     def camera(self, hand: int) -> tuple[Array, Array]:
         """Return centre ``(3,)`` and rotation ``(3, 3)`` of the left-hand (1) or right-hand (2) photograph's camera."""
-        n, zeros = self._bench.seat.projector(hand), self._bench.seat.manual.elements
-        kappa, phi, omega = (
-            (self._elements[f"{name}{n}"] - zeros[f"{name}{n}"].zero) * GON for name in ("kappa", "phi", "omega")
-        )
+        n = self._bench.seat.projector(hand)
+        turned = rotation(*(tilt * GON for tilt in self._bench.seat.manual.tilts(self._elements, n)))
         x = 0.0 if hand == 1 else self._elements["bx"]
         centre = np.array([x, -self._elements[f"by{n}"], self._elements[f"bz{n}"]])
-        return centre, rotation(omega, phi, kappa)
+        return centre, turned
 
     def displacements(self, mark: Array) -> Array:
         """Return the derivatives ``(2 eyes, 2, 3)`` of what the eyes see by displacements from the mark ``(3,)``."""
@@ -191,11 +201,8 @@ def _compared(look: Look, surface: Array) -> tuple[Array, Array, Array, Array, A
     Places that the mark covers or that lie outside either picture are left out.
     """
     plan, seen = look.places(surface)
-    columns = seen[:, 0] / look.pitch + (SIDE - 1) / 2.0
-    rows = -seen[:, 1] / look.pitch + (SIDE - 1) / 2.0
-    inside = ((columns >= 0) & (columns < SIDE - 1) & (rows >= 0) & (rows < SIDE - 1)).all(axis=0)
-    uncovered = (np.hypot(seen[:, 0], seen[:, 1]) > _MARK_RADIUS * look.pitch).all(axis=0)
-    keep = inside & uncovered
+    columns, rows, plain = look.elements_at(seen)
+    keep = plain.all(axis=0)
     greys, slopes = [], []
     for eye in (0, 1):
         grey, slope = _interpolated(look.pictures[eye], columns[eye, keep], rows[eye, keep])
@@ -223,13 +230,9 @@ def rectified(look: Look, surface: Surface, side: int) -> tuple[npt.NDArray[np.b
 
     The patch is `side` picture elements each way; places are displacements from the mark in plan, mm in the model.
     """
-    at = look.spacing * (np.arange(side) - (side - 1) / 2.0)
-    plan = np.array(np.meshgrid(at, at)).reshape(2, -1)
+    plan = look.patch(side)
     seen = look.shown[0] @ np.concatenate([plan, [surface.height + surface.slope @ plan]])
-    columns = seen[0] / look.pitch + (SIDE - 1) / 2.0
-    rows = -seen[1] / look.pitch + (SIDE - 1) / 2.0
-    inside = (columns >= 0) & (columns < SIDE - 1) & (rows >= 0) & (rows < SIDE - 1)
-    inside &= np.hypot(seen[0], seen[1]) > _MARK_RADIUS * look.pitch
+    columns, rows, inside = look.elements_at(seen)
     grey = np.zeros(inside.size)
     grey[inside] = _interpolated(look.pictures[0], columns[inside], rows[inside])[0]
     return inside, grey, plan

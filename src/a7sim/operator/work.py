@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.manual import RIGHT_FITTINGS
 from a7sim.operator.absolute import OnGround, absolute_orientation_at
 from a7sim.operator.bench import Bench
 from a7sim.operator.centres import centre_of, observe_centre
@@ -15,11 +14,13 @@ from a7sim.operator.crew import Crew, NobodyGoesOn, Who
 from a7sim.operator.empirical import empirical_orientation, set_off
 from a7sim.operator.interior import InteriorOrientation, InteriorOrientations, interior_orientation
 from a7sim.operator.job import Job, ModelJob
+from a7sim.operator.levers import right_fittings
 from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
 from a7sim.operator.plate import prints_of
 from a7sim.operator.relative import RelativeOrientation, RelativeOrientations, relative_orientation
 from a7sim.reduction import PerspectiveCentre
+from a7sim.standard_points import CASES
 
 
 @dataclass(frozen=True)
@@ -108,11 +109,12 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
         prints = take_up_prints(bench, model)
         see_that_somebody_goes_on(bench)
         bench.begin(crew.everybody, model, prints)
-        bench.preset(crew.everybody, model.standard_points["1"])
+        remark_on_absent_points(bench, model)
+        preset_counters(bench, model)
         begin_form(bench, model, "relative orientation", begins)
         orientation = oriented(bench, model)
         begin_form(bench, model, "model coordinates", begins)
-        points = model_coordinates(bench, model, prints)
+        points = model_coordinates(bench, model)
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
             begin_form(bench, model, f"{side} perspective centre", begins)
@@ -142,19 +144,43 @@ def see_that_somebody_goes_on(bench: Bench) -> None:
         raise NobodyGoesOn
 
 
-def model_coordinates(bench: Bench, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> dict[str, Array]:
+def remark_on_absent_points(bench: Bench, model: ModelJob) -> None:
+    """Write into the book which points of the case lie in water, or are not pricked on both prints."""
+    crew = bench.crew
+    listed = {label: model.standard_points.get(label, "") for label in CASES[bench.job.plan.case]}
+    for who, there in bench.alike(crew.everybody, list(listed.values())):
+        absent = [f"{label} ({name})" if name else label for label, name in listed.items() if name not in there]
+        if absent:
+            crew.remark(who, f"{model.name}: not pricked on both prints, done without: {', '.join(absent)}")
+
+
+def preset_counters(bench: Bench, model: ModelJob) -> None:
+    """Preset the counters at point 1, as the thesis does, or where that is not there at the first point that is.
+
+    Those who find no standard point at all on both their prints give up.
+    """
+    crew = bench.crew
+    waiting = crew.everybody
+    for label in model.all_positions():
+        point = model.standard_points[label]
+        there = bench.pricked(waiting, point)
+        presetting, waiting = waiting[there], waiting[~there]
+        if presetting.size:
+            if label != "1":
+                crew.remark(presetting, f"{model.name}: there is no point 1: counters preset at {point}, point {label}")
+            bench.preset(presetting, point)
+    crew.give_up(waiting, f"{model.name}: no standard point is pricked on both prints")
+
+
+def model_coordinates(bench: Bench, model: ModelJob) -> dict[str, Array]:
     """Measure all points that both prints show; sessions whose prints show the same do it together."""
     crew = bench.crew
-    wanted = dict.fromkeys([*model.standard_points.values(), *model.other_points])
-    on_both = [name for name in wanted if name in prints[1] and name in prints[2]]
-    shown = np.array([~np.isnan(prints[1][name] + prints[2][name])[0] for name in on_both])
-    points = {name: np.full((3, crew.sessions), np.nan) for name in on_both}
-    for pattern in np.unique(shown[:, crew.everybody], axis=1).T:
-        alike = crew.everybody[(shown[:, crew.everybody] == pattern[:, None]).all(axis=0)]
-        names = [name for name, is_shown in zip(on_both, pattern, strict=True) if is_shown]
+    wanted = list(dict.fromkeys([*model.standard_points.values(), *model.other_points]))
+    points: dict[str, Array] = {}
+    for alike, names in bench.alike(crew.everybody, wanted):
         for name, measured in zip(names, np.moveaxis(bench.measure(alike, names), 1, 0), strict=True):
-            points[name][:, alike] = measured[:, alike]
-    return {name: points[name] for name in on_both}
+            points.setdefault(name, np.full((3, crew.sessions), np.nan))[:, alike] = measured[:, alike]
+    return {name: points[name] for name in wanted if name in points}
 
 
 def begin_form(bench: Bench, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
@@ -180,8 +206,7 @@ def oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
 def set_base_and_fittings(bench: Bench, base: str, polarity: str) -> None:
     """Set base in or out, and the fittings that belong to it and to the pictures."""
     who, hands = bench.crew.everybody, bench.hands
-    words = RIGHT_FITTINGS[polarity, base].as_words()
-    right = {name: position for name, position in words.items() if name in bench.seat.manual.fittings}
+    right = right_fittings(bench.seat.manual, polarity, base)
     bench.seat.spend_setting(who, 1 + len(right))
     hands.set_base_mode(who, base)
     for name, position in right.items():
@@ -218,10 +243,14 @@ def take_up_prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]
     for hand, projector in ((1, model.left_projector), (2, model.right_projector)):
         prints[hand] = prints_of(bench, who, projector)
     common = [name for name in prints[1] if name in prints[2]]
-    shifts = np.array([prints[1][name][0] - prints[2][name][0] for name in common]).reshape(-1, crew.sessions)
-    shift = np.nanmean(shifts[:, who], axis=0) if common else np.zeros(who.size)
+    shifts = np.array([prints[1][name][0] - prints[2][name][0] for name in common]).reshape(-1, crew.sessions)[:, who]
+    nowhere = np.isnan(shifts).all(axis=0)
     crew.give_up(
-        who[shift <= 0.0],
+        who[nowhere], f"{model.name}: no point is pricked on both the prints of {model.left} and {model.right}"
+    )
+    who, shifts = who[~nowhere], shifts[:, ~nowhere]
+    crew.give_up(
+        who[np.nanmean(shifts, axis=0) <= 0.0] if who.size else who,
         f"{model.name}: the prints of {model.left} and {model.right} do not overlap towards each other: the "
         "photographs have changed places, or one lies upside down",
     )

@@ -8,6 +8,7 @@ from a7sim.scenario.loading import (
     scenario_of,
     scenario_schema,
 )
+from a7sim.scenario.requests import Request, RequestedScenario, rephrased, requested
 from a7sim.scenario.schema import (
     SCHEMA_VERSION,
     Camera,
@@ -20,11 +21,8 @@ from a7sim.scenario.schema import (
     Photo,
     Plan,
     ProjectorCondition,
-    Request,
-    RequestedScenario,
     Scenario,
     StripPlan,
-    requested,
 )
 from a7sim.scenario.schema import Model as ModelPlan
 from a7sim.scenario.skills import PROFILES, observer_of_skill
@@ -52,6 +50,7 @@ __all__ = [
     "find_scenario",
     "load_scenario",
     "observer_of_skill",
+    "rephrased",
     "requested",
     "scenario_of",
     "scenario_schema",

@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from a7sim.standard_points import CASES, POSITIONS
+from a7sim.standard_points import POSITIONS, determine_orientation
 
 LEAST_SEPARATION = 1.0
 """Counter units between the two levels of a perspective centre."""
@@ -203,6 +203,6 @@ def _mistakes_in_positions(positions: Mapping[str, Any], path: str) -> Iterator[
     for label, name in positions.items():
         if count[str(name)] > 1:
             yield f"{path}.{label}: expected a point of its own, got {name!r} at {count[str(name)]} positions"
-    missing = [label for label in CASES["A"] if label not in positions]
-    if missing:
-        yield f"{path}: expected all of the positions 1 to 6, got none for {', '.join(missing)}"
+    if not determine_orientation(positions):
+        got = ", ".join(label for label in POSITIONS if label in positions) or "none"
+        yield f"{path}: expected a point in each of the three rows, and two or more in two of them, got {got}"

@@ -110,6 +110,14 @@ class Photo(_Data, frozen=True, kw_only=True):
     """How the picture was laid in its carrier; upside down is a slip for training."""
 
 
+class Water(_Data, frozen=True, kw_only=True):
+    """A sheet of water: no point on it can be pricked, and its picture shows nothing to set a mark on."""
+
+    name: Name = "lake"
+    shore: Annotated[list[tuple[Metres, Metres]], Meta(min_length=3, max_length=200, description="3 to 200 places")]
+    """East and north along the shore, once round."""
+
+
 class Terrain(_Data, frozen=True, kw_only=True):
     """Rolling ground about a mean height."""
 
@@ -118,6 +126,7 @@ class Terrain(_Data, frozen=True, kw_only=True):
     """The heights stay within mean_height -+ relief."""
     wavelength: Annotated[float, Meta(gt=0, le=1e6, description="a wavelength in metres above 0")] = 800.0
     seed: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] = 0
+    water: list[Water] = []
 
 
 class Air(_Data, frozen=True, kw_only=True):
@@ -173,7 +182,7 @@ class Model(_Data, frozen=True, kw_only=True):
     right: Name
     base: Literal["inside", "outside"] = "inside"
     standard_points: dict[str, Name] | None = None
-    """Position (1-6, a-i) to point name; generated on the terrain when absent."""
+    """Position (1-6, a-i) to point name; laid out on dry land of the terrain when absent."""
     published: Published | None = None
 
 
@@ -388,7 +397,7 @@ class Plan(_Data, frozen=True, kw_only=True):
     """Units of the Z counter a mm; 8 is this project's assumption (geometry.md, Gears)."""
     plan_gear: Name = "1-2-1"
     preset: tuple[Reading, Reading, Reading] = (5000.0, 5000.0, 5000.0)
-    """What X, Y and Z shall show at point 1."""
+    """What X, Y and Z shall show at point 1, or where that is under water at the first standard point there is."""
     centre_method: Literal["two levels", "levels", "grid plate", "scales"] = "two levels"
     """Lines through points 1 to 6 at two levels of Z or more (thesis 3.6), or resection of a grid plate put in the
     picture's place."""
@@ -523,23 +532,3 @@ class Scenario(_Data, frozen=True, kw_only=True):
     def half_width(self) -> float:
         """Distance of the outer rows of standard points from the base, mm in the photograph."""
         return HALF_WIDTH_MM if self.plotting is None else self.plotting.half_width
-
-
-class Request(_Data, frozen=True):
-    """How somebody asked for a session: the command that gives it again, and what it changed in the scenario's file."""
-
-    command_line: str
-    settings: dict[str, str]
-    """Changed values by their path."""
-
-
-class RequestedScenario(Scenario, frozen=True, kw_only=True):
-    """A scenario as somebody asked for it; files know nothing of the request."""
-
-    request: Request
-
-
-def requested(scenario: Scenario, request: Request) -> RequestedScenario:
-    """Return a scenario with the request that chose it."""
-    values = {name: getattr(scenario, name) for name in Scenario.__struct_fields__}
-    return RequestedScenario(**values, request=request)

@@ -12,6 +12,9 @@ from a7sim.scene.terrain import Ground
 SIGNAL_MM = 0.12
 """Half the arm of a signal on film."""
 
+WATER_TONE = 0.2
+"""Grey of still water from above, without any detail [assumption]."""
+
 _OCTAVES_M = (160.0, 47.0, 13.0, 3.7, 1.1)
 
 
@@ -80,6 +83,8 @@ def picture_of_ground(
         perspective = _undone(imaging, np.einsum("ij,j...->i...", from_film, xy))
         met = ground.met_by(centre, ray_of(perspective, rotation, c))
         grey = with_lines(lines, met[:2], ground_texture(met[0], met[1]))
+        if ground.shores:
+            grey = np.where(ground.under_water(met[:2]), WATER_TONE, grey)
         return np.maximum(grey, covered(xy))
 
     return content

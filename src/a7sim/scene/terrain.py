@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from a7sim.geometry import Array
 from a7sim.scenario.schema import Terrain
+
+Truths = npt.NDArray[np.bool_]
 
 _WAVES = 7
 
@@ -18,6 +21,8 @@ class Ground:
     amplitudes: Array
     wave_numbers: Array
     phases: Array
+    shores: tuple[Array, ...] = ()
+    """Of every sheet of water, places ``(2, n)`` in m once round."""
 
     @classmethod
     def of(cls, terrain: Terrain) -> "Ground":
@@ -31,6 +36,7 @@ class Ground:
             terrain.relief * shares / shares.sum(),
             2.0 * np.pi / lengths * np.array([np.cos(azimuths), np.sin(azimuths)]),
             rng.uniform(0.0, 2.0 * np.pi, _WAVES),
+            tuple(np.array(water.shore).T for water in terrain.water),
         )
 
     def height(self, east: Array, north: Array) -> Array:
@@ -48,3 +54,21 @@ class Ground:
             met = centre + (level - centre[2]) / direction[2] * direction
             level = self.height(met[0], met[1])
         return np.asarray(met)
+
+    def under_water(self, plan: Array) -> Truths:
+        """Return which places ``(2, ...)`` in m lie within a shore."""
+        wet = np.zeros(plan.shape[1:], dtype=bool)
+        for shore in self.shores:
+            wet |= _within(shore, plan)
+        return wet
+
+
+def _within(border: Array, plan: Array) -> Truths:
+    """Return which places ``(2, ...)`` a closed border ``(2, n)`` runs round: a line to the east crosses it oddly."""
+    east, north = plan
+    odd = np.zeros(plan.shape[1:], dtype=bool)
+    for (x1, y1), (x2, y2) in zip(border.T, np.roll(border, -1, axis=1).T, strict=True):
+        if y1 != y2:
+            crossing = x1 + (north - y1) / (y2 - y1) * (x2 - x1)
+            odd ^= ((y1 > north) != (y2 > north)) & (east < crossing)
+    return odd

@@ -46,7 +46,7 @@ class Scene:
     stations: dict[str, Station]
     ground_points: dict[str, Array]
     standard_points: dict[str, dict[str, str]]
-    """Model name to position to point name."""
+    """Model name to position to point name; where a position lies in water there is none."""
     other_points: tuple[str, ...]
     """Names of the signalised and the measured points that a job sheet lists beside the standard points."""
     published: dict[str, RelativeTruth]
@@ -147,8 +147,10 @@ def _lay_out_standard_points(
     names = {}
     for label, (share, row) in PLACES.items():
         east, north = left[:2] + share * along + row * half_width * across
-        names[label] = _standard_name(model, label)
-        signalised.setdefault(names[label], np.array([east, north, _height_of(ground, east, north)]))
+        name = _standard_name(model, label)
+        place = signalised.setdefault(name, np.array([east, north, _height_of(ground, east, north)]))
+        if not ground.under_water(place[:2]):
+            names[label] = name
     return names
 
 
@@ -181,10 +183,11 @@ def _photograph(
         names, calibrated = fiducial_places(camera)
         fiducials = Marks(names, deformation.of_fiducials(calibrated, filming))
         station = stations[photo.name]
-        imaged = Marks(tuple(signalised), _imaged(scenario, station, ground, np.array(list(signalised.values())).T))
-        before = np.array(list(signalised.values())).T[2] < station.centre[2]
+        places = np.array(list(signalised.values())).T
+        imaged = Marks(tuple(signalised), _imaged(scenario, station, ground, places))
+        visible = (places[2] < station.centre[2]) & ~ground.under_water(places[:2])
         imaged = Marks(imaged.names, deformation.of_points(imaged.xy, filming))
-        points = chosen(imaged, within_format(imaged.xy) & before)
+        points = chosen(imaged, within_format(imaged.xy) & visible)
         to_film = deformation.matrix
         content = picture_of_ground(
             ground,

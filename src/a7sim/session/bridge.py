@@ -1,53 +1,80 @@
 """A strip bridged at the instrument beside the same strip of independent models, both on the ground."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from a7sim.documents import Document, head, of_absolute, of_adjustment
+from a7sim.documents import Document, as_json, head, of_absolute, of_adjustment
 from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit
 from a7sim.operator.bridging import BridgedModels, bridge
 from a7sim.reduction import Ground, Model, Undetermined, absolute_orientation, strip_adjustment
-from a7sim.scenario import Scenario
+from a7sim.scenario import Scenario, rephrased
+from a7sim.session.folder import MODELS, RESULTS, prepare_folder, write_whole
+from a7sim.session.journal import Journal
+from a7sim.session.results import models_csv, of_request
 from a7sim.session.running import Watcher, open_session, run
+from a7sim.session.sitting import journal_header, sitting
 from a7sim.session.strips import ground_of
 from a7sim.sheets import sheet
+
+INDEPENDENT = "independent"
+"""Folder of the independent models within that of the bridge."""
 
 Places = dict[str, tuple[float, float, float]]
 
 
-def run_bridge(scenario: Scenario, seed: int, watcher: Watcher | None = None) -> Document:
-    """Bridge a strip, work the same models independently, and return both on the ground.
+def run_bridge(
+    scenario: Scenario, seed: int, out: Path | None = None, watcher: Watcher | None = None, force: bool = False
+) -> Document:
+    """Bridge a strip, work the same models independently, and return both on the ground; with `out`, leave the files.
 
+    There the files of bridging are those of `run`, and the independent models have a folder of their own.
     `status` is 'complete', or 'does not fit' with the `message` of the operator who gave up. Raises Mistake for a
-    plotter that cannot bridge.
+    plotter that cannot bridge, and for a folder that cannot be used, before anything is written.
     """
     watcher = watcher or Watcher()
     if len(scenario.models) < 2 or "outside" not in {model.base for model in scenario.models}:
         raise Mistake("models: expected a strip with base inside and outside in turn, as bridging needs")
-    document = head("bridge") | {"scenario": scenario.title, "seed": seed, "status": "complete", "message": ""}
-    session = open_session(scenario, seed)
-    ground = ground_of(scenario, session.scene)
+    journal = Journal()
+    session = open_session(scenario, seed, journal.heard)
+    job = session.job
+    if out is not None:
+        prepare_folder(out, force)
     done: list[Document] = []
-    places: list[Places] = []
-    try:
-        for model in bridge(session.person, session.job, watcher.tick, watcher.begins):
-            places.append(model.places_of(0))
+    places: dict[str, Places] = {}
+    document = head("bridge") | of_request(scenario)
+    document |= {"scenario": scenario.title, "seed": seed, "status": "failed", "message": ""}
+    document["bridged"] = {"models": done}
+
+    def leaves() -> dict[str, str]:
+        return {MODELS: models_csv([_as_model(name, each) for name, each in places.items()])}
+
+    about = journal_header(scenario, seed) | {"work": "bridging"}
+    with sitting(document, session.person, journal, about, out, leaves):
+        for model in bridge(session.person, job, watcher.tick, watcher.begins):
+            places[model.model.name] = model.places_of(0)
             done.append(_of_model(model))
-    except DoesNotFit as trouble:
-        return document | {"status": "does not fit", "message": str(trouble), "bridged": {"models": done}}
-    document["bridged"] = {
-        "models": done,
-        "strip": _on_ground(bridged_strip(places), ground, scenario),
+    if document["status"] != "complete":
+        return document
+    document["bridged"] |= {
+        "strip": _on_ground(bridged_strip([*places.values()]), ground_of(scenario, session.scene), scenario),
         "hours": round(session.person.clock.now / 3600.0, 3),
     }
-    alone = run(scenario, seed, watcher=watcher)
+    alone = run(
+        rephrased(scenario, "a7sim bridge", "a7sim run"), seed, out / INDEPENDENT if out else None, watcher, force
+    )
     document |= {"status": alone["status"], "message": alone["message"]}
     document["independent"] = {"strip": alone.get("strip", {}), "hours": alone["operator"]["hours"]}
+    if out is not None:
+        write_whole(out / RESULTS, as_json(document))
     return document
+
+
+def _as_model(name: str, places: Places) -> Model:
+    return Model(name, tuple(places), np.array([*places.values()]).T)
 
 
 def bridged_strip(places: Sequence[Places]) -> Model:
@@ -73,7 +100,7 @@ def _on_ground(strip: Model, ground: Ground, scenario: Scenario) -> Document:
 def _of_model(bridged: BridgedModels) -> Document:
     orientation = bridged.orientation.of(0)
     mm = [1.0, 1.0, 1.0 / bridged.z_units_per_mm]
-    common = {name: [round(v, 4) for v in each[:, 0] * mm] for name, each in bridged.common.items()}
+    common = {name: [round(float(v), 4) for v in each[:, 0] * mm] for name, each in bridged.common.items()}
     return {
         "model": bridged.model.name,
         "left": bridged.model.left,

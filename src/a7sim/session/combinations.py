@@ -11,7 +11,7 @@ from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.operator import ModelJob
 from a7sim.reduction import Ground, Model, Undetermined
-from a7sim.scenario import Request, RequestedScenario, Scenario, requested
+from a7sim.scenario import Scenario, rephrased
 from a7sim.scenario.schema import StripPlan
 from a7sim.scene import build_scene
 from a7sim.session import results
@@ -63,10 +63,7 @@ def run_combinations(
 
 def _in_case(scenario: Scenario, case: str) -> Scenario:
     of_case = msgspec.structs.replace(scenario, plotting=msgspec.structs.replace(scenario.plan, case=case))
-    if not isinstance(of_case, RequestedScenario):
-        return of_case
-    command_line = of_case.request.command_line.replace("--strips all", f"--case {case}")
-    return requested(of_case, Request(command_line, of_case.request.settings | {"plan.case": f'"{case}"'}))
+    return rephrased(of_case, "--strips all", f"--case {case}", {"plan.case": f'"{case}"'})
 
 
 def _see_that_strips_can_be_made(scenario: Scenario) -> None:

@@ -8,20 +8,20 @@ from pathlib import Path
 import numpy as np
 
 import a7sim
-from a7sim.documents import Document, as_json, head, of_absolute
+from a7sim.documents import Document, head, of_absolute
 from a7sim.geometry import Array, length_of
 from a7sim.manual import BASE_COMPONENTS, VARIANTS
 from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit
 from a7sim.operator.compilation import CONTOUR, Errand, Traced, Tracing
 from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, plotted
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
-from a7sim.session.folder import BOOK, GEOJSON, JOURNAL, RESULTS, SVG, prepare_folder, write_whole
+from a7sim.session.folder import GEOJSON, SVG, prepare_folder
 from a7sim.session.journal import Journal
 from a7sim.session.map_sheet import as_geojson, as_svg
-from a7sim.session.results import of_operator, of_request, of_slips
+from a7sim.session.results import of_request
 from a7sim.session.running import Session, Watcher, open_session
+from a7sim.session.sitting import journal_header, sitting
 from a7sim.session.strips import given_control
 
 OLD_MAP_M = 5.0
@@ -67,37 +67,21 @@ def compile_model(
     order = _order(wanted, scenario, session.scene)
     if out is not None:
         prepare_folder(out, force)
-    document = (
-        head("compile")
-        | of_request(scenario)
-        | {
-            "software": f"a7sim {a7sim.__version__}",
-            "scenario": scenario.title,
-            "seed": seed,
-            "model": wanted.model,
-            "status": "complete",
-            "message": "",
-        }
-    )
-    journalled = {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
-    with journal.opened(out / JOURNAL if out else None, journalled):
-        try:
-            sheet = _sheet(session, wanted, order, watcher)
-            document |= _of_sheet(sheet, session.scene, scenario)
-            if out is not None:
-                write_whole(out / GEOJSON, as_geojson(sheet))
-                write_whole(out / SVG, as_svg(sheet, scenario.title))
-        except DoesNotFit as trouble:
-            document |= {"status": "does not fit", "message": str(trouble)}
-        finally:
-            document |= {
-                "operator": of_operator(session.person, journal.events),
-                "truth": {"slips": of_slips(session.person)},
-            }
-            if out is not None:
-                write_whole(out / BOOK, session.person.book.as_csv())
-    if out is not None:
-        write_whole(out / RESULTS, as_json(document))
+    document = head("compile") | {
+        **of_request(scenario),
+        "software": f"a7sim {a7sim.__version__}",
+        "scenario": scenario.title,
+        "seed": seed,
+        "model": wanted.model,
+        "status": "failed",
+        "message": "",
+    }
+    drawn: dict[str, str] = {}
+    header = journal_header(scenario, seed)
+    with sitting(document, session.person, journal, header, out, lambda: drawn):
+        sheet = _sheet(session, wanted, order, watcher)
+        document |= _of_sheet(sheet, session.scene, scenario)
+        drawn |= {GEOJSON: as_geojson(sheet), SVG: as_svg(sheet, scenario.title)}
     return document
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from a7sim.geometry import Array
 from a7sim.instrument.fleet import Fleet
@@ -30,6 +31,9 @@ class FleetHands:
 
     def set_fitting(self, who: Who, name: str, position: str) -> None:
         self._fleet.set_fitting(who, name, position)
+
+    def fitting(self, who: Who, name: str) -> npt.NDArray[np.str_]:
+        return self._fleet.fitting(who, name)
 
     def set_element(self, who: Who, name: str, values: Array) -> None:
         self._fleet.set_element(who, name, np.round(values, 2))

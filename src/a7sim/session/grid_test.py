@@ -10,28 +10,21 @@ from rich.table import Table
 from rich.text import Text
 
 import a7sim
-from a7sim.documents import Document, as_json, head, of_statistics
+from a7sim.documents import Document, head, of_statistics
 from a7sim.files import csv_text
 from a7sim.geometry import GON, angles_of
-from a7sim.instrument import Autograph, build_autograph
+from a7sim.instrument import Autograph
 from a7sim.instrument.condition import condition_of
-from a7sim.instrument.language import Desk, Listener
-from a7sim.link.client import Client
-from a7sim.link.clock import Clock
-from a7sim.link.inprocess import InProcessSerial
-from a7sim.manual import BASE_COMPONENTS, VARIANTS
-from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit, Person
 from a7sim.operator.grid_test import GridTestOrder, ProjectorSheet, calibrate
 from a7sim.operator.seat import side, wrapped
-from a7sim.reduction import Adjustment, Undetermined
+from a7sim.reduction import Adjustment
 from a7sim.reduction.grid_test import UNKNOWNS
 from a7sim.scenario import Condition, Scenario
-from a7sim.scene import build_scene
-from a7sim.session.folder import BOOK, JOURNAL, RESIDUALS, RESULTS, prepare_folder, write_whole
+from a7sim.session.folder import RESIDUALS, prepare_folder
 from a7sim.session.journal import Journal
-from a7sim.session.results import of_operator, of_request, of_slips
-from a7sim.session.running import Watcher
+from a7sim.session.results import of_request
+from a7sim.session.running import Watcher, open_session
+from a7sim.session.sitting import journal_header, sitting
 from a7sim.sheets import sheet
 
 SYMBOLS = {"omega": "ω", "phi": "φ", "kappa": "κ"}
@@ -52,69 +45,43 @@ def run_grid_test(
     `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for an order that the plate
     or the instrument cannot fill and for a folder that cannot be used, before anything is written.
     """
-    if VARIANTS[scenario.instrument.variant].lacks(*BASE_COMPONENTS):
-        raise Mistake(
-            "instrument.variant: expected a plotter with by and bz, to whose counters its centres are referred, "
-            f"got an {scenario.instrument.variant}"
-        )
     watcher = watcher or Watcher()
     journal = Journal()
-    autograph, person = _opened(scenario, seed, journal.heard)
+    session = open_session(scenario, seed, journal.heard)
+    autograph = session.autograph
     document = _header(scenario, seed, order, autograph)
     if out is not None:
         prepare_folder(out, force)
     sheets: list[ProjectorSheet] = []
-    about = {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant, "work": "grid test"}
-    with journal.opened(out / JOURNAL if out else None, about):
-        try:
-            for sheet in calibrate(person, order, watcher.tick, watcher.begins):
-                sheets.append(sheet)
-                truth = true_errors(autograph, condition_of(scenario.instrument, seed), sheet.projector)
-                document["projectors"][side(sheet.projector)] = of_projector(sheet, truth)
-            document["status"] = "complete"
-        except (DoesNotFit, Undetermined) as trouble:
-            document |= {"status": "does not fit", "message": str(trouble)}
-        except KeyboardInterrupt:
-            document |= {"status": "interrupted", "message": "the test was interrupted"}
-            raise
-        finally:
-            document |= {
-                "operator": of_operator(person, journal.events),
-                "truth": {"slips": of_slips(person)},
-            }
-            if out is not None:
-                write_whole(out / BOOK, person.book.as_csv())
-                write_whole(out / RESIDUALS, csv_text(RESIDUAL_COLUMNS, _residual_rows(sheets)))
-                write_whole(out / RESULTS, as_json(document))
+
+    def leaves() -> dict[str, str]:
+        return {RESIDUALS: csv_text(RESIDUAL_COLUMNS, _residual_rows(sheets))}
+
+    about = journal_header(scenario, seed) | {"work": "grid test"}
+    with sitting(document, session.person, journal, about, out, leaves, called="test"):
+        for sheet in calibrate(session.person, order, watcher.tick, watcher.begins):
+            sheets.append(sheet)
+            truth = true_errors(autograph, condition_of(scenario.instrument, seed), sheet.projector)
+            document["projectors"][side(sheet.projector)] = of_projector(sheet, truth)
     return document
 
 
-def _opened(scenario: Scenario, seed: int, listener: Listener) -> tuple[Autograph, Person]:
-    autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
-    clock = Clock()
-    port = InProcessSerial(desk=Desk(autograph, listener), clock=clock, timeout=1.0)
-    return autograph, Person(Client(port), clock, scenario.observer, seed)
-
-
 def _header(scenario: Scenario, seed: int, order: GridTestOrder, autograph: Autograph) -> Document:
-    return (
-        head("calibrate")
-        | of_request(scenario)
-        | {
-            "software": f"a7sim {a7sim.__version__}",
-            "scenario": scenario.title,
-            "seed": seed,
-            "variant": scenario.instrument.variant,
-            "serial": scenario.instrument.serial,
-            "plate": order.plate.name,
-            "crosses": len(order.chosen),
-            "levels_mm": order.heights(autograph.variant),
-            "pointings": order.pointings,
-            "status": "failed",
-            "message": "",
-            "projectors": {},
-        }
-    )
+    return head("calibrate") | {
+        **of_request(scenario),
+        "software": f"a7sim {a7sim.__version__}",
+        "scenario": scenario.title,
+        "seed": seed,
+        "variant": scenario.instrument.variant,
+        "serial": scenario.instrument.serial,
+        "plate": order.plate.name,
+        "crosses": len(order.chosen),
+        "levels_mm": order.heights(autograph.variant),
+        "pointings": order.pointings,
+        "status": "failed",
+        "message": "",
+        "projectors": {},
+    }
 
 
 # --- the document -------------------------------------------------------------------------------------
@@ -204,7 +171,8 @@ def true_errors(autograph: Autograph, condition: Condition, projector: int) -> D
     omega, phi, kappa = (float(angle) / GON for angle in angles_of(turned))
     elements = autograph.variant.elements
     of_projector = condition.left if projector == 1 else condition.right
-    shown = {name: autograph.element(f"{name}{projector}") for name in ("c", "omega", "phi", "kappa", "by", "bz")}
+    counted = {name: f"{name}{projector}" for name in ("c", "omega", "phi", "kappa", "by", "bz")}
+    shown = {name: autograph.element(n) if n in elements else 0.0 for name, n in counted.items()}
     base = autograph.element("bx") if projector == 2 else 0.0
     sx, sy, sz = (1e-6 * ppm for ppm in condition.carriage_scale_ppm)
     xy, xz, yz = (1e-6 * ppm for ppm in condition.carriage_skew_ppm)

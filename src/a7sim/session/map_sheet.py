@@ -270,8 +270,9 @@ def _grid(paper: _Paper) -> Iterator[str]:
     spacing = _round_below(0.1 * paper.sheet.map_scale)
     level = float(np.mean(paper.sheet.spots.range))
     (x0, y0), (x1, y1) = paper.sheet.area.low, paper.sheet.area.high
+    z = paper.sheet.spots.readings[2]
     corners = paper.sheet.model.on_ground(
-        np.array([[x0, x1, x1, x0], [y0, y0, y1, y1], np.full(4, paper.sheet.spots.readings[2].flat[0])])
+        np.array([[x0, x1, x1, x0], [y0, y0, y1, y1], np.full(4, z[np.isfinite(z)][0])])
     )
     easts, norths = (
         spacing * np.arange(np.ceil(c.min() / spacing), np.floor(c.max() / spacing) + 1) for c in corners[:2]

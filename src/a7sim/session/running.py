@@ -2,27 +2,25 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from a7sim.documents import Document, as_json
 from a7sim.files import csv_text
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Desk, Listener
-from a7sim.link.client import Client
+from a7sim.link.client import Client, Port
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit, Job, ModelJob, Person, work
+from a7sim.operator import Job, ModelJob, Person, work
 from a7sim.reduction import Ground, Model, Undetermined
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene, build_scene
 from a7sim.session import results
 from a7sim.session.folder import (
-    BOOK,
     CARD_KEY,
     CARDS,
-    JOURNAL,
     MODELS,
     OUTPUT_CARDS,
     RESULTS,
@@ -31,7 +29,16 @@ from a7sim.session.folder import (
     write_whole,
 )
 from a7sim.session.journal import Journal
+from a7sim.session.sitting import journal_header, sitting
 from a7sim.session.strips import GroundedStrip, cards_of, given_control, ground_of, grounded, models_of, of_grounded
+
+Cable = Callable[[InProcessSerial], Port]
+"""What lies between instrument and operator: it takes the instrument's end and returns the operator's."""
+
+
+def straight(port: InProcessSerial) -> Port:
+    """Return the instrument's end itself: a cable without length."""
+    return port
 
 
 @dataclass
@@ -43,17 +50,21 @@ class Session:
     scene: Scene
     autograph: Autograph
     person: Person
-    job: Job
+
+    @cached_property
+    def job(self) -> Job:
+        """The job sheet. Raises Mistake where the scenario has no settings of a plotter."""
+        return job_of(self.scenario, self.scene)
 
 
-def open_session(scenario: Scenario, seed: int, listener: Listener | None = None) -> Session:
+def open_session(scenario: Scenario, seed: int, listener: Listener | None = None, cable: Cable = straight) -> Session:
     """Return a session ready to begin. Raises Mistake when a file of measurements is bad."""
     scene = build_scene(scenario, seed)
     autograph = build_autograph(scenario.instrument, scene.drawer, seed)
     clock = Clock()
     port = InProcessSerial(desk=Desk(autograph, listener), clock=clock, timeout=1.0)
-    person = Person(Client(port), clock, scenario.observer, seed)
-    return Session(scenario, seed, scene, autograph, person, job_of(scenario, scene))
+    person = Person(Client(cable(port)), clock, scenario.observer, seed)
+    return Session(scenario, seed, scene, autograph, person)
 
 
 def job_of(scenario: Scenario, scene: Scene) -> Job:
@@ -93,6 +104,7 @@ def run(
     out: Path | None = None,
     watcher: Watcher | None = None,
     force: bool = False,
+    cable: Cable = straight,
 ) -> Document:
     """Work through a scenario up to its strip and return the document of results; with `out`, leave the files there.
 
@@ -102,33 +114,21 @@ def run(
     """
     watcher = watcher or Watcher()
     journal = Journal()
-    session = open_session(scenario, seed, journal.heard)
+    session = open_session(scenario, seed, journal.heard, cable)
+    job = session.job
     if out is not None:
         prepare_folder(out, force)
-    document = results.header(scenario, seed) | {"status": "failed", "message": ""}
     done: list[Document] = []
-    with journal.opened(out / JOURNAL if out else None, _journal_header(scenario, seed)):
-        try:
-            for record in work(session.person, session.job, watcher.tick, watcher.begins):
-                plan = next(model for model in scenario.models if model.name == record.model.name)
-                truth = session.scene.relative_truth(plan)
-                done.append(results.of_model(record, session.autograph, truth, plan.published))
-            document["status"] = "complete"
-        except DoesNotFit as trouble:
-            document |= {"status": "does not fit", "message": str(trouble)}
-        except KeyboardInterrupt:
-            document |= {"status": "interrupted", "message": "the session was interrupted"}
-            raise
-        finally:
-            document |= {
-                "models": done,
-                "operator": results.of_operator(session.person, journal.events),
-                "truth": {"slips": results.of_slips(session.person)},
-            }
-            if out is not None:
-                write_whole(out / BOOK, session.person.book.as_csv())
-                write_whole(out / MODELS, results.models_csv(models_of(done)))
-                write_whole(out / RESULTS, as_json(document))
+    document = results.header(scenario, seed) | {"status": "failed", "message": "", "models": done}
+
+    def leaves() -> dict[str, str]:
+        return {MODELS: results.models_csv(models_of(done))}
+
+    with sitting(document, session.person, journal, journal_header(scenario, seed), out, leaves):
+        for record in work(session.person, job, watcher.tick, watcher.begins):
+            plan = next(model for model in scenario.models if model.name == record.model.name)
+            truth = session.scene.relative_truth(plan)
+            done.append(results.of_model(record, session.autograph, truth, plan.published))
     return _concluded(session, document, out)
 
 
@@ -159,7 +159,3 @@ def _write_cards(out: Path, strip: GroundedStrip, models: Sequence[Model], groun
     write_whole(out / CARDS, "\n".join([*cards.deck, ""]))
     write_whole(out / OUTPUT_CARDS, "\n".join([*cards.output, ""]))
     write_whole(out / CARD_KEY, csv_text(("point", "number"), cards.key.items()))
-
-
-def _journal_header(scenario: Scenario, seed: int) -> dict[str, Any]:
-    return {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}

@@ -177,9 +177,9 @@ def _residuals(orientation: dict[str, Any]) -> RenderableType:
     rms = orientation["rms_parallax_mm"]
     table = sheet(*[""] * 5)
     table.show_header = False
-    for row in FIGURE_4_1:
-        present = [label for label in row if label in residuals]
-        table.add_row(*(f"{label} {residuals[label]:+.3f}" for label in present))
+    shown = [column for column in zip(*FIGURE_4_1, strict=True) if any(label in residuals for label in column)]
+    for row in zip(*shown, strict=True):
+        table.add_row(*(f"{label} {residuals[label]:+.3f}" if label in residuals else "" for label in row))
     return _titled(f"Residual y-parallaxes at the standard points, mm (rms {rms:.4f})", table)
 
 

@@ -25,10 +25,7 @@ class Relative:
         left, right = model.left_projector, model.right_projector
 
         def turned(n: int) -> Array:
-            omega, phi, kappa = (
-                elements[f"{name}{n}"] - variant.elements[f"{name}{n}"].zero for name in ("omega", "phi", "kappa")
-            )
-            return rotation(omega * GON, phi * GON, kappa * GON)
+            return rotation(*(tilt * GON for tilt in variant.tilts(elements, n)))
 
         base = _base_of(elements, model)
         to_left = transposed(turned(left))
@@ -57,11 +54,8 @@ def true_elements(
     left, right = model.left_projector, model.right_projector
     set_base = _base_of(elements, model)
 
-    def angle(name: str, n: int) -> float:
-        return (elements[f"{name}{n}"] - variant.elements[f"{name}{n}"].zero) * GON
-
     if method == "dependent":
-        turned_left = rotation(*(angle(name, left) for name in ("omega", "phi", "kappa")))
+        turned_left = rotation(*(tilt * GON for tilt in variant.tilts(elements, left)))
         base = mxv(turned_left, truth.base)
         base *= elements["bx"] / base[0]
         true = {
@@ -71,9 +65,10 @@ def true_elements(
         cameras = {right: mxm(turned_left, truth.rotation)}
     else:
         turned_left = _laid_onto(truth.base, set_base)
+        omega2 = variant.tilts(elements, 2)[0] * GON
         for _ in range(_MOST_TURNS):
             cameras = {left: turned_left, right: mxm(turned_left, truth.rotation)}
-            turned_left = mxm(_about(set_base, angle("omega", 2) - float(angles_of(cameras[2])[0])), turned_left)
+            turned_left = mxm(_about(set_base, omega2 - float(angles_of(cameras[2])[0])), turned_left)
         true = {}
     for n, turned in cameras.items():
         for name, radians in zip(("omega", "phi", "kappa"), angles_of(turned), strict=True):

@@ -1,5 +1,6 @@
-"""What all clients of one instrument share: the instrument, the lock, and who listens to what crosses the link."""
+"""What all clients of one instrument share: the instrument and its movement, the lock, the token, and who listens."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -17,16 +18,32 @@ class LinkEvent:
     text: str
 
 
+POLL_TAKES = 0.1
+"""Simulated s that pass over a look at the status while something moves, so that a client may wait by looking."""
+
 Listener = Callable[[LinkEvent], None]
 
 
 @dataclass
 class Desk:
-    """An instrument with its clients."""
+    """An instrument with its clients.
+
+    Movement lasts, on the simulated clock, as long as each part needs for its way; parts move at the same time, and
+    each does one thing after the other. What is read meanwhile is what stands at the end.
+    """
 
     autograph: Autograph
     listener: Listener | None = None
+    token: str | None = None
+    """What clients must log in with, None where everybody is welcome."""
+    poll_takes: float = POLL_TAKES
+    """Simulated s that a look at the status takes while something moves; 0 where the clock goes by itself."""
     lock_holder: str | None = None
+    busy_since: float = -math.inf
+    """Simulated time in s at which the present movement, or the last one, began."""
+    busy_until: float = -math.inf
+    """Simulated time in s at which it ends."""
+    _parts_busy_until: dict[str, float] = field(default_factory=dict)
     _opened: int = field(default=0)
 
     def open(self, client: str | None = None, cr_ends_line: bool = True) -> Engine:
@@ -52,6 +69,19 @@ class Desk:
     def may_turn(self, client: str) -> bool:
         """Whether a client may move anything: it holds the lock, or nobody does."""
         return self.lock_holder in (None, client)
+
+    def moved(self, time: float) -> None:
+        """Take note of what has set out at a simulated time in s."""
+        for part, seconds in self.autograph.time_taken().items():
+            if time >= self.busy_until:
+                self.busy_since = time
+            ends = max(time, self._parts_busy_until.get(part, time)) + seconds
+            self._parts_busy_until[part] = ends
+            self.busy_until = max(self.busy_until, ends)
+
+    def polled(self, time: float) -> float | None:
+        """Return until when a client waits that looked at the status while something moves, None if it need not."""
+        return min(time + self.poll_takes, self.busy_until) if self.poll_takes else None
 
     def heard(self, time: float, client: str, direction: str, text: str) -> None:
         """Tell the listener of a line that crossed the link."""

@@ -1,13 +1,13 @@
 """The language engine of one client: bytes in, bytes out; no I/O, no clock of its own."""
 
+import hmac
 import re
 import zlib
 from typing import TYPE_CHECKING
 
-from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
-from a7sim.instrument.language.status import Status
-from a7sim.instrument.language.syntax import unit_of, units_of
+from a7sim.instrument.language.program import Fault, Program, Step, program_of, text_of
+from a7sim.instrument.language.status import OPERATION_COMPLETE, SETTLING, Status
 from a7sim.instrument.refusals import OutOfRange, Refusal, SettingsConflict, UnknownName
 
 if TYPE_CHECKING:
@@ -16,8 +16,21 @@ if TYPE_CHECKING:
 LONGEST_LINE = 4096
 """Bytes, its end not counted."""
 
-_LONGEST_KEPT = LONGEST_LINE + 2
+LARGEST_REPLY = 4 * 1024 * 1024
+"""Bytes of the replies to one line."""
+
+UNITS_AT_ONCE, REPLY_AT_ONCE = 50, 64 * 1024
+"""Units of a line that are obeyed, and bytes that they reply, before other clients may have their turn."""
+
+MOST_KEPT_BACK = 64 * 1024
+"""Bytes of input that wait behind a unit that waits for movement."""
+
+_LONGEST_PENDING = LONGEST_LINE + 2
 """A line, the CR of its end, and one byte that shows a line to be too long."""
+
+_TOO_MUCH = f"expected replies of at most {LARGEST_REPLY} bytes a line"
+
+_LOGIN = re.compile(r"LOG(IN)?\s", re.IGNORECASE)
 
 _NUMBER_OF = {
     OutOfRange: ErrorNumber.DATA_OUT_OF_RANGE,
@@ -27,75 +40,209 @@ _NUMBER_OF = {
 
 
 class Engine:
-    """A client's conversation with the instrument."""
+    """A client's conversation with the instrument.
+
+    `waits_until` is the simulated time in s up to which the client's input waits for movement to end, None where it
+    does not. Until something is fed at that time or later, be it nothing, input is kept and nothing of it is obeyed.
+    Within a long line it is the present time now and then, so that others may have their turn.
+    """
 
     def __init__(self, desk: "Desk", client: str, cr_ends_line: bool = True) -> None:
         self.desk = desk
         self.client = client
-        self.status: Status = Status()
+        self.waits_until: float | None = None
+        self._status = Status()
+        self._admitted = desk.token is None
+        self._time = 0.0
+        self._movement_seen = desk.busy_since
+        self._completes_at: float | None = None
+        self._cr_ends_line = cr_ends_line
         self._ends = re.compile(rb"[\r\n]" if cr_ends_line else rb"\n")
         self._pending = bytearray()
-        self._level: tuple[tuple[str, int | None], ...] = ()
+        self._kept_back = bytearray()
+        self._overrun = False
+        self._rest: Program = ()
+        self._waited = False
+        self._replies: list[str | bytes] = []
+        self._reply_size = 0
+        self._overflowed = False
 
     def feed(self, received: bytes, time: float) -> bytes:
         """Take bytes that arrived at a simulated time in s; return the bytes of the replies."""
-        replies = bytearray()
+        return b"".join(self.replies_to(received, time))
+
+    def replies_to(self, received: bytes, time: float) -> list[bytes]:
+        """Take bytes that arrived at a simulated time in s; return the reply to each line that has one."""
+        self._time = time
+        replies: list[bytes] = []
+        if self.waits_until is None and not self._pending and self._one_line(received):
+            self._obey_line(received, replies)
+            return replies
+        if self.waits_until is not None:
+            if time < self.waits_until:
+                self._keep_back(received)
+                return replies
+            received = self._resume(replies) + received
         start = 0
-        for end in self._ends.finditer(received):
+        while self.waits_until is None:
+            end = self._ends.search(received, start)
+            if end is None:
+                self._keep(received[start:])
+                return replies
             self._keep(received[start : end.start()])
-            replies += self._line_ended(time)
             start = end.end()
-        self._keep(received[start:])
-        return bytes(replies)
-
-    def _keep(self, part: bytes) -> None:
-        self._pending += part[: _LONGEST_KEPT - len(self._pending)]
-
-    def _line_ended(self, time: float) -> bytes:
-        line = bytes(self._pending).removesuffix(b"\r")
-        self._pending.clear()
-        if len(line) > LONGEST_LINE:
-            self.desk.heard(time, self.client, ">", f"(a line of more than {LONGEST_LINE} bytes, dropped)")
-            self.status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {LONGEST_LINE} bytes a line")
-            return b""
-        text = line.decode("latin-1")
-        if not text.strip(" \t"):
-            return b""
-        self.desk.heard(time, self.client, ">", text)
-        replies = self._obey(text)
-        if not replies:
-            return b""
-        self.desk.heard(time, self.client, "<", ";".join(map(_as_text, replies)))
-        return b";".join(map(_as_bytes, replies)) + b"\n"
-
-    def _obey(self, line: str) -> list[str | bytes]:
-        self._level = ()
-        replies = []
-        for text in units_of(line):
-            try:
-                reply = self._obey_unit(text)
-            except LanguageError as error:
-                self.status.report(error.number, error.detail)
-            except Refusal as refusal:
-                number = _NUMBER_OF.get(type(refusal), ErrorNumber.EXECUTION_ERROR)
-                self.status.report(number, f"{text[:60]}: {refusal}")
-            else:
-                if reply is not None:
-                    replies.append(reply)
+            line = bytes(self._pending)
+            self._pending.clear()
+            self._obey_line(line, replies)
+        self._keep_back(received[start:])
         return replies
 
-    def _obey_unit(self, text: str) -> str | bytes | None:
-        unit = unit_of(text)
-        if unit.common:
-            command, suffix = COMMANDS.find(unit.mnemonics, unit.query)
-        else:
-            path = unit.mnemonics if unit.rooted else self._level + unit.mnemonics
-            command, suffix = COMMANDS.find(path, unit.query)
-            self._level = path[:-1]
-        call = command.call(unit, suffix, self)
-        if command.turns and not self.desk.may_turn(self.client):
-            raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "another client holds the lock")
-        return command.handler(self, call)
+    def _one_line(self, received: bytes) -> bool:
+        """Whether there is one whole line, as there mostly is."""
+        length = len(received)
+        return received.find(b"\n") == length - 1 <= LONGEST_LINE and (not self._cr_ends_line or b"\r" not in received)
+
+    def _resume(self, replies: list[bytes]) -> bytes:
+        """Obey the rest of the line that waited; return the input that waited behind it."""
+        self.waits_until = None
+        self._obey_rest(replies)
+        if self.waits_until is not None:
+            return b""
+        kept = bytes(self._kept_back)
+        self._kept_back.clear()
+        if self._overrun:
+            self._overrun = False
+            kept += b"\0" * _LONGEST_PENDING
+        return kept
+
+    def _keep_back(self, received: bytes) -> None:
+        room = MOST_KEPT_BACK - len(self._kept_back)
+        self._kept_back += received[:room]
+        self._overrun |= len(received) > room
+
+    def _keep(self, part: bytes) -> None:
+        self._pending += part[: _LONGEST_PENDING - len(self._pending)]
+
+    def _obey_line(self, line: bytes, replies: list[bytes]) -> None:
+        if len(line) > LONGEST_LINE and len(text_of(line)) > LONGEST_LINE:
+            self._heard(f"(a line of more than {LONGEST_LINE} bytes, dropped)")
+            self._status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {LONGEST_LINE} bytes a line")
+            return
+        if self.desk.listener is not None:
+            self._tell(text_of(line))
+        self._rest = program_of(line)
+        self._obey_rest(replies)
+
+    def _tell(self, text: str) -> None:
+        if text.strip(" \t"):
+            secret = self.desk.token is not None and _LOGIN.search(text)
+            self._heard("(a line with a login)" if secret else text)
+
+    def _heard(self, text: str) -> None:
+        self.desk.heard(self._time, self.client, ">", text)
+
+    def _obey_rest(self, replies: list[bytes]) -> None:
+        """Obey the units of a line that are left, up to one that waits; at its end, add its reply if it has one."""
+        program = self._rest
+        breath = self._reply_size + REPLY_AT_ONCE
+        for place, unit in enumerate(program):
+            try:
+                done = self._obey(unit)
+            except LanguageError as error:
+                self._status.report(error.number, error.detail)
+                done = True
+            if (place >= UNITS_AT_ONCE or self._reply_size > breath) and self.waits_until is None:
+                self.waits_until = self._time
+            if self.waits_until is not None:
+                self._rest = program[place + done :]
+                return
+        if self._replies:
+            if self.desk.listener is not None:
+                self.desk.heard(self._time, self.client, "<", ";".join(map(_as_text, self._replies)))
+            replies.append(b";".join(map(_as_bytes, self._replies)) + b"\n")
+            self._replies.clear()
+            self._reply_size = 0
+            self._overflowed = False
+
+    def _obey(self, unit: Step | Fault) -> bool:
+        """Obey a unit; return whether it is done, or is still to come after a wait. Raises LanguageError."""
+        if not self._admitted and (isinstance(unit, Fault) or not unit.command.open_to_all):
+            raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "expected SYSTem:LOGin first")
+        if isinstance(unit, Fault):
+            raise LanguageError(unit.number, unit.detail)
+        command = unit.command
+        try:
+            call = unit.bare or unit.call(self)
+            if command.turns and not self.desk.may_turn(self.client):
+                raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "another client holds the lock")
+            if command.waits and self._has_to_wait():
+                return False
+            if self._overflowed and command.query:
+                raise LanguageError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
+            reply = command.handler(self, call)
+        except Refusal as refusal:
+            number = _NUMBER_OF.get(type(refusal), ErrorNumber.EXECUTION_ERROR)
+            raise LanguageError(number, f"{unit.text[:60]}: {refusal}") from refusal
+        finally:
+            if command.turns:
+                self.desk.moved(self._time)
+        if reply is not None:
+            self._answered(reply)
+        if command.polls and self._time < self.desk.busy_until:
+            self.waits_until = self.desk.polled(self._time)
+        return True
+
+    def _has_to_wait(self) -> bool:
+        """Wait for the movement that is going on, and once only: what others begin meanwhile is theirs to wait for."""
+        if self._waited:
+            self._waited = False
+        elif self._time < self.desk.busy_until:
+            self.waits_until = self.desk.busy_until
+            self._waited = True
+        return self._waited
+
+    def _answered(self, reply: str | bytes) -> None:
+        self._overflowed = self._reply_size + len(reply) > LARGEST_REPLY
+        if self._overflowed:
+            raise LanguageError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
+        self._reply_size += len(reply)
+        self._replies.append(reply)
+
+    # --- what handlers ask of the conversation --------------------------------------------------------
+
+    @property
+    def status(self) -> Status:
+        """The client's status as it stands at the time of what is being obeyed."""
+        desk, status = self.desk, self._status
+        if self._movement_seen != desk.busy_since:
+            self._movement_seen = desk.busy_since
+            status.operation.event |= SETTLING
+        others = status.operation.condition & ~SETTLING
+        status.operation.condition = others | (SETTLING if self._time < desk.busy_until else 0)
+        if self._completes_at is not None and self._completes_at <= self._time:
+            self._completes_at = None
+            status.event |= OPERATION_COMPLETE
+        return status
+
+    def complete(self) -> None:
+        """Raise the bit of operation complete when the movement that is going on now is done (`*OPC`)."""
+        self._completes_at = self.desk.busy_until
+
+    def clear(self) -> None:
+        """Clear events and errors (`*CLS`)."""
+        self.status.clear()
+        self.forget_completion()
+
+    def forget_completion(self) -> None:
+        """Raise no bit of operation complete that was to be raised."""
+        self._completes_at = None
+
+    def log_in(self, token: str) -> None:
+        """Admit the client to an instrument that asks for a token. Raises LanguageError for a wrong one."""
+        expected = self.desk.token
+        if expected is not None and not hmac.compare_digest(token.encode(), expected.encode()):
+            raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "this is not the token")
+        self._admitted = True
 
 
 def _as_bytes(reply: str | bytes) -> bytes:

@@ -34,6 +34,8 @@ class ErrorNumber(IntEnum):
     ILLEGAL_PARAMETER_VALUE = -224, "Illegal parameter value"
     QUEUE_OVERFLOW = -350, "Queue overflow"
     INPUT_BUFFER_OVERRUN = -363, "Input buffer overrun"
+    TIME_OUT_ERROR = -365, "Time out error"
+    QUERY_DEADLOCKED = -430, "Query DEADLOCKED"
 
 
 class LanguageError(Exception):

@@ -7,8 +7,11 @@ from a7sim.instrument.language.errors import ErrorNumber, entry
 
 QUEUE_LENGTH = 32
 
-POWER_ON, COMMAND_ERROR, EXECUTION_ERROR, DEVICE_ERROR, OPERATION_COMPLETE = 128, 32, 16, 8, 1
+POWER_ON, COMMAND_ERROR, EXECUTION_ERROR, DEVICE_ERROR, QUERY_ERROR, OPERATION_COMPLETE = 128, 32, 16, 8, 4, 1
 _ERROR_AVAILABLE, _QUESTIONABLE, _EVENT_SUMMARY, _MASTER_SUMMARY, _OPERATION = 4, 8, 32, 64, 128
+
+SETTLING = 2
+"""Bit 1 of the operation register: something of the instrument is moving."""
 
 
 @dataclass
@@ -54,6 +57,8 @@ class Status:
             self.event |= EXECUTION_ERROR
         elif -400 < number <= -300:
             self.event |= DEVICE_ERROR
+        elif -500 < number <= -400:
+            self.event |= QUERY_ERROR
 
     def next_error(self) -> str:
         """Return and take off the oldest error."""

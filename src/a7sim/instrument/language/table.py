@@ -7,7 +7,7 @@ from itertools import product
 from typing import Any, Protocol
 
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
-from a7sim.instrument.language.syntax import Number, Parameter, Text, Unit, Word
+from a7sim.instrument.language.syntax import Number, Parameter, Text, Word
 
 _LENGTHS = {"": 1.0, "MM": 1.0, "UM": 1e-3}
 _ANGLES = {"": 1.0, "GON": 1.0, "DEG": 10.0 / 9.0}
@@ -174,6 +174,12 @@ class Command:
     """A parameter that may follow the others any number of times."""
     turns: bool = False
     """Whether it moves something, which the holder of the lock may do alone."""
+    waits: bool = False
+    """Whether it waits until the movement that is going on is done."""
+    polls: bool = False
+    """Whether it looks at the status, as who waits for movement may do again and again."""
+    open_to_all: bool = False
+    """Whether who has not logged in may say it."""
     about: str = ""
     suffixes: tuple[int, ...] = field(default=(1, 2))
 
@@ -189,9 +195,8 @@ class Command:
             parts.append(f"{self.repeats.described()}...")
         return " ".join([self.header, ",".join(parts)]).strip()
 
-    def call(self, unit: Unit, suffix: int, client: Any) -> Call:
-        """Return the call that a unit makes of this command. Raises LanguageError."""
-        given = unit.parameters()
+    def call(self, given: Sequence[Parameter], suffix: int, client: Any) -> Call:
+        """Return the call that the parameters of a unit make of this command. Raises LanguageError."""
         least = sum(not each.optional for each in self.takes)
         if len(given) < least:
             raise LanguageError(ErrorNumber.MISSING_PARAMETER, f"expected {self.written()}")

@@ -1,0 +1,39 @@
+"""Let atheris look for lines that reach what no line has reached, and see that the promises hold for them.
+
+    pip install atheris
+    python benchmarks/fuzz_guided.py -max_total_time=60 -seed=1     # options of libFuzzer
+
+The checks are those of fuzz_language.py. Stops at the first line that breaks a promise.
+"""
+
+import sys
+
+import atheris
+
+with atheris.instrument_imports(include=["a7sim.instrument.language"]):
+    import fuzz_language
+
+
+def listener(numbers):
+    """Return a function that hears bytes as lines, on a new instrument now and then."""
+    desks = fuzz_language.instruments(1)
+    fuzzed = []
+
+    def hear(data):
+        if not fuzzed or fuzzed[0].tally["lines"] >= fuzz_language.LINES_AN_INSTRUMENT:
+            desk = next(desks)
+            fuzzed[:] = [fuzz_language.Fuzzed(desk, numbers, desk.token is None)]
+        for line in data.split(b"\n"):
+            fuzzed[0].hears(line)
+
+    return hear
+
+
+def main():
+    with fuzz_language.reported() as numbers:
+        atheris.Setup(sys.argv, listener(numbers))
+        atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""`a7sim operate`: the operator works an instrument that is served."""
+
+from pathlib import Path
+
+import click
+
+from a7sim.cli.links import of_a_link, token_from
+from a7sim.cli.options import (
+    POINTS_A_MODEL,
+    chosen,
+    ended,
+    of_a_folder,
+    of_a_scenario,
+    of_an_orientation,
+    of_results,
+    watched,
+)
+from a7sim.link.twin import BesideTwin, served_at
+from a7sim.mistakes import Mistake
+from a7sim.session.tables import of_session
+from a7sim.session.ways import run_all_ways
+
+
+@click.command("operate")
+@click.argument("scenario")
+@click.option("--link", "url", required=True, metavar="URL", help="Where the instrument is served.")
+@of_a_link
+@of_an_orientation
+@of_a_scenario
+@of_a_folder
+@of_results
+def command(
+    scenario: str,
+    url: str,
+    timeout: float,
+    token_file: Path | None,
+    case: str | None,
+    method: str | None,
+    seed: int | None,
+    settings: tuple[str, ...],
+    skill: str | None,
+    perfect_observer: bool,
+    out: Path | None,
+    force: bool,
+    as_document: bool,
+    quiet: bool,
+) -> None:
+    """Let the operator work the served instrument of SCENARIO, with the same results as `a7sim run`.
+
+    The instrument must be served anew from the same scenario and seed: what is true of it never crosses the link, so a
+    twin of it in this process stands for the truth, and a reply that is not the twin's ends the session.
+
+    Example: a7sim operate akwanga --link tcp://127.0.0.1:5025
+    """
+    loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer, {"plan.case": case, "plan.method": method})
+    if "plotter" not in loaded.work:
+        raise Mistake(f"{scenario}: expected work at the plotter for the operator, got {', '.join(loaded.work)}")
+    with (
+        served_at(url, timeout, token_from(token_file)) as served,
+        watched(POINTS_A_MODEL * len(loaded.models), as_document, quiet) as watcher,
+    ):
+        document = run_all_ways(loaded, seed, out, watcher, force, lambda twin: BesideTwin(served, twin, url))
+    ended(document, as_document, quiet, of_session)

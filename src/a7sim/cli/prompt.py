@@ -1,0 +1,99 @@
+"""A prompt at an instrument, with history and completion of headers."""
+
+import csv
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import click
+
+from a7sim.link.client import Client
+from a7sim.link.completion import completions
+from a7sim.link.exchange import say
+
+HISTORY = "send-history"
+
+LONGEST_HISTORY = 1000
+"""Lines."""
+
+_LEAVING = ("exit", "quit", "bye")
+
+
+def prompted(url: str, client: Client) -> None:
+    """Ask for lines and show what comes of each, until the end of input or `exit`."""
+    identity = say(client, "*IDN?").shown or "an instrument that does not say what it is"
+    headers = _headers(client)
+    click.echo(f"{url}: {identity}. Tab completes, help lists the headers, exit leaves.")
+    with _editing(headers):
+        while True:
+            try:
+                line = input("a7sim> ").strip()
+            except EOFError:
+                click.echo()
+                return
+            except KeyboardInterrupt:
+                click.echo()
+                continue
+            if line.lower() in _LEAVING:
+                return
+            if line.lower() in ("help", "?"):
+                click.echo("\n".join(headers))
+            elif line:
+                _shown(client, line)
+
+
+def _shown(client: Client, line: str) -> None:
+    exchange = say(client, line)
+    if exchange.shown is not None:
+        click.echo(exchange.shown)
+    for error in exchange.errors:
+        number, _, text = error.partition(",")
+        click.secho(f"{number}: {text.strip(chr(34)).replace(';', ': ', 1)}", fg="red")
+
+
+def _headers(client: Client) -> list[str]:
+    listed = say(client, "SYST:HELP:HEAD?").shown
+    return next(csv.reader([listed])) if listed else []
+
+
+@contextmanager
+def _editing(headers: list[str]) -> Iterator[None]:
+    """Give `input` completion and a history that lasts, where the platform has readline."""
+    try:
+        import readline  # noqa: PLC0415 # not on every platform
+    except ImportError:
+        yield
+        return
+
+    def complete(_: str, state: int) -> str | None:
+        found = completions(readline.get_line_buffer()[: readline.get_endidx()], headers)
+        return found[state] if state < len(found) else None
+
+    readline.set_completer(complete)
+    readline.set_completer_delims(" ;\t")
+    readline.parse_and_bind("bind ^I rl_complete" if "libedit" in (readline.__doc__ or "") else "tab: complete")
+    history = data_folder() / HISTORY
+    with suppress(OSError):
+        readline.read_history_file(history)
+    readline.set_history_length(LONGEST_HISTORY)
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            history.parent.mkdir(parents=True, exist_ok=True)
+            readline.write_history_file(history)
+            history.chmod(0o600)
+
+
+def data_folder() -> Path:
+    """Return the folder where the platform keeps a program's own files."""
+    home = Path.home()
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local"
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Application Support"
+    else:
+        base = os.environ.get("XDG_DATA_HOME") or home / ".local" / "share"
+    return Path(base) / "a7sim"

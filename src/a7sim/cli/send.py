@@ -1,0 +1,74 @@
+"""`a7sim send`: lines to a served instrument, one after the other or at a prompt."""
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+import msgspec
+
+from a7sim.cli.links import of_a_link, token_from
+from a7sim.link.client import Client
+from a7sim.link.exchange import Exchange, say
+from a7sim.link.opening import told
+
+EXIT_REFUSED = 1
+
+
+@click.command("send")
+@click.argument("url")
+@click.argument("lines", metavar="[LINE]...", nargs=-1)
+@of_a_link
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File for the bytes of a block.")
+@click.option("--json", "as_document", is_flag=True, help="Print all exchanges as one JSON document.")
+def command(
+    url: str, lines: tuple[str, ...], timeout: float, token_file: Path | None, out: Path | None, as_document: bool
+) -> None:
+    """Send each LINE to the instrument at URL and print its replies; what it refuses ends in exit code 1.
+
+    Without a LINE they come from standard input, or from a prompt on a terminal. URL is a7sim://SCENARIO?seed=N,
+    tcp://HOST:PORT, rfc2217://HOST:PORT, or the path of a device or pty.
+
+    Example: a7sim send a7sim://akwanga '*IDN?' 'BASE:BX 194.99;BX?'
+    """
+    with told(url), Client.open(url, timeout, token_from(token_file)) as client:
+        if not lines and not as_document and sys.stdin.isatty():
+            from a7sim.cli.prompt import prompted  # noqa: PLC0415 # readline takes hold of the terminal
+
+            prompted(url, client)
+            return
+        exchanges = []
+        for line in _given(lines):
+            exchange = say(client, line)
+            exchanges.append(exchange)
+            if not as_document and exchange.shown is not None:
+                click.echo(exchange.shown)
+    if out is not None:
+        out.write_bytes(b"".join(_blocks(exchanges)))
+    _ended(exchanges, as_document)
+
+
+def _given(lines: tuple[str, ...]) -> Iterable[str]:
+    source: Iterable[str] = (part for line in lines for part in line.splitlines()) if lines else sys.stdin
+    return (line.strip() for line in source if line.strip())
+
+
+def _blocks(exchanges: Iterable[Exchange]) -> Iterable[bytes]:
+    return (part for exchange in exchanges for part in exchange.reply or () if isinstance(part, bytes))
+
+
+def _ended(exchanges: list[Exchange], as_document: bool) -> None:
+    errors = [error for exchange in exchanges for error in exchange.errors]
+    if as_document:
+        click.echo(msgspec.json.format(msgspec.json.encode(_document(exchanges, errors)), indent=2))
+    else:
+        for error in errors:
+            click.echo(f"a7sim: {error}", err=True)
+    if errors:
+        raise click.exceptions.Exit(EXIT_REFUSED)
+
+
+def _document(exchanges: list[Exchange], errors: list[str]) -> dict[str, Any]:
+    said = [{"sent": exchange.sent, "reply": exchange.shown} for exchange in exchanges]
+    return {"schema_version": 1, "command": "send", "exchanges": said, "errors": errors}

@@ -1,0 +1,135 @@
+"""A pseudo-terminal as a wire: a serial port of this machine under a name of one's own."""
+
+import asyncio
+import os
+import termios
+import tty
+from pathlib import Path
+
+from a7sim.link.conversation import Conversation
+from a7sim.link.wires import LARGEST_READ, MOST_UNREAD, Host
+from a7sim.mistakes import Mistake
+
+OF_ITS_KIND = "/dev/pts/"
+"""Where the links lead that may be overwritten."""
+
+
+class PtyWire:
+    """The instrument's end of a pseudo-terminal, and the link to the other end.
+
+    It keeps the other end open itself, so that clients may come and go. Like a cable of three wires it cannot tell
+    one from the next; a client that is dropped leaves an empty line, on which a new conversation begins.
+    """
+
+    def __init__(self, host: Host, link: Path) -> None:
+        """Make the terminal and the link. Raises Mistake where there is something else in the link's place."""
+        self._host = host
+        self._link = link
+        self._unsent = bytearray()
+        self._clogged = False
+        self._reading = False
+        self._loop = asyncio.get_running_loop()
+        self._near, self._far = os.openpty()
+        tty.setraw(self._far)
+        os.set_blocking(self._near, False)
+        self.device = os.ttyname(self._far)
+        try:
+            _make_link(link, self.device)
+        except BaseException:
+            self._close_ends()
+            raise
+        self._conversation = self._welcomed()
+        self.resume_reading()
+
+    def _welcomed(self) -> Conversation:
+        welcomed = self._host.welcome(self, serial=True)
+        if isinstance(welcomed, bytes):
+            raise Mistake(f"--pty: expected fewer lines than clients are allowed: {welcomed.decode('ascii').strip()}")
+        return welcomed
+
+    def remove(self) -> None:
+        """Take link and terminal away."""
+        self._conversation.cut()
+        self.pause_reading()
+        self._loop.remove_writer(self._near)
+        if self._link.is_symlink() and str(self._link.readlink()) == self.device:
+            self._link.unlink()
+        self._close_ends()
+
+    def _close_ends(self) -> None:
+        os.close(self._near)
+        os.close(self._far)
+
+    def _readable(self) -> None:
+        try:
+            data = os.read(self._near, LARGEST_READ)
+        except (BlockingIOError, InterruptedError):
+            return
+        self._conversation.received(data)
+
+    def _writable(self) -> None:
+        self._unsent = self._unsent[self._sent(self._unsent) :]
+        if not self._unsent:
+            self._loop.remove_writer(self._near)
+        if self._clogged and len(self._unsent) <= MOST_UNREAD // 4:
+            self._clogged = False
+            self._conversation.unclogged()
+
+    def _sent(self, data: bytes | bytearray) -> int:
+        try:
+            return os.write(self._near, data)
+        except (BlockingIOError, InterruptedError):
+            return 0
+
+    # --- what the conversation asks -------------------------------------------------------------------
+
+    def write(self, data: bytes) -> None:
+        """Send bytes, now or as soon as they can go."""
+        if not self._unsent:
+            data = data[self._sent(data) :]
+            if not data:
+                return
+            self._loop.add_writer(self._near, self._writable)
+        self._unsent += data
+        if not self._clogged and len(self._unsent) > MOST_UNREAD:
+            self._clogged = True
+            self._conversation.clogged()
+
+    def pause_reading(self) -> None:
+        """Receive nothing more for the time being."""
+        self._reading = False
+        self._loop.remove_reader(self._near)
+
+    def resume_reading(self) -> None:
+        """Receive again."""
+        if not self._reading:
+            self._reading = True
+            self._loop.add_reader(self._near, self._readable)
+
+    def close(self, farewell: bytes = b"") -> None:
+        """Begin anew: there is nobody who could be told."""
+        self.abort()
+
+    def abort(self) -> None:
+        """Forget the client with all that is on the line, and begin anew."""
+        self._conversation.cut()
+        self._host.left(self)
+        self._loop.remove_writer(self._near)
+        self._unsent.clear()
+        self._clogged = False
+        termios.tcflush(self._far, termios.TCIOFLUSH)
+        self._conversation = self._welcomed()
+        self.resume_reading()
+
+
+def _make_link(link: Path, device: str) -> None:
+    temporary = link.with_name(f".{link.name}.{os.getpid()}")
+    try:
+        if os.path.lexists(link) and not (link.is_symlink() and str(link.readlink()).startswith(OF_ITS_KIND)):
+            raise Mistake(f"--pty {link}: expected nothing there or an old link to a terminal, got something else")
+        temporary.unlink(missing_ok=True)
+        temporary.symlink_to(device)
+        temporary.replace(link)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise Mistake(f"--pty {link}: expected a place where a link can be made: {error.strerror}") from error

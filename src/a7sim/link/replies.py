@@ -1,0 +1,68 @@
+"""Taking a reply apart: texts, and blocks of bytes that may hold any character (IEEE 488.2 definite length)."""
+
+from dataclasses import dataclass
+
+_SEMICOLON, _QUOTE, _END, _HASH = b';"\n#'
+
+Part = str | bytes
+"""What one query answered: text, or the bytes of a block."""
+
+
+class NotAReply(Exception):
+    """Bytes that no instrument of this language sends."""
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """A reply and how many bytes it took, its end with them."""
+
+    parts: tuple[Part, ...]
+    length: int
+
+
+def whole_reply(received: bytes | bytearray) -> Taken | None:
+    """Return the reply at the beginning of what was received, None while it is not whole. Raises NotAReply."""
+    parts: list[Part] = []
+    at = 0
+    while True:
+        found = _block(received, at) if received[at : at + 1] == b"#" else _text(received, at)
+        if found is None or found[1] >= len(received):
+            return None
+        part, at = found
+        parts.append(part)
+        if received[at] == _END:
+            return Taken(tuple(parts), at + 1)
+        if received[at] != _SEMICOLON:
+            raise NotAReply(f"expected ; or a line end behind a block, got byte {received[at]}")
+        at += 1
+
+
+def _text(received: bytes | bytearray, start: int) -> tuple[str, int] | None:
+    within = False
+    for at in range(start, len(received)):
+        byte = received[at]
+        if byte == _END or (byte == _SEMICOLON and not within):
+            return bytes(received[start:at]).removesuffix(b"\r").decode("latin-1"), at
+        within ^= byte == _QUOTE
+    return None
+
+
+def _block(received: bytes | bytearray, start: int) -> tuple[bytes, int] | None:
+    digits = bytes(received[start + 1 : start + 2])
+    if not digits:
+        return None
+    if digits not in b"123456789":
+        raise NotAReply(f"expected a block of definite length, got #{digits.decode('latin-1')}")
+    begins = start + 2 + int(digits)
+    size = bytes(received[start + 2 : begins])
+    if len(size) < int(digits):
+        return None
+    if not size.isdigit():
+        raise NotAReply(f"expected the size of a block, got {size.decode('latin-1')}")
+    ends = begins + int(size)
+    return (bytes(received[begins:ends]), ends) if len(received) >= ends else None
+
+
+def as_text(part: Part) -> str:
+    """Return a part for people: a block as its size."""
+    return part if isinstance(part, str) else f"#block of {len(part)} bytes"

@@ -1,0 +1,109 @@
+"""The instrument at its doors: TCP, RFC 2217 and pseudo-terminals, one loop, one desk, an engine for every client."""
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from a7sim.instrument.language import Desk, ErrorNumber, entry
+from a7sim.link.addresses import Address
+from a7sim.link.clock import Clock, WallClock
+from a7sim.link.conversation import Conversation, Terms, Wire
+from a7sim.link.pty_wire import PtyWire
+from a7sim.link.wires import LARGEST_READ, TcpWire, TelnetWire
+from a7sim.mistakes import Mistake
+
+MOST_TURNED_AWAY = 64
+"""Clients at a time that are told why they are turned away; the others are just turned away."""
+
+ACCEPTED_AT_ONCE = 512
+"""Connections that may wait to be taken in, and are taken in before the clients have their turn."""
+
+
+@dataclass(frozen=True)
+class Doors:
+    """Where the instrument is to be reached."""
+
+    tcp: Sequence[Address] = ()
+    rfc2217: Sequence[Address] = ()
+    pty: Sequence[Path] = ()
+
+
+class Server:
+    """An instrument that is served, from `open` to `close`."""
+
+    def __init__(self, desk: Desk, clock: Clock | WallClock, terms: Terms) -> None:
+        self.desk = desk
+        self._clock = clock
+        self._terms = terms
+        self._buffer = bytearray(LARGEST_READ)
+        self._wires: set[Wire] = set()
+        self._turned_away: set[Wire] = set()
+        self._opened = 0
+        self._listeners: list[asyncio.Server] = []
+        self._terminals: list[PtyWire] = []
+
+    async def open(self, doors: Doors) -> list[dict[str, Any]]:
+        """Open all doors and return what each is, as a document. Raises Mistake, and then none is open."""
+        try:
+            opened = [await self._listen("tcp", "socket", TcpWire, address) for address in doors.tcp]
+            opened += [await self._listen("rfc2217", "rfc2217", TelnetWire, address) for address in doors.rfc2217]
+            opened += [self._lay(path) for path in doors.pty]
+        except BaseException:
+            await self.close()
+            raise
+        return opened
+
+    async def _listen(self, kind: str, scheme: str, wire: type[TcpWire], address: Address) -> dict[str, Any]:
+        loop = asyncio.get_running_loop()
+        try:
+            listener = await loop.create_server(
+                lambda: wire(self, self._buffer), address.host, address.port, backlog=ACCEPTED_AT_ONCE
+            )
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise Mistake(f"--{kind} {address}: expected an address to listen on: {why}") from error
+        self._listeners.append(listener)
+        host, port = listener.sockets[0].getsockname()[:2]
+        return {"kind": kind, "host": host, "port": port, "url": f"{scheme}://{Address(host, port)}"}
+
+    def _lay(self, path: Path) -> dict[str, Any]:
+        terminal = PtyWire(self, path)
+        self._terminals.append(terminal)
+        return {"kind": "pty", "path": str(path), "device": terminal.device, "url": str(path)}
+
+    async def close(self) -> None:
+        """Close all doors; every client is cut off."""
+        for listener in self._listeners:
+            listener.close()
+        for terminal in self._terminals:
+            terminal.remove()
+            self._wires.discard(terminal)
+        self._terminals.clear()
+        for wire in [*self._wires, *self._turned_away]:
+            wire.abort()
+        await asyncio.sleep(0)
+
+    @property
+    def clients(self) -> int:
+        """How many there are, each terminal counted as one."""
+        return len(self._wires)
+
+    def welcome(self, wire: Wire, serial: bool) -> Conversation | bytes:
+        """Return a conversation for a wire, or why there is none, as a line."""
+        most = self._terms.most_clients
+        if len(self._wires) >= most:
+            if len(self._turned_away) >= MOST_TURNED_AWAY:
+                wire.abort()
+            self._turned_away.add(wire)
+            text = entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {most} clients at a time")
+            return f"{text}\n".encode("ascii")
+        self._wires.add(wire)
+        self._opened += 1
+        return Conversation(self.desk, self._clock, self._terms, wire, self._opened, serial)
+
+    def left(self, wire: Wire) -> None:
+        """Take note that a wire is no more."""
+        self._wires.discard(wire)
+        self._turned_away.discard(wire)

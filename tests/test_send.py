@@ -1,0 +1,258 @@
+"""`a7sim send` and `a7sim operate` at the command line: what a person types and sees (issue 5)."""
+
+import json
+import os
+import pty
+import re
+import select
+import subprocess
+import sys
+
+import msgspec
+import pytest
+
+from a7sim.documents import as_json
+from a7sim.link.twin import BesideTwin, served_at
+from a7sim.mistakes import Mistake
+from a7sim.scenario import load_scenario
+from a7sim.session import run
+from tests.test_cli import ROOT, a7sim
+from tests.wires import new_desk, served
+
+CONTROLS = re.compile(r"\x07|\x1b\[[0-9;?]*[A-Za-z]")
+
+OWN = "a7sim://akwanga?seed=7"
+
+
+@pytest.fixture
+def url():
+    with served("tcp", new_desk()) as served_url:
+        yield served_url
+
+
+# --- send ----------------------------------------------------------------------------------------------
+
+
+def test_replies_are_printed_one_a_line_and_nothing_for_a_command(url):
+    done = a7sim("send", url, "BASE:BX 194.99", "BASE:BX?;MODE?", "*OPC?")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "194.99;IN\n1\n", "")
+
+
+def test_what_was_refused_is_said_at_the_end_with_exit_code_1(url):
+    done = a7sim("send", url, "FOO?", "BASE:BX 999;BX?")
+    assert (done.returncode, done.stdout) == (1, "0.00\n")
+    assert re.fullmatch(r'a7sim: -113,"Undefined header;FOO\?"\na7sim: -222,"Data out of range;.*"\n', done.stderr)
+
+
+def test_lines_come_from_standard_input_where_none_are_given(url):
+    done = subprocess.run(
+        [sys.executable, "-m", "a7sim", "send", url],
+        input="BASE:BX 20\n\n  BASE:BX?  \nFOO",
+        capture_output=True, text=True, check=False, cwd=ROOT,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (1, "20.00\n")
+    assert "Undefined header" in done.stderr
+
+
+def test_a_document_holds_all_exchanges(url):
+    done = a7sim("send", url, "BASE:BX 20", "BASE:BX?", "FOO?", "--json")
+    assert json.loads(done.stdout) == {
+        "schema_version": 1,
+        "command": "send",
+        "exchanges": [
+            {"sent": "BASE:BX 20", "reply": None},
+            {"sent": "BASE:BX?", "reply": "20.00"},
+            {"sent": "FOO?", "reply": None},
+        ],
+        "errors": ['-113,"Undefined header;FOO?"'],
+    }
+    assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_a_block_is_shown_as_its_size_and_kept_in_a_file(url, tmp_path):
+    file = tmp_path / "left.grey"
+    done = a7sim("send", url, "EYEP1:PICT? 33,33,0.5;*OPC?", "--out", file)
+    assert (done.returncode, done.stdout) == (0, "#block of 1089 bytes;1\n")
+    assert file.read_bytes() == new_desk().open().feed(b"EYEP1:PICT? 33,33,0.5\n", 0.0)[6:-1]
+
+
+def test_a_token_comes_from_a_file_or_the_environment_and_goes_out_first(tmp_path, monkeypatch):
+    (tmp_path / "token").write_text("of the file\n")
+    desk = new_desk()
+    heard = []
+    desk.listener = lambda event: heard.append(event.text)
+    with served("tcp", desk) as url:
+        monkeypatch.setenv("A7SIM_TOKEN", "of the environment")
+        a7sim("send", url, "*OPC?")
+        a7sim("send", url, "*OPC?", "--token-file", tmp_path / "token")
+    logins = [text for text in heard if text.startswith("SYST:LOG")]
+    assert (heard[0], logins) == (logins[0], ['SYST:LOG "of the environment"', 'SYST:LOG "of the file"'])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["tcp://127.0.0.1:1", "*OPC?"], "a7sim: tcp://127.0.0.1:1: expected an instrument to answer there"),
+        (["nowhere", "*OPC?"], "a7sim: nowhere: expected an instrument to answer there: no such file"),
+        ([OWN, "--timeout", "0", "*OPC?"], "0<x"),
+        ([OWN, "--token-file", "no/such/file", "*OPC?"], "no/such/file"),
+    ],
+)
+def test_bad_input_to_send_is_one_clear_sentence(arguments, sentence):
+    done = a7sim("send", *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+class Terminal:
+    """A person at a terminal on which a program runs."""
+
+    def __init__(self, arguments, home):
+        environment = os.environ | {"XDG_DATA_HOME": str(home), "TERM": "dumb"}
+        self.process, self._screen = pty.fork()
+        if not self.process:
+            os.chdir(ROOT)
+            os.execve(sys.executable, [sys.executable, "-m", "a7sim", *arguments], environment)
+        self.seen = ""
+
+    def types(self, keys):
+        os.write(self._screen, keys.encode())
+
+    def until(self, words):
+        while words not in self.seen:
+            assert select.select([self._screen], [], [], 20.0)[0], self.seen
+            try:
+                self.seen += CONTROLS.sub("", os.read(self._screen, 4096).decode())
+            except OSError:
+                break
+        assert words in self.seen
+        seen, self.seen = self.seen.split(words, 1)
+        return seen
+
+    def leaves(self):
+        _, status = os.waitpid(self.process, 0)
+        os.close(self._screen)
+        return os.waitstatus_to_exitcode(status)
+
+
+def test_a_prompt_completes_headers_answers_and_says_what_is_wrong_after_each_line(tmp_path):
+    terminal = Terminal(["send", OWN], tmp_path)
+    assert "WILD HEERBRUGG,A7" in terminal.until("a7sim> ")
+    terminal.types("BASE:BX 20\nbas:\nBASE:B\t?\n")
+    assert "-102: Syntax error: expected a blank after bas" in terminal.until("a7sim> BASE:BX?")
+    assert terminal.until("a7sim> ").strip() == "20.00"
+    terminal.types("help\n")
+    assert "PROJector<n>:KAPPa?" in terminal.until("a7sim> ")
+    terminal.types("exit\n")
+    assert terminal.leaves() == 0
+    again = Terminal(["send", OWN], tmp_path)
+    again.until("a7sim> ")
+    again.types("\x1b[A\x1b[A\x1b[A\n")
+    assert again.until("a7sim> ").splitlines()[-1].strip() == "0.00"
+    again.types("\x04")
+    assert again.leaves() == 0
+
+
+# --- operate -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def one_model():
+    """The first model of Akwanga, and what comes of it in process."""
+    scenario = load_scenario("akwanga")
+    scenario = msgspec.structs.replace(scenario, models=scenario.models[:1])
+    return scenario, as_json(run(scenario, 7))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["tcp", "pty", "rfc2217"])
+def test_an_operator_at_a_served_instrument_leaves_the_same_results(one_model, kind, tmp_path):
+    scenario, results = one_model
+    with served(kind, new_desk(scenario)) as url, served_at(url, timeout=5.0) as port:
+        run(scenario, 7, tmp_path / "out", cable=lambda twin: BesideTwin(port, twin, url))
+    assert (tmp_path / "out" / "results.json").read_text(encoding="utf-8") == results
+
+
+@pytest.mark.slow
+def test_operate_leaves_the_results_of_run_to_the_byte(url, tmp_path):
+    for verb, link in (("run", ()), ("operate", ("--link", url))):
+        done = a7sim(verb, "akwanga", "--seed", 7, "--out", tmp_path / verb, "--quiet", *link)
+        assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    for file in ("results.json", "book.csv", "session.jsonl", "strip.csv"):
+        assert (tmp_path / "operate" / file).read_bytes() == (tmp_path / "run" / file).read_bytes()
+
+
+def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
+    scenario, _ = one_model
+    read = []
+
+    class Eavesdropper(BesideTwin):
+        def readline(self, size=-1):
+            line = super().readline(size)
+            read.append((line, self._served.given))
+            return line
+
+    class Served:
+        def __init__(self, engine):
+            self._engine, self._replies = engine, b""
+
+        def write(self, data):
+            self._replies += self._engine.feed(data, 0.0)
+
+        def readline(self, size=-1):
+            self.given, _, self._replies = self._replies.partition(b"\n")
+            self.given += b"\n"
+            return self.given
+
+    run(scenario, 7, cable=lambda twin: Eavesdropper(Served(new_desk(scenario).open()), twin, "url"))
+    assert len(read) > 1000
+    assert all(line is given for line, given in read if line)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "seed", "sentence"),
+    [
+        (
+            "akwanga",
+            8,
+            r"is not a new one of this scenario and seed \(serve it anew\); expected .* in answer to PHOT1:FID",
+        ),
+        ("akwanga-a8", 7, r"is not a new one .* expected WILD HEERBRUGG,A7.* in answer to \*IDN\?, got .*A8"),
+    ],
+)
+def test_an_instrument_of_another_scenario_or_seed_is_refused_in_one_sentence(one_model, scenario, seed, sentence):
+    with (
+        served("tcp", new_desk(scenario, seed)) as url,
+        pytest.raises(Mistake, match=f"{url}: the instrument served {sentence}"),
+        served_at(url, timeout=1.0) as port,
+    ):
+        run(one_model[0], 7, cable=lambda twin: BesideTwin(port, twin, url))
+
+
+def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
+    class Silent:
+        def write(self, data):
+            return len(data)
+
+        def readline(self, size=-1):
+            return b""
+
+    with pytest.raises(Mistake, match=r"url: expected an answer to \*IDN\? in time, got none"):
+        run(one_model[0], 7, cable=lambda twin: BesideTwin(Silent(), twin, "url"))
+
+
+def test_operate_holds_the_lock_and_gives_it_back():
+    desk = new_desk()
+    with served("tcp", desk) as url:
+        with served_at(url, timeout=1.0):
+            assert desk.lock_holder is not None
+            with pytest.raises(Mistake, match="another client holds its lock"), served_at(url, timeout=1.0):
+                pytest.fail("two operators in one chair")
+        assert desk.lock_holder is None
+
+
+def test_operate_needs_work_at_the_plotter(url):
+    done = a7sim("operate", "schut-1956", "--link", url)
+    assert done.returncode == 2
+    assert "expected work at the plotter" in done.stderr

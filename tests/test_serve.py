@@ -1,0 +1,381 @@
+"""The served instrument over TCP (issue 5): many clients at one desk, each with its limits, none in another's way."""
+
+import selectors
+import socket
+import threading
+import time
+from pathlib import Path
+from statistics import median
+
+import pytest
+
+import a7sim
+from a7sim.instrument import Autograph
+from a7sim.instrument.language import LARGEST_REPLY, LONGEST_LINE, Desk
+from a7sim.instrument.language.status import QUEUE_LENGTH
+from a7sim.instrument.language.syntax import LONGEST_NUMBER
+from a7sim.link.conversation import Terms
+from a7sim.link.serving import MOST_TURNED_AWAY, Doors
+from a7sim.link.wires import LARGEST_READ, MOST_UNREAD, QUICK_ACKNOWLEDGEMENT
+from a7sim.manual import VARIANTS
+from tests.served import ANYWHERE, PATIENCE, Line, Served
+
+IDENTITY = f"WILD HEERBRUGG,A7,0,{a7sim.__version__}"
+
+
+@pytest.fixture
+def served():
+    with Served() as opened:
+        yield opened
+
+
+# --- many clients, one instrument ----------------------------------------------------------------------
+
+
+def test_clients_share_the_instrument_and_each_has_its_own_errors(served):
+    first, second = served.line(), served.line()
+    assert first.ask("DRIV:X 12.5;:FOO;*OPC?") == "1"
+    assert second.ask("COUN:X?;:SYST:ERR:COUN?") == "12.50;0"
+    assert first.ask("SYST:ERR:COUN?") == "1"
+
+
+def test_who_holds_the_lock_turns_alone_and_a_holder_who_disconnects_frees_it(served):
+    holder, other = served.line(), served.line()
+    assert (holder.ask("SYST:LOCK:REQ?"), other.ask("SYST:LOCK:REQ?")) == ("1", "0")
+    assert other.ask("DRIV:X 5;:COUN:X?;:SYST:ERR?").startswith("0.00;-203,")
+    holder.close()
+    assert served.until(lambda: served.server.clients == 1)
+    assert other.ask("DRIV:X 5;:COUN:X?;:SYST:LOCK:REQ?") == "5.00;1"
+
+
+def test_a_client_that_sends_and_hangs_up_its_half_is_answered_and_let_go(served):
+    line = served.line()
+    line.send(b"DRIV:X 7\n" + b"COUN:X?\n" * 2000)
+    line.socket.shutdown(socket.SHUT_WR)
+    assert [line.read() for _ in range(2000)] == ["7.00"] * 2000
+    assert line.read() == ""
+
+
+@pytest.mark.parametrize(
+    ("sent", "replies"),
+    [
+        (b"COUN:X?\nCOUN:Y?\n", ["0.00", "0.00"]),
+        (b"*TST?\r\n\r\n*OPC?\r\n", ["0", "1"]),
+        (b"\n\n;;\n *TST? \n", ["0"]),
+        (b"*TST?\rCOUN:X?\nSYST:ERR?\n", ['-101,"Invalid character;character number 13"']),
+        (b"NOTE 'a\x00b'\nSYST:ERR?\n", ['-101,"Invalid character;character number 0"']),
+        (b"\x00\x00*TST?\nSYST:ERR:COUN?\n", ["1"]),
+        ("NOTE 'φ″'\nSYST:ERR:COUN?\n".encode(), ["1"]),
+        (bytes(range(256)).replace(b"\n", b"") + b"\nSYST:ERR:COUN?\n", ["1"]),
+        (b"\xff\xfb\x2c\xff\xfa\nSYST:ERR:COUN?\n", ["1"]),
+    ],
+)
+def test_whatever_bytes_come_in_whatever_pieces(served, sent, replies):
+    for size in (1, 3, len(sent)):
+        line = served.line()
+        for start in range(0, len(sent), size):
+            line.send(sent[start : start + size])
+        assert [line.read() for _ in replies] == replies
+        assert line.ask("*IDN?") == IDENTITY
+
+
+@pytest.mark.skipif(QUICK_ACKNOWLEDGEMENT is None, reason="an option of Linux")
+@pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
+def test_a_client_with_nagles_algorithm_waits_for_no_late_acknowledgement(kind):
+    """Commands have no reply that could carry the acknowledgement, without which the client keeps its next line."""
+    with Served(doors=Doors(**{kind: [ANYWHERE]})) as served:
+        line = served.line()
+        if kind == "rfc2217":
+            line.socket.recv(64)
+        line.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 0)
+        began = time.monotonic()
+        for _ in range(100):
+            line.send(b"*CLS\n")
+            assert line.ask("*TST?") == "0"
+        assert time.monotonic() - began < 100 * 0.02
+
+
+# --- movement ------------------------------------------------------------------------------------------
+
+
+def test_without_the_walls_clock_waiting_takes_simulated_time_only(served):
+    line = served.line()
+    began = time.monotonic()
+    assert line.ask("BASE:BX 200;*OPC?;BX 0;*OPC?;*WAI;BX?") == "1;1;0.00"
+    assert time.monotonic() - began < 5.0
+    assert served.clock.now == 200.0
+
+
+def test_who_waits_by_looking_at_the_status_comes_to_an_end(served):
+    line = served.line()
+    line.send(b"*CLS;DRIV:X 10;*OPC\n")
+    looks = 1
+    while line.ask("*ESR?") != "1":
+        looks += 1
+    assert 10 <= looks <= 12
+
+
+def test_on_the_walls_clock_waiting_really_waits_and_the_others_go_on():
+    with Served(realtime=True) as served:
+        waiting, other = served.line(), served.line()
+        began = time.monotonic()
+        waiting.send(b"DRIV:X 4;:STAT:OPER:COND?\n")
+        assert waiting.read() == "2"
+        waiting.send(b"*OPC?\nCOUN:X?;:STAT:OPER:COND?\n")
+        asked = 0
+        while time.monotonic() - began < 0.3:
+            assert other.ask("COUN:X?") == "4.00"
+            asked += 1
+        assert asked > 10
+        assert (waiting.read(), waiting.read()) == ("1", "4.00;0")
+        assert 0.4 <= time.monotonic() - began < 3.0
+
+
+def test_a_client_that_goes_while_it_waits_leaves_nothing_behind():
+    with Served(realtime=True) as served:
+        waiting = served.line()
+        waiting.send(b"SYST:LOCK:REQ?;:DRIV:X 200;*OPC?\n" + b"COUN:X?\n" * 10000)
+        assert served.until(lambda: served.desk.lock_holder is not None)
+        waiting.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+        waiting.close()
+        assert served.line().ask("COUN:X?") == "200.00"
+
+
+# --- login ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def guarded():
+    with Served(Desk(Autograph(VARIANTS["A7"]), token="sesame 8x")) as opened:
+        yield opened
+
+
+@pytest.mark.parametrize("line", ["COUN:X?", "*OPC?", "SYST:ERR?", "SYST:LOCK:REQ?", "FOO?", "SYST:HELP:HEAD?"])
+def test_before_the_login_only_the_identity_is_told(guarded, line):
+    client = guarded.line()
+    client.send(line.encode() + b";*CLS;DRIV:X 5;:RST\n")
+    assert client.ask("*IDN?") == IDENTITY
+    assert guarded.desk.autograph.counter("X") == 0.0
+    assert guarded.desk.lock_holder is None
+
+
+def test_after_the_login_the_errors_from_before_it_are_there(guarded):
+    client = guarded.line()
+    client.send(b'COUN:X?\nSYST:LOG "sesame 8"\n:FOO\n')
+    client.send('SYST:LOG "sesame 8x"\n'.encode("latin-1"))
+    assert client.ask("SYST:ERR:COUN?") == "3"
+    assert client.ask("SYST:ERR?;:SYST:ERR?") == (
+        '-203,"Command protected;expected SYSTem:LOGin first";-203,"Command protected;this is not the token"'
+    )
+
+
+def test_the_journal_never_holds_a_token_right_or_wrong():
+    heard = []
+    with Served(Desk(Autograph(VARIANTS["A7"]), heard.append, token="sesame")) as guarded:
+        client = guarded.line()
+        client.send(b'SYST:LOG "sesam"\nsyst:version?;login  "sesame"\nSYST:LOGIN "sesame"\n')
+        assert client.ask("COUN:X?;:SYST:ERR:COUN?") == "0.00;2"
+    assert [event.text for event in heard if event.direction == ">"] == [
+        *["(a line with a login)"] * 3,
+        "COUN:X?;:SYST:ERR:COUN?",
+    ]
+
+
+# --- limits --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("line", "number"),
+    [
+        ("NOTE '" + "x" * LONGEST_LINE + "'", -363),
+        ("DRIV:X " + "0" * LONGEST_NUMBER + "1", -104),
+        ("DRIV:X " + "1" * 4000 + "!", -104),
+        ("DRIV:X 1E99999", -222),
+        ("PROJ3:KAPP?", -114),
+        ("PROJ0:KAPP?", -114),
+        ("PROJ999999999:KAPP?", -114),
+        ("PROJ" + "1" * 4000 + ":KAPP?", -113),
+        (":".join(["SYST"] * 800) + "?", -113),
+        ("DRIV:X " + "(" * 4000, -104),
+        ("DRIV:X " + "(" * 2000 + "1" + ")" * 2000, -104),
+        ("NOTE " + '"' * 4001, -102),
+        ("DRIV:X " + "," * 4000, -102),
+        ("NOTE 'open", -102),
+        ("EYEP:PICT? 1025,1,1", -222),
+    ],
+)
+def test_every_limit_of_a_line_has_its_error_at_once_and_the_next_line_works(served, line, number):
+    client = served.line()
+    began = time.monotonic()
+    assert client.ask(f"{line}\n*CLS?\nSYST:ERR?").split(",")[0] == str(number)
+    assert time.monotonic() - began < 2.0
+    assert client.ask("*IDN?") == IDENTITY
+
+
+def test_the_error_queue_overflows_into_its_last_entry(served):
+    client = served.line()
+    client.send(b"FOO\n" * 1000)
+    assert client.ask("SYST:ERR:COUN?") == str(QUEUE_LENGTH)
+    assert [client.ask("SYST:ERR?").split(",")[0] for _ in range(QUEUE_LENGTH)] == ["-113"] * 31 + ["-350"]
+
+
+def test_the_replies_to_a_line_are_bounded(served):
+    line = ";".join(["PICT? 1024,1024,1"] * 4)
+    client = served.line()
+    client.send(f"EYEP:{line}\n".encode())
+    size = len("#71048576") + 1024 * 1024
+    expected = 3 * size + 2 + 1
+    assert expected < LARGEST_REPLY < 4 * size
+    while expected:
+        expected -= len(client.socket.recv(min(65536, expected)))
+    assert client.ask("SYST:ERR?;*ESR?").startswith('-430,"Query DEADLOCKED;')
+
+
+def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
+    with Served(terms=Terms(most_clients=3)) as served:
+        lines = [served.line() for _ in range(3)]
+        assert [line.ask("*TST?") for line in lines] == ["0"] * 3
+        for _ in range(2 * MOST_TURNED_AWAY):
+            served.line()
+        assert [line.ask("*TST?") for line in lines] == ["0"] * 3
+        lines[0].close()
+        assert served.until(lambda: served.server.clients == 2)
+        assert served.line().ask("*TST?") == "0"
+
+
+def test_why_a_client_is_turned_away():
+    with Served(terms=Terms(most_clients=1)) as served:
+        assert served.line().ask("*TST?") == "0"
+        late = served.line()
+        assert late.ask("*IDN?") == '-200,"Execution error;expected at most 1 clients at a time"'
+        assert late.hung_up()
+
+
+def test_64_clients_are_let_in_unless_said_otherwise(served):
+    lines = [served.line() for _ in range(65)]
+    assert [line.ask("*TST?") for line in lines[:64]] == ["0"] * 64
+    assert lines[64].read().startswith("-200,")
+
+
+def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
+    with Served(terms=Terms(patience=0.5)) as served:
+        other = served.line()
+        assert other.ask("*TST?") == "0"
+        slow = served.line()
+        slow.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        slow.socket.setblocking(False)
+        flood = b"SYST:HELP:HEAD?\n" * 10_000
+        kept = [(0, 0)]
+        gone = False
+        until = time.monotonic() + PATIENCE
+        while not gone:
+            assert time.monotonic() < until
+            try:
+                slow.socket.send(flood)
+            except BlockingIOError:
+                kept += served.there(lambda: [_kept(wire) for wire in served.server._wires])
+                assert other.ask("COUN:X?") == "0.00"
+                gone = served.there(lambda: served.server.clients) == 1
+            except ConnectionError:
+                gone = True
+        assert other.ask("*IDN?") == IDENTITY
+        unread, unheard = map(max, zip(*kept, strict=True))
+        assert MOST_UNREAD < unread < 2 * MOST_UNREAD
+        assert unheard <= LARGEST_READ
+
+
+def _kept(wire):
+    return wire._transport.get_write_buffer_size(), len(wire._conversation._backlog)
+
+
+def test_a_client_that_reads_late_gets_every_reply_in_order(served):
+    count = 20 * MOST_UNREAD // len(IDENTITY)
+    line = served.line()
+    sender = threading.Thread(target=line.send, args=(b"*IDN?\n" * count,))
+    sender.start()
+    time.sleep(0.2)
+    assert all(line.read() == IDENTITY for _ in range(count))
+    sender.join()
+
+
+def test_who_says_nothing_is_told_and_let_go_and_who_speaks_stays():
+    with Served(terms=Terms(idle=0.4)) as served:
+        silent, speaking = served.line(), served.line()
+        assert silent.ask("SYST:LOCK:REQ?") == "1"
+        until = time.monotonic() + 0.8
+        while time.monotonic() < until:
+            assert speaking.ask("*TST?") == "0"
+            time.sleep(0.02)
+        assert silent.read() == '-365,"Time out error;expected something to do within 0.4 s"'
+        assert silent.read() == ""
+        assert speaking.ask("SYST:LOCK:REQ?") == "1"
+
+
+@pytest.mark.slow
+def test_ten_thousand_connections_opened_and_dropped_leave_nothing(served):
+    steady = served.line()
+    assert steady.ask("*TST?") == "0"
+    descriptors = Path("/proc/self/fd")
+    before = len(list(descriptors.iterdir()))
+    for i in range(10_000):
+        line = Line(served.port)
+        if i % 4 == 0:
+            line.send(b"SYST:LOCK:REQ?\n*OP")
+        if i % 10:
+            line.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+        line.close()
+    assert served.until(lambda: served.server.clients == 1)
+    assert served.until(lambda: len(list(descriptors.iterdir())) <= before)
+    assert steady.ask("SYST:LOCK:REQ?") == "1"
+
+
+# --- fairness ------------------------------------------------------------------------------------------
+
+
+def test_a_burst_starves_nobody(served):
+    bursting, other = served.line(), served.line()
+    burst = (b"*RST;" * 100 + b":COUN:X?\n") * 150
+    stop = threading.Event()
+
+    def drain():
+        left = 150
+        while left:
+            left -= bursting.socket.recv(1 << 20).count(b"\n")
+        stop.set()
+
+    threading.Thread(target=drain, daemon=True).start()
+    threading.Thread(target=bursting.send, args=(burst,), daemon=True).start()
+    took = []
+    while not stop.is_set():
+        began = time.monotonic()
+        assert other.ask("*TST?") == "0"
+        took.append(time.monotonic() - began)
+    assert len(took) > 20
+    assert median(took) < 0.1
+
+
+def test_a_hundred_clients_polling_at_once_are_all_served_alike():
+    with Served(terms=Terms(most_clients=100)) as served:
+        lines = [served.line() for _ in range(100)]
+        for n, line in enumerate(lines):
+            assert line.ask(f"*ESE {n};*ESE?") == str(n)
+        for line in lines:
+            line.socket.setblocking(False)
+        counts = _polled(lines, seconds=2.0)
+    assert min(counts) >= 0.2 * median(counts) > 1
+
+
+def _polled(lines, seconds):
+    """Let each client ask again as soon as it is answered; return how often each was."""
+    waiting = selectors.DefaultSelector()
+    counts = [0] * len(lines)
+    for n, line in enumerate(lines):
+        waiting.register(line.socket, selectors.EVENT_READ, n)
+        line.send(b"*ESE?\n")
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        for key, _ in waiting.select(1.0):
+            assert key.fileobj.recv(4096) == f"{key.data}\n".encode()
+            counts[key.data] += 1
+            key.fileobj.send(b"*ESE?\n")
+    return counts

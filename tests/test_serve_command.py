@@ -1,0 +1,220 @@
+"""`a7sim serve` at the command line (issue 5): what it prints and refuses, how it stops, what memory it takes."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import serial
+
+import a7sim
+from a7sim.link.client import Client
+from tests.served import PATIENCE, Line
+
+SERVE = [sys.executable, "-c", "from a7sim.cli import main; main()", "serve"]
+IDENTITY = f"WILD HEERBRUGG,A7,3268,{a7sim.__version__}"
+ANYWHERE = ("--tcp", "127.0.0.1:0")
+
+
+class Running:
+    """`a7sim serve akwanga`, from ready to its end."""
+
+    def __init__(self, *arguments, **environment):
+        self.process = subprocess.Popen(
+            [*SERVE, "akwanga", "--json", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env={**os.environ, **environment},
+            text=True,
+        )
+        text = ""
+        while not text.endswith("\n}\n"):
+            line = self.process.stdout.readline()
+            assert line, self.process.stderr.read()
+            text += line
+        self.document = json.loads(text)
+        self.doors = self.document["listening"]
+
+    def line(self):
+        return Line(next(door["port"] for door in self.doors if door["kind"] == "tcp"))
+
+    def stopped_by(self, number):
+        """Return exit code, s it took, and what was said on standard error."""
+        began = time.monotonic()
+        self.process.send_signal(number)
+        _, errors = self.process.communicate(timeout=PATIENCE)
+        return self.process.returncode, time.monotonic() - began, errors
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.communicate()
+
+
+def refused(*arguments, **environment):
+    """Return what a server that does not begin says."""
+    done = subprocess.run(
+        [*SERVE, *arguments],
+        capture_output=True,
+        check=False,
+        text=True,
+        timeout=30,
+        env={**os.environ, **environment},
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+@pytest.fixture(scope="module")
+def everywhere(tmp_path_factory):
+    """A server with three doors."""
+    link = tmp_path_factory.mktemp("line") / "a7"
+    with Running(*ANYWHERE, "--rfc2217", "127.0.0.1:0", "--pty", str(link), "--seed", "7") as running:
+        yield running
+
+
+def test_the_document_says_where_it_listens_and_all_doors_lead_to_one_instrument(everywhere):
+    document = everywhere.document
+    assert (document["schema_version"], document["command"], document["seed"]) == (1, "serve", 7)
+    assert [door["kind"] for door in document["listening"]] == ["tcp", "rfc2217", "pty"]
+    for n, door in enumerate(document["listening"]):
+        with serial.serial_for_url(door["url"], timeout=PATIENCE) as port:
+            client = Client(port)
+            assert client.ask("*IDN?") == IDENTITY
+            assert client.ask(f"COUN:X?;:DRIV:X {n + 1};:COUN:X?") == f"{n}.00;{n + 1}.00"
+
+
+def test_no_line_without_end_of_64_mib_makes_the_server_grow(everywhere):
+    with everywhere.line() as line:
+        piece = b"x" * (1 << 20)
+        line.send(piece)
+        line.send(b"\n")
+        assert line.ask("SYST:ERR?").startswith("-363,")
+        before = _resident(everywhere.process.pid)
+        for _ in range(64):
+            line.send(piece)
+        line.send(b"\n")
+        assert line.ask("SYST:ERR?").startswith("-363,")
+        assert _resident(everywhere.process.pid) - before < 1024
+        assert line.ask("*IDN?") == IDENTITY
+
+
+def _resident(pid):
+    """Return the resident memory of a process in KiB."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(next(line for line in status.splitlines() if line.startswith("VmRSS")).split()[1])
+
+
+def test_no_line_of_the_language_opens_reads_or_writes_a_file():
+    """Every header with texts that name files, watched by the audit hooks of the interpreter (PEP 578)."""
+    done = subprocess.run([sys.executable, "-c", _WATCHED], capture_output=True, check=False, text=True)
+    assert done.stdout.splitlines()[-1] == "audited: ['open']", done.stdout + done.stderr
+
+
+_WATCHED = """
+import sys
+from a7sim.scenario import load_scenario
+from a7sim.scene import build_scene
+from a7sim.instrument import build_autograph
+from a7sim.instrument.language import Desk
+from a7sim.link.clock import Clock
+from a7sim.link.waiting import obeyed
+scenario = load_scenario("akwanga")
+engine = Desk(build_autograph(scenario.instrument, build_scene(scenario, 7).drawer, 7)).open()
+clock = Clock()
+def say(line):
+    return obeyed(engine, line.encode() + b"\\n", clock).decode("latin-1")
+headers = say("SYST:HELP:HEAD?").replace("<n>", "1").replace("[", "").replace("]", "").strip().split(",")
+lines = [header.strip('"') for header in headers]
+mount = ['PHOT1:LOAD "101"', 'PHOT2:LOAD "102"']
+def everything():
+    for more in ("", ' "/etc/passwd"', " 1", " 9,9,1", ' 1,"x"'):
+        for line in mount + lines:
+            say(line + more * (line in lines))
+everything()
+heard = []
+touching = ("open", "os.", "shutil.", "subprocess.", "import", "socket.")
+sys.addaudithook(lambda event, _: event.startswith(touching) and heard.append(event))
+everything()
+open("/dev/null").close()
+print("audited:", heard)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_ends_it_within_a_second_with_link_gone_and_journal_whole(tmp_path, number):
+    link, out = tmp_path / "a7", tmp_path / "session"
+    with Running(*ANYWHERE, "--pty", str(link), "--out", str(out)) as running:
+        line = running.line()
+        assert line.ask("DRIV:X 5;:COUN:X?") == "5.00"
+        line.send(b"COUN:X?\n" * 20000)
+        code, took, errors = running.stopped_by(number)
+    assert (code, errors) == (0, "")
+    assert took < 1.0
+    assert not os.path.lexists(link)
+    text = (out / "session.jsonl").read_text()
+    assert text.endswith("}\n")
+    header, *events = map(json.loads, text.splitlines())
+    assert header["seed"] == running.document["seed"]
+    assert [event["text"] for event in events[:2]] == ["DRIV:X 5;:COUN:X?", "5.00"]
+
+
+def test_ready_comes_last_and_quiet_says_nothing():
+    with subprocess.Popen([*SERVE, "akwanga", *ANYWHERE], stdout=subprocess.PIPE, text=True) as process:
+        kind, url = process.stdout.readline().split()
+        assert process.stdout.readline() == "ready\n"
+        with serial.serial_for_url(url, timeout=PATIENCE) as port:
+            assert (kind, Client(port).ask("*IDN?")) == ("tcp", IDENTITY)
+        process.terminate()
+        assert (process.stdout.read(), process.wait(PATIENCE)) == ("", 0)
+
+
+def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
+    token = tmp_path / "token"
+    token.write_text("heerbrugg\n")
+    for arguments, environment in (
+        (("--listen-anyway", "--tcp", "0.0.0.0:0", "--token-file", str(token)), {}),
+        (ANYWHERE, {"A7SIM_TOKEN": "heerbrugg"}),
+    ):
+        with Running(*arguments, **environment) as running, running.line() as line:
+            line.send(b'COUN:X?\nSYST:LOG "aarau"\nCOUN:X?\n')
+            assert line.ask("*IDN?") == IDENTITY
+            assert line.ask('SYST:LOG "heerbrugg";:COUN:X?;:SYST:ERR:COUN?') == "0.00;3"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--tcp", "0.0.0.0:0"], "0.0.0.0:0: expected an address of this machine alone"),
+        (["--rfc2217", "192.0.2.1:2217"], "192.0.2.1:2217: expected an address of this machine alone"),
+        (["--tcp", "[::]:0"], "[::]:0: expected an address of this machine alone"),
+        (["--tcp", "example.org:0"], "example.org:0: expected an address of this machine alone"),
+        (["--listen-anyway"], "--listen-anyway: expected a token"),
+        (["--token-file", "nowhere"], "--token-file nowhere: expected a file with a token"),
+        (["--token-file", os.devnull], "expected a token, got an empty file"),
+        (["--tcp", "5025"], "--tcp: expected HOST:PORT such as 127.0.0.1:5025, got '5025'"),
+        (["--rfc2217", "127.0.0.1:99999"], "--rfc2217: expected HOST:PORT"),
+        (["--pty", os.devnull], "expected nothing there or an old link"),
+        (["--fault", "often"], "--fault: expected drop-reply, delay, garble or disconnect"),
+        (["--baud", "1"], "--baud"),
+    ],
+)
+def test_what_cannot_be_served_is_said_in_a_sentence(arguments, sentence):
+    assert sentence in refused("akwanga", *arguments, A7SIM_TOKEN="")
+
+
+def test_an_address_that_is_taken_is_said_and_nothing_stays_behind(tmp_path):
+    link = tmp_path / "a7"
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        said = refused("akwanga", "--tcp", "127.0.0.1:0", "--tcp", address, "--pty", str(link))
+    assert f"--tcp {address}: expected an address to listen on" in said
+    assert not os.path.lexists(link)

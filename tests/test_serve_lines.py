@@ -1,0 +1,270 @@
+"""Served serial lines (issue 5): pseudo-terminals, RFC 2217, lines as slow as a wire, lines that fail on request."""
+
+import os
+import threading
+import time
+import tty
+from pathlib import Path
+
+import numpy as np
+import pytest
+import serial
+
+import a7sim
+from a7sim.instrument import Autograph
+from a7sim.instrument.language import Desk
+from a7sim.link.client import Client
+from a7sim.link.conversation import Terms
+from a7sim.link.faults import Cut, Faults, Noise, faults_of
+from a7sim.link.serving import Doors
+from a7sim.manual import VARIANTS
+from a7sim.mistakes import Mistake
+from tests.door import with_model
+from tests.served import ANYWHERE, PATIENCE, Served
+
+IDENTITY = f"WILD HEERBRUGG,A7,0,{a7sim.__version__}"
+
+
+@pytest.fixture
+def link(tmp_path):
+    return tmp_path / "a7"
+
+
+@pytest.fixture
+def terminal(link):
+    with Served(doors=Doors(pty=[link])) as served:
+        yield served
+
+
+def at(served, timeout=PATIENCE):
+    return serial.serial_for_url(served.opened[0]["url"], timeout=timeout)
+
+
+# --- pseudo-terminals ----------------------------------------------------------------------------------
+
+
+def test_a_terminal_is_a_serial_port_in_raw_mode(terminal, link):
+    assert str(link.readlink()) == terminal.opened[0]["device"]
+    with at(terminal) as port:
+        client = Client(port)
+        assert client.ask("*IDN?") == IDENTITY
+        port.write(b"*TST?\r*OPC?\r\n\x03\x04\x13*TST?\n*TST?\n")
+        assert [port.readline() for _ in range(3)] == [b"0\n", b"1\n", b"0\n"]
+        assert client.errors() == ['-101,"Invalid character;character number 3"']
+
+
+def test_every_byte_of_a_block_comes_through_a_terminal(link):
+    door = with_model()
+    expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
+    with Served(door.desk, doors=Doors(pty=[link])) as served, at(served) as port:
+        assert Client(port).block("EYEP1:PICT? 60,50,4") == expected
+
+
+def test_clients_of_a_terminal_come_and_go(terminal):
+    for n in range(5):
+        with at(terminal) as port:
+            assert Client(port).ask(f"*ESE {n};*ESE?") == str(n)
+
+
+def test_the_link_goes_with_the_server_and_an_old_one_is_replaced(link):
+    near, far = os.openpty()
+    link.symlink_to(os.ttyname(far))
+    with Served(doors=Doors(pty=[link])) as served:
+        assert str(link.readlink()) == served.opened[0]["device"] != os.ttyname(far)
+    assert not link.is_symlink()
+    os.close(near), os.close(far)
+
+
+@pytest.mark.parametrize("make", [lambda path: path.write_text("mine"), Path.mkdir, lambda path: path.symlink_to("x")])
+def test_what_is_no_link_to_a_terminal_is_left_alone(link, make):
+    make(link)
+    with pytest.raises(Mistake, match="expected nothing there or an old link"), Served(doors=Doors(pty=[link])):
+        pass
+    assert os.path.lexists(link)
+    assert [path.name for path in link.parent.iterdir()] == ["a7"]
+
+
+def test_a_link_that_now_leads_elsewhere_is_left_alone(link):
+    with Served(doors=Doors(pty=[link])):
+        link.unlink()
+        link.symlink_to("/dev/pts/elsewhere")
+    assert str(link.readlink()) == "/dev/pts/elsewhere"
+
+
+def test_a_folder_that_is_not_there_is_said_and_every_other_door_is_closed_again(tmp_path):
+    first = tmp_path / "first"
+    with (
+        pytest.raises(Mistake, match=r"nowhere/a7: expected a place where a link can be made"),
+        Served(doors=Doors(pty=[first, tmp_path / "nowhere" / "a7"])),
+    ):
+        pass
+    assert not first.is_symlink()
+
+
+def test_a_terminal_whose_client_does_not_read_begins_anew(link):
+    with Served(terms=Terms(patience=0.2), doors=Doors(pty=[link], tcp=[ANYWHERE])) as served:
+        first = served.server._terminals[0]._conversation
+        far = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        tty.setraw(far)
+        os.write(far, b"SYST:LOCK:REQ?\n" + b"SYST:HELP:HEAD?\n" * 100)
+        assert served.until(lambda: served.server._terminals[0]._conversation is not first)
+        other = served.line()
+        assert other.ask("SYST:LOCK:REQ?") == "1"
+        os.close(far)
+        with serial.Serial(str(link), timeout=PATIENCE) as port:
+            assert Client(port).ask("*IDN?") == IDENTITY
+
+
+def test_a_terminal_long_silent_frees_its_lock_and_stays(link):
+    with Served(terms=Terms(idle=0.2), doors=Doors(pty=[link])) as served:
+        with at(served) as port:
+            assert Client(port).ask("SYST:LOCK:REQ?") == "1"
+        assert served.until(lambda: served.desk.lock_holder is None)
+        with at(served) as port:
+            assert Client(port).ask("*TST?") == "0"
+            assert port.in_waiting == 0
+
+
+# --- RFC 2217 ------------------------------------------------------------------------------------------
+
+
+def test_a_port_over_rfc_2217_carries_every_byte_and_ends_lines_with_cr_as_well():
+    door = with_model()
+    expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
+    assert expected.count(b"\xff") > 0
+    with Served(door.desk, doors=Doors(rfc2217=[ANYWHERE])) as served, at(served) as port:
+        client = Client(port)
+        assert client.block("EYEP1:PICT? 60,50,4") == expected
+        port.write(b"*TST?\r")
+        assert port.readline() == b"0\n"
+        port.baudrate = 19200
+        port.dtr = False
+        assert (port.cts, port.dsr, port.cd, port.ri) == (True, True, True, False)
+        port.write(b"NOTE '\xff'\n")
+        assert client.errors() == ['-101,"Invalid character;character number 255"']
+
+
+# --- as slow as a wire ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["tcp", "pty"])
+def test_a_paced_line_needs_ten_bits_a_byte_both_ways_and_holds_up_nobody(link, kind):
+    baud, asked = 2400, 3
+    doors = Doors(tcp=[ANYWHERE], pty=[link])
+    with Served(terms=Terms(baud=baud), doors=doors) as served:
+        url = served.opened[0]["url"] if kind == "tcp" else str(link)
+        with serial.serial_for_url(url, timeout=PATIENCE) as port:
+            port.write(b"*IDN?\n")
+            began = time.monotonic()
+            other = threading.Thread(target=served.line().ask, args=("*TST?",))
+            other.start()
+            assert port.readline() == f"{IDENTITY}\n".encode()
+            for _ in range(asked - 1):
+                port.write(b"*IDN?\n")
+                assert port.readline() == f"{IDENTITY}\n".encode()
+            took = time.monotonic() - began
+            other.join(PATIENCE)
+    wire = asked * 10 * (len(b"*IDN?\n") + len(IDENTITY) + 1) / baud
+    assert wire * 0.95 <= took <= wire * 1.6 + 0.3
+
+
+def test_a_paced_line_keeps_little_and_loses_nothing():
+    with Served(terms=Terms(baud=2_000_000)) as served:
+        line = served.line()
+        sender = threading.Thread(target=line.send, args=(b"COUN:X?\n" * 5000,))
+        sender.start()
+        assert all(line.read() == "0.00" for _ in range(5000))
+        sender.join()
+
+
+def test_a_paced_client_that_hangs_up_its_half_is_answered_to_the_end():
+    with Served(terms=Terms(baud=19200)) as served:
+        line = served.line()
+        line.send(b"*TST?\n" * 50)
+        line.socket.shutdown(1)
+        assert [line.read() for _ in range(51)] == ["0"] * 50 + [""]
+
+
+# --- faults on request ---------------------------------------------------------------------------------
+
+
+def faulty(spec, seed=1, baud=None):
+    return Served(
+        Desk(Autograph(VARIANTS["A7"])), Terms(faults=faults_of(spec), fault_seed=seed, baud=baud, most_clients=200)
+    )
+
+
+def replies_lost(seed, count=400):
+    with faulty("drop-reply:0.25", seed) as served:
+        line = served.line()
+        for n in range(count):
+            line.send(f"*ESE {n % 256};*ESE?\n".encode())
+        line.socket.shutdown(1)
+        came = []
+        while reply := line.read():
+            came.append(int(reply))
+    return came
+
+
+def test_replies_are_dropped_as_often_as_asked_and_the_same_ones_again():
+    came = replies_lost(seed=1)
+    assert 0.65 < len(came) / 400 < 0.85
+    assert came == replies_lost(seed=1)
+    assert came != replies_lost(seed=2)
+
+
+def test_replies_are_late_by_the_delay_and_in_order():
+    with faulty("delay:80ms") as served:
+        line = served.line()
+        began = time.monotonic()
+        line.send(b"*TST?\n*OPC?\nCOUN:X?\n")
+        assert [line.read() for _ in range(3)] == ["0", "1", "0.00"]
+        assert 0.08 <= time.monotonic() - began < 2.0
+
+
+def test_bytes_are_garbled_as_often_as_asked_and_line_ends_spared():
+    reply = bytes(range(32, 127)) * 100 + b"\n"
+    noise = Noise(Faults(garble=0.02), np.random.default_rng(3))
+    came = [noise.carried(reply) for _ in range(10)]
+    wrong = sum(a != b for each in came for a, b in zip(each, reply, strict=True))
+    assert 0.015 < wrong / (10 * len(reply)) < 0.025
+    assert all(each[-1:] == b"\n" for each in came)
+
+
+def test_a_line_that_is_cut_takes_its_client_and_nobody_else():
+    with faulty("disconnect:0.2") as served:
+        answered = []
+        for _ in range(100):
+            line = served.line()
+            line.send(b"*TST?\n")
+            answered.append(line.read() == "0")
+        assert 0.65 < sum(answered) / 100 < 0.93
+        assert served.until(lambda: served.server.clients == sum(answered))
+
+
+def test_a_cut_is_an_end_not_a_reply():
+    with pytest.raises(Cut):
+        Noise(Faults(disconnect=1.0), np.random.default_rng(0)).carried(b"0\n")
+
+
+def test_faults_read_as_they_are_written():
+    assert faults_of("drop-reply:0.01,delay:50ms,garble:0.001,disconnect:0.0005") == Faults(0.01, 0.001, 0.0005, 0.05)
+    assert faults_of("delay:1.5s") == Faults(delay=1.5)
+
+
+@pytest.mark.parametrize(
+    ("spec", "sentence"),
+    [
+        ("", "expected drop-reply, delay, garble or disconnect"),
+        ("lose:0.1", "expected drop-reply, delay, garble or disconnect"),
+        ("garble:2", "garble: expected a probability from 0 to 1, got '2'"),
+        ("garble:nan", "expected a probability from 0 to 1"),
+        ("drop-reply", "expected a probability from 0 to 1, got ''"),
+        ("delay:50", "expected up to 60s, such as 50ms or 1.5s, got '50'"),
+        ("delay:2000s", "expected up to 60s"),
+        ("garble:0.1,garble:0.2", "expected garble once"),
+    ],
+)
+def test_faults_that_cannot_be_read_are_said(spec, sentence):
+    with pytest.raises(Mistake, match=sentence.replace("(", r"\(")):
+        faults_of(spec)
