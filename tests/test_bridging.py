@@ -12,9 +12,12 @@ from a7sim.operator import bridging
 from a7sim.operator.bench import Bench, Parallaxes
 from a7sim.operator.bridging import bridged
 from a7sim.reduction import similarity_by_quaternion
+from a7sim.report.kept import read_session
+from a7sim.report.writing import report_of
 from a7sim.scenario import load_scenario
 from a7sim.session.bridge import bridged_strip, run_bridge, tables_of
 from a7sim.session.crowd import open_crowd
+from tests.pages import Page
 from tests.sessions import without_errors
 
 CLOSES_MM = 0.05
@@ -123,6 +126,10 @@ def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(tmp_path):
         assert said["scale"] == pytest.approx(model.scale[0], abs=1e-7)
     assert document["status"] == "complete"
     assert {"bridged", "independent"} <= set(document)
+    page = Page(report_of(read_session(out)))
+    table = page.table("Bridged models: scale carried by bx, rms of differences at common points")
+    assert [row[3] for row in table.rows] == [f"{model['scale']:.5f}" for model in document["bridged"]["models"]]
+    assert document["bridged"]["strip"]["message"] in "".join(page.text)
     assert document["bridged"]["strip"].keys() == document["independent"]["strip"].keys() - {"joins"}
     tables_of(document)
 

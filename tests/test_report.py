@@ -1,5 +1,6 @@
 """The report of a session: one page that needs nothing beside it and says what the results say."""
 
+import base64
 import json
 import re
 import shutil
@@ -212,6 +213,32 @@ def test_a_grid_test_has_its_residuals_at_the_crosses(tmp_path, typed):
     assert "left projector" in titles and "right projector" in titles
     assert "Right projector: residuals at the crosses" in "".join(page.text)
     assert page.table("What gives this session again").row("command line")[1].endswith("--points 9 --levels 1")
+
+
+def test_a_map_stands_on_the_page_as_a_picture_of_its_own(tmp_path, results):
+    """The styles of a map reach nothing else on the page: it is an image with its data, not a part of the page."""
+    strip = results["strip"]
+    line = {"name": "contour 460", "closed": True, "endings": [], "vertices": 9, "length_m": 80.0}
+    document = {
+        "schema_version": 1, "command": "compile", "scenario": "Akwanga", "seed": 7, "status": "complete",
+        "message": "", "model": "1", "map_scale": 2500.0, "plan_gear": "1-2-1", "spot_heights": 5,
+        "range_m": [440.0, 470.0], "expected": {"sigma_height_m": 0.05, "sigma_plan_m": 0.07},
+        "levelling": {"rounds": 2, "tilt_left_gon": 0.01, "scale_found": 3750.0}
+        | {key: strip[key] for key in ("absolute", "residuals_m", "accuracy_m", "warnings")},
+        "lines": [line | {"rms_height_m": 0.051, "largest_height_m": 0.2}],
+        "beside_the_truth": {"contours": None}, "operator": results["operator"], "truth": {"slips": []},
+    }  # fmt: skip
+    (tmp_path / "results.json").write_text(json.dumps(document), encoding="utf-8")
+    drawn = '<svg xmlns="http://www.w3.org/2000/svg"><style>text { fill: red; }</style></svg>'
+    (tmp_path / "map.svg").write_text(drawn, encoding="utf-8")
+    text = report_of(read_session(tmp_path))
+    page = Page(text)
+    image = next(attributes for tag, attributes in page.elements if tag == "img")
+    assert image["alt"] == "Map of model 1"
+    assert base64.b64decode(image["src"].partition("base64,")[2]).decode() == drawn
+    assert "fill: red" not in text
+    assert page.table("Lines beside the true ground").row("contour 460")[4] == "0.051"
+    assert "Levelling on the ground control: residuals in height" in "".join(page.text)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.text import Text
 
 from a7sim.documents import Document
+from a7sim.reduction.strips import is_centre
 from a7sim.report.figures.grid import grid_residuals
 from a7sim.report.figures.model import (
     centre_residuals,
@@ -24,6 +25,7 @@ from a7sim.report.page import Chapter, Folded, Part, Picture, Sheet
 from a7sim.report.rays import rays_of
 from a7sim.report.terminal import parts_of
 from a7sim.session import tables
+from a7sim.session.bridge import INDEPENDENT
 from a7sim.session.bridge import tables_of as of_bridge
 from a7sim.session.compiled_tables import of_compilation
 from a7sim.session.folder import RESIDUALS, STRIP, STRIP_OF_WAY, SVG
@@ -121,10 +123,12 @@ def _map(svg: str, title: str) -> Picture:
 def _of_bridge(kept: Kept) -> Chapters:
     document = kept.document
     yield Chapter("Bridge", list(parts_of(of_bridge(document), caption="Bridged models")))
-    for way in ("bridged", "independent"):
+    independent = _places(kept, f"{INDEPENDENT}/{STRIP}")
+    ground = {point: at for point, at in independent.items() if not is_centre(point)}
+    for way, places in (("bridged", ground), (INDEPENDENT, independent)):
         strip = document.get(way, {}).get("strip", {})
         if "residuals_m" in strip:
-            yield _of_strip({"joins": []} | strip, {}, f"Strip, {way}", f"b{way}")
+            yield _of_strip({"joins": []} | strip, places, f"Strip, {way}", f"b{way}")
 
 
 def _of_operator(kept: Kept) -> Chapters:

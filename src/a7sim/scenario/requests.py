@@ -36,5 +36,5 @@ def rephrased(scenario: Scenario, words: str, instead: str, settings: Mapping[st
     if not isinstance(scenario, RequestedScenario):
         return scenario
     request = scenario.request
-    changed = Request(request.command_line.replace(words, instead), request.settings | settings)
+    changed = Request(request.command_line.replace(words, instead), {**request.settings, **settings})
     return replace(scenario, request=changed)

@@ -7,6 +7,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+import a7sim
 from a7sim.documents import Document, as_json, head, of_absolute, of_adjustment
 from a7sim.mistakes import Mistake
 from a7sim.operator.bridging import BridgedModels, bridge
@@ -46,7 +47,8 @@ def run_bridge(
     done: list[Document] = []
     places: dict[str, Places] = {}
     document = head("bridge") | of_request(scenario)
-    document |= {"scenario": scenario.title, "seed": seed, "status": "failed", "message": ""}
+    document |= {"software": f"a7sim {a7sim.__version__}", "scenario": scenario.title, "seed": seed}
+    document |= {"variant": scenario.instrument.variant, "status": "failed", "message": ""}
     document["bridged"] = {"models": done}
 
     def leaves() -> dict[str, str]:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from a7sim.documents import Document
-from a7sim.reduction.strips import CENTRE
+from a7sim.reduction.strips import CENTRE, is_centre
 from a7sim.report.drawing import FAINT, INK, LEFT, PANEL, RIGHT, SOFT, WIDTH_IN, arrows, drawing, nice, scale_arrow
 from a7sim.report.page import Picture
 
@@ -93,7 +93,7 @@ def residuals_in_height(strip: Document, name: str, of: str) -> Picture | None:
 
 def plan_and_profile(places: Places, strip: Document, name: str, of: str) -> Picture | None:
     """Return the points and centres of a strip in plan, and their heights along it."""
-    centres = {point: at for point, at in places.items() if point.endswith(CENTRE)}
+    centres = {point: at for point, at in places.items() if is_centre(point)}
     points = {point: at for point, at in places.items() if point not in centres}
     if len(centres) < 2 or not points:
         return None
