@@ -132,6 +132,12 @@ def test_centres_are_those_of_the_results(page, results):
             )
 
 
+def test_a_prime_is_the_left_projector_also_with_base_out(page):
+    text = "".join(page.text)
+    assert "Model 1: perspective centre O′, left photograph 101" in text
+    assert "Model 2: perspective centre O″, left photograph 102" in text
+
+
 def test_residuals_on_the_ground_are_those_of_the_results(page, results):
     table = page.table("Residuals, computed minus given, m")
     expected = results["strip"]["residuals_m"]

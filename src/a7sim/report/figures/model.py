@@ -30,8 +30,10 @@ if TYPE_CHECKING:
 CONFIDENT = 2.4477
 """So many standard deviations make the ellipse that holds 95 % of a plane's normal errors."""
 
-OF_SIDE = {"left": ("′", LEFT, "o"), "right": ("″", RIGHT, "s")}
-"""Sign, colour and marker of the photographs."""
+OTHER = {"left": "right", "right": "left"}
+
+OF_PROJECTOR = {"left": ("′", LEFT, "o"), "right": ("″", RIGHT, "s")}
+"""Sign, colour and marker of the projectors; with base out the left-hand photograph lies in the right one."""
 
 
 def residual_parallaxes(model: Document, name: str) -> Picture:
@@ -57,7 +59,7 @@ def residual_parallaxes(model: Document, name: str) -> Picture:
             axes.annotate(label, at, (-6, 3), textcoords="offset points", ha="right", fontweight="bold")
             value = f"{round(residuals[label], 3) + 0.0:+.3f}"
             axes.annotate(value, at, (5, -4), textcoords="offset points", va="top", fontsize=10, color=SOFT)
-        low, high, left, right = min(y) - 0.32 * across, max(y) + 0.3 * across, min(x), max(x)
+        low, high, left, right = min(y) - 0.52 * across, max(y) + 0.3 * across, min(x), max(x)
         margin = 0.12 * (right - left)
         scale_at = left - 0.5 * margin, low - 0.02 * across
         scale_arrow(axes, scale_at, (0.0, length * step), f"{step:g} mm", RIGHT)
@@ -98,7 +100,8 @@ def iterations(model: Document, name: str) -> Picture:
         axes.set_yscale("log")
         axes.plot(numbers, _above_zero(each["rms_mm"] for each in rounds), "o-", color=LEFT, label="rms about the mean")
         means = _above_zero(abs(each["mean_mm"]) for each in rounds)
-        axes.plot(numbers, means, "s--", color=RIGHT, markerfacecolor=PANEL, label="mean, without its sign")
+        if any(each["mean_mm"] for each in rounds):
+            axes.plot(numbers, means, "s--", color=RIGHT, markerfacecolor=PANEL, label="mean, without its sign")
         if last > 0.0:
             axes.axhline(last, color=INK, linestyle=":", label="rms left at all standard points")
         axes.set(xlabel="round", ylabel="y-parallax, mm", xticks=numbers)
@@ -118,7 +121,7 @@ def perspective_centre(model: Document, side: str, rays: Mapping[str, tuple[floa
     `rays` are the places (X, Y) at which each point's ray comes through the height of the centre.
     """
     found, true = model["perspective_centres"][side], model["truth"]["centres"][side]
-    sign, colour, marker = OF_SIDE[side]
+    sign, colour, marker = OF_PROJECTOR[side if model["base"] == "inside" else OTHER[side]]
     title = f"Model {model['model']}: perspective centre O{sign}, {side} photograph {model[side]}"
     said = (
         f"Found at X {found['X0']:.3f}, Y {found['Y0']:.3f}, Z {found['Z0']:.3f}; "
@@ -137,13 +140,15 @@ def perspective_centre(model: Document, side: str, rays: Mapping[str, tuple[floa
         plan.margins(0.12)
         plan.grid()
         plan.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, columnspacing=1.0)
-        plan.locator_params(nbins=4)
+        plan.locator_params(axis="x", nbins=2)
+        plan.locator_params(axis="y", nbins=4)
         height.errorbar([0.0], [found["Z0"]], [found["sigma_Z0"]], fmt=marker, color=colour, capsize=6)
         height.plot([0.0], [true["Z0"]], "x", color=TRUE, markersize=10, markeredgewidth=2.5)
         height.set(xticks=[], xlim=(-1.0, 1.0), title="Z ± σ")
         height.margins(y=0.25)
         height.grid()
-        drawn.legend = "Filled: one standard deviation; dashed: 95 %; dots: the ray of each point at that height"
+        drawn.legend = "Filled: one standard deviation; dashed: 95 %"
+        drawn.legend += "; dots: the ray of each point at that height" if rays else ""
     return drawn.picture
 
 
