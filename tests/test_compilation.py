@@ -18,15 +18,12 @@ from a7sim.operator.line_hands import LineHands
 from a7sim.operator.plotting import Order, Sheet, _heights
 from a7sim.operator.stereo_view import FINE_MM, StereoView
 from a7sim.operator.work import worked
-from a7sim.report.kept import read_session
-from a7sim.report.writing import report_of
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import open_session
 from a7sim.session.compiling import Wanted, compile_model
 from a7sim.session.map_sheet import as_geojson, as_svg, index_heights
 from a7sim.session.strips import given_control, ground_of
-from tests.pages import Page
 from tests.sessions import without_errors
 from tests.test_cli import a7sim
 
@@ -232,16 +229,6 @@ def test_an_unknown_line_ends_with_one_sentence_and_exit_code_2():
     done = a7sim("compile", "akwanga", "--line", "road9")
     assert done.returncode == 2
     assert done.stderr == "a7sim: line: expected one of road1, track1, got road9\n"
-
-
-@pytest.mark.slow
-def test_a_height_outside_the_model_ends_with_one_sentence_and_exit_code_2(tmp_path):
-    done = a7sim("compile", "akwanga", "--contour", "900", "--out", tmp_path / "sheet")
-    assert done.returncode == 2
-    assert done.stderr.startswith("a7sim: contour 900: expected a height within the model")
-    assert done.stderr.count("\n") == 1
-    text = "".join(Page(report_of(read_session(tmp_path / "sheet"))).text)
-    assert "The session broke off" in text and "contour 900: expected a height within the model" in text
 
 
 def test_an_operator_is_given_no_coordinate_that_a_points_role_leaves_out():
