@@ -99,6 +99,9 @@ class Spindle:
             self._error = self.setting_sigma * rng.standard_normal()
 
 
+_WITH_DECIMALS = tuple(f".{decimals}f" for decimals in range(7))
+
+
 @dataclass
 class Counter:
     """A counter geared to a carriage: ``reading = offset + units_per_mm * position``."""
@@ -127,6 +130,10 @@ class Counter:
     def reading(self, position: float) -> float:
         """Return what the counter shows at a carriage position in mm."""
         return round(self.offset + self.units_per_mm * position, self.decimals) + 0.0
+
+    def text(self, position: float) -> str:
+        """Return what it shows as it is read off, with all its decimals."""
+        return format(self.reading(position), _WITH_DECIMALS[self.decimals])
 
     def position(self, reading: float) -> float:
         """Return the carriage position in mm where the counter shows a reading, rounded to its last digit."""
