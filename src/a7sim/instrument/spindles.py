@@ -99,7 +99,8 @@ class Spindle:
             self._error = self.setting_sigma * rng.standard_normal()
 
 
-_WITH_DECIMALS = tuple(f".{decimals}f" for decimals in range(7))
+_ROUNDED_TO = tuple(f"z.{decimals}f" for decimals in range(7))
+"""Formats by decimals; a zero has no sign."""
 
 
 @dataclass
@@ -133,7 +134,7 @@ class Counter:
 
     def text(self, position: float) -> str:
         """Return what it shows as it is read off, with all its decimals."""
-        return format(self.reading(position), _WITH_DECIMALS[self.decimals])
+        return format(self.offset + self.units_per_mm * position, _ROUNDED_TO[self.decimals])
 
     def position(self, reading: float) -> float:
         """Return the carriage position in mm where the counter shows a reading, rounded to its last digit."""
