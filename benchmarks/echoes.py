@@ -28,16 +28,23 @@ def _echoed(connection):
         connection.sendall(heard)
 
 
-class Echo(asyncio.Protocol):
-    """A protocol that writes what it receives."""
+class Echo(asyncio.BufferedProtocol):
+    """A protocol that writes what it receives, quicker than asyncio.Protocol, which allocates 256 KiB for each read."""
+
+    def __init__(self):
+        self._buffer = bytearray(LARGEST_READ)
 
     def connection_made(self, transport):
         """Remember where to write."""
         self._transport = transport
 
-    def data_received(self, data):
-        """Write it."""
-        self._transport.write(data)
+    def get_buffer(self, sizehint):
+        """Return where to read into."""
+        return self._buffer
+
+    def buffer_updated(self, nbytes):
+        """Write what was read."""
+        self._transport.write(bytes(memoryview(self._buffer)[:nbytes]))
 
 
 async def protocol():

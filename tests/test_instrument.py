@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from a7sim.geometry import GON, at_level, ray_of, rotation
@@ -127,6 +127,13 @@ def test_the_centres_stand_where_the_base_puts_them(base):
     x1, x2 = (0.0, 200.0) if base == "inside" else (200.0, 0.0)
     assert a7.pose(1)[0] == pytest.approx([x1, -3.0, 5.0])
     assert a7.pose(2)[0] == pytest.approx([x2, 4.0, -6.0])
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-500.0, 500.0), st.floats(0.01, 100.0), st.sampled_from([0, 1, 2]))
+@example(0.0, -0.001, 1.0, 2)
+def test_a_counter_shows_in_digits_what_it_reads_and_never_minus_zero(offset, position, units_per_mm, decimals):
+    counter = Counter(units_per_mm, decimals, offset)
+    assert counter.text(position) == f"{counter.reading(position):.{decimals}f}"
 
 
 @given(

@@ -1,8 +1,11 @@
 """Edges of SCPI's grammar as a table, of the kind that scpi-parser tests: a line, its reply, its errors."""
 
+import re
+
 import pytest
 
-from tests.door import with_model
+from a7sim.instrument.language.commands import COMMANDS
+from tests.door import Door, with_model, with_photographs
 
 HEADERS = [
     ("SYST:ERR?;VERS?", '0,"No error";1999.0', []),
@@ -93,3 +96,25 @@ def test_a_line_at_the_edge_of_the_grammar(line, reply, errors):
     door = with_model()
     assert door.say(line) == reply
     assert door.errors() == errors
+
+
+def test_a_plain_query_is_answered_the_same_whether_anybody_listens():
+    """The quick way of a line that is one plain query, taken while nobody listens, is that of all lines."""
+    for new in (with_photographs, with_model, guarded):
+        quick, heard = new(), new()
+        heard.desk.listener = [].append
+        for header in COMMANDS.headers():
+            query = re.sub(r"\[[^]]*\]", "", header.replace("<n>", "2"))
+            if query.endswith("?"):
+                assert (query, quick.say(query)) == (query, heard.say(query))
+                assert queue(quick) == queue(heard)
+
+
+def guarded() -> Door:
+    door = with_photographs()
+    door.desk.token = "heerbrugg"
+    return Door(door.desk)
+
+
+def queue(door):
+    return list(door.engine.status.errors)

@@ -190,7 +190,7 @@ class Autograph:
 
     def counter_text(self, axis: str) -> str:
         """Return the reading of a counter with the decimals that it shows."""
-        return f"{self.counter(axis):.{self._counters[axis].decimals}f}"
+        return self._counters[axis].text(self._carriages[axis].at)
 
     def counter_limits(self, axis: str) -> tuple[float, float]:
         """Return the counter readings at the two ends of a carriage."""

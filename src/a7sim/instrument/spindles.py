@@ -99,6 +99,10 @@ class Spindle:
             self._error = self.setting_sigma * rng.standard_normal()
 
 
+_ROUNDED_TO = tuple(f"z.{decimals}f" for decimals in range(7))
+"""Formats by decimals; a zero has no sign."""
+
+
 @dataclass
 class Counter:
     """A counter geared to a carriage: ``reading = offset + units_per_mm * position``."""
@@ -127,6 +131,10 @@ class Counter:
     def reading(self, position: float) -> float:
         """Return what the counter shows at a carriage position in mm."""
         return round(self.offset + self.units_per_mm * position, self.decimals) + 0.0
+
+    def text(self, position: float) -> str:
+        """Return what it shows as it is read off, with all its decimals."""
+        return format(self.offset + self.units_per_mm * position, _ROUNDED_TO[self.decimals])
 
     def position(self, reading: float) -> float:
         """Return the carriage position in mm where the counter shows a reading, rounded to its last digit."""

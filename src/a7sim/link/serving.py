@@ -38,7 +38,7 @@ class Server:
         self.desk = desk
         self._clock = clock
         self._terms = terms
-        self._buffer = bytearray(LARGEST_READ)
+        self._buffer = memoryview(bytearray(LARGEST_READ))
         self._wires: set[Wire] = set()
         self._turned_away: set[Wire] = set()
         self._opened = 0

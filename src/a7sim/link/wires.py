@@ -36,7 +36,7 @@ class TcpWire(asyncio.BufferedProtocol):
 
     serial = False
 
-    def __init__(self, host: Host, buffer: bytearray) -> None:
+    def __init__(self, host: Host, buffer: memoryview) -> None:
         self._host = host
         self._buffer = buffer
         self._transport: asyncio.Transport
@@ -62,13 +62,13 @@ class TcpWire(asyncio.BufferedProtocol):
             self._transport.write_eof()
         asyncio.get_running_loop().call_later(FAREWELL, self._transport.abort)
 
-    def get_buffer(self, sizehint: int) -> bytearray:
+    def get_buffer(self, sizehint: int) -> memoryview:
         """Return the buffer for the next read."""
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
         """Hand on what was read."""
-        self._take(bytes(memoryview(self._buffer)[:nbytes]))
+        self._take(self._buffer[:nbytes].tobytes())
 
     def _take(self, data: bytes) -> None:
         if self._conversation is not None:
@@ -141,7 +141,7 @@ class TelnetWire(TcpWire):
 
     serial = True
 
-    def __init__(self, host: Host, buffer: bytearray) -> None:
+    def __init__(self, host: Host, buffer: memoryview) -> None:
         super().__init__(host, buffer)
         self._telnet = Telnet()
 
@@ -152,7 +152,7 @@ class TelnetWire(TcpWire):
 
     def buffer_updated(self, nbytes: int) -> None:
         """Hand on what of it is data, and answer the rest."""
-        data, answer = self._telnet.received(bytes(memoryview(self._buffer)[:nbytes]))
+        data, answer = self._telnet.received(self._buffer[:nbytes].tobytes())
         if answer:
             super().write(answer)
         if data:

@@ -6,7 +6,7 @@ import zlib
 from typing import TYPE_CHECKING
 
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
-from a7sim.instrument.language.program import Fault, Program, Step, program_of, text_of
+from a7sim.instrument.language.program import Fault, Program, Question, Step, program_of, question_of, text_of
 from a7sim.instrument.language.status import OPERATION_COMPLETE, SETTLING, Status
 from a7sim.instrument.refusals import OutOfRange, Refusal, SettingsConflict, UnknownName
 
@@ -74,6 +74,10 @@ class Engine:
     def replies_to(self, received: bytes, time: float) -> list[bytes]:
         """Take bytes that arrived at a simulated time in s; return the reply to each line that has one."""
         self._time = time
+        if self.waits_until is None and not self._pending and self._admitted and self.desk.listener is None:
+            question = question_of(received, self._cr_ends_line)
+            if question is not None:
+                return self._answer(question)
         replies: list[bytes] = []
         if self.waits_until is None and not self._pending and self._one_line(received):
             self._obey_line(received, replies)
@@ -96,6 +100,20 @@ class Engine:
             self._obey_line(line, replies)
         self._keep_back(received[start:])
         return replies
+
+    def _answer(self, question: Question) -> list[bytes]:
+        try:
+            reply = question.handler(self, question.call)
+        except LanguageError as error:
+            self._report(error)
+        except Refusal as refusal:
+            self._report(_error_of(refusal, question.text))
+        else:
+            return [_as_bytes(reply) + b"\n"] if reply is not None else []
+        return []
+
+    def _report(self, error: LanguageError) -> None:
+        self._status.report(error.number, error.detail)
 
     def _one_line(self, received: bytes) -> bool:
         """Whether there is one whole line, as there mostly is."""
@@ -149,7 +167,7 @@ class Engine:
             try:
                 done = self._obey(unit)
             except LanguageError as error:
-                self._status.report(error.number, error.detail)
+                self._report(error)
                 done = True
             if (place >= UNITS_AT_ONCE or self._reply_size > breath) and self.waits_until is None:
                 self.waits_until = self._time
@@ -181,8 +199,7 @@ class Engine:
                 raise LanguageError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
             reply = command.handler(self, call)
         except Refusal as refusal:
-            number = _NUMBER_OF.get(type(refusal), ErrorNumber.EXECUTION_ERROR)
-            raise LanguageError(number, f"{unit.text[:60]}: {refusal}") from refusal
+            raise _error_of(refusal, unit.text) from refusal
         finally:
             if command.turns:
                 self.desk.moved(self._time)
@@ -243,6 +260,10 @@ class Engine:
         if expected is not None and not hmac.compare_digest(token.encode(), expected.encode()):
             raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "this is not the token")
         self._admitted = True
+
+
+def _error_of(refusal: Refusal, text: str) -> LanguageError:
+    return LanguageError(_NUMBER_OF.get(type(refusal), ErrorNumber.EXECUTION_ERROR), f"{text[:60]}: {refusal}")
 
 
 def _as_bytes(reply: str | bytes) -> bytes:

@@ -6,7 +6,7 @@ from functools import lru_cache
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 from a7sim.instrument.language.syntax import Parameter, Unit, unit_of, units_of
-from a7sim.instrument.language.table import Call, Command
+from a7sim.instrument.language.table import Call, Command, Handler
 
 LONGEST_KEPT_LINE = 100
 """Bytes of a line that is kept taken apart; longer ones seldom come twice."""
@@ -49,6 +49,31 @@ Program = tuple[Step | Fault, ...]
 def program_of(line: bytes) -> Program:
     """Return the units of a line in order, with or without its line end. Every line begins at the root."""
     return _kept(line) if len(line) <= LONGEST_KEPT_LINE else _taken_apart(line)
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A line that is nothing but a query, always means the same and need not wait: what a client polls."""
+
+    text: str
+    handler: Handler
+    call: Call
+
+
+def question_of(received: bytes, cr_ends_line: bool) -> Question | None:
+    """Return the question that what was received is, None where it is anything else."""
+    return _kept_question(received, cr_ends_line) if len(received) <= LONGEST_KEPT_LINE else None
+
+
+@lru_cache(maxsize=LINES_KEPT)
+def _kept_question(received: bytes, cr_ends_line: bool) -> Question | None:
+    if received.find(b"\n") != len(received) - 1 or (cr_ends_line and b"\r" in received):
+        return None
+    program = program_of(received)
+    step = program[0] if len(program) == 1 else None
+    if not isinstance(step, Step) or step.bare is None or not step.command.query or step.command.holds:
+        return None
+    return Question(step.text, step.command.handler, step.bare)
 
 
 def _taken_apart(line: bytes) -> Program:

@@ -188,6 +188,11 @@ class Command:
         """Whether the header ends in a question mark."""
         return self.header.endswith("?")
 
+    @property
+    def holds(self) -> bool:
+        """Whether it may be held back, or hold back what follows."""
+        return self.turns or self.waits or self.polls
+
     def written(self) -> str:
         """Return header and parameters as the manual prints them."""
         parts = [f"[{each.described()}]" if each.optional else each.described() for each in self.takes]
