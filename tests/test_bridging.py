@@ -113,7 +113,9 @@ def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(tmp_path):
     out = tmp_path / "out"
     document = run_bridge(scenario, 7, out)
     assert json.loads((out / "results.json").read_text()) == json.loads(json.dumps(document))
-    assert {"independent", "book.csv", "models.csv", "session.jsonl", "results.json"} == {p.name for p in out.iterdir()}
+    assert {"independent", "book.csv", "models.csv", "session.jsonl", "session.states.jsonl", "results.json"} == {
+        p.name for p in out.iterdir()
+    }
     assert json.loads((out / "independent" / "results.json").read_text())["strip"] == document["independent"]["strip"]
     _, models = worked(scenario, (7,))
     rows = [row.split(",")[:2] for row in (out / "models.csv").read_text().splitlines()[2:]]

@@ -1,5 +1,6 @@
 """Scenarios: what a file may say about a flight, photographs, an instrument and an operator."""
 
+from a7sim.scenario.carried import carried, hash_of, scenario_from
 from a7sim.scenario.loading import (
     ScenarioError,
     find_scenario,
@@ -42,9 +43,12 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "StripPlan",
+    "carried",
     "find_scenario",
+    "hash_of",
     "load_scenario",
     "observer_of_skill",
+    "scenario_from",
     "scenario_of",
     "scenario_schema",
 ]

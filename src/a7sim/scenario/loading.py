@@ -15,6 +15,9 @@ from a7sim.scenario.schema import Scenario
 from a7sim.scenario.skills import PROFILES
 from a7sim.scenario.validation import mistakes_of_form
 
+SHELVES = (Path(__file__).parents[1] / "scenarios", Path(__file__).parents[3] / "scenarios")
+"""Where the scenarios are that come with a7sim."""
+
 
 class ScenarioError(Mistake):
     """A scenario that cannot be used; `mistakes` names each mistake with its path."""
@@ -36,15 +39,11 @@ def find_scenario(name: str | Path) -> Path:
             return path
     except OSError as error:
         raise ScenarioError(str(name)[:200], [f"expected a readable file: {error.strerror}"]) from error
-    shelves = (
-        Path(__file__).parents[1] / "scenarios",
-        Path(__file__).parents[3] / "scenarios",
-    )
-    for shelf in shelves:
+    for shelf in SHELVES:
         found = shelf / f"{path.name.removesuffix('.toml')}.toml"
         if path.parent in (Path(), Path("scenarios")) and found.is_file():
             return found
-    known = sorted({file.stem for shelf in shelves for file in shelf.glob("*.toml")})
+    known = sorted({file.stem for shelf in SHELVES for file in shelf.glob("*.toml")})
     raise ScenarioError(str(name), [f"expected a scenario file or one of {', '.join(known)}, found no such file"])
 
 
