@@ -231,14 +231,6 @@ def test_an_unknown_line_ends_with_one_sentence_and_exit_code_2():
     assert done.stderr == "a7sim: line: expected one of road1, track1, got road9\n"
 
 
-@pytest.mark.slow
-def test_a_height_outside_the_model_ends_with_one_sentence_and_exit_code_2(tmp_path):
-    done = a7sim("compile", "akwanga", "--contour", "900", "--out", tmp_path / "sheet")
-    assert done.returncode == 2
-    assert done.stderr.startswith("a7sim: contour 900: expected a height within the model")
-    assert done.stderr.count("\n") == 1
-
-
 def test_an_operator_is_given_no_coordinate_that_a_points_role_leaves_out():
     """Plan control without a height, height control without a plan, no checks: nan, not what the terrain has there."""
     scenario = load_scenario("schut-1956")

@@ -21,7 +21,7 @@ from a7sim.geometry import (
     turn_of,
 )
 from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit
+from a7sim.operator import DoesNotFit, empirical
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Crew
 from a7sim.operator.empirical import over_correction, over_correction_by_coefficients, steps_of
@@ -117,9 +117,11 @@ def test_an_over_correction_is_not_a_number_where_the_four_points_cannot_be_clea
 
 @pytest.mark.parametrize("n", ["1", "1.4"])
 @METHODS
-def test_the_parallax_at_the_last_point_shrinks_as_the_parallax_equation_says(method, n):
+def test_the_parallax_at_the_last_point_shrinks_as_the_parallax_equation_says(monkeypatch, method, n):
     """By 1 - n/n0 a round, n0 = (1 + z^2/d^2)/2; the rounds that count are those with parallaxes well above a count."""
-    off = TWO_GON_OFF | {"plan.over_correction": n, "terrain.relief": "0", "plan.method": f'"{method}"'}
+    monkeypatch.setattr(empirical, "MOST_ROUNDS", 6)
+    rough = {"plan.tolerated_parallax_um": "1000"}
+    off = TWO_GON_OFF | rough | {"plan.over_correction": n, "terrain.relief": "0", "plan.method": f'"{method}"'}
     found, _ = orient(without_errors(load_scenario("akwanga", off)), 1)
     seen = np.array([each.parallaxes["6"] for each in found.rounds])
     ratios = (seen[1:] / seen[:-1])[np.abs(seen[:-1]) > 0.5]

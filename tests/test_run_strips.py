@@ -31,10 +31,10 @@ def all_strips(tmp_path_factory):
 
 
 def test_without_errors_the_strip_returns_the_ground_within_what_the_counters_leave():
-    """Counters leave 0.02 gon in a model and 0.12 mm in the height of a centre; no film or eye adds to it."""
+    """Counters leave 0.02 gon in a model and 0.15 mm in the height of a centre; no film or eye adds to it."""
     strip = run(tilted_flight([(0.4, -0.3, 0.2), (-0.5, 0.6, -0.4), (0.2, 0.1, 0.5)]), 5)["strip"]
     everywhere = np.concatenate([residuals(strip, "control"), residuals(strip, "check")])
-    assert np.abs(everywhere[:, :2]).max() < 0.12
+    assert np.abs(everywhere[:, :2]).max() < 0.15
     assert np.abs(everywhere[:, 2]).max() < 0.25
     assert strip["joins"][0]["max_residual_mm"] < 0.15
 

@@ -67,7 +67,8 @@ def test_what_fails_for_another_reason_says_so_in_the_file_and_goes_on_up(tmp_pa
 
     with pytest.raises(Mistake, match="burnt out"):
         run(load_scenario("akwanga"), 1, tmp_path / "out", Watcher(begins=fail))
-    assert results_of(tmp_path / "out")["status"] == "failed"
+    document = results_of(tmp_path / "out")
+    assert (document["status"], document["message"]) == ("failed", "the lamp has burnt out")
 
 
 def test_without_settings_of_a_plotter_nothing_is_written(tmp_path):

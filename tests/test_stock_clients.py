@@ -1,4 +1,4 @@
-"""Stock clients run one script of 200 lines over every link and get the same answers (issue 5)."""
+"""Stock clients run one script of more than 200 lines over every link and get the same answers (issue 5)."""
 
 from contextlib import contextmanager
 
@@ -115,9 +115,9 @@ def first():
         return conversation(client)
 
 
-def test_the_script_has_200_lines_and_every_query_of_it_is_answered(first):
+def test_the_script_has_200_lines_or_more_and_every_query_of_it_is_answered(first):
     answers, picture, errors = first
-    assert len(SCRIPT) == 200
+    assert len(SCRIPT) >= 200
     assert all(answer for line, answer in answers if asks(line))
     assert len(picture) == 64 * 48
     assert errors.startswith('5;-221,"Settings conflict;')
