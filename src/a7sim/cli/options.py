@@ -58,17 +58,18 @@ _OF_A_FOLDER = (
     click.option("--out", type=click.Path(path_type=Path), help="Folder for journal, book, tables and results."),
     click.option("--force", is_flag=True, help="Write into a folder that exists."),
 )
+DURABILITY_OPTION = click.option(
+    "--durability",
+    type=click.Choice(DURABILITIES),
+    default="records",
+    show_default=True,
+    help="When the journal is on the disk: every line, every registration and the rest within 0.2 s, or never.",
+)
 _OF_A_JOURNAL = (
     click.option(
         "--resume", type=click.Path(path_type=Path), metavar="DIR", help="Go on with the session in DIR, cut off."
     ),
-    click.option(
-        "--durability",
-        type=click.Choice(DURABILITIES),
-        default="records",
-        show_default=True,
-        help="When the journal is on the disk: every line, every registration and the rest within 0.2 s, or never.",
-    ),
+    DURABILITY_OPTION,
 )
 _OF_RESULTS = (
     click.option("--json", "as_document", is_flag=True, help="Print the results as one JSON document."),

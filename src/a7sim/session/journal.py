@@ -42,6 +42,12 @@ def header_of(command: str, scenario: Scenario, seed: int, **settings: Any) -> d
     }
 
 
+def header_of_unknown(command: str, **settings: Any) -> dict[str, Any]:
+    """Return what a journal says first where nobody knows what the instrument is of."""
+    first = {"schema_version": SCHEMA_VERSION, "software": software(), "command": command}
+    return first | {"scenario": None, "settings": settings}
+
+
 @dataclass(frozen=True)
 class Keeping:
     """How a session is kept: when its journal is on the disk, and whether it goes on from a journal that is there."""
@@ -71,10 +77,10 @@ class Journal:
         self._since_checkpoint = 0
         self._changes = 0
 
-    def opened(self, folder: Path | None, header: dict[str, Any], desk: Desk) -> "Journal":
-        """Begin to write about a desk, where there is a folder. Raises Mistake where it cannot be written.
+    def opened(self, folder: Path | None, header: dict[str, Any], desk: Desk | None) -> "Journal":
+        """Begin to write, where there is a folder; about a desk, where there is one.
 
-        A session that is resumed sets aside what is torn of its journal.
+        A session that is resumed sets aside what is torn of its journal. Raises Mistake where it cannot be written.
         """
         self._desk = desk
         if folder is not None:

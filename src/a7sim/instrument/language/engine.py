@@ -159,7 +159,7 @@ class Engine:
                 return
         if self._replies:
             if self.desk.listener is not None:
-                self._heard("<", ";".join(map(_as_text, self._replies)))
+                self._heard("<", ";".join(map(as_heard, self._replies)))
             replies.append(b";".join(map(_as_bytes, self._replies)) + b"\n")
             self._replies.clear()
             self._reply_size = 0
@@ -243,6 +243,11 @@ class Engine:
             status.event |= OPERATION_COMPLETE
         return status
 
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """What is in the error queue, oldest first, left there."""
+        return tuple(self._status.errors)
+
     def complete(self) -> None:
         """Raise the bit of operation complete when the movement that is going on now is done (`*OPC`)."""
         self._completes_at = self.desk.busy_until
@@ -268,7 +273,8 @@ def _as_bytes(reply: str | bytes) -> bytes:
     return reply if isinstance(reply, bytes) else reply.encode("ascii", "replace")
 
 
-def _as_text(reply: str | bytes) -> str:
+def as_heard(reply: str | bytes) -> str:
+    """Return what is told to a listener of a reply: of a block its size and checksum only."""
     if isinstance(reply, str):
         return reply
     return f"#block of {len(reply)} bytes, crc32 {zlib.crc32(reply):08x}"
