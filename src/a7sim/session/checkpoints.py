@@ -46,7 +46,7 @@ def read_checkpoints(path: Path) -> Iterator[Checkpoint]:
     for line in lines:
         try:
             checkpoint = msgspec.json.decode(line, type=Checkpoint)
-        except msgspec.DecodeError:
+        except (msgspec.DecodeError, UnicodeDecodeError):
             return
         if hash_of_state(checkpoint.state) != checkpoint.hash:
             return

@@ -125,7 +125,7 @@ def _damage(line: bytes, number: int) -> str:
     if number == 1:
         try:
             header = msgspec.json.decode(line)
-        except msgspec.DecodeError:
+        except (msgspec.DecodeError, UnicodeDecodeError):
             header = None
         if isinstance(header, dict) and header.get("schema_version", SCHEMA_VERSION) != SCHEMA_VERSION:
             return _other_version(header)
