@@ -12,8 +12,9 @@ import statistics
 import sys
 import time
 
-import processes
 from round_trips import QUERY
+
+import processes
 
 LEAST_SHARE = 0.2
 

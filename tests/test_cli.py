@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-WORK_FILES = {"session.jsonl", "book.csv", "models.csv", "results.json"}
+WORK_FILES = {"session.jsonl", "session.states.jsonl", "book.csv", "models.csv", "results.json"}
 STRIP_FILES = {"strip.csv", "strip.crd", "strip-output.crd", "strip-numbers.csv"}
 FILES = WORK_FILES | STRIP_FILES
 
@@ -98,15 +98,19 @@ def test_results_hold_what_is_promised(akwanga_run):
 
 def test_the_journal_holds_every_line_in_order_with_simulated_time(akwanga_run):
     _, out = akwanga_run
-    header, *events = map(json.loads, (out / "session.jsonl").read_text(encoding="utf-8").splitlines())
-    assert header["schema_version"] == 1
-    assert (header["seed"], header["variant"]) == (7, "A7")
-    assert [event["t"] for event in events] == sorted(event["t"] for event in events)
-    assert {event["dir"] for event in events} == {">", "<"}
+    header, *lines = map(json.loads, (out / "session.jsonl").read_text(encoding="utf-8").splitlines())
+    assert header["schema_version"] == 2
+    assert (header["seed"], header["variant"], header["command"]) == (7, "A7", "run")
+    assert [line["t"] for line in lines] == sorted(line["t"] for line in lines)
+    assert {line.get("kind") for line in lines} == {None, "entry", "strike", "state"}
+    entries = [line for line in lines if line.get("kind") == "entry"]
+    assert len(entries) == json.loads((out / "results.json").read_text())["operator"]["book_entries"]
+    events = [line for line in lines if "dir" in line]
+    assert {event["dir"] for event in events} == {"+", ">", "<"}
     asked = [event for event in events if event["dir"] == ">" and "?" in event["text"].split('"')[0]]
     answered = [event for event in events if event["dir"] == "<"]
     assert len(asked) == len(answered) > 1000
-    assert any(event["text"].startswith("NOTE") for event in events)
+    assert any(event.get("text", "").startswith("NOTE") for event in events)
     assert events[-1]["t"] > 3600.0
 
 

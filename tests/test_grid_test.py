@@ -466,7 +466,13 @@ def test_calibrate_files_a_sheet(tmp_path):
     done = a7sim("calibrate", "akwanga", "--points", 25, "--json", "--out", out)
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
-    assert {path.name for path in out.iterdir()} == {"session.jsonl", "book.csv", "residuals.csv", "results.json"}
+    assert {path.name for path in out.iterdir()} == {
+        "session.jsonl",
+        "session.states.jsonl",
+        "book.csv",
+        "residuals.csv",
+        "results.json",
+    }
     assert document == json.loads((out / "results.json").read_text(encoding="utf-8"))
     assert list(document)[:2] == ["schema_version", "command"]
     assert document["command"] == "calibrate"

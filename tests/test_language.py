@@ -949,8 +949,8 @@ def test_the_journal_keeps_size_and_checksum_of_a_picture_only():
     heard.clear()
     reply = door.feed(b"*OPC?;:EYEP1:PICT? 16,16,1\n")
     block = reply.removeprefix(b"1;").removesuffix(b"\n")
-    assert [event.direction for event in heard] == [">", "<"]
-    assert heard[1].text == f"1;#block of {len(block)} bytes, crc32 {zlib.crc32(block):08x}"
+    assert [event.direction for event in heard] == [">", "~", "<"]
+    assert heard[2].text == f"1;#block of {len(block)} bytes, crc32 {zlib.crc32(block):08x}"
 
 
 def test_no_query_gives_away_a_fault_of_the_instrument():
@@ -988,9 +988,12 @@ def test_all_that_crosses_the_link_is_heard_in_order_with_its_time():
     engine = desk.open()
     engine.feed(b"NOTE 'coffee'\n*OPC?;FOO?;*TST?\n", 12.5)
     engine.feed(b"\n" + b" " * 5000 + b"\n", 13.0)
-    assert [(event.time, event.direction) for event in heard] == [(12.5, ">"), (12.5, ">"), (12.5, "<"), (13.0, ">")]
-    assert [event.text for event in heard[:3]] == ["NOTE 'coffee'", "*OPC?;FOO?;*TST?", "1;0"]
-    assert len(heard[3].text) < 100
+    desk.close(engine.client, 14.0)
+    assert [(event.time, event.direction) for event in heard] == [
+        *[(0.0, "+"), (12.5, ">"), (12.5, ">"), (12.5, "<"), (13.0, "!"), (14.0, "-")]
+    ]
+    assert [event.text for event in heard[1:4]] == ["NOTE 'coffee'", "*OPC?;FOO?;*TST?", "1;0"]
+    assert len(heard[4].text) < 100
     assert {event.client for event in heard} == {engine.client}
 
 

@@ -291,7 +291,11 @@ def test_lines_cross_at_the_time_of_the_clock():
     port = InProcessSerial(desk=Desk(Autograph(VARIANTS["A7"]), heard.append), clock=clock, timeout=SHORT)
     clock.spend(12.5)
     answers(port, "*OPC?")
-    assert [(event.time, event.direction, event.text) for event in heard] == [(12.5, ">", "*OPC?"), (12.5, "<", "1")]
+    assert [(event.time, event.direction, event.text) for event in heard] == [
+        (0.0, "+", ""),
+        (12.5, ">", "*OPC?"),
+        (12.5, "<", "1"),
+    ]
 
 
 def test_a_port_without_a_desk_cannot_be_opened():

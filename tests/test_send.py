@@ -80,7 +80,7 @@ def test_a_token_comes_from_a_file_or_the_environment_and_goes_out_first(tmp_pat
     (tmp_path / "token").write_text("of the file\n")
     desk = new_desk()
     heard = []
-    desk.listener = lambda event: heard.append(event.text)
+    desk.listener = lambda event: heard.append(event.text) if event.direction == ">" else None
     with served("tcp", desk) as url:
         monkeypatch.setenv("A7SIM_TOKEN", "of the environment")
         a7sim("send", url, "*OPC?")

@@ -9,7 +9,7 @@ import click
 import a7sim
 from a7sim.mistakes import Mistake
 
-EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_INTERRUPTED = 1, 2, 130
+EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_DIFFERS, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 _VERBS = {
     "run": "a7sim.cli.run",
@@ -22,6 +22,8 @@ _VERBS = {
     "prepare": "a7sim.cli.prepare",
     "bridge": "a7sim.cli.bridge",
     "serve": "a7sim.cli.serve",
+    "replay": "a7sim.cli.replay",
+    "record": "a7sim.cli.record",
     "report": "a7sim.cli.report",
     "export": "a7sim.cli.export",
     "compare": "a7sim.cli.compare",

@@ -19,6 +19,7 @@ from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.scenario import PROFILES, Observer, Request, Scenario, bare_name, load_scenario, requested
 from a7sim.session import Watcher
+from a7sim.session.durable import DURABILITIES
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -58,6 +59,19 @@ _OF_A_FOLDER = (
     click.option("--out", type=click.Path(path_type=Path), help="Folder for journal, book, tables and results."),
     click.option("--force", is_flag=True, help="Write into a folder that exists."),
 )
+DURABILITY_OPTION = click.option(
+    "--durability",
+    type=click.Choice(DURABILITIES),
+    default="records",
+    show_default=True,
+    help="When the journal is on the disk: every line, every registration and the rest within 0.2 s, or never.",
+)
+_OF_A_JOURNAL = (
+    click.option(
+        "--resume", type=click.Path(path_type=Path), metavar="DIR", help="Go on with the session in DIR, cut off."
+    ),
+    DURABILITY_OPTION,
+)
 _OF_RESULTS = (
     click.option("--json", "as_document", is_flag=True, help="Print the results as one JSON document."),
     click.option("--quiet", is_flag=True, help="Print nothing."),
@@ -83,6 +97,9 @@ of_an_orientation = _with(_OF_AN_ORIENTATION)
 
 of_a_folder = _with(_OF_A_FOLDER)
 """--out, --force."""
+
+of_a_journal = _with(_OF_A_JOURNAL)
+"""--resume, --durability."""
 
 of_results = _with(_OF_RESULTS)
 """--json, --quiet: what `ended` takes."""
@@ -129,6 +146,16 @@ def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> di
             raise Mistake(f"--set: expected PATH=VALUE such as plan.bx=190.0, got {setting!r}")
         overrides[key] = value
     return overrides | {key: f'"{value}"' for key, value in texts.items() if value is not None}
+
+
+def resumed_alone(*beside: str) -> None:
+    """See that --resume comes without all that the journal says. Raises Mistake."""
+    ctx = click.get_current_context()
+    allowed = {"resume", "as_document", "quiet", *beside}
+    for name in ctx.params:
+        if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            said = max(next(each.opts for each in ctx.command.params if each.name == name), key=len)
+            raise Mistake(f"--resume: expected no {said} beside it, since the journal says what was asked for")
 
 
 POINTS_A_MODEL = 130

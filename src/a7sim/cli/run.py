@@ -9,20 +9,25 @@ from a7sim.cli.options import (
     chosen,
     ended,
     of_a_folder,
+    of_a_journal,
     of_a_scenario,
     of_an_orientation,
     of_results,
+    resumed_alone,
     watched,
 )
 from a7sim.mistakes import Mistake
 from a7sim.session.combinations import run_combinations
+from a7sim.session.durable import Durability
+from a7sim.session.journal import Keeping
+from a7sim.session.resuming import begun_in
 from a7sim.session.tables import of_session, of_strips
 from a7sim.session.ways import run_all_ways
 from a7sim.standard_points import CASES
 
 
 @click.command("run")
-@click.argument("scenario")
+@click.argument("scenario", required=False)
 @of_an_orientation
 @click.option(
     "--strips",
@@ -33,9 +38,10 @@ from a7sim.standard_points import CASES
 )
 @of_a_scenario
 @of_a_folder
+@of_a_journal
 @of_results
 def command(
-    scenario: str,
+    scenario: str | None,
     case: str | None,
     method: str | None,
     strips: str,
@@ -45,18 +51,34 @@ def command(
     perfect_observer: bool,
     out: Path | None,
     force: bool,
+    resume: Path | None,
+    durability: Durability,
     as_document: bool,
     quiet: bool,
 ) -> None:
     """Let the operator set up the models of SCENARIO, a file or the name of one that comes with a7sim.
 
+    A session that was cut off goes on with --resume, and nothing else: its journal says what was asked for.
+
     Example: a7sim run akwanga --case E --seed 7 --out runs/akwanga-e
     """
-    others = {"plan.case": case, "plan.method": method}
-    loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer, others)
-    if strips == "all" and case is not None:
-        raise Mistake("--strips all: expected no --case beside it, since every case is worked")
-    sessions = len(CASES) if strips == "all" else 1
+    every_case = strips == "all"
+    if resume is not None:
+        resumed_alone("durability")
+        begun = begun_in(resume, "run")
+        loaded, seed, every_case, out = begun.scenario, begun.seed, begun.setting("strips") == "all", resume
+    elif scenario is None:
+        raise Mistake("run: expected a SCENARIO, or --resume DIR")
+    else:
+        others = {"plan.case": case, "plan.method": method}
+        loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer, others)
+        if every_case and case is not None:
+            raise Mistake("--strips all: expected no --case beside it, since every case is worked")
+    keeping = Keeping(durability, resume is not None)
+    sessions = len(CASES) if every_case else 1
     with watched(POINTS_A_MODEL * sessions * len(loaded.models), as_document, quiet) as watcher:
-        document = (run_combinations if strips == "all" else run_all_ways)(loaded, seed, out, watcher, force)
-    ended(document, as_document, quiet, of_strips if strips == "all" else of_session)
+        if every_case:
+            document = run_combinations(loaded, seed, out, watcher, force, keeping)
+        else:
+            document = run_all_ways(loaded, seed, out, watcher, force, keeping=keeping)
+    ended(document, as_document, quiet, of_strips if every_case else of_session)

@@ -10,9 +10,9 @@ from typing import Any
 import click
 
 from a7sim.cli.links import TOKEN_VARIABLE, token_from
-from a7sim.cli.options import Above, chosen, of_a_folder, of_a_scenario
+from a7sim.cli.options import Above, chosen, of_a_folder, of_a_journal, of_a_scenario, resumed_alone
 from a7sim.documents import Document, as_json, head
-from a7sim.instrument import Autograph, build_autograph
+from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk
 from a7sim.instrument.language.desk import POLL_TAKES
 from a7sim.link.addresses import Address, address_of
@@ -23,16 +23,24 @@ from a7sim.link.serving import Doors, Server
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.folder import JOURNAL, prepare_folder
-from a7sim.session.journal import Journal
+from a7sim.session.durable import Durability, JournalStopped
+from a7sim.session.folder import prepare_folder
+from a7sim.session.journal import Journal, Keeping, header_of
+from a7sim.session.resuming import Begun, begun_in, served_again
 
 USUAL = Address("127.0.0.1", 5025)
+
+_OF_THE_DOOR = (
+    *("tcp", "rfc2217", "pty", "baud", "listen_anyway", "token_file", "clients", "idle", "fault", "fault_seed"),
+    "durability",
+)
+"""What a session that is served again may be told anew."""
 
 _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
 
 @click.command("serve")
-@click.argument("scenario")
+@click.argument("scenario", required=False)
 @click.option("--tcp", multiple=True, metavar="HOST:PORT", help="Listen on a bare socket  [default: 127.0.0.1:5025]")
 @click.option("--rfc2217", multiple=True, metavar="HOST:PORT", help="Listen as a serial port over telnet.")
 @click.option("--pty", multiple=True, type=click.Path(path_type=Path), help="Make a link to a pseudo-terminal.")
@@ -48,10 +56,11 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 @click.option("--fault-seed", type=click.IntRange(min=0), default=0, show_default=True, help="Draws the faults.")
 @of_a_scenario
 @of_a_folder
+@of_a_journal
 @click.option("--json", "as_document", is_flag=True, help="Print where it listens as one JSON document.")
 @click.option("--quiet", is_flag=True, help="Print nothing.")
 def command(
-    scenario: str,
+    scenario: str | None,
     tcp: tuple[str, ...],
     rfc2217: tuple[str, ...],
     pty: tuple[Path, ...],
@@ -69,41 +78,96 @@ def command(
     perfect_observer: bool,
     out: Path | None,
     force: bool,
+    resume: Path | None,
+    durability: Durability,
     as_document: bool,
     quiet: bool,
 ) -> None:
     """Serve the instrument of SCENARIO until it is stopped: Ctrl-C and kill end it with exit code 0.
 
+    With --resume it is the instrument of a session that was cut off, as its journal leaves it; clients come anew.
+
     Example: a7sim serve akwanga --tcp 127.0.0.1:5025 --pty ./a7
     """
-    loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
     doors = _doors(tcp, rfc2217, pty)
     token = token_from(token_file)
     _refuse_open_doors(doors, listen_anyway, token)
     terms = Terms(baud, faults_of(fault) if fault is not None else None, fault_seed, idle, most_clients=clients)
-    journal = Journal()
-    poll_takes = 0.0 if realtime else POLL_TAKES
-    desk = Desk(_instrument(loaded, seed), journal.heard if out else None, token, poll_takes)
-    if out is not None:
-        prepare_folder(out, force)
-    told = _Told(_head(loaded, seed), as_document, quiet)
-    header = {"scenario": loaded.title, "seed": seed, "variant": loaded.instrument.variant}
-    with journal.opened(out / JOURNAL if out else None, header):
-        asyncio.run(_serve(desk, doors, terms, realtime, told))
+    if resume is not None:
+        resumed_alone(*_OF_THE_DOOR)
+        served = _served_again(begun_in(resume, "serve"), token, Keeping(durability, resumes=True))
+    elif scenario is None:
+        raise Mistake("serve: expected a SCENARIO, or --resume DIR")
+    else:
+        loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
+        if out is not None:
+            prepare_folder(out, force)
+        served = _served_anew(loaded, seed, token, realtime, out, Keeping(durability))
+    with served.journal:
+        asyncio.run(_serve(served, doors, terms, _Told(served.head, as_document, quiet)))
 
 
-async def _serve(desk: Desk, doors: Doors, terms: Terms, realtime: bool, told: "_Told") -> None:
+@dataclass(frozen=True)
+class _Served:
+    """What is served: a desk, the time at it, and the journal of what is said there."""
+
+    head: Document
+    desk: Desk
+    clock: Clock | WallClock
+    journal: Journal
+
+
+def _served_anew(
+    scenario: Scenario, seed: int, token: str | None, realtime: bool, out: Path | None, keeping: Keeping
+) -> _Served:
+    autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
+    journal = Journal(keeping)
+    desk = Desk(autograph, journal.heard if out else None, token, 0.0 if realtime else POLL_TAKES)
+    header = header_of("serve", scenario, seed, realtime=realtime, login=token is not None)
+    return _Served(_head(scenario, seed), desk, _clock(realtime), journal.opened(out, header, desk))
+
+
+def _served_again(begun: Begun, token: str | None, keeping: Keeping) -> _Served:
+    if begun.setting("login") != (token is not None):
+        asked, given = ("a", "none") if token is None else ("no", "one")
+        raise Mistake(
+            f"{begun.journalled.where(1)}: expected {asked} token, as the session was begun with, got {given}"
+        )
+    journal = Journal(keeping)
+    desk, now = served_again(begun, journal)
+    desk.token = token
+    return _Served(_head(begun.scenario, begun.seed), desk, _clock(begun.setting("realtime"), now), journal)
+
+
+def _clock(realtime: bool, now: float = 0.0) -> Clock | WallClock:
+    return WallClock(now=now) if realtime else Clock(now)
+
+
+async def _serve(served: _Served, doors: Doors, terms: Terms, told: "_Told") -> None:
     stopped = asyncio.Event()
+    broken: list[JournalStopped] = []
     loop = asyncio.get_running_loop()
+
+    def fail(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        error = context.get("exception")
+        if isinstance(error, JournalStopped):
+            broken.append(error)
+            stopped.set()
+        else:
+            loop.default_exception_handler(context)
+
+    loop.set_exception_handler(fail)
     for name in _STOPPING:
         loop.add_signal_handler(getattr(signal, name), stopped.set)
-    server = Server(desk, WallClock() if realtime else Clock(), terms)
+    server = Server(served.desk, served.clock, terms)
     opened = await server.open(doors)
     try:
         told.ready(opened)
         await stopped.wait()
     finally:
         await server.close()
+    if broken:
+        raise broken[0]
 
 
 @dataclass(frozen=True)
@@ -126,10 +190,6 @@ class _Told:
 
 def _head(scenario: Scenario, seed: int) -> Document:
     return head("serve") | {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
-
-
-def _instrument(scenario: Scenario, seed: int) -> Autograph:
-    return build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
 
 
 def _doors(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]) -> Doors:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from a7sim.instrument.carriers import Carrier
 from a7sim.instrument.condition import INSTRUMENT_STREAM, condition_of, local_coefficients, zero_error
 from a7sim.instrument.optics import as_they_act, projector_seen, view, wheel_senses
 from a7sim.instrument.projection import place_of_centre, place_on_carrier, pose
-from a7sim.instrument.recorder import Recorder
+from a7sim.instrument.recorder import Recorder, Registration
 from a7sim.instrument.refusals import OutOfRange, SettingsConflict, UnknownName
 from a7sim.instrument.spindles import Counter, Runout, Spindle
 from a7sim.manual import LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element, Fittings, Gear, Variant
@@ -25,6 +26,9 @@ MARK_RADIUS_MM = 0.02
 MOVE_CENTRES = ("bx", "by1", "by2", "bz1", "bz2", "common_phi")
 COUNTED_FROM_ZERO = ("phi1", "phi2", "omega1", "omega2", "common_phi")
 """Tilts, whose counters do not read zero where they are none."""
+
+State = dict[str, Any]
+"""How an instrument stands, as data that JSON can hold."""
 
 
 class Autograph:
@@ -181,6 +185,60 @@ class Autograph:
         """
         taken, self._taken = self._taken, {}
         return taken
+
+    # --- how all of it stands -------------------------------------------------------------------------
+
+    def state(self, changes: int = 0) -> State:
+        """Return all that handles and chance have made of the instrument, for `restore`: part of the truth.
+
+        Of the recorder it holds what has changed after so many `changes`.
+        """
+        dice = self._rng.bit_generator.state
+        return {
+            "spindles": {name: list(each.state()) for name, each in self._spindles.items()},
+            "carriages": {axis: list(each.state()) for axis, each in self._carriages.items()},
+            "counters": {axis: list(each.state()) for axis, each in self._counters.items()},
+            "gears": [self.plan_gear, self.height_gear],
+            "base_mode": self.base_mode,
+            "fittings": dict(self.fittings.as_words()),
+            "carriers": {
+                str(n): [each.photograph.name, list(each.laid), list(each.centring)]
+                for n, each in sorted(self._carriers.items())
+            },
+            "dice": [str(dice["state"]["state"]), str(dice["state"]["inc"]), dice["has_uint32"], dice["uinteger"]],
+            "registered": [
+                [each.number, each.point, [list(reading) for reading in each.readings], each.struck]
+                for each in self.recorder.changes[changes:]
+            ],
+        }
+
+    def restore(self, state: State) -> None:
+        """Stand as when a state was taken, with what it holds registered on top of what is registered."""
+        for parts, name in ((self._spindles, "spindles"), (self._carriages, "carriages"), (self._counters, "counters")):
+            for key, each in state[name].items():
+                parts[key].restore(each)
+        self.plan_gear, self.height_gear = state["gears"]
+        self.base_mode = state["base_mode"]
+        self.fittings = Fittings(**state["fittings"])
+        self._carriers = {
+            int(n): Carrier(self._photographs[name], tuple(laid), tuple(centring))
+            for n, (name, laid, centring) in state["carriers"].items()
+        }
+        inner, increment, has_uint32, uinteger = state["dice"]
+        self._rng.bit_generator.state = {
+            **self._rng.bit_generator.state,
+            "state": {"state": int(inner), "inc": int(increment)},
+            "has_uint32": has_uint32,
+            "uinteger": uinteger,
+        }
+        self.register_again(state)
+        self._taken.clear()
+        self._poses.clear()
+
+    def register_again(self, state: State) -> None:
+        """Register what a state holds on top of what is registered."""
+        for number, point, readings, struck in state["registered"]:
+            self.recorder.apply(Registration(number, point, tuple((name, text) for name, text in readings), struck))
 
     # --- carriages, counters, gears -------------------------------------------------------------------
 

@@ -21,12 +21,19 @@ class Recorder:
     """The registrations in order, numbered from 1."""
 
     registrations: list[Registration] = field(default_factory=list)
+    changes: list[Registration] = field(default_factory=list)
+    """Every registration as it became, by being made or struck, in order: what has come since some time is a tail."""
 
     def register(self, point: str, readings: list[tuple[str, str]]) -> Registration:
         """Add a registration and return it."""
         registration = Registration(len(self.registrations) + 1, point, tuple(readings))
-        self.registrations.append(registration)
+        self.apply(registration)
         return registration
+
+    def apply(self, change: Registration) -> None:
+        """Let a registration stand as it became."""
+        self.registrations[change.number - 1 : change.number] = [change]
+        self.changes.append(change)
 
     def strike(self, number: int, why: str) -> None:
         """Mark a registration as struck out, once.
@@ -37,4 +44,4 @@ class Recorder:
             raise OutOfRange(f"expected a registration 1 to {len(self.registrations)}, got {number}")
         if self.registrations[number - 1].struck is not None:
             raise SettingsConflict(f"registration {number} is struck out already")
-        self.registrations[number - 1] = replace(self.registrations[number - 1], struck=why)
+        self.apply(replace(self.registrations[number - 1], struck=why))

@@ -55,6 +55,14 @@ class Spindle:
         """Return the spindle of an element, at its counter zero."""
         return cls(element.low, element.high, element.zero, element.endless, play, setting_sigma, fault)
 
+    def state(self) -> tuple[float, float, float]:
+        """Return where drum and shaft stand and the setting error, for `restore`."""
+        return self.at, self._shaft, self._error
+
+    def restore(self, state: tuple[float, float, float]) -> None:
+        """Stand as when the state was taken."""
+        self.at, self._shaft, self._error = state
+
     @property
     def position(self) -> float:
         """Where the shaft really stands, in mm or gon."""
@@ -115,6 +123,14 @@ class Counter:
 
     def __post_init__(self) -> None:
         self._at_rest = self.offset
+
+    def state(self) -> tuple[float, int, float]:
+        """Return units a mm, decimals and offset, for `restore`."""
+        return self.units_per_mm, self.decimals, self.offset
+
+    def restore(self, state: tuple[float, int, float]) -> None:
+        """Count as when the state was taken."""
+        self.units_per_mm, self.decimals, self.offset = state
 
     def passed(self, before: float, after: float, rng: np.random.Generator) -> None:
         """Follow the carriage from one position to another, and slip where a carry fails.

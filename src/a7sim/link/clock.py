@@ -22,15 +22,15 @@ class Clock:
 
 
 class WallClock:
-    """Simulated time that is the wall's: it goes by itself."""
+    """Simulated time that is the wall's: it goes by itself, on from where it is set when it is made."""
 
-    def __init__(self, wall: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, wall: Callable[[], float] = time.monotonic, now: float = 0.0) -> None:
         self._wall = wall
-        self._began = wall()
+        self._began = wall() - now
 
     @property
     def now(self) -> float:
-        """Seconds since the clock was made."""
+        """Seconds since the session began."""
         return self._wall() - self._began
 
     def pass_to(self, time: float) -> bool:

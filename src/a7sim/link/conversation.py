@@ -63,7 +63,7 @@ class Conversation:
         self._clock = clock
         self._terms = terms
         self._wire = wire
-        self._engine = desk.open(cr_ends_line=serial)
+        self._engine = desk.open(cr_ends_line=serial, time=clock.now)
         self._backlog = memoryview(b"")
         self._reading = self._open = True
         self._clogged = self._ended = False
@@ -117,7 +117,7 @@ class Conversation:
     def cut(self) -> None:
         """Forget the client: it is gone, and a lock that it holds is free again."""
         self._open = False
-        self._desk.close(self._engine.client)
+        self._desk.close(self._engine.client, self._clock.now)
         for timer in (self._next, self._impatient, self._sleeper):
             if timer is not None:
                 timer.cancel()

@@ -48,7 +48,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
             raise SerialException("expected a port to open, got none")
         if self.is_open:
             raise SerialException(f"expected a closed port, got {self.port}, which is open")
-        self._engine = self._connect().open()
+        self._engine = self._connect().open(time=self.clock.now)
         self._replies.clear()
         self._cancelled = False
         self.is_open = True
@@ -56,7 +56,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
     def close(self) -> None:
         """End the conversation; a lock that it holds is free again."""
         if self.is_open and self._engine is not None:
-            self._engine.desk.close(self._engine.client)
+            self._engine.desk.close(self._engine.client, self.clock.now)
         self._engine = None
         self.is_open = False
         self.cancel_read()

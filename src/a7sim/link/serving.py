@@ -41,7 +41,6 @@ class Server:
         self._buffer = memoryview(bytearray(LARGEST_READ))
         self._wires: set[Wire] = set()
         self._turned_away: set[Wire] = set()
-        self._opened = 0
         self._listeners: list[asyncio.Server] = []
         self._terminals: list[PtyWire] = []
 
@@ -100,8 +99,7 @@ class Server:
             text = entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {most} clients at a time")
             return f"{text}\n".encode("ascii")
         self._wires.add(wire)
-        self._opened += 1
-        return Conversation(self.desk, self._clock, self._terms, wire, self._opened, serial)
+        return Conversation(self.desk, self._clock, self._terms, wire, self.desk.opened + 1, serial)
 
     def left(self, wire: Wire) -> None:
         """Take note that a wire is no more."""

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 COLUMNS = ("number", "time_s", "model", "form", "round", "point", "item", "reading", "struck", "remark")
@@ -31,6 +32,8 @@ class Book:
     model: str = ""
     form: str = ""
     round: int = 0
+    listener: Callable[[Entry], None] | None = None
+    """Is told of every entry as it is written, and again as it is struck out."""
 
     def head(self, model: str, form: str, round: int = 0) -> None:
         """Begin a form; what follows is entered under it."""
@@ -39,12 +42,20 @@ class Book:
     def enter(self, time: float, point: str, item: str, reading: str, remark: str = "") -> int:
         """Enter a reading and return its number."""
         number = len(self.entries) + 1
-        self.entries.append(Entry(number, time, self.model, self.form, self.round, point, item, reading, remark))
+        entry = Entry(number, time, self.model, self.form, self.round, point, item, reading, remark)
+        self.entries.append(entry)
+        self._tell(entry)
         return number
 
     def strike(self, number: int, why: str) -> None:
         """Strike an entry out; it stays, marked."""
-        self.entries[number - 1] = replace(self.entries[number - 1], struck=why)
+        struck = replace(self.entries[number - 1], struck=why)
+        self.entries[number - 1] = struck
+        self._tell(struck)
+
+    def _tell(self, entry: Entry) -> None:
+        if self.listener is not None:
+            self.listener(entry)
 
     def remark(self, time: float, text: str) -> None:
         """Enter a remark."""

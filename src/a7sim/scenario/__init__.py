@@ -1,5 +1,6 @@
 """Scenarios: what a file may say about a flight, photographs, an instrument and an operator."""
 
+from a7sim.scenario.carried import carried, hash_of, scenario_from
 from a7sim.scenario.loading import (
     ScenarioError,
     bare_name,
@@ -47,11 +48,14 @@ __all__ = [
     "ScenarioError",
     "StripPlan",
     "bare_name",
+    "carried",
     "find_scenario",
+    "hash_of",
     "load_scenario",
     "observer_of_skill",
     "rephrased",
     "requested",
+    "scenario_from",
     "scenario_of",
     "scenario_schema",
 ]

@@ -15,7 +15,8 @@ from a7sim.scenario.schema import Scenario
 from a7sim.scenario.skills import PROFILES
 from a7sim.scenario.validation import mistakes_of_form
 
-_SHELVES = (Path(__file__).parents[1] / "scenarios", Path(__file__).parents[3] / "scenarios")
+SHELVES = (Path(__file__).parents[1] / "scenarios", Path(__file__).parents[3] / "scenarios")
+"""Where the scenarios are that come with a7sim."""
 
 
 class ScenarioError(Mistake):
@@ -38,18 +39,18 @@ def find_scenario(name: str | Path) -> Path:
             return path
     except OSError as error:
         raise ScenarioError(str(name)[:200], [f"expected a readable file: {error.strerror}"]) from error
-    for shelf in _SHELVES:
+    for shelf in SHELVES:
         found = shelf / f"{path.name.removesuffix('.toml')}.toml"
         if path.parent in (Path(), Path("scenarios")) and found.is_file():
             return found
-    known = sorted({file.stem for shelf in _SHELVES for file in shelf.glob("*.toml")})
+    known = sorted({file.stem for shelf in SHELVES for file in shelf.glob("*.toml")})
     raise ScenarioError(str(name), [f"expected a scenario file or one of {', '.join(known)}, found no such file"])
 
 
 def bare_name(name: str | Path) -> str:
     """Return what a scenario is called wherever it stands: its bare name if it comes with a7sim, else its file's."""
     path = find_scenario(name).resolve()
-    return path.stem if path.parent in [shelf.resolve() for shelf in _SHELVES] else path.name
+    return path.stem if path.parent in [shelf.resolve() for shelf in SHELVES] else path.name
 
 
 def load_scenario(name: str | Path, overrides: Mapping[str, str] | None = None) -> Scenario:

@@ -14,10 +14,10 @@ from a7sim.operator.bridging import BridgedModels, bridge
 from a7sim.reduction import Ground, Model, Undetermined, absolute_orientation, strip_adjustment
 from a7sim.scenario import Scenario, rephrased
 from a7sim.session.folder import MODELS, RESULTS, prepare_folder, write_whole
-from a7sim.session.journal import Journal
+from a7sim.session.journal import Journal, header_of
 from a7sim.session.results import models_csv, of_request
 from a7sim.session.running import Watcher, open_session, run
-from a7sim.session.sitting import journal_header, sitting
+from a7sim.session.sitting import sitting
 from a7sim.session.strips import ground_of
 from a7sim.sheets import sheet
 
@@ -54,8 +54,8 @@ def run_bridge(
     def leaves() -> dict[str, str]:
         return {MODELS: models_csv([_as_model(name, each) for name, each in places.items()])}
 
-    about = journal_header(scenario, seed) | {"work": "bridging"}
-    with sitting(document, session.person, journal, about, out, leaves):
+    about = header_of("bridge", scenario, seed)
+    with sitting(document, session, journal, about, out, leaves):
         for model in bridge(session.person, job, watcher.tick, watcher.begins):
             places[model.model.name] = model.places_of(0)
             done.append(_of_model(model))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +17,11 @@ from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, plotted
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
 from a7sim.session.folder import GEOJSON, SVG, prepare_folder
-from a7sim.session.journal import Journal
+from a7sim.session.journal import Journal, header_of
 from a7sim.session.map_sheet import as_geojson, as_svg
 from a7sim.session.results import of_request
 from a7sim.session.running import Session, Watcher, open_session
-from a7sim.session.sitting import journal_header, sitting
+from a7sim.session.sitting import sitting
 from a7sim.session.strips import given_control
 
 OLD_MAP_M = 5.0
@@ -77,8 +77,8 @@ def compile_model(
         "message": "",
     }
     drawn: dict[str, str] = {}
-    header = journal_header(scenario, seed)
-    with sitting(document, session.person, journal, header, out, lambda: drawn):
+    header = header_of("compile", scenario, seed, **asdict(wanted))
+    with sitting(document, session, journal, header, out, lambda: drawn):
         sheet = _sheet(session, wanted, order, watcher)
         document |= _of_sheet(sheet, session.scene, scenario)
         drawn |= {GEOJSON: as_geojson(sheet), SVG: as_svg(sheet, scenario.title)}

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from a7sim.mistakes import Mistake
 
-JOURNAL, BOOK, MODELS, STRIP, RESULTS = "session.jsonl", "book.csv", "models.csv", "strip.csv", "results.json"
+JOURNAL, STATES, TORN = "session.jsonl", "session.states.jsonl", "session.jsonl.torn"
+BOOK, MODELS, STRIP, RESULTS = "book.csv", "models.csv", "strip.csv", "results.json"
 CARDS, OUTPUT_CARDS, CARD_KEY = "strip.crd", "strip-output.crd", "strip-numbers.csv"
 STRIPS = "strips.csv"
 GEOJSON, SVG = "map.geojson", "map.svg"
@@ -14,6 +15,8 @@ MODELS_OF_WAY, STRIP_OF_WAY = "{}-models.csv", "{}-strip.csv"
 WAYS = ("comparator", "A8")
 FILES = (
     JOURNAL,
+    STATES,
+    TORN,
     BOOK,
     MODELS,
     STRIP,
@@ -49,5 +52,9 @@ def prepare_folder(out: Path, force: bool) -> None:
 def write_whole(path: Path, text: str) -> None:
     """Write a file so that it is there whole or not at all."""
     temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(path)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise

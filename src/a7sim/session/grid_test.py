@@ -21,10 +21,10 @@ from a7sim.reduction import Adjustment
 from a7sim.reduction.grid_test import UNKNOWNS
 from a7sim.scenario import Condition, Scenario
 from a7sim.session.folder import RESIDUALS, prepare_folder
-from a7sim.session.journal import Journal
+from a7sim.session.journal import Journal, header_of
 from a7sim.session.results import of_request
 from a7sim.session.running import Watcher, open_session
-from a7sim.session.sitting import journal_header, sitting
+from a7sim.session.sitting import sitting
 from a7sim.sheets import sheet
 
 SYMBOLS = {"omega": "ω", "phi": "φ", "kappa": "κ"}
@@ -57,8 +57,8 @@ def run_grid_test(
     def leaves() -> dict[str, str]:
         return {RESIDUALS: csv_text(RESIDUAL_COLUMNS, _residual_rows(sheets))}
 
-    about = journal_header(scenario, seed) | {"work": "grid test"}
-    with sitting(document, session.person, journal, about, out, leaves, called="test"):
+    about = header_of("calibrate", scenario, seed, points=order.crosses, levels=order.levels, pointings=order.pointings)
+    with sitting(document, session, journal, about, out, leaves, called="test"):
         for sheet in calibrate(session.person, order, watcher.tick, watcher.begins):
             sheets.append(sheet)
             truth = true_errors(autograph, condition_of(scenario.instrument, seed), sheet.projector)

@@ -1,42 +1,201 @@
-"""The journal of a session: every line that crossed the link, in order, with its simulated time."""
+"""The journal of a session as it is written: what crossed the link and what the operator wrote down, in order."""
 
+import re
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TextIO
-
-import msgspec
+from typing import Any
 
 import a7sim
-from a7sim.instrument.language import LinkEvent
+from a7sim.instrument.language import Desk, LinkEvent
+from a7sim.mistakes import Mistake
+from a7sim.operator.book import Entry
+from a7sim.scenario import Scenario, carried, hash_of
+from a7sim.session.checkpoints import EVERY, Checkpoint, as_lines, hash_of_state
+from a7sim.session.durable import Durability, DurableFile, JournalStopped, stopped
+from a7sim.session.folder import JOURNAL, STATES, TORN
+from a7sim.session.lines import SCHEMA_VERSION, Chain, Event, Journalled, read_journal
 
-SCHEMA_VERSION = 1
+_REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
+
+_LONGEST_SHOWN = 300
+
+
+def software() -> str:
+    """Return the name and version under which journals are written."""
+    return f"a7sim {a7sim.__version__}"
+
+
+def header_of(command: str, scenario: Scenario, seed: int, **settings: Any) -> dict[str, Any]:
+    """Return what a journal says first: all that a session follows from, beside what is said in it."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "software": software(),
+        "command": command,
+        "title": scenario.title,
+        "scenario": carried(scenario),
+        "scenario_hash": hash_of(scenario),
+        "seed": seed,
+        "variant": scenario.instrument.variant,
+        "settings": settings,
+    }
+
+
+def header_of_unknown(command: str, **settings: Any) -> dict[str, Any]:
+    """Return what a journal says first where nobody knows what the instrument is of."""
+    first = {"schema_version": SCHEMA_VERSION, "software": software(), "command": command}
+    return first | {"scenario": None, "settings": settings}
+
+
+@dataclass(frozen=True)
+class Keeping:
+    """How a session is kept: when its journal is on the disk, and whether it goes on from a journal that is there."""
+
+    durability: Durability = "records"
+    resumes: bool = False
 
 
 class Journal:
-    """A file of JSON lines: a header, then an event a line, each whole on disk before the next.
+    """A journal, which hears from when it is made and writes from when it is opened, as a context.
 
-    It counts from the beginning what it hears, and writes from when it is opened, as a context.
+    A session that is resumed is worked again from its beginning: as long as the journal that is there lasts, what
+    would be written is compared with it; then it is written on.
     """
 
-    def __init__(self) -> None:
-        self._file: TextIO | None = None
-        self.events = 0
+    def __init__(self, keeping: Keeping | None = None) -> None:
+        self.lines_over_the_link = 0
+        self._keeping = keeping or Keeping()
+        self._unwritten: list[LinkEvent] = []
+        self._file: DurableFile | None = None
+        self._states: Path | None = None
+        self._desk: Desk | None = None
+        self._there: Journalled | None = None
+        self._chain = Chain()
+        self._line = 0
+        self._time = 0.0
+        self._since_checkpoint = 0
+        self._changes = 0
 
-    def opened(self, path: Path | None, header: dict[str, Any]) -> "Journal":
-        """Begin to write, where there is a path; nothing must have been heard before."""
-        if path is not None:
-            self._file = path.open("w", encoding="utf-8", buffering=1)
-            self._write({"schema_version": SCHEMA_VERSION, "software": f"a7sim {a7sim.__version__}", **header})
+    def opened(self, folder: Path | None, header: dict[str, Any], desk: Desk | None) -> "Journal":
+        """Begin to write, where there is a folder; about a desk, where there is one.
+
+        A session that is resumed sets aside what is torn of its journal. Raises Mistake where it cannot be written.
+        """
+        self._desk = desk
+        if folder is not None:
+            if self._keeping.resumes:
+                self._there = read_journal(folder / JOURNAL)
+                set_aside(self._there)
+            self._begin(folder, self._there.size if self._there else 0, b"")
+            try:
+                self._write(header)
+                for event in self._unwritten:
+                    self.heard(event)
+            except BaseException:
+                self._close()
+                raise
+        self._unwritten.clear()
         return self
 
-    def heard(self, event: LinkEvent) -> None:
-        """Write an event."""
-        self.events += 1
-        self._write({"t": round(event.time, 2), "client": event.client, "dir": event.direction, "text": event.text})
+    def continued(self, there: Journalled, desk: Desk, checkpoints: list[Checkpoint]) -> "Journal":
+        """Go on behind a journal whose session stands at a desk. Raises Mistake where it cannot be written."""
+        set_aside(there)
+        self._desk = desk
+        self._begin(there.path.parent, there.size, as_lines(checkpoints))
+        self._chain.crc, self._line = there.crc, len(there)
+        last = checkpoints[-1].line if checkpoints else 1
+        self._since_checkpoint = sum(not there.event(number).kind for number in range(last + 1, len(there) + 1))
+        self._changes = sum(len(each.state["autograph"]["registered"]) for each in checkpoints)
+        return self
 
-    def _write(self, line: dict[str, Any]) -> None:
-        if self._file is not None:
-            self._file.write(msgspec.json.encode(line).decode() + "\n")
+    def _begin(self, folder: Path, size: int, states: bytes) -> None:
+        self._states = folder / STATES
+        self._file = DurableFile(folder / JOURNAL, self._keeping.durability, size)
+        self._states.write_bytes(states)
+
+    def heard(self, event: LinkEvent) -> None:
+        """Write what happened on the link. Raises JournalStopped where that fails, unless somebody just went."""
+        with suppress(JournalStopped) if event.direction == "-" else nullcontext():
+            self._hear(event)
+
+    def _hear(self, event: LinkEvent) -> None:
+        if event.direction in "<>":
+            self.lines_over_the_link += 1
+        if self._file is None:
+            if self._desk is None:
+                self._unwritten.append(event)
+            return
+        registers, self._time = False, event.time
+        if event.direction == ">":
+            if self._since_checkpoint >= EVERY and self._desk is not None and self._desk.quiet:
+                self._checkpoint(event.time, self._desk)
+            registers = _REGISTERS.search(event.text) is not None
+        self._since_checkpoint += 1
+        self._write(Event(event.time, event.client, event.direction, event.text), registers)
+
+    def written(self, entry: Entry, time: float) -> None:
+        """Write an entry of the observation book, or that it was struck out. Raises Mistake where that fails."""
+        if self._file is None:
+            return
+        self._time = time
+        if entry.struck:
+            self._write(Event(time, kind="strike", number=entry.number, struck=entry.struck))
+        else:
+            self._write(
+                Event(
+                    time,
+                    kind="entry",
+                    number=entry.number,
+                    model=entry.model,
+                    form=entry.form,
+                    round=entry.round,
+                    point=entry.point,
+                    item=entry.item,
+                    reading=entry.reading,
+                    remark=entry.remark,
+                )
+            )
+
+    def stopped(self, error: BaseException | None) -> None:
+        """Write nothing more, after a last checkpoint where nothing went wrong. Raises Mistake where that fails."""
+        try:
+            if error is None and self._desk is not None and self._desk.quiet and self._since_checkpoint:
+                self._checkpoint(self._time, self._desk)
+            if error is None and self._there is not None and self._line < len(self._there):
+                over = self._there.where(self._line + 1)
+                raise Mistake(f"{over}: expected the end of the session, got a line that is left over")
+        finally:
+            self._close()
+
+    def _close(self) -> None:
+        file, self._file = self._file, None
+        if file is not None:
+            file.close()
+
+    def _checkpoint(self, time: float, desk: Desk) -> None:
+        state = desk.state(self._changes)
+        self._changes = len(desk.autograph.recorder.changes)
+        self._since_checkpoint = 0
+        found = hash_of_state(state)
+        self._write(Event(time, kind="state", hash=found))
+        if self._states is not None:
+            try:
+                with self._states.open("ab") as states:
+                    states.write(as_lines([Checkpoint(self._line, time, found, state)]))
+            except OSError as error:
+                raise stopped(self._states, error) from error
+
+    def _write(self, data: Any, at_once: bool = False) -> None:
+        if self._file is None:
+            return
+        line = self._chain.line(data)
+        self._line += 1
+        if self._there is not None and self._line <= len(self._there):
+            if line != self._there.lines[self._line - 1]:
+                raise Mistake(_not_the_same(self._there, self._line, line))
+        else:
+            self._file.add(line + b"\n", at_once)
 
     def __enter__(self) -> "Journal":
         return self
@@ -45,4 +204,27 @@ class Journal:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._file is not None:
-            self._file.close()
+            self.stopped(error)
+
+
+def begin_folder(folder: Path, header: dict[str, Any]) -> None:
+    """Leave a journal of nothing but its header: what is worked in a folder's folders. Raises Mistake."""
+    file = DurableFile(folder / JOURNAL)
+    file.add(Chain().line(header) + b"\n")
+    file.close()
+
+
+def set_aside(there: Journalled) -> None:
+    """Put what is torn of a journal beside it. Raises Mistake where that cannot be written."""
+    if there.torn:
+        try:
+            (there.path.parent / TORN).write_bytes(there.torn)
+        except OSError as error:
+            raise Mistake(f"{there.path}: expected a journal that can be written: {error.strerror}") from error
+
+
+def _not_the_same(there: Journalled, number: int, line: bytes) -> str:
+    was, is_now = (each[:_LONGEST_SHOWN].decode("utf-8", "replace") for each in (there.lines[number - 1], line))
+    if number == 1:
+        return f"{there.where(number)}: expected a session of {software()} and its scenario, got another: {was}"
+    return f"{there.where(number)}: expected what this session does again, {is_now}, got another's, {was}"

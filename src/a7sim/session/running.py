@@ -28,8 +28,8 @@ from a7sim.session.folder import (
     prepare_folder,
     write_whole,
 )
-from a7sim.session.journal import Journal
-from a7sim.session.sitting import journal_header, sitting
+from a7sim.session.journal import Journal, Keeping, header_of
+from a7sim.session.sitting import sitting
 from a7sim.session.strips import GroundedStrip, cards_of, given_control, ground_of, grounded, models_of, of_grounded
 
 Cable = Callable[[InProcessSerial], Port]
@@ -50,6 +50,7 @@ class Session:
     scene: Scene
     autograph: Autograph
     person: Person
+    desk: Desk
 
     @cached_property
     def job(self) -> Job:
@@ -62,9 +63,10 @@ def open_session(scenario: Scenario, seed: int, listener: Listener | None = None
     scene = build_scene(scenario, seed)
     autograph = build_autograph(scenario.instrument, scene.drawer, seed)
     clock = Clock()
-    port = InProcessSerial(desk=Desk(autograph, listener), clock=clock, timeout=1.0)
+    desk = Desk(autograph, listener)
+    port = InProcessSerial(desk=desk, clock=clock, timeout=1.0)
     person = Person(Client(cable(port)), clock, scenario.observer, seed)
-    return Session(scenario, seed, scene, autograph, person)
+    return Session(scenario, seed, scene, autograph, person, desk)
 
 
 def job_of(scenario: Scenario, scene: Scene) -> Job:
@@ -105,18 +107,22 @@ def run(
     watcher: Watcher | None = None,
     force: bool = False,
     cable: Cable = straight,
+    keeping: Keeping | None = None,
 ) -> Document:
     """Work through a scenario up to its strip and return the document of results; with `out`, leave the files there.
 
     `status` in the document is 'complete', or 'does not fit' with the operator's `message`. An interrupted
     session (KeyboardInterrupt) leaves whole files and goes on up. Raises Mistake for a bad file of
     measurements or a folder that cannot be used, before anything is written.
+
+    A session that `keeping` resumes works on in its folder, and leaves there what one without interruption leaves.
     """
     watcher = watcher or Watcher()
-    journal = Journal()
+    keeping = keeping or Keeping()
+    journal = Journal(keeping)
     session = open_session(scenario, seed, journal.heard, cable)
     job = session.job
-    if out is not None:
+    if out is not None and not keeping.resumes:
         prepare_folder(out, force)
     done: list[Document] = []
     document = results.header(scenario, seed) | {"status": "failed", "message": "", "models": done}
@@ -124,7 +130,7 @@ def run(
     def leaves() -> dict[str, str]:
         return {MODELS: results.models_csv(models_of(done))}
 
-    with sitting(document, session.person, journal, journal_header(scenario, seed), out, leaves):
+    with sitting(document, session, journal, header_of("run", scenario, seed), out, leaves):
         for record in work(session.person, job, watcher.tick, watcher.begins):
             plan = next(model for model in scenario.models if model.name == record.model.name)
             truth = session.scene.relative_truth(plan)

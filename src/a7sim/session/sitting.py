@@ -1,29 +1,32 @@
 """A session from sitting down to the files it leaves, whatever is done in it."""
 
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from a7sim.documents import Document, as_json
+from a7sim.instrument.language import Desk
 from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit, Person
 from a7sim.reduction import Undetermined
-from a7sim.scenario import Scenario
-from a7sim.session.folder import BOOK, JOURNAL, RESULTS, write_whole
+from a7sim.session.folder import BOOK, RESULTS, write_whole
 from a7sim.session.journal import Journal
 from a7sim.session.results import of_operator, of_slips
 
 
-def journal_header(scenario: Scenario, seed: int) -> dict[str, Any]:
-    """Return what a journal says first of a session."""
-    return {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
+class Seated(Protocol):
+    """An operator at the desk of an instrument."""
+
+    person: Person
+    desk: Desk
 
 
 @contextmanager
 def sitting(
     document: Document,
-    person: Person,
+    seated: Seated,
     journal: Journal,
     header: Mapping[str, Any],
     out: Path | None = None,
@@ -37,7 +40,9 @@ def sitting(
     `leaves` returns by file name, and the results are left there, whole.
     """
     document |= {"status": "failed", "message": ""}
-    with journal.opened(out / JOURNAL if out else None, dict(header)):
+    person = seated.person
+    with journal.opened(out, dict(header), seated.desk):
+        person.book.listener = lambda entry: journal.written(entry, person.clock.now)
         try:
             yield
             document["status"] = "complete"
@@ -50,7 +55,20 @@ def sitting(
             document |= {"status": "interrupted", "message": f"the {called} was interrupted"}
             raise
         finally:
-            document |= {"operator": of_operator(person, journal.events), "truth": {"slips": of_slips(person)}}
+            document |= {
+                "operator": of_operator(person, journal.lines_over_the_link),
+                "truth": {"slips": of_slips(person)},
+            }
             if out is not None:
-                for name, text in {BOOK: person.book.as_csv(), **leaves(), RESULTS: as_json(document)}.items():
-                    write_whole(out / name, text)
+                _leave(out, {BOOK: person.book.as_csv(), **leaves(), RESULTS: as_json(document)})
+
+
+def _leave(out: Path, files: Mapping[str, str]) -> None:
+    """Leave files in a folder; where that cannot be and something went wrong before, the latter is what is said."""
+    wrong_before = sys.exception()
+    try:
+        for name, text in files.items():
+            write_whole(out / name, text)
+    except OSError:
+        if wrong_before is None:
+            raise

@@ -11,6 +11,7 @@ from a7sim.session import results
 from a7sim.session.a8_strip import strip_on_a8
 from a7sim.session.analytical import StripResult, strip_by_comparator
 from a7sim.session.folder import MODELS_OF_WAY, RESULTS, STRIP_OF_WAY, prepare_folder, write_whole
+from a7sim.session.journal import Keeping
 from a7sim.session.running import Cable, Watcher, run, straight
 from a7sim.session.strips import of_grounded
 from a7sim.session.two_ways import differences
@@ -23,6 +24,7 @@ def run_all_ways(
     watcher: Watcher | None = None,
     force: bool = False,
     cable: Cable = straight,
+    keeping: Keeping | None = None,
 ) -> Document:
     """Measure the strip of a scenario in every way it asks for and return the document of results.
 
@@ -31,7 +33,7 @@ def run_all_ways(
     Raises Mistake for what does not make a strip.
     """
     if "plotter" in scenario.work:
-        document = run(scenario, seed, out, watcher, force, cable)
+        document = run(scenario, seed, out, watcher, force, cable, keeping)
     else:
         document = results.header(scenario, seed) | {"status": "complete", "message": ""}
         if out is not None:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import a7sim
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 from a7sim.instrument.language.status import Register
 from a7sim.instrument.language.syntax import quoted
@@ -72,7 +71,7 @@ def _fixed(value: float, decimals: int = 2) -> str:
 
 def _identity(engine: "Engine", call: Call) -> str:
     autograph = _autograph(engine)
-    return f"WILD HEERBRUGG,{autograph.variant.name},{autograph.serial},{a7sim.__version__}"
+    return f"WILD HEERBRUGG,{autograph.variant.name},{autograph.serial},{engine.desk.version}"
 
 
 def _clear(engine: "Engine", call: Call) -> None:

@@ -4,13 +4,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from a7sim.instrument.autograph import Autograph
+import a7sim
+from a7sim.instrument.autograph import Autograph, State
 from a7sim.instrument.language.engine import Engine
 
 
 @dataclass(frozen=True, slots=True)
 class LinkEvent:
-    """A line that crossed the link: simulated time in s, the client, '>' to the instrument or '<' from it."""
+    """What happened on the link, in order: simulated time in s, the client, and what it was.
+
+    `direction` is '>' for a line to the instrument and '<' for one from it; '+' where a client comes and '-' where it
+    goes; '~' where a line that waited goes on, and '!' where one was too long and dropped. Together they are all that
+    the instrument's state follows from.
+    """
 
     time: float
     client: str
@@ -38,23 +44,32 @@ class Desk:
     """What clients must log in with, None where everybody is welcome."""
     poll_takes: float = POLL_TAKES
     """Simulated s that a look at the status takes while something moves; 0 where the clock goes by itself."""
+    version: str = a7sim.__version__
+    """Of the software, as the instrument tells it."""
     lock_holder: str | None = None
     busy_since: float = -math.inf
     """Simulated time in s at which the present movement, or the last one, began."""
     busy_until: float = -math.inf
     """Simulated time in s at which it ends."""
     _parts_busy_until: dict[str, float] = field(default_factory=dict)
-    _opened: int = field(default=0)
+    opened: int = 0
+    """How many clients have come."""
+    clients: dict[str, Engine] = field(default_factory=dict)
+    """Those that are there."""
 
-    def open(self, client: str | None = None, cr_ends_line: bool = True) -> Engine:
-        """Return an engine for a new client; it gets a name of its own unless it brings one."""
-        self._opened += 1
-        return Engine(self, client or f"client{self._opened}", cr_ends_line)
+    def open(self, client: str | None = None, cr_ends_line: bool = True, time: float = 0.0) -> Engine:
+        """Return an engine for a client that comes; it gets a name of its own unless it brings one."""
+        self.opened += 1
+        engine = Engine(self, client or f"client{self.opened}", cr_ends_line)
+        self.clients[engine.client] = engine
+        self.heard(time, engine.client, "+", "")
+        return engine
 
-    def close(self, client: str) -> None:
-        """Forget a client; a lock that it holds is free again."""
-        if self.lock_holder == client:
-            self.lock_holder = None
+    def close(self, client: str, time: float = 0.0) -> None:
+        """Forget a client that goes; a lock that it holds is free again."""
+        if self.clients.pop(client, None) is not None:
+            self.heard(time, client, "-", "")
+        self.release_lock(client)
 
     def request_lock(self, client: str) -> bool:
         """Give the lock to a client unless another holds it."""
@@ -63,8 +78,9 @@ class Desk:
         return self.lock_holder == client
 
     def release_lock(self, client: str) -> None:
-        """Take the lock back from a client that holds it."""
-        self.close(client)
+        """Take the lock back from a client if it holds it."""
+        if self.lock_holder == client:
+            self.lock_holder = None
 
     def may_turn(self, client: str) -> bool:
         """Whether a client may move anything: it holds the lock, or nobody does."""
@@ -84,6 +100,36 @@ class Desk:
         return min(time + self.poll_takes, self.busy_until) if self.poll_takes else None
 
     def heard(self, time: float, client: str, direction: str, text: str) -> None:
-        """Tell the listener of a line that crossed the link."""
+        """Tell the listener what happened on the link."""
         if self.listener is not None:
             self.listener(LinkEvent(time, client, direction, text))
+
+    @property
+    def quiet(self) -> bool:
+        """Whether no line waits to go on."""
+        return all(each.waits_until is None for each in self.clients.values())
+
+    def state(self, changes: int = 0) -> State:
+        """Return all that the events so far have made of the instrument and its clients, for `restore`.
+
+        To be asked while it is `quiet` and no line is being obeyed; `changes` are those of `Autograph.state`.
+        """
+        return {
+            "autograph": self.autograph.state(changes),
+            "lock_holder": self.lock_holder,
+            "busy": [each if math.isfinite(each) else None for each in (self.busy_since, self.busy_until)],
+            "parts": dict(self._parts_busy_until),
+            "opened": self.opened,
+            "clients": {name: each.state() for name, each in self.clients.items()},
+        }
+
+    def restore(self, state: State) -> None:
+        """Be as when a state was taken: the same instrument with the same clients."""
+        self.autograph.restore(state["autograph"])
+        self.lock_holder = state["lock_holder"]
+        self.busy_since, self.busy_until = (-math.inf if each is None else each for each in state["busy"])
+        self._parts_busy_until = dict(state["parts"])
+        self.opened = state["opened"]
+        self.clients = {name: Engine(self, name) for name in state["clients"]}
+        for name, each in state["clients"].items():
+            self.clients[name].restore(each)

@@ -1,11 +1,13 @@
 """The language engine of one client: bytes in, bytes out; no I/O, no clock of its own."""
 
 import hmac
+import math
 import re
 import zlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.logins import without_token
 from a7sim.instrument.language.program import Fault, Program, Question, Step, program_of, question_of, text_of
 from a7sim.instrument.language.status import OPERATION_COMPLETE, SETTLING, Status
 from a7sim.instrument.refusals import OutOfRange, Refusal, SettingsConflict, UnknownName
@@ -29,8 +31,6 @@ _LONGEST_PENDING = LONGEST_LINE + 2
 """A line, the CR of its end, and one byte that shows a line to be too long."""
 
 _TOO_MUCH = f"expected replies of at most {LARGEST_REPLY} bytes a line"
-
-_LOGIN = re.compile(r"LOG(IN)?\s", re.IGNORECASE)
 
 _NUMBER_OF = {
     OutOfRange: ErrorNumber.DATA_OUT_OF_RANGE,
@@ -122,6 +122,7 @@ class Engine:
 
     def _resume(self, replies: list[bytes]) -> bytes:
         """Obey the rest of the line that waited; return the input that waited behind it."""
+        self._heard("~", "")
         self.waits_until = None
         self._obey_rest(replies)
         if self.waits_until is not None:
@@ -143,7 +144,7 @@ class Engine:
 
     def _obey_line(self, line: bytes, replies: list[bytes]) -> None:
         if len(line) > LONGEST_LINE and len(text_of(line)) > LONGEST_LINE:
-            self._heard(f"(a line of more than {LONGEST_LINE} bytes, dropped)")
+            self._heard("!", f"(a line of more than {LONGEST_LINE} bytes, dropped)")
             self._status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {LONGEST_LINE} bytes a line")
             return
         if self.desk.listener is not None:
@@ -153,11 +154,11 @@ class Engine:
 
     def _tell(self, text: str) -> None:
         if text.strip(" \t"):
-            secret = self.desk.token is not None and _LOGIN.search(text)
-            self._heard("(a line with a login)" if secret else text)
+            token = self.desk.token
+            self._heard(">", text if token is None else without_token(text, token))
 
-    def _heard(self, text: str) -> None:
-        self.desk.heard(self._time, self.client, ">", text)
+    def _heard(self, direction: str, text: str) -> None:
+        self.desk.heard(self._time, self.client, direction, text)
 
     def _obey_rest(self, replies: list[bytes]) -> None:
         """Obey the units of a line that are left, up to one that waits; at its end, add its reply if it has one."""
@@ -176,7 +177,7 @@ class Engine:
                 return
         if self._replies:
             if self.desk.listener is not None:
-                self.desk.heard(self._time, self.client, "<", ";".join(map(_as_text, self._replies)))
+                self._heard("<", ";".join(map(as_heard, self._replies)))
             replies.append(b";".join(map(_as_bytes, self._replies)) + b"\n")
             self._replies.clear()
             self._reply_size = 0
@@ -225,6 +226,24 @@ class Engine:
         self._reply_size += len(reply)
         self._replies.append(reply)
 
+    # --- how the conversation stands ------------------------------------------------------------------
+
+    def state(self) -> dict[str, Any]:
+        """Return what the lines so far have made of the conversation, none of them waiting; for `restore`."""
+        return {
+            "status": self._status.state(),
+            "admitted": self._admitted,
+            "completes_at": None if self._completes_at is None else max(self._completes_at, -1.0),
+            "movement_seen": self._movement_seen if math.isfinite(self._movement_seen) else None,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from where a state was taken."""
+        self._status.restore(state["status"])
+        self._admitted = state["admitted"]
+        self._completes_at = state["completes_at"]
+        self._movement_seen = -math.inf if state["movement_seen"] is None else state["movement_seen"]
+
     # --- what handlers ask of the conversation --------------------------------------------------------
 
     @property
@@ -240,6 +259,11 @@ class Engine:
             self._completes_at = None
             status.event |= OPERATION_COMPLETE
         return status
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """What is in the error queue, oldest first, left there."""
+        return tuple(self._status.errors)
 
     def complete(self) -> None:
         """Raise the bit of operation complete when the movement that is going on now is done (`*OPC`)."""
@@ -270,7 +294,8 @@ def _as_bytes(reply: str | bytes) -> bytes:
     return reply if isinstance(reply, bytes) else reply.encode("ascii", "replace")
 
 
-def _as_text(reply: str | bytes) -> str:
+def as_heard(reply: str | bytes) -> str:
+    """Return what is told to a listener of a reply: of a block its size and checksum only."""
     if isinstance(reply, str):
         return reply
     return f"#block of {len(reply)} bytes, crc32 {zlib.crc32(reply):08x}"

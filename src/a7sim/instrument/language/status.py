@@ -1,7 +1,8 @@
 """The status model of IEEE 488.2 and SCPI-1999, one a client."""
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
+from typing import Any
 
 from a7sim.instrument.language.errors import ErrorNumber, entry
 
@@ -43,6 +44,19 @@ class Status:
     operation: Register = field(default_factory=Register)
     questionable: Register = field(default_factory=Register)
     errors: deque[str] = field(default_factory=deque)
+
+    def state(self) -> dict[str, Any]:
+        """Return all registers and the queue, for `restore`."""
+        registers = {name: list(astuple(getattr(self, name))) for name in ("operation", "questionable")}
+        enabled = {"event": self.event, "event_enable": self.event_enable, "service_enable": self.service_enable}
+        return enabled | registers | {"errors": list(self.errors)}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Report as when a state was taken."""
+        self.event, self.event_enable = state["event"], state["event_enable"]
+        self.service_enable = state["service_enable"]
+        self.operation, self.questionable = Register(*state["operation"]), Register(*state["questionable"])
+        self.errors = deque(state["errors"])
 
     def report(self, number: ErrorNumber, detail: str = "") -> None:
         """Queue an error and raise its bit; a full queue makes its last entry an overflow."""

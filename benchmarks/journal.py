@@ -1,0 +1,101 @@
+"""What the journal costs, as a share of the time of the same session without it, and how quickly it is sought in.
+
+Session and session with journal take turns, so that both meet the same machine; the quickest of each are compared,
+since whatever else goes on there only makes them slower.
+"""
+
+import random
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+from a7sim.instrument import build_autograph
+from a7sim.instrument.language import Desk
+from a7sim.scenario import load_scenario
+from a7sim.scene import build_scene
+from a7sim.session import run
+from a7sim.session.durable import DURABILITIES
+from a7sim.session.journal import Journal, Keeping, header_of
+from a7sim.session.lines import read_journal
+from a7sim.session.replaying import Replay, replayed
+
+REPEATS = 5
+EVENTS = 100_000
+SESSION_S = 8 * 3600.0
+SEEKS = 20
+SEED = 7
+
+
+def seconds(scenario, folder, durability):
+    keeping = Keeping(durability) if durability else None
+    began = time.perf_counter()
+    run(scenario, SEED, folder if durability else None, keeping=keeping, force=True)
+    return time.perf_counter() - began
+
+
+def cost(home):
+    scenario = load_scenario("akwanga")
+    ways = [None, *reversed(DURABILITIES)]
+    took = {way: [] for way in ways}
+    for _ in range(REPEATS):
+        for way in ways:
+            took[way].append(seconds(scenario, home / "run", way))
+    without = min(took[None])
+    lines = len(read_journal(home / "run" / "session.jsonl"))
+    print(f"akwanga, {lines} lines: {without:.2f} s without a journal")
+    for way in ways[1:]:
+        more = min(took[way]) - without
+        flush = " (flush: each line to the operating system)" if way == "none" else ""
+        print(f"  --durability {way:<8} {more / without:+7.1%}  {1e6 * more / lines:6.1f} us a line{flush}")
+
+
+def long_session(folder):
+    """Leave the journal of a session of so many events: turning, looking, reading, registering."""
+    scenario = load_scenario("akwanga")
+    desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, SEED).drawer, SEED))
+    folder.mkdir()
+    dice = random.Random(SEED)
+    with Journal(Keeping("none")).opened(folder, header_of("serve", scenario, SEED), desk) as journal:
+        desk.listener = journal.heard
+        engine = desk.open()
+        engine.feed(b'PHOT1:LOAD "101";:PHOT2:LOAD "102";:BASE:BX 194.99\n', 0.0)
+        for step in range(EVENTS // 4):
+            now = 60.0 + step * SESSION_S / (EVENTS // 4)
+            engine.feed(f"DRIV:X {dice.uniform(-20, 200):.2f};Y {dice.uniform(-150, 150):.2f}\n".encode(), now)
+            line = f'REC "{step}"\n' if step % 25 == 0 else f"PROJ1:BY {dice.uniform(-5, 5):.2f}\n"
+            engine.feed(line.encode(), now)
+            engine.feed(b'EYEP:STER? "1011";:COUN?\n', now)
+    return folder / "session.jsonl"
+
+
+def seeking(home):
+    path = long_session(home / "long")
+    dice = random.Random(SEED)
+    took = []
+    for _ in range(SEEKS):
+        began = time.perf_counter()
+        journalled = read_journal(path)
+        line = dice.randrange(3, len(journalled))
+        replay = Replay(journalled)
+        for number, _, difference in replayed(replay, replay.seek(line)):
+            assert difference is None
+            if number == line:
+                break
+        took.append(time.perf_counter() - began)
+    size = path.stat().st_size / 1e6
+    print(f"{len(journalled)} lines, {size:.1f} MB: any of {SEEKS} times sought")
+    print(f"  in {statistics.median(took):.2f} s (median), {max(took):.2f} s (longest), reading and checking included")
+    print(f"  of that {floor(path):.2f} s to read the bytes and split them into lines")
+
+
+def floor(path):
+    began = time.perf_counter()
+    path.read_bytes().split(b"\n")
+    return time.perf_counter() - began
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as temporary:
+        cost(Path(temporary))
+        seeking(Path(temporary))

@@ -1,0 +1,82 @@
+"""`a7sim record`: a journal of what a client and an instrument say to each other."""
+
+import signal
+import socket
+import threading
+from pathlib import Path
+from typing import Any
+
+import click
+
+from a7sim.cli.options import DURABILITY_OPTION
+from a7sim.documents import as_json, head
+from a7sim.link.addresses import Address, address_of
+from a7sim.link.between import Between
+from a7sim.link.clock import WallClock
+from a7sim.link.opening import open_port
+from a7sim.mistakes import Mistake
+from a7sim.scenario import load_scenario
+from a7sim.session.durable import Durability
+from a7sim.session.folder import prepare_folder
+from a7sim.session.journal import Journal, Keeping, header_of, header_of_unknown
+
+_STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
+
+
+@click.command("record")
+@click.argument("url")
+@click.option("--tcp", default="127.0.0.1:0", show_default=True, metavar="HOST:PORT", help="Where clients come.")
+@click.option("--scenario", metavar="SCENARIO", help="What the instrument is served from, so that it can be replayed.")
+@click.option("--seed", type=click.IntRange(min=0), help="With which seed.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for the journal.")
+@click.option("--force", is_flag=True, help="Write into a folder that exists.")
+@DURABILITY_OPTION
+@click.option("--json", "as_document", is_flag=True, help="Print where clients come as one JSON document.")
+def command(
+    url: str,
+    tcp: str,
+    scenario: str | None,
+    seed: int | None,
+    out: Path,
+    force: bool,
+    durability: Durability,
+    as_document: bool,
+) -> None:
+    """Stand between a client and the instrument at URL, and journal what they say until stopped, by Ctrl-C or kill.
+
+    Clients come one after the other; each line and each reply is journalled before it goes on.
+
+    Example: a7sim record tcp://127.0.0.1:5025 --tcp 127.0.0.1:5026 --out runs/recorded
+    """
+    header = _header(url, scenario, seed)
+    open_port(url).close()
+    address = address_of(tcp, "--tcp")
+    if not address.loopback:
+        raise Mistake(f"--tcp {address}: expected an address of this machine alone")
+    stop = threading.Event()
+    for name in _STOPPING:
+        signal.signal(getattr(signal, name), lambda *_: stop.set())
+    with _door(address) as door:
+        prepare_folder(out, force)
+        with Journal(Keeping(durability)).opened(out, header, None) as journal:
+            host, port = door.getsockname()[:2]
+            where = f"socket://{Address(host, port)}"
+            click.echo(as_json(head("record") | {"url": where, "instrument": url}) if as_document else where, nl=False)
+            click.echo("" if as_document else "\nready")
+            Between(url, journal.heard, WallClock(), stop).serve(door)
+
+
+def _header(url: str, scenario: str | None, seed: int | None) -> dict[str, Any]:
+    if scenario is None:
+        if seed is not None:
+            raise Mistake("--seed: expected a --scenario beside it, got none")
+        return header_of_unknown("record", instrument=url)
+    loaded = load_scenario(scenario)
+    return header_of("record", loaded, loaded.seed if seed is None else seed, instrument=url)
+
+
+def _door(address: Address) -> socket.socket:
+    try:
+        return socket.create_server((address.host, address.port), backlog=1)
+    except OSError as error:
+        raise Mistake(f"--tcp {address}: expected an address to listen on: {error.strerror}") from error

@@ -1,0 +1,230 @@
+"""`a7sim replay`: a session worked again on a fresh instrument."""
+
+import re
+import time
+from bisect import bisect_left
+from contextlib import nullcontext
+from pathlib import Path
+
+import click
+
+from a7sim.cli import EXIT_DIFFERS
+from a7sim.cli.options import of_a_folder
+from a7sim.documents import as_json, head
+from a7sim.mistakes import Mistake
+from a7sim.session.checkpoints import Differing
+from a7sim.session.conversation import Told, line_of_event
+from a7sim.session.folder import JOURNAL, prepare_folder
+from a7sim.session.journal import Journal, header_of
+from a7sim.session.lines import Journalled, read_journal
+from a7sim.session.playing import Player
+from a7sim.session.replaying import Difference, Replay, replayed
+from a7sim.session.scripts import SUFFIX, find_script, read_script
+
+_MOST_PARTS = 20
+
+_TIME = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:\.\d*)?)")
+
+
+@click.command("replay")
+@click.argument("session")
+@click.option("--verify", is_flag=True, help="Stop at the first difference, with exit code 3.")
+@click.option(
+    "--speed",
+    type=click.Choice(["1", "10", "max"]),
+    default="max",
+    show_default=True,
+    help="How many times as fast as it happened.",
+)
+@click.option(
+    "--from",
+    "begin",
+    metavar="T|@LINE|TEXT",
+    help="Tell from a time on (s, or h:mm:ss), a line, or the first note with a text, such as the name of a form.",
+)
+@of_a_folder
+@click.option("--json", "as_document", is_flag=True, help="Print how it ended as one JSON document.")
+@click.option("--quiet", is_flag=True, help="Do not print the conversation.")
+def command(
+    session: str,
+    verify: bool,
+    speed: str,
+    begin: str | None,
+    out: Path | None,
+    force: bool,
+    as_document: bool,
+    quiet: bool,
+) -> None:
+    """Say the lines of SESSION again to a fresh instrument: a folder, a journal, or a script (.a7s).
+
+    Of a script --out keeps the journal.
+
+    Example: a7sim replay runs/akwanga --verify --quiet
+    """
+    pace = Pace(float("inf") if speed == "max" else float(speed))
+    silent = quiet or as_document
+    if _is_script(session):
+        if begin is not None:
+            raise Mistake("--from: expected a journal to seek in, got a script")
+        played(session, pace, out, force, silent, as_document)
+        return
+    if out is not None:
+        raise Mistake("--out: expected a script, whose journal it keeps; a journal there is already")
+    path = Path(session)
+    journalled = read_journal(path / JOURNAL if path.is_dir() else path)
+    first = 2 if begin is None else _line(journalled, begin)
+    if journalled.header.get("scenario") is None and not verify:
+        _told(journalled, first, pace, silent, as_document)
+    else:
+        _replayed(journalled, first, verify, pace, silent, as_document)
+
+
+class Pace:
+    """The wall's time beside the session's: what is told waits until it is due."""
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._begun: tuple[float, float] | None = None
+
+    def until(self, now: float) -> None:
+        """Wait until it is so late in the session, counted from when this was first asked."""
+        if self._begun is None:
+            self._begun = time.monotonic(), now
+        wall, session = self._begun
+        due = wall + (now - session) / self._speed
+        time.sleep(max(0.0, due - time.monotonic()))
+
+
+def _is_script(session: str) -> bool:
+    return session.endswith(SUFFIX) or ("/" not in session and not Path(session).exists())
+
+
+def _line(journalled: Journalled, begin: str) -> int:
+    """Return the first line that is to be told. Raises Mistake where there is none."""
+    numbers = range(2, len(journalled) + 1)
+    found: int | None = None
+    if begin.startswith("@") and begin[1:].isdecimal():
+        found = int(begin[1:])
+    elif time_there := _TIME.fullmatch(begin):
+        hours, minutes, seconds = (float(each or 0) for each in time_there.groups())
+        at = 3600.0 * hours + 60.0 * minutes + seconds
+        found = 2 + bisect_left(numbers, at, key=lambda number: journalled.event(number).t)
+    else:
+        notes = (n for n in numbers if _notes(journalled.event(n).text, begin))
+        found = next(notes, None)
+    if found is None or found not in numbers:
+        raise Mistake(f"--from {begin}: expected a time, @LINE or the text of a note within {journalled.path}")
+    return found
+
+
+def _notes(text: str, wanted: str) -> bool:
+    return text.upper().startswith("NOTE") and wanted.lower() in text.lower()
+
+
+def _told(journalled: Journalled, first: int, pace: Pace, silent: bool, as_document: bool) -> None:
+    """Tell a conversation with an instrument that nobody can build again."""
+    for number in range(first, len(journalled) + 1):
+        event = journalled.event(number)
+        pace.until(event.t)
+        if not silent:
+            click.echo(line_of_event(event))
+    _ended(journalled, 0, None, 0, as_document, silent)
+
+
+def _replayed(journalled: Journalled, first: int, verify: bool, pace: Pace, silent: bool, as_document: bool) -> None:
+    replay = Replay(journalled)
+    begins = replay.seek(first) if first > 2 else 2
+    known = len(replay.checkpoints)
+    differing = 0
+    difference: Difference | None = None
+    for number, event, differs in replayed(replay, begins):
+        if number >= first:
+            pace.until(event.t)
+            if not silent:
+                click.echo(line_of_event(event))
+        if differs is not None:
+            differing += 1
+            difference = difference or differs
+            if verify:
+                break
+            if not silent:
+                click.echo(f"{'differs':>10} {differs.replayed or 'nothing'}")
+    if difference is None:
+        difference = replay.ended()
+        differing += difference is not None
+    parts = () if difference is None else difference.parts or replay.parts_that_differ(difference.line)
+    if difference is not None and (verify or not silent):
+        _tell(journalled, difference, parts)
+    _ended(journalled, differing, difference, len(replay.checkpoints) - known, as_document, silent and not verify)
+    if difference is not None and verify:
+        raise click.exceptions.Exit(EXIT_DIFFERS)
+
+
+def _tell(journalled: Journalled, difference: Difference, parts: tuple[Differing, ...]) -> None:
+    click.echo(f"a7sim: {journalled.where(difference.line)}: the first difference", err=True)
+    click.echo(f"a7sim: the journal has      {difference.journalled or 'nothing'}", err=True)
+    click.echo(f"a7sim: the instrument says  {difference.replayed or 'nothing'}", err=True)
+    for part in parts[:_MOST_PARTS]:
+        click.echo(f"a7sim: state, {part.part}: {part.was} in the journal, {part.is_now} now", err=True)
+
+
+def _ended(
+    journalled: Journalled,
+    differing: int,
+    difference: Difference | None,
+    checkpoints: int,
+    as_document: bool,
+    silent: bool,
+) -> None:
+    lines = len(journalled) - 1
+    torn = len(journalled.torn)
+    if as_document:
+        found = None
+        if difference is not None:
+            found = {"line": difference.line, "journal": difference.journalled, "instrument": difference.replayed}
+        document = head("replay") | {
+            "session": str(journalled.path),
+            "status": "differs" if differing else "same",
+            "lines": lines,
+            "checkpoints": checkpoints,
+            "torn_bytes": torn,
+            "difference": found,
+        }
+        click.echo(as_json(document), nl=False)
+    elif not silent:
+        came = f"{differing} different" if differing else "no difference"
+        rest = f"; a torn last line of {torn} bytes is left out" if torn else ""
+        click.echo(f"{lines} lines, {checkpoints} checkpoints: {came}{rest}")
+
+
+def played(session: str, pace: Pace, out: Path | None, force: bool, silent: bool, as_document: bool) -> None:
+    """Play a script, and end with exit code 3 where it and the instrument part."""
+    script = read_script(find_script(session))
+    journal = Journal()
+    told = Told(lambda text: None if silent else click.echo(text), pace.until, journal.heard)
+    player = Player(script, told.heard)
+    if out is not None:
+        prepare_folder(out, force)
+    header = header_of("replay", script.scenario, script.seed, script=script.file.name)
+    with journal.opened(out, header, player.desk) if out else nullcontext():
+        failed = player.play()
+    if as_document:
+        document = head("replay") | {
+            "session": str(script.file),
+            "status": "differs" if failed else "same",
+            "lines": len(script.statements),
+            "difference": None
+            if failed is None
+            else {
+                "line": failed.place.line,
+                "file": str(failed.place.file),
+                "expected": failed.expected,
+                "got": failed.got,
+            },
+        }
+        click.echo(as_json(document), nl=False)
+    if failed is not None:
+        click.echo(f"a7sim: {failed}", err=True)
+        raise click.exceptions.Exit(EXIT_DIFFERS)
+    if not silent:
+        click.echo(f"{len(script.statements)} statements: all as expected")

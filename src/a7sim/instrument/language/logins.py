@@ -1,0 +1,32 @@
+"""Lines as they may be told to others: what somebody gave as a token never is, but whether it was the token."""
+
+import hmac
+import re
+
+from a7sim.instrument.language.syntax import units_of
+
+THE_TOKEN = "(the token)"
+"""Stands for the token, so that a line can be said again to an instrument whose token is this."""
+
+_ANOTHER, _SECRET = "(not the token)", "(kept secret)"
+
+_LOGIN = re.compile(r"LOG(IN)?\s", re.IGNORECASE)
+_HEADER = re.compile(r"[\s:A-Z0-9_]*LOG(?:IN)?\s+", re.IGNORECASE)
+_QUOTED = re.compile(r"\"((?:[^\"]|\"\")*)\"\s*|'((?:[^']|'')*)'\s*")
+
+
+def without_token(text: str, token: str | None) -> str:
+    """Return a line with what it gives as a token left out; None where nobody knows the token and all may be it."""
+    return ";".join(_told(unit, token) for unit in units_of(text)) if _LOGIN.search(text) else text
+
+
+def _told(unit: str, token: str | None) -> str:
+    header = _HEADER.match(unit)
+    if header is None:
+        return _SECRET if _LOGIN.search(unit) and (unit.count('"') % 2 or unit.count("'") % 2) else unit
+    quoted = _QUOTED.fullmatch(unit, header.end())
+    if quoted is None:
+        return f"{header[0]}{_SECRET}"
+    given = quoted[1].replace('""', '"') if quoted[1] is not None else quoted[2].replace("''", "'")
+    right = token is None or hmac.compare_digest(given.encode(), token.encode())
+    return f'{header[0]}"{THE_TOKEN if right else _ANOTHER}"'

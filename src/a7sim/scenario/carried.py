@@ -1,0 +1,63 @@
+"""A scenario carried about as data: whoever has it needs no scenario file, only the measurements that it names."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from a7sim.mistakes import Mistake
+from a7sim.scenario.loading import SHELVES
+from a7sim.scenario.requests import RequestedScenario
+from a7sim.scenario.schema import Scenario
+
+
+def carried(scenario: Scenario) -> dict[str, Any]:
+    """Return a scenario as data for JSON, whole; measurements that come with a7sim are named by their file alone.
+
+    Where somebody asked for it in a certain way, that is carried along.
+    """
+    return _naming(msgspec.to_builtins(scenario), _shelved)
+
+
+def scenario_from(data: Any) -> Scenario:
+    """Return the scenario that was carried. Raises Mistake for data that is none."""
+    try:
+        return msgspec.convert(_naming(data, _found), RequestedScenario if "request" in data else Scenario)
+    except (msgspec.ValidationError, TypeError, AttributeError) as error:
+        raise Mistake(f"expected a scenario of this version of a7sim, got another: {error}") from error
+
+
+def hash_of(scenario: Scenario) -> str:
+    """Return the SHA-256 of a scenario and of the measurements that it names, however it was asked for.
+
+    Raises Mistake where one is missing.
+    """
+    content = {name: value for name, value in carried(scenario).items() if name != "request"}
+    digest = hashlib.sha256(msgspec.json.encode(content, order="sorted"))
+    for file in sorted({photo.measured.file for photo in scenario.photos if photo.measured}):
+        try:
+            digest.update(Path(file).read_bytes())
+        except OSError as error:
+            raise Mistake(f"{file}: expected the measurements of the scenario: {error.strerror}") from error
+    return digest.hexdigest()
+
+
+def _naming(data: dict[str, Any], name: Any) -> dict[str, Any]:
+    photos = [
+        {**photo, "measured": {**photo["measured"], "file": name(photo["measured"]["file"])}}
+        if photo.get("measured")
+        else photo
+        for photo in data["photos"]
+    ]
+    return {**data, "photos": photos}
+
+
+def _shelved(file: str) -> str:
+    path = Path(file).resolve()
+    return path.name if path.parent in [shelf.resolve() for shelf in SHELVES] else str(path)
+
+
+def _found(file: str) -> str:
+    shelved = (shelf / file for shelf in SHELVES if Path(file).name == file)
+    return str(next((path for path in shelved if path.is_file()), file))

@@ -1,0 +1,82 @@
+"""A script played: its lines said to a fresh instrument, what it expects compared with what comes."""
+
+from dataclasses import dataclass
+
+from a7sim.instrument import build_autograph
+from a7sim.instrument.language import Desk, Engine, Listener
+from a7sim.instrument.language.engine import LONGEST_LINE
+from a7sim.link.clock import Clock
+from a7sim.link.replies import Part, as_text, whole_reply
+from a7sim.link.waiting import obeyed
+from a7sim.scene import build_scene
+from a7sim.session.scripts import Expect, Place, Say, Script, Statement, Wait
+
+
+@dataclass(frozen=True)
+class NotMet:
+    """Where a script and the instrument part: what was expected there, and what came."""
+
+    place: Place
+    expected: str
+    got: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: expected {self.expected}, got {self.got}"
+
+
+class Player:
+    """A fresh instrument with the operator of a script at it."""
+
+    def __init__(self, script: Script, listener: Listener | None = None) -> None:
+        scene = build_scene(script.scenario, script.seed)
+        self._script = script
+        self._clock = Clock()
+        self.desk = Desk(build_autograph(script.scenario.instrument, scene.drawer, script.seed), listener)
+
+    def play(self) -> NotMet | None:
+        """Carry out the statements up to the first that fails, and return that; an error not expected is one."""
+        engine = self.desk.open()
+        for done, after in zip(self._script.statements, [*self._script.statements[1:], None], strict=True):
+            failed = self._carry_out(engine, done)
+            if failed is None and not _asks_for_errors(after) and engine.errors:
+                failed = NotMet(done.place, f"{_said(done)} to be obeyed", engine.errors[0])
+            if failed is not None:
+                return failed
+        self.desk.close(engine.client, self._clock.now)
+        return None
+
+    def _carry_out(self, engine: Engine, statement: Statement) -> NotMet | None:
+        if isinstance(statement, Wait):
+            self._clock.spend(statement.seconds)
+            return None
+        reply = obeyed(engine, _said(statement).encode("latin-1", "replace") + b"\n", self._clock)
+        if isinstance(statement, Say):
+            return None
+        taken = whole_reply(reply)
+        answer = () if taken is None else tuple(field for part in taken.parts for field in _fields(part))
+        if statement.met_by(answer):
+            return None
+        errors = f" ({engine.errors[0]})" if engine.errors else ""
+        return NotMet(statement.place, str(statement), (", ".join(answer) or "no answer") + errors)
+
+
+def _said(statement: Statement) -> str:
+    if isinstance(statement, Wait):
+        return f"wait {statement.seconds:g}"
+    return (statement.query if isinstance(statement, Expect) else statement.text)[: LONGEST_LINE + 1]
+
+
+def _asks_for_errors(statement: Statement | None) -> bool:
+    return isinstance(statement, Expect) and any(word in statement.query.upper() for word in ("ERR", "*ESR", "*STB"))
+
+
+def _fields(part: Part) -> list[str]:
+    """Return the values of an answer, texts with their quotes."""
+    text, fields, within = as_text(part), [""], False
+    for character in text:
+        within ^= character == '"'
+        if character == "," and not within:
+            fields.append("")
+        else:
+            fields[-1] += character
+    return fields

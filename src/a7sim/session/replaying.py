@@ -1,0 +1,204 @@
+"""A journal worked again on a fresh instrument: every reply and every checkpoint compared with what stands there."""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from a7sim.instrument import build_autograph
+from a7sim.instrument.language import LONGEST_LINE, Desk, LinkEvent
+from a7sim.instrument.language.desk import POLL_TAKES
+from a7sim.instrument.language.logins import THE_TOKEN
+from a7sim.link.clock import Clock
+from a7sim.link.waiting import obeyed
+from a7sim.mistakes import Mistake
+from a7sim.scenario import Scenario, hash_of, scenario_from
+from a7sim.scene import build_scene
+from a7sim.session.checkpoints import Checkpoint, Differing, differences, hash_of_state, read_checkpoints
+from a7sim.session.folder import STATES
+from a7sim.session.lines import Event, Journalled
+
+RECORDED = "record"
+"""The command whose journals hold what crossed a line, and nothing of how the instrument waited."""
+
+
+def scenario_of_journal(journalled: Journalled) -> tuple[Scenario, int]:
+    """Return the scenario and the seed of a session. Raises Mistake where they are not those it was begun with."""
+    header = journalled.header
+    if header.get("scenario") is None:
+        raise Mistake(f"{journalled.where(1)}: expected a session whose scenario is known, got one that names none")
+    try:
+        scenario = scenario_from(header["scenario"])
+        found = hash_of(scenario)
+    except Mistake as mistake:
+        raise Mistake(f"{journalled.where(1)}: {mistake}") from mistake
+    if found != header.get("scenario_hash"):
+        raise Mistake(
+            f"{journalled.where(1)}: expected the scenario and the measurements that the session began with "
+            f"(hash {str(header.get('scenario_hash'))[:12]}), got others ({found[:12]})"
+        )
+    return scenario, header["seed"]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where a replay first differs: the line, what the journal has and what the instrument says; '' for nothing."""
+
+    line: int
+    journalled: str
+    replayed: str
+    parts: tuple[Differing, ...] = ()
+    """Of the state, at the next checkpoint whose state is known."""
+
+
+class Replay:
+    """A fresh instrument to which the lines of a journal are said again, from the first or from a checkpoint."""
+
+    def __init__(self, journalled: Journalled) -> None:
+        scenario, seed = scenario_of_journal(journalled)
+        header = journalled.header
+        settings = header.get("settings", {})
+        autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
+        self.journalled = journalled
+        self.desk = Desk(
+            autograph,
+            self._heard,
+            THE_TOKEN if settings.get("login") else None,
+            0.0 if settings.get("realtime") else POLL_TAKES,
+            str(header.get("software", "")).removeprefix("a7sim "),
+        )
+        self.time = 0.0
+        self.checkpoints: list[Checkpoint] = []
+        """Those passed, their states as they are here."""
+        self._clock = Clock() if header.get("command") == RECORDED else None
+        self._said: deque[LinkEvent] = deque()
+        self._changes = 0
+
+    def _heard(self, event: LinkEvent) -> None:
+        if self._clock is None or event.direction == "<":
+            self._said.append(event)
+
+    def seek(self, line: int) -> int:
+        """Go to the last checkpoint before a line whose state is known; return the line that comes next."""
+        known: list[Checkpoint] = []
+        for checkpoint in read_checkpoints(self.journalled.path.with_name(STATES)):
+            if checkpoint.line >= line or not self._is_of_the_journal(checkpoint):
+                break
+            known.append(checkpoint)
+        if not known:
+            return 2
+        *before, last = known
+        for each in before:
+            self.desk.autograph.register_again(each.state["autograph"])
+        self.desk.restore(last.state)
+        self.checkpoints = known
+        self._changes = len(self.desk.autograph.recorder.changes)
+        self.time = last.t
+        return last.line + 1
+
+    def _is_of_the_journal(self, checkpoint: Checkpoint) -> bool:
+        number = checkpoint.line
+        return 1 < number <= len(self.journalled) and self.journalled.event(number).hash == checkpoint.hash
+
+    def say(self, number: int, event: Event) -> Difference | None:
+        """Let an event of the journal happen again; return how it differs, if it does."""
+        self.time = event.t
+        if event.kind == "state":
+            return self._compared(number, event)
+        if event.kind:
+            return None
+        if self._clock is not None:
+            return self._say_as_recorded(number, event)
+        if event.dir != "<":
+            left = self._left_over(number)
+            self._happen(event)
+            if left is not None:
+                return left
+        return self._expected(number, event)
+
+    def _say_as_recorded(self, number: int, event: Event) -> Difference | None:
+        """Compare replies only, in their order: lines may have been sent before they came."""
+        if event.dir == "<":
+            return self._expected(number, event)
+        if event.dir == "-":
+            self._said.clear()
+        self._happen(event)
+        return None
+
+    def ended(self) -> Difference | None:
+        """Return what the instrument still says where the journal ends, if it does."""
+        return self._left_over(len(self.journalled) + 1)
+
+    def _left_over(self, number: int) -> Difference | None:
+        if not self._said:
+            return None
+        said = self._said.popleft()
+        self._said.clear()
+        return Difference(number, "", _shown(said.client, said.direction, said.text))
+
+    def _expected(self, number: int, event: Event) -> Difference | None:
+        said = self._said.popleft() if self._said else None
+        if said is not None:
+            same = (said.direction, said.text) == (event.dir, event.text)
+            if same and (self._clock is not None or (said.time, said.client) == (event.t, event.client)):
+                return None
+        replayed = "" if said is None else _shown(said.client, said.direction, said.text)
+        return Difference(number, _shown(event.client, event.dir, event.text), replayed)
+
+    def _happen(self, event: Event) -> None:
+        desk, client = self.desk, event.client
+        if event.dir == "+":
+            desk.open(client, time=event.t)
+        elif event.dir == "-":
+            desk.close(client, event.t)
+        elif client in desk.clients:
+            engine = desk.clients[client]
+            received = _bytes_of(event)
+            if self._clock is None:
+                engine.feed(received, event.t)
+            else:
+                self._clock.pass_to(event.t)
+                obeyed(engine, received, self._clock)
+
+    def _compared(self, number: int, event: Event) -> Difference | None:
+        state = self.desk.state(self._changes)
+        self._changes = len(self.desk.autograph.recorder.changes)
+        found = hash_of_state(state)
+        self.checkpoints.append(Checkpoint(number, event.t, found, state))
+        if found == event.hash:
+            return None
+        return Difference(number, f"state {event.hash}", f"state {found}", self._parts(number, state))
+
+    def _parts(self, number: int, state: dict[str, Any]) -> tuple[Differing, ...]:
+        for checkpoint in read_checkpoints(self.journalled.path.with_name(STATES)):
+            if checkpoint.line == number and self._is_of_the_journal(checkpoint):
+                return tuple(differences(checkpoint.state, state))
+        return ()
+
+    def parts_that_differ(self, after: int) -> tuple[Differing, ...]:
+        """Return in what the state differs at the first checkpoint after a line, the rest up to there said again."""
+        for number in range(after + 1, len(self.journalled) + 1):
+            event = self.journalled.event(number)
+            if event.kind == "state":
+                return self._parts(number, self.desk.state(self._changes))
+            self.say(number, event)
+        return ()
+
+
+def replayed(replay: Replay, first: int = 2) -> Iterator[tuple[int, Event, Difference | None]]:
+    """Say the lines of a journal again, from a line on; yield each with its number and how it differs."""
+    for number in range(first, len(replay.journalled) + 1):
+        event = replay.journalled.event(number)
+        yield number, event, replay.say(number, event)
+
+
+def _bytes_of(event: Event) -> bytes:
+    if event.dir == "~":
+        return b""
+    if event.dir == "!":
+        return b"x" * (LONGEST_LINE + 1) + b"\n"
+    return event.text.encode("latin-1", "replace") + (b"\r\n" if event.text.endswith("\r") else b"\n")
+
+
+def _shown(client: str, direction: str, text: str) -> str:
+    return f"{client} {direction} {text}".rstrip()

@@ -1,0 +1,210 @@
+"""Operator scripts (`.a7s`): a session written by hand, a statement a line.
+
+scenario akwanga seed 7                  # first of all: the instrument and what lies in the drawer
+PHOT1:LOAD "101"                         # any line of the command language
+wait 30                                  # simulated s
+expect EYEP1? "1011" = 0, 0 +- 5         # a query, what it answers, and within what; texts exactly
+include mounting.a7s                     # another script, beside this one
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from a7sim.files import read_text
+from a7sim.mistakes import Mistake
+from a7sim.scenario import Scenario, ScenarioError, load_scenario
+from a7sim.scenario.loading import SHELVES
+
+SUFFIX = ".a7s"
+
+ANYTHING = "*"
+"""Stands for a value that may be any."""
+
+_OF_BINARY_FRACTIONS = 1e-9
+
+_SCENARIO = re.compile(r"scenario\s+(\S+)(?:\s+seed\s+(\d{1,40}))?")
+_EXPECTED = re.compile(r"expect\s+(?P<query>.+?)\s+=\s+(?P<values>.+?)(?:\s+\+-\s+(?P<within>\S+))?")
+_KEYWORD = re.compile(r"(scenario|expect|wait|include)(\s|$)")
+_PARTS = re.compile(r"\"(?:[^\"]|\"\")*\"|'(?:[^']|'')*'|[^\"'#]|[\"']")
+_VALUES = re.compile(r"\s*(\"(?:[^\"]|\"\")*\"|[^,\"]+?)\s*(?:,|$)")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in which file something stands."""
+
+    file: Path
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}, line {self.line}"
+
+
+@dataclass(frozen=True)
+class Say:
+    """A line for the instrument."""
+
+    place: Place
+    text: str
+
+
+@dataclass(frozen=True)
+class Wait:
+    """Simulated s that go by."""
+
+    place: Place
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Expect:
+    """A query and what it is to answer, numbers `within` so much; a value * may be any."""
+
+    place: Place
+    query: str
+    values: tuple[str, ...]
+    within: float = 0.0
+
+    def __str__(self) -> str:
+        tolerance = f" +- {self.within:g}" if self.within else ""
+        return f"{self.query} = {', '.join(self.values)}{tolerance}"
+
+    def met_by(self, answer: tuple[str, ...]) -> bool:
+        """Whether an answer is the one expected."""
+        return len(answer) == len(self.values) and all(map(self._met, self.values, answer))
+
+    def _met(self, expected: str, got: str) -> bool:
+        if expected == ANYTHING:
+            return True
+        wanted, shown = _number(expected), _number(got)
+        if wanted is None or shown is None:
+            return expected.strip('"') == got.strip('"')
+        return abs(wanted - shown) <= self.within + _OF_BINARY_FRACTIONS
+
+
+Statement = Say | Wait | Expect
+
+
+@dataclass(frozen=True)
+class Script:
+    """A script with all that it includes: what lies in the drawer, and the statements in their order."""
+
+    file: Path
+    scenario: Scenario
+    seed: int
+    statements: tuple[Statement, ...]
+
+
+def find_script(name: str) -> Path:
+    """Return the path of a script, by path or by the bare name of one that comes with a7sim. Raises Mistake."""
+    path = Path(name)
+    if path.is_file():
+        return path
+    shelves = [shelf / "scripts" for shelf in SHELVES]
+    for shelf in shelves:
+        found = shelf / f"{path.name.removesuffix(SUFFIX)}{SUFFIX}"
+        if path.parent == Path() and found.is_file():
+            return found
+    known = sorted({file.stem for shelf in shelves for file in shelf.glob(f"*{SUFFIX}")})
+    raise Mistake(
+        f"{name}: expected the folder of a session, its journal, or a script such as {', '.join(known)}; "
+        "found no such file"
+    )
+
+
+def read_script(path: Path) -> Script:
+    """Return a script. Raises Mistake for what is none, naming file and line."""
+    asked: list[tuple[Place, str, int | None]] = []
+    statements = tuple(_statements(path, (), asked))
+    if not asked:
+        raise Mistake(f"{path}, line 1: expected a first line such as 'scenario akwanga seed 7', got none")
+    place, name, seed = asked[0]
+    for other, *rest in asked[1:]:
+        if rest != [name, seed]:
+            raise Mistake(f"{other}: expected the scenario and seed of {place}, got others")
+    try:
+        beside = place.file.parent / name
+        scenario = load_scenario(beside if beside.is_file() else name)
+    except ScenarioError as error:
+        raise Mistake(f"{place}: {error}") from error
+    return Script(path, scenario, scenario.seed if seed is None else seed, statements)
+
+
+def _statements(
+    path: Path, within: tuple[Path, ...], asked: list[tuple[Place, str, int | None]]
+) -> Iterator[Statement]:
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        text = _without_comment(line).strip()
+        place = Place(path, number)
+        keyword = _KEYWORD.match(text)
+        rest = text[keyword.end() :].strip() if keyword else ""
+        if keyword and keyword[1] == "scenario":
+            asked.append((place, *_scenario(place, text)))
+        elif text and not asked:
+            raise Mistake(f"{place}: expected a first line such as 'scenario akwanga seed 7', got {text!r}")
+        elif keyword and keyword[1] == "include":
+            yield from _included(place, rest, (*within, path.resolve()), asked)
+        elif keyword and keyword[1] == "wait":
+            yield Wait(place, _seconds(place, rest))
+        elif keyword:
+            yield _expect(place, text)
+        elif text:
+            yield Say(place, text)
+
+
+def _included(
+    place: Place, name: str, within: tuple[Path, ...], asked: list[tuple[Place, str, int | None]]
+) -> Iterator[Statement]:
+    path = place.file.parent / name
+    if not name or not path.is_file():
+        raise Mistake(f"{place}: expected a script beside this one to include, got {name or 'no name'}")
+    if path.resolve() in within:
+        raise Mistake(f"{place}: expected a script that does not include itself, got {name}")
+    yield from _statements(path, within, asked)
+
+
+def _scenario(place: Place, text: str) -> tuple[str, int | None]:
+    found = _SCENARIO.fullmatch(text)
+    if found is None:
+        raise Mistake(f"{place}: expected 'scenario NAME' or 'scenario NAME seed N', got {text!r}")
+    return found[1], int(found[2]) if found[2] else None
+
+
+def _seconds(place: Place, text: str) -> float:
+    seconds = _number(text)
+    if seconds is None or not 0.0 <= seconds <= 1e6:
+        raise Mistake(f"{place}: expected 'wait' and 0 to 1000000 s, got {text!r}")
+    return seconds
+
+
+def _expect(place: Place, text: str) -> Expect:
+    found = _EXPECTED.fullmatch(text)
+    if found is None or "?" not in found["query"]:
+        raise Mistake(f"{place}: expected 'expect QUERY? = VALUE, VALUE +- TOLERANCE', got {text!r}")
+    within = 0.0 if found["within"] is None else _number(found["within"])
+    if within is None or within < 0.0:
+        raise Mistake(f"{place}: expected a tolerance of 0 or more behind +-, got {found['within']!r}")
+    values = tuple(_VALUES.findall(found["values"]))
+    if ",".join(values).replace(" ", "") != found["values"].replace(" ", ""):
+        raise Mistake(f"{place}: expected values with commas between them, got {found['values']!r}")
+    return Expect(place, found["query"], values, within)
+
+
+def _without_comment(line: str) -> str:
+    kept = ""
+    for part in _PARTS.finditer(line):
+        if part.start() != len(kept):
+            break
+        kept += part[0]
+    return kept
+
+
+def _number(text: str) -> float | None:
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None

@@ -1,0 +1,614 @@
+"""Nothing observed is lost (issue 6): what a journal holds, what damage is found, how a session goes on, replay."""
+
+import errno
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from a7sim import __version__
+from a7sim.cli.replay import Pace
+from a7sim.instrument.language import LinkEvent
+from a7sim.link.clock import Clock
+from a7sim.mistakes import Mistake
+from a7sim.scenario import carried, find_scenario, load_scenario, scenario_from
+from a7sim.session import combinations, durable, run
+from a7sim.session.checkpoints import read_checkpoints
+from a7sim.session.durable import DurableFile, JournalStopped
+from a7sim.session.journal import Journal, Keeping, header_of, header_of_unknown
+from a7sim.session.lines import Chain, read_journal
+from a7sim.session.replaying import Replay, replayed
+from a7sim.session.resuming import begun_in
+from a7sim.session.running import Watcher
+from tests.processes import ANYWHERE, COMMAND, Running, a7sim, said_here
+from tests.served import Line
+
+ROOT = Path(__file__).parents[1]
+LIGHT = {"plan.parallax_readings": "1"}
+SETTINGS = [part for key, value in LIGHT.items() for part in ("--set", f"{key}={value}")]
+
+
+def files_of(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder of a session of the operator, seed 7, that nobody interrupted."""
+    out = tmp_path_factory.mktemp("whole") / "out"
+    assert run(load_scenario("dewitt-pair", LIGHT), 7, out)["status"] == "complete"
+    return out
+
+
+@pytest.fixture
+def copied(whole, tmp_path):
+    """A copy of it to be damaged."""
+    return Path(shutil.copytree(whole, tmp_path / "copy"))
+
+
+def resumed(folder):
+    begun = begun_in(folder, "run")
+    return run(begun.scenario, begun.seed, folder, keeping=Keeping(resumes=True))
+
+
+def forged(journalled, header=None, change=lambda number, data: data):
+    """Return the lines of a journal with checksums that fit, though somebody changed them."""
+    chain = Chain()
+    lines = []
+    for number, line in enumerate(journalled.lines, start=1):
+        data = json.loads(line)
+        del data["crc"]
+        data = header if number == 1 and header else change(number, data)
+        lines.append(chain.line(data) + b"\n")
+    return b"".join(lines)
+
+
+# --- what it holds ----------------------------------------------------------------------------------------
+
+
+def test_the_header_stands_alone(whole):
+    header = read_journal(whole / "session.jsonl").header
+    assert header["software"] == f"a7sim {__version__}"
+    assert (header["command"], header["seed"], header["variant"]) == ("run", 7, "A7")
+    assert header["scenario"]["photos"][0]["measured"]["file"] == "dewitt-pair.csv"
+    assert not any(str(part) in json.dumps(header) for part in (ROOT, Path.home()))
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "scenarios").glob("*.toml")))
+def test_every_scenario_can_be_carried(name):
+    carried_about = json.loads(json.dumps(carried(load_scenario(name))))
+    assert json.loads(json.dumps(carried(scenario_from(carried_about)))) == carried_about
+    assert find_scenario(name).is_file()
+
+
+def test_it_holds_the_book_too(whole):
+    lines = [json.loads(line) for line in (whole / "session.jsonl").read_text().splitlines()[1:]]
+    entries = [line for line in lines if line.get("kind") == "entry"]
+    rows = (whole / "book.csv").read_text().splitlines()[1:]
+    assert [f"{line['number']},{line['t']:.1f}" for line in entries] == [",".join(row.split(",")[:2]) for row in rows]
+
+
+def test_the_truth_stands_in_a_file_of_its_own(whole):
+    checkpoints = list(read_checkpoints(whole / "session.states.jsonl"))
+    journalled = read_journal(whole / "session.jsonl")
+    assert len(checkpoints) >= 2
+    assert [journalled.event(each.line).hash for each in checkpoints] == [each.hash for each in checkpoints]
+    laid = checkpoints[-1].state["autograph"]["carriers"]["1"][1]
+    assert any(laid)
+    assert not any(str(value) in (whole / "session.jsonl").read_text() for value in laid if value)
+
+
+# --- damage -----------------------------------------------------------------------------------------------
+
+
+def test_a_flipped_byte_is_found_and_its_line_named(whole, tmp_path):
+    """Every byte of some lines in the middle, their ends too, and of the header's beginning."""
+    data = (whole / "session.jsonl").read_bytes()
+    lines = data.splitlines(keepends=True)
+    path = tmp_path / "session.jsonl"
+    starts = {number: sum(map(len, lines[: number - 1])) for number in (1, 2, len(lines) // 2, len(lines) // 2 + 1)}
+    short = b"".join(lines[: len(lines) // 2 + 5])
+    for number, start in starts.items():
+        for offset in range(min(len(lines[number - 1]), 200)):
+            flipped = bytearray(short)
+            flipped[start + offset] ^= 1 << offset % 8
+            path.write_bytes(flipped)
+            with pytest.raises(Mistake, match=rf"session\.jsonl, line {number}: expected"):
+                read_journal(path)
+
+
+def test_a_lost_and_an_exchanged_line_are_found(whole, tmp_path):
+    lines = (whole / "session.jsonl").read_bytes().splitlines(keepends=True)
+    for damaged in ([*lines[:40], *lines[41:]], [*lines[:40], lines[41], lines[40], *lines[42:]]):
+        (tmp_path / "session.jsonl").write_bytes(b"".join(damaged))
+        with pytest.raises(Mistake, match="line 41: expected the checksum"):
+            read_journal(tmp_path / "session.jsonl")
+
+
+def test_a_journal_cut_at_any_of_its_last_300_bytes_is_read_to_its_last_whole_line(whole, tmp_path):
+    data = (whole / "session.jsonl").read_bytes()
+    path = tmp_path / "session.jsonl"
+    for cut in range(1, 301):
+        left = data[:-cut]
+        path.write_bytes(left)
+        journalled = read_journal(path)
+        end = left.rfind(b"\n") + 1
+        assert (len(journalled), journalled.size, journalled.torn) == (left.count(b"\n"), end, left[end:])
+
+
+@pytest.mark.parametrize("flipped", [0x0B, ord("}")])
+def test_a_flipped_last_line_end_is_no_torn_line(whole, tmp_path, flipped):
+    data = bytearray((whole / "session.jsonl").read_bytes())
+    data[-1] = flipped
+    (tmp_path / "session.jsonl").write_bytes(data)
+    with pytest.raises(Mistake, match="expected a line end, got another byte"):
+        read_journal(tmp_path / "session.jsonl")
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"", "expected the journal of a session, got no whole line"),
+        (b'{"schema_version":2', "got no whole line: nothing was observed yet"),
+        (
+            b'{"schema_version":1,"software":"a7sim 0.1.0"}\n{}\n',
+            "line 1: expected a journal of schema_version 2, got 1",
+        ),
+        (b"hello\n", "line 1: expected the checksum"),
+        (b"\xff\xfe\n\n", "line 1: expected the checksum"),
+    ],
+)
+def test_what_is_no_journal_gets_one_sentence(tmp_path, content, sentence, capsys):
+    (tmp_path / "session.jsonl").write_bytes(content)
+    for arguments in (("run", "--resume", tmp_path), ("replay", tmp_path)):
+        done = said_here(capsys, *arguments)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert sentence in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
+# --- going on ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("share", [0.0, 0.37, 0.9, 1.0])
+def test_a_run_that_was_cut_off_leaves_what_an_uninterrupted_one_leaves(whole, tmp_path, share):
+    data = (whole / "session.jsonl").read_bytes()
+    header = data.index(b"\n") + 1
+    cut = data[: header + int(share * (len(data) - header))]
+    (tmp_path / "session.jsonl").write_bytes(cut)
+    resumed(tmp_path)
+    torn = cut[cut.rfind(b"\n") + 1 :]
+    expected = files_of(whole) | ({"session.jsonl.torn": torn} if torn else {})
+    assert files_of(tmp_path) == expected
+
+
+def test_a_run_that_is_killed_goes_on_to_the_same_bytes(whole, tmp_path, capsys):
+    """SIGKILL where the journal has come to a third and to two thirds of its length; benchmarks/killed.py has more."""
+    size = (whole / "session.jsonl").stat().st_size
+    journal = tmp_path / "out" / "session.jsonl"
+    command = ["run", "dewitt-pair", "--seed", "7", *SETTINGS, "--quiet", "--out", str(tmp_path / "out")]
+    for share in (1 / 3, 2 / 3):
+        running = subprocess.Popen([*COMMAND, *command])
+        while not (journal.exists() and journal.stat().st_size > share * size) and running.poll() is None:
+            time.sleep(0.001)
+        running.kill()
+        assert running.wait() == -signal.SIGKILL
+        command = ["run", "--resume", str(tmp_path / "out"), "--quiet"]
+    assert said_here(capsys, *command).returncode == 0
+    left = files_of(tmp_path / "out")
+    left.pop("session.jsonl.torn", None)
+    assert {name: left[name] for name in files_of(whole)} == files_of(whole)
+
+
+def test_a_journal_of_another_seed_is_refused_at_its_line(copied):
+    journalled = read_journal(copied / "session.jsonl")
+    header = header_of("run", load_scenario("dewitt-pair", LIGHT), 8)
+    (copied / "session.jsonl").write_bytes(forged(journalled, header))
+    first = next(n for n in range(2, len(journalled)) if "FID?" in journalled.event(n).text) + 1
+    with pytest.raises(Mistake, match=rf"session\.jsonl, line {first}: expected what this session does again"):
+        resumed(copied)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "sentence"),
+    [
+        ("software", "a7sim 0.0.1", "line 1: expected a session of a7sim .*, got one of a7sim 0.0.1"),
+        ("command", "serve", "line 1: expected a session of run to go on with, got one of serve"),
+        ("scenario_hash", "0" * 64, "line 1: expected the scenario and the measurements that the session began with"),
+        ("scenario", {"photos": []}, "line 1: expected a scenario of this version of a7sim"),
+    ],
+)
+def test_a_journal_of_something_else_is_refused_at_line_1(copied, key, value, sentence):
+    journalled = read_journal(copied / "session.jsonl")
+    (copied / "session.jsonl").write_bytes(forged(journalled, journalled.header | {key: value, "crc": ""}))
+    with pytest.raises(Mistake, match=sentence):
+        resumed(copied)
+
+
+def test_a_line_left_over_is_named(copied):
+    with (copied / "session.jsonl").open("ab") as journal:
+        chain = Chain(read_journal(copied / "session.jsonl").crc)
+        journal.write(chain.line({"t": 99999.0, "client": "client1", "dir": ">", "text": "*IDN?"}) + b"\n")
+    lines = len(read_journal(copied / "session.jsonl"))
+    with pytest.raises(Mistake, match=rf"line {lines}: expected the end of the session, got a line that is left over"):
+        resumed(copied)
+
+
+def test_a_session_that_is_being_written_is_not_resumed(copied):
+    journalled = read_journal(copied / "session.jsonl")
+    file = DurableFile(journalled.path, size=journalled.size)
+    try:
+        with pytest.raises(Mistake, match="expected a session that is over, got one that is being written"):
+            resumed(copied)
+    finally:
+        file.close()
+
+
+@pytest.mark.slow
+def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch):
+    """Interrupted in the second of two sessions, here of one model each."""
+    monkeypatch.setattr(combinations, "CASES", {case: combinations.CASES[case] for case in "AB"})
+    light = load_scenario("akwanga", LIGHT)
+    light = msgspec.structs.replace(light, models=light.models[:1])
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    combinations.run_combinations(light, 1985, whole)
+    begun = iter(["no", "yes"])
+
+    def interrupt(activity):
+        if "model coordinates" in activity and next(begun) == "yes":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        combinations.run_combinations(light, 1985, cut, Watcher(begins=interrupt))
+    assert not (cut / "results.json").exists()
+    session = begun_in(cut, "run")
+    assert session.setting("strips") == "all"
+    combinations.run_combinations(session.scenario, session.seed, cut, keeping=Keeping(resumes=True))
+    assert {name: files_of(cut / name) for name in ("case-A", "case-B")} == {
+        name: files_of(whole / name) for name in ("case-A", "case-B")
+    }
+    assert (cut / "results.json").read_bytes() == (whole / "results.json").read_bytes()
+
+
+def test_resume_takes_nothing_beside_it(whole, capsys):
+    for extra in (["akwanga"], ["--seed", "7"], ["--out", "x"]):
+        done = said_here(capsys, "run", "--resume", whole, *extra)
+        assert done.returncode == 2
+        assert "since the journal says what was asked for" in done.stderr
+
+
+# --- served -----------------------------------------------------------------------------------------------
+
+
+def journalled_events(out):
+    journalled = read_journal(out / "session.jsonl")
+    return [journalled.event(number) for number in range(2, len(journalled) + 1)]
+
+
+def test_a_server_that_is_killed_goes_on_with_all_that_two_clients_registered(tmp_path, capsys):
+    out = tmp_path / "out"
+    with Running(*ANYWHERE, "--out", str(out)) as first:
+        one, other = first.line(), first.line()
+        assert one.ask("SYST:LOCK:REQ?;:PROJ1:BY 1;*OPC?") == "1;1"
+        assert one.ask('DRIV:X 100;*WAI;:DRIV:X 20;:REC "a",BY1;:REC:LAST?') == '1,"a",20.00,0.00,-300.00,BY1,1.00'
+        other.send(b'PROJ2:BY 1\nREC "b"\n' + b"x" * 5000 + b"\n")
+        assert other.ask("REC:COUN?;:SYST:ERR:COUN?") == "2;2"
+    with Running.resuming(out) as again:
+        line = again.line()
+        assert line.ask("REC:COUN?;:PROJ1:BY?;:COUN:X?;:SYST:LOCK:REQ?") == "2;1.00;20.00;1"
+        line.send(b'REC "c"\n')
+        assert line.ask("REC:LAST?").startswith('3,"c",20.00')
+        assert again.stopped_by(signal.SIGTERM)[0] == 0
+    events = journalled_events(out)
+    assert [(event.dir, event.client) for event in events if event.dir in ("+", "-")] == [
+        *[("+", "client1"), ("+", "client2"), ("-", "client1"), ("-", "client2"), ("+", "client3"), ("-", "client3")]
+    ]
+    assert [before.t <= after.t for before, after in pairwise(events)] == [True] * (len(events) - 1)
+    assert said_here(capsys, "replay", out, "--verify", "--quiet").returncode == 0
+
+
+def test_a_server_that_asked_for_a_token_goes_on_with_one(tmp_path, capsys):
+    out = tmp_path / "out"
+    with Running(*ANYWHERE, "--out", str(out), A7SIM_TOKEN="sesame") as first:
+        line = first.line()
+        assert line.ask('COUN?;:SYST:LOG "sesame";:DRIV:X 5;:COUN:X?') == "5.00"
+    assert "sesame" not in (out / "session.jsonl").read_text()
+    done = said_here(capsys, "serve", "--resume", out, *ANYWHERE)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "line 1: expected a token, as the session was begun with, got none" in done.stderr
+    with Running.resuming(out, A7SIM_TOKEN="open") as again:
+        assert again.line().ask('SYST:LOG "open";:COUN:X?') == "5.00"
+        again.stopped_by(signal.SIGTERM)
+    assert said_here(capsys, "replay", out, "--verify", "--quiet").returncode == 0
+
+
+# --- what cannot be written -------------------------------------------------------------------------------
+
+
+def with_files_of_at_most(size):
+    """Make writing beyond so many bytes of a file fail, after what there is room for: a disk that is full."""
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    return limit
+
+
+def test_a_run_on_a_full_disk_stops_in_a_sentence_and_goes_on_when_there_is_room(whole, tmp_path):
+    out = tmp_path / "out"
+    command = ("run", "dewitt-pair", "--seed", "7", *SETTINGS, "--out", out)
+    done = a7sim(*command, preexec_fn=with_files_of_at_most(100_001))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        f"a7sim: {out}/session.jsonl: it can no longer be written, so the session stops here: File too large\n"
+    )
+    journalled = read_journal(out / "session.jsonl")
+    assert (journalled.size > 99_000, journalled.torn) == (True, b"")
+    resumed(out)
+    assert files_of(out) == files_of(whole)
+
+
+def test_a_server_on_a_full_disk_says_so_and_acknowledges_nothing_that_is_not_written(tmp_path):
+    out = tmp_path / "out"
+    with Running(*ANYWHERE, "--out", str(out), preexec_fn=with_files_of_at_most(20_000)) as running:
+        one, other = running.line(), running.line()
+        acknowledged = 0
+        while one.ask(f'REC "{acknowledged + 1}";:REC:COUN?') == str(acknowledged + 1):
+            acknowledged += 1
+        assert other.hung_up()
+        _, errors = running.process.communicate(timeout=30)
+        assert running.process.returncode == 2
+        assert errors.endswith("so the session stops here: File too large\n")
+        assert errors.count("\n") == 1
+    with Running.resuming(out) as again:
+        assert again.line().ask("REC:COUN?") in (str(acknowledged), str(acknowledged + 1))
+    assert acknowledged > 50
+
+
+def test_a_line_half_written_is_taken_back(tmp_path, monkeypatch):
+    file = DurableFile(tmp_path / "f", "none")
+    file.add(b"one\n")
+    writes = iter([2, OSError(errno.ENOSPC, "No space left on device")])
+
+    def failing(handle, data):
+        outcome = next(writes)
+        if isinstance(outcome, OSError):
+            raise outcome
+        return real(handle, data[:outcome])
+
+    real = os.write
+    monkeypatch.setattr(durable.os, "write", failing)
+    with pytest.raises(
+        JournalStopped, match="f: it can no longer be written, so the session stops here: No space left"
+    ):
+        file.add(b"two\n")
+    monkeypatch.setattr(durable.os, "write", real)
+    with pytest.raises(JournalStopped, match="No space left"):
+        file.add(b"three\n")
+    with pytest.raises(JournalStopped):
+        file.close()
+    assert (tmp_path / "f").read_bytes() == b"one\n"
+
+
+@pytest.mark.parametrize("command", ["run", "serve"])
+def test_a_folder_that_cannot_be_written_is_said_before_anything_starts(tmp_path, command, capsys):
+    (tmp_path / "file").write_text("")
+    done = said_here(
+        capsys, command, "akwanga", "--out", tmp_path / "file" / "out", *(ANYWHERE if command == "serve" else ())
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "expected a folder that can be written" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("call", ["open", "ftruncate"])
+def test_a_journal_on_a_read_only_disk_is_said_in_a_sentence(tmp_path, monkeypatch, call):
+    def refused(*_):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(durable.os, call, refused)
+    with pytest.raises(Mistake, match=r"session\.jsonl: expected a journal that can be written: Read-only file system"):
+        run(load_scenario("dewitt-pair", LIGHT), 7, tmp_path / "out")
+
+
+# --- on the disk ------------------------------------------------------------------------------------------
+
+
+def synced(tmp_path, monkeypatch, durability, lines, waits=False):
+    """Return how often the file was brought to the disk by lines that register (True) or not, before it was closed."""
+    times = []
+    monkeypatch.setattr(durable, "_on_disk", lambda handle: times.append(time.monotonic()))
+    file = DurableFile(tmp_path / "f", durability)
+    began = time.monotonic()
+    for registers in lines:
+        file.add(b"line\n", registers)
+    count = len(times)
+    if waits:
+        while not times and time.monotonic() < began + 5.0:
+            time.sleep(0.005)
+    file.close()
+    return count, times[0] - began if times else None
+
+
+def test_registrations_are_on_the_disk_at_once_and_all_else_within_a_fifth_of_a_second(tmp_path, monkeypatch):
+    assert synced(tmp_path, monkeypatch, "records", [False, True, False, True])[0] == 2
+    count, first = synced(tmp_path, monkeypatch, "records", [False], waits=True)
+    assert count == 0
+    assert first < durable.SYNCED_WITHIN_S
+
+
+def test_always_and_none_are_what_they_say(tmp_path, monkeypatch):
+    assert synced(tmp_path, monkeypatch, "always", [False, True, False])[0] == 3
+    assert synced(tmp_path, monkeypatch, "none", [False, True, False]) == (0, None)
+
+
+@pytest.mark.parametrize(
+    ("line", "registers"),
+    [('REC "a"', True), ('record "a",BY1', True), (':REC:STR 1,"x"', True), ("REC:COUN?", False), ("COUN?", False)],
+)
+def test_what_registers_is_known_by_its_line(tmp_path, monkeypatch, line, registers):
+    at_once = []
+    monkeypatch.setattr(DurableFile, "add", lambda self, line, now=False: at_once.append(now))
+    journal = Journal().opened(tmp_path, {"schema_version": 2}, None)
+    journal.heard(LinkEvent(0.0, "client1", ">", line))
+    assert at_once == [False, registers]
+
+
+# --- replay -----------------------------------------------------------------------------------------------
+
+
+def test_a_replay_from_a_checkpoint_ends_where_one_from_the_beginning_ends(whole):
+    journalled = read_journal(whole / "session.jsonl")
+    states = []
+    for line in (2, len(journalled) - 20):
+        replay = Replay(journalled)
+        first = replay.seek(line)
+        assert all(difference is None for _, _, difference in replayed(replay, first))
+        assert replay.ended() is None
+        states.append(replay.desk.state())
+        assert (first > len(journalled) // 2) == (line > 2)
+    assert states[0]["clients"] == states[1]["clients"]
+    registered = [state["autograph"].pop("registered") for state in states]
+    assert states[0]["autograph"] == states[1]["autograph"]
+    assert registered[0] == registered[1] != []
+
+
+def test_a_changed_reply_stops_the_replay_with_both_lines_and_the_state(copied, capsys):
+    journalled = read_journal(copied / "session.jsonl")
+    number = next(n for n in range(3000, len(journalled)) if "COUN" in journalled.event(n).text) + 1
+
+    def change(n, data):
+        return data | {"text": "1" + data["text"]} if n == number else data
+
+    (copied / "session.jsonl").write_bytes(forged(journalled, change=change))
+    done = said_here(capsys, "replay", copied, "--verify", "--quiet")
+    said = journalled.event(number).text
+    assert done.returncode == 3
+    assert done.stderr.splitlines() == [
+        f"a7sim: {copied}/session.jsonl, line {number}: the first difference",
+        f"a7sim: the journal has      client1 < 1{said}",
+        f"a7sim: the instrument says  client1 < {said}",
+    ]
+
+
+def test_a_changed_command_shows_in_what_the_state_differs(copied, capsys):
+    journalled = read_journal(copied / "session.jsonl")
+    number = next(n for n in range(2, len(journalled)) if journalled.event(n).text.startswith("PROJ1:PDIS "))
+
+    def change(n, data):
+        return data | {"text": "PROJ1:PDIS 151.5"} if n == number else data
+
+    (copied / "session.jsonl").write_bytes(forged(journalled, change=change))
+    done = said_here(capsys, "replay", copied, "--verify", "--json")
+    document = json.loads(done.stdout)
+    assert (done.returncode, document["status"]) == (3, "differs")
+    assert number < document["difference"]["line"] < number + 200
+    assert any(line.startswith("a7sim: state, autograph.spindles.c1: [") for line in done.stderr.splitlines())
+
+
+def test_lines_left_over_fail(copied, capsys):
+    """A reply that the journal ends before, and one in it that nobody asked for."""
+    journalled = read_journal(copied / "session.jsonl")
+    last = max(n for n in range(2, len(journalled)) if journalled.event(n).dir == "<")
+    chain = Chain(int(json.loads(journalled.lines[last - 1])["crc"], 16))
+    unasked = chain.line({"t": 99999.0, "client": "client1", "dir": "<", "text": "5"})
+    reply = f"client1 < {journalled.event(last).text}"
+    for lines, number, of_journal, of_instrument in (
+        (journalled.lines[: last - 1], last, "nothing", reply),
+        ([*journalled.lines[:last], unasked], last + 1, "client1 < 5", "nothing"),
+    ):
+        (copied / "session.jsonl").write_bytes(b"\n".join(lines) + b"\n")
+        done = said_here(capsys, "replay", copied, "--verify", "--quiet")
+        assert done.returncode == 3
+        assert done.stderr.splitlines()[:3] == [
+            f"a7sim: {copied}/session.jsonl, line {number}: the first difference",
+            f"a7sim: the journal has      {of_journal}",
+            f"a7sim: the instrument says  {of_instrument}",
+        ]
+
+
+@pytest.mark.parametrize(
+    ("begin", "first"),
+    [("@100", lambda n, e: n == 100), ("0:30:00", lambda n, e: e.t >= 1800.0), ("2000.5", lambda n, e: e.t >= 2000.5)],
+)
+def test_a_replay_tells_from_a_line_or_a_time_on(whole, begin, first, capsys):
+    journalled = read_journal(whole / "session.jsonl")
+    number = next(n for n in range(2, len(journalled)) if first(n, journalled.event(n)))
+    done = said_here(capsys, "replay", whole, "--from", begin, "--verify")
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) == len(journalled) - number + 2
+    assert done.stdout.split()[0] == f"{journalled.event(number).t:.2f}"
+
+
+def test_a_replay_tells_from_a_note_on(whole, capsys):
+    done = said_here(capsys, "replay", whole, "--from", "left perspective centre")
+    assert done.stdout.splitlines()[0].endswith('client1   > NOTE "1: left perspective centre"')
+    assert done.returncode == 0
+    done = said_here(capsys, "replay", whole, "--from", "coffee")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "--from coffee: expected a time, @LINE or the text of a note" in done.stderr
+
+
+def test_a_replay_goes_at_the_speed_that_is_asked_for(monkeypatch):
+    slept = []
+    clock = Clock()
+    monkeypatch.setattr(time, "monotonic", lambda: clock.now)
+    monkeypatch.setattr(time, "sleep", lambda s: (slept.append(round(s, 6)), clock.spend(s)))
+    pace = Pace(10.0)
+    for now in (100.0, 100.0, 105.0, 106.0):
+        pace.until(now)
+    assert slept == [0.0, 0.0, 0.5, 0.1]
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "tests" / "journals").glob("*.jsonl")), ids=lambda path: path.stem)
+def test_a_journal_of_every_version_replays_for_ever(path, capsys):
+    assert path.stat().st_size < 150_000
+    done = said_here(capsys, "replay", path, "--verify", "--quiet")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+# --- record -----------------------------------------------------------------------------------------------
+
+
+def test_what_a_client_and_an_instrument_say_is_recorded_and_replays(tmp_path, capsys):
+    out = tmp_path / "recorded"
+    with Running(*ANYWHERE) as served:
+        command = ["record", served.doors[0]["url"], "--scenario", "akwanga", "--out", str(out), "--json"]
+        recorder = subprocess.Popen([*COMMAND, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        text = ""
+        while not text.endswith("\n}\n"):
+            text += recorder.stdout.readline()
+        port = int(json.loads(text)["url"].rsplit(":", 1)[1])
+        with Line(port) as line:
+            assert line.ask("DRIV:X 30;*OPC?;:COUN:X?") == "1;30.00"
+            line.send(b"EYEP1:PICT? 4,4,1\n" + b"x" * 5000 + b"\n")
+            assert line.read().startswith("#216")
+            assert line.ask("SYST:ERR?").endswith('-363,"Input buffer overrun;expected at most 4096 bytes a line"')
+        with Line(port) as line:
+            assert line.ask("COUN:X?") == "30.00"
+        recorder.send_signal(signal.SIGTERM)
+        _, errors = recorder.communicate(timeout=30)
+        assert (recorder.returncode, errors) == (0, "")
+    events = journalled_events(out)
+    assert [event.dir for event in events if event.dir != "<"] == [*"+>>!>-", *"+>-"]
+    assert [event.text[:10] for event in events if event.dir == "<"] == ["1;30.00", "#block of ", '-363,"Inpu', "30.00"]
+    assert said_here(capsys, "replay", out, "--verify", "--quiet").returncode == 0
+
+
+def test_a_record_of_an_unknown_instrument_is_told_and_not_verified(tmp_path, capsys):
+    with Journal().opened(tmp_path, header_of_unknown("record", instrument="a7"), None) as journal:
+        journal.heard(LinkEvent(1.0, "client1", ">", "*IDN?"))
+    done = said_here(capsys, "replay", tmp_path)
+    assert done.stdout.splitlines()[0] == "      1.00 client1   > *IDN?"
+    done = said_here(capsys, "replay", tmp_path, "--verify")
+    assert done.returncode == 2
+    assert "expected a session whose scenario is known" in done.stderr

@@ -1,0 +1,97 @@
+"""The state of an instrument is all of it (issue 6): restored, it goes on as the one that it was taken from."""
+
+import json
+import random
+
+import pytest
+
+from a7sim.instrument import build_autograph
+from a7sim.instrument.language import Desk
+from a7sim.link.clock import Clock
+from a7sim.link.waiting import obeyed
+from a7sim.scenario import load_scenario
+from a7sim.scene import build_scene
+from a7sim.session.checkpoints import Checkpoint, as_lines, differences, hash_of_state, read_checkpoints
+
+LINES = {
+    "akwanga": [
+        "PROJ{n}:KAPP {a:.2f};PHI {b:.2f};:SYST:ERR?",
+        "PROJ{n}:BY {c:.2f};BY:TURN {d:.4f}",
+        "PROJ{n}:PDIS 15{m}.5",
+        "FITT:DOVE IN;XCOL OUT",
+        "BASE:BX {x:.2f};MODE OUT;*OPC",
+        "GEAR:HEIG 'Dc';PLAN '2-1-1'",
+        "COUN:Y:PRES {x:.2f}",
+    ],
+    "akwanga-a8": ["COMM:PHI {b:.2f}", "PROJ{n}:OMEG {b:.2f}", "BASE:BX {x:.2f}"],
+}
+OF_ALL = [
+    "DRIV:X {x:.2f};:WHE:Y {c:.3f};:DRIV:Z MAX",
+    'PHOT{n}:LOAD "10{m}";CENT {d:.3f},{d:.3f},{d:.3f};CENT?;FID?',
+    'REC "P{m}",KAPP1,BX;:REC:LAST?;COUN?;STR {m},"misread"',
+    "*ESE 255;*SRE 48;:STAT:OPER:ENAB 2;:*STB?;*ESR?;:SYST:ERR:COUN?",
+    'EYEP1? "1011";:EYEP2? "1021";:COUN?;*OPC?',
+    "SYST:LOCK:REQ?;:FOO",
+    "SYST:LOCK:REL;:STAT:OPER?",
+    "*CLS;:SYST:ERR?;:PHOT1?;:PROJ1:PHI?;:PROJ2:OMEG?;:BASE:BX?",
+]
+
+
+def line(dice, name):
+    a, b, c = dice.uniform(-5, 5), dice.uniform(98, 102), dice.uniform(-4, 4)
+    given = {"n": dice.choice((1, 2)), "m": dice.choice((1, 2, 3)), "a": a, "b": b, "c": c, "d": c / 20}
+    return dice.choice(LINES[name] + OF_ALL).format(**given, x=dice.uniform(90, 200)).encode() + b"\n"
+
+
+def worn(name, token=None):
+    scenario = load_scenario(name, {"instrument.condition": '"worn"', "instrument.laying_sigma_mm": "0.3"})
+    return Desk(build_autograph(scenario.instrument, build_scene(scenario, 3).drawer, 3), token=token)
+
+
+@pytest.mark.parametrize("name", list(LINES))
+@pytest.mark.parametrize("seed", range(4))
+def test_an_instrument_restored_goes_on_as_the_one_its_state_was_taken_from(name, seed):
+    """A worn one, whose dice fall at every setting, with two clients in the midst of their work."""
+    dice = random.Random(seed)
+    desk, clock = worn(name, "sesame"), Clock()
+    engines = [desk.open(), desk.open()]
+    engines[0].feed(b'SYST:LOG "sesame";:REC "P0"\n', 0.0)
+    engines[1].feed(b'SYST:LOG "sesame"\n' if seed % 2 else b"COUN?\n", 0.0)
+    for _ in range(60):
+        obeyed(dice.choice(engines), line(dice, name), clock)
+    changes = len(desk.autograph.recorder.changes)
+    state = json.loads(json.dumps(desk.state()))
+    again = worn(name, "sesame")
+    again.restore(state)
+    assert json.loads(json.dumps(again.state())) == state
+    later = Clock(clock.now)
+    for _ in range(60):
+        client, said = dice.choice(engines).client, line(dice, name)
+        expected = obeyed(desk.clients[client], said, clock)
+        assert obeyed(again.clients[client], said, later) == expected
+    assert clock.now == later.now
+    assert desk.state(changes) == again.state(changes)
+    assert len(desk.state(changes)["autograph"]["registered"]) < len(desk.autograph.recorder.changes)
+    assert again.open().client == "client3"
+
+
+def test_states_that_are_not_what_their_hash_says_are_not_believed(tmp_path):
+    states = [{"a": 1, "b": [1.5]}, {"a": 2, "b": [1.5]}]
+    kept = [Checkpoint(n, 1.0, hash_of_state(state), state) for n, state in enumerate(states)]
+    (tmp_path / "states").write_bytes(as_lines(kept))
+    assert list(read_checkpoints(tmp_path / "states")) == kept
+    (tmp_path / "states").write_bytes(as_lines(kept).replace(b'"a":2', b'"a":3'))
+    assert list(read_checkpoints(tmp_path / "states")) == kept[:1]
+    for damaged in (as_lines(kept)[:-9], as_lines(kept).replace(b'"b"', b'"\xff"')):
+        (tmp_path / "states").write_bytes(damaged)
+        assert list(read_checkpoints(tmp_path / "states")) in (kept[:1], [])
+    assert list(read_checkpoints(tmp_path / "nowhere")) == []
+
+
+def test_differences_are_named_by_their_place():
+    was, is_now = {"x": {"at": 1.0, "of": [1]}, "y": 2}, {"x": {"at": 1.5, "of": [1]}, "z": 3}
+    assert [(each.part, each.was, each.is_now) for each in differences(was, is_now)] == [
+        ("x.at", 1.0, 1.5),
+        ("y", 2, None),
+        ("z", None, 3),
+    ]
