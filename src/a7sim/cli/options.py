@@ -87,7 +87,11 @@ def _with(options: tuple[Callable[[Command], Command], ...]) -> Callable[[Comman
     return decorated
 
 
-_NOT_OF_THE_RESULTS = {"seed", "out", "force", "as_document", "quiet"}
+_NOT_OF_THE_RESULTS = {
+    *("seed", "out", "force", "resume", "durability", "as_document", "quiet"),
+    *("url", "timeout", "token_file"),
+}
+_SAME_RESULTS_AS = {"operate": "run"}
 
 of_a_scenario = _with(_OF_A_SCENARIO)
 """--seed, --set, --skill, --perfect-observer: what `chosen` takes."""
@@ -126,7 +130,8 @@ def chosen(
 def _command_line(scenario: str, seed: int) -> str:
     """Return the command under way as anybody could type it for the same results."""
     ctx = click.get_current_context()
-    words = ["a7sim", ctx.info_name or "", scenario, "--seed", str(seed)]
+    verb = ctx.info_name or ""
+    words = ["a7sim", _SAME_RESULTS_AS.get(verb, verb), scenario, "--seed", str(seed)]
     for option in ctx.command.params:
         name = option.name or ""
         given = ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
