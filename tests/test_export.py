@@ -77,7 +77,7 @@ def test_a_torn_last_line_of_the_journal_is_left_out_and_other_damage_named(akwa
     journal.write_bytes(b"".join([*lines[:99], b'{"t":1.0,"cli\n', *lines[100:]]))
     code, _, complaint = typed("export", copy, "--to", "asciicast")
     assert code == 2
-    assert "session.jsonl, line 100: expected an event in JSON, got a damaged line" in complaint
+    assert "session.jsonl, line 100: expected the checksum that follows from the lines before and this one" in complaint
 
 
 # --- the book and its forms ---------------------------------------------------------------------------

@@ -8,7 +8,6 @@ import msgspec
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
-from a7sim.documents import Document
 from a7sim.mistakes import Mistake
 from a7sim.operator.book import Entry
 from a7sim.report.kept import Kept
@@ -17,6 +16,7 @@ from a7sim.session.bridge import tables_of as of_bridge
 from a7sim.session.compiled_tables import of_compilation
 from a7sim.session.folder import JOURNAL
 from a7sim.session.grid_test import sheet_of as of_grid_test
+from a7sim.session.lines import read_journal
 
 COLUMNS, LINES = 100, 32
 
@@ -80,29 +80,16 @@ def _lines(kept: Kept) -> Iterator[Line]:
 def _notes(kept: Kept) -> Iterator[Line]:
     """Yield what the operator noted in the journal: forms that begin, and remarks."""
     models, forms, remarks = ({getattr(entry, name) for entry in kept.book} for name in ("model", "form", "remark"))
-    for event in journal_of(kept):
-        text = event.get("text", "")
-        if event.get("dir") == ">" and text.startswith(_NOTE):
-            note = text.removeprefix(_NOTE).removesuffix('"').replace('""', '"')
-            begins = note in forms or (note.partition(": ")[0] in models and note not in remarks)
-            yield Line(float(event["t"]), f"\x1b[1m{_clock(event['t'])} {note}\x1b[0m\n", note if begins else "")
-
-
-def journal_of(kept: Kept) -> Iterator[Document]:
-    """Yield the events of the journal, the header left out; a torn last line is left out too. Raises Mistake."""
     path = kept.folder / JOURNAL
     if not path.is_file():
         return
-    with path.open("rb") as file:
-        for number, line in enumerate(file, start=1):
-            try:
-                event = msgspec.json.decode(line)
-            except msgspec.DecodeError as error:
-                if not line.endswith(b"\n"):
-                    return
-                raise Mistake(f"{path}, line {number}: expected an event in JSON, got a damaged line") from error
-            if number > 1 and isinstance(event, dict):
-                yield event
+    journalled = read_journal(path)
+    for number in range(2, len(journalled) + 1):
+        event = journalled.event(number)
+        if event.dir == ">" and event.text.startswith(_NOTE):
+            note = event.text.removeprefix(_NOTE).removesuffix('"').replace('""', '"')
+            begins = note in forms or (note.partition(": ")[0] in models and note not in remarks)
+            yield Line(event.t, f"\x1b[1m{_clock(event.t)} {note}\x1b[0m\n", note if begins else "")
 
 
 def _reading(entry: Entry) -> Line:
