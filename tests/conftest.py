@@ -1,10 +1,15 @@
 """Fixtures that several test files share."""
 
 import os
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from a7sim.cli import main
 
 settings.register_profile("steady", derandomize=True, deadline=None)
 settings.load_profile("steady")
@@ -21,3 +26,41 @@ def reference() -> Path:
         pytest.skip("no reference data: A7SIM_REFERENCE is not set and ../shared/reference is not there")
     assert folder.is_dir(), f"A7SIM_REFERENCE names {folder}, which is no folder"
     return folder
+
+
+def _session_of(out: Path, *words: str) -> int:
+    command = [sys.executable, "-m", "a7sim", "run", "akwanga", *words, "--quiet", "--out", out]
+    return subprocess.run(command, check=False).returncode
+
+
+@pytest.fixture(scope="session")
+def akwanga_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of Akwanga's session with seed 7, as `a7sim run` leaves it."""
+    out = tmp_path_factory.mktemp("shared") / "akwanga"
+    assert _session_of(out, "--seed", "7") == 0
+    return out
+
+
+@pytest.fixture(scope="session")
+def short_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a novice who finds that a picture lies upside down."""
+    out = tmp_path_factory.mktemp("shared") / "upside-down"
+    assert _session_of(out, "--set", "photos.1.laid=upside down", "--skill", "novice") == 1
+    return out
+
+
+Typed = Callable[..., tuple[int | str | None, str, str]]
+
+
+@pytest.fixture
+def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Typed:
+    """Type a command and return its exit code, what it prints, and what it complains of."""
+
+    def at_the_door(*words: object) -> tuple[int | str | None, str, str]:
+        monkeypatch.setattr(sys, "argv", ["a7sim", *map(str, words)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        printed = capsys.readouterr()
+        return left.value.code, printed.out, printed.err
+
+    return at_the_door

@@ -12,9 +12,12 @@ from a7sim.operator import bridging
 from a7sim.operator.bench import Bench, Parallaxes
 from a7sim.operator.bridging import bridged
 from a7sim.reduction import similarity_by_quaternion
+from a7sim.report.kept import read_session
+from a7sim.report.writing import report_of
 from a7sim.scenario import load_scenario
 from a7sim.session.bridge import bridged_strip, run_bridge, tables_of
 from a7sim.session.crowd import open_crowd
+from tests.pages import Page
 from tests.sessions import without_errors
 
 CLOSES_MM = 0.05
@@ -146,6 +149,17 @@ def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(shipped):
     for said, model in zip(document["bridged"]["models"], models, strict=False):
         assert said["elements"] == {name: each[0] for name, each in model.orientation.elements.items()}
         assert said["scale"] == pytest.approx(model.scale[0], abs=1e-7)
+
+
+@pytest.mark.slow
+def test_the_report_of_a_bridge_has_both_strips(shipped):
+    _, document, out = shipped
+    page = Page(report_of(read_session(out)))
+    table = page.table("Bridged models: scale carried by bx, rms of differences at common points")
+    assert [row[3] for row in table.rows] == [f"{model['scale']:.5f}" for model in document["bridged"]["models"]]
+    text = "".join(page.text)
+    assert "Strip, bridged: residuals in plan" in text
+    assert "Strip, independent: plan and profile" in text
 
 
 def test_a_strip_without_base_out_cannot_be_bridged():

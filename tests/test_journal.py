@@ -28,7 +28,7 @@ from a7sim.session.lines import Chain, read_journal
 from a7sim.session.replaying import Replay, replayed
 from a7sim.session.resuming import begun_in
 from a7sim.session.running import Watcher
-from tests.processes import ANYWHERE, COMMAND, Running, a7sim, said_here
+from tests.commands import ANYWHERE, COMMAND, Running, a7sim, said_here
 from tests.served import Line
 
 ROOT = Path(__file__).parents[1]

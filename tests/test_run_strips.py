@@ -9,11 +9,14 @@ import pytest
 
 from a7sim.mistakes import Mistake
 from a7sim.reduction import Ground, absolute_orientation, formed_strip, read_cards
+from a7sim.report.kept import read_session
+from a7sim.report.writing import report_of
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import run
 from a7sim.session.combinations import run_combinations
 from a7sim.session.strips import card_numbers, ground_of, grounded, models_of, of_grounded
+from tests.pages import Page
 from tests.sessions import tilted_flight
 from tests.test_cli import a7sim
 
@@ -174,3 +177,15 @@ def test_the_strip_of_paper_p_is_measured_in_two_ways_side_by_side(tmp_path):
     }  # fmt: skip
     for words in ("Strip, comparator", "Strip, A8", "After the polynomial of degree 2", "A8 minus"):
         assert words in done.stdout
+
+
+def test_the_report_of_all_strips_has_a_row_and_a_mark_for_each(all_strips):
+    """The numbers are those of the results; each case's folder has a report of its own, with its own command."""
+    document, out, _ = all_strips
+    page = Page(report_of(read_session(out)))
+    table = page.table("Strips of all cases, rms residuals in m")
+    assert [row[0] for row in table.rows] == [str(strip["number"]) for strip in document["strips"]]
+    assert [row[5] for row in table.rows] == [f"{s['accuracy_m']['checks']['plan']:.3f}" for s in document["strips"]]
+    assert sum(tag == "svg" for tag, _ in page.elements) == 2
+    alone = json.loads((out / "case-C" / "results.json").read_text(encoding="utf-8"))
+    assert alone["command_line"] == "a7sim run akwanga --seed 1985 --case C"

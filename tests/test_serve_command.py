@@ -1,5 +1,6 @@
 """`a7sim serve` at the command line (issue 5): what it prints and refuses, how it stops, what memory it takes."""
 
+import errno
 import json
 import os
 import signal
@@ -13,7 +14,7 @@ import serial
 
 import a7sim
 from a7sim.link.client import Client
-from tests.processes import ANYWHERE, SERVE, Running
+from tests.commands import ANYWHERE, SERVE, Running
 from tests.served import PATIENCE
 
 IDENTITY = f"WILD HEERBRUGG,A7,3268,{a7sim.__version__}"
@@ -161,7 +162,8 @@ def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
         (["--tcp", "example.org:0"], "example.org:0: expected an address of this machine alone"),
         (["--listen-anyway"], "--listen-anyway: expected a token"),
         (["--token-file", "nowhere"], "--token-file nowhere: expected a file with a token"),
-        (["--token-file", os.devnull], "expected a token, got an empty file"),
+        (["--token-file", os.devnull], f"--token-file {os.devnull}: expected a token of 1 to 1000 printable ASCII"),
+        (["--token-file", __file__], "characters on one line"),
         (["--tcp", "5025"], "--tcp: expected HOST:PORT such as 127.0.0.1:5025, got '5025'"),
         (["--rfc2217", "127.0.0.1:99999"], "--rfc2217: expected HOST:PORT"),
         (["--pty", os.devnull], "expected nothing there or an old link"),
@@ -178,5 +180,5 @@ def test_an_address_that_is_taken_is_said_and_nothing_stays_behind(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"127.0.0.1:{taken.getsockname()[1]}"
         said = refused("akwanga", "--tcp", "127.0.0.1:0", "--tcp", address, "--pty", str(link))
-    assert f"--tcp {address}: expected an address to listen on" in said
+    assert f"--tcp {address}: expected an address to listen on: {os.strerror(errno.EADDRINUSE)}\n" in said
     assert not os.path.lexists(link)

@@ -24,6 +24,9 @@ _VERBS = {
     "serve": "a7sim.cli.serve",
     "replay": "a7sim.cli.replay",
     "record": "a7sim.cli.record",
+    "report": "a7sim.cli.report",
+    "export": "a7sim.cli.export",
+    "compare": "a7sim.cli.compare",
 }
 
 

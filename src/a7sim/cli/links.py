@@ -1,6 +1,7 @@
 """What the commands that talk to a served instrument share; light, so that `a7sim send` starts quickly."""
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -8,8 +9,14 @@ from typing import Any, TypeVar
 import click
 
 from a7sim.link.opening import TIMEOUT_S
+from a7sim.mistakes import Mistake
 
 TOKEN_VARIABLE = "A7SIM_TOKEN"
+
+LONGEST_TOKEN = 1000
+"""Characters: a line of the language has room for it, even if all are quotes that have to be doubled."""
+
+_SENDABLE = re.compile(f"[ -~]{{1,{LONGEST_TOKEN}}}")
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -34,6 +41,18 @@ def of_a_link(command: Command) -> Command:
 
 
 def token_from(file: Path | None) -> str | None:
-    """Return the token in a file, else that of the environment, None where there is neither."""
-    token = os.environ.get(TOKEN_VARIABLE) if file is None else file.read_text(encoding="utf-8").strip()
-    return token or None
+    """Return the token in a file, else that of the environment, None where there is neither. Raises Mistake."""
+    if file is None:
+        return _token(os.environ[TOKEN_VARIABLE], TOKEN_VARIABLE) if os.environ.get(TOKEN_VARIABLE) else None
+    try:
+        text = file.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise Mistake(f"--token-file {file}: expected a file with a token: {error.strerror}") from error
+    return _token(text, f"--token-file {file}")
+
+
+def _token(text: str, where: str) -> str:
+    token = text.strip()
+    if not _SENDABLE.fullmatch(token):
+        raise Mistake(f"{where}: expected a token of 1 to {LONGEST_TOKEN} printable ASCII characters on one line")
+    return token

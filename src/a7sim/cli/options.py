@@ -1,6 +1,7 @@
 """What the commands that seat an operator share: options, the scenario that they choose, and how they end."""
 
 import math
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from a7sim.cli import EXIT_DOES_NOT_FIT
 from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
-from a7sim.scenario import PROFILES, Observer, Scenario, load_scenario
+from a7sim.scenario import PROFILES, Observer, Request, Scenario, bare_name, load_scenario, requested
 from a7sim.session import Watcher
 from a7sim.session.durable import DURABILITIES
 
@@ -86,6 +87,8 @@ def _with(options: tuple[Callable[[Command], Command], ...]) -> Callable[[Comman
     return decorated
 
 
+_NOT_OF_THE_RESULTS = {"seed", "out", "force", "resume", "durability", "as_document", "quiet"}
+
 of_a_scenario = _with(_OF_A_SCENARIO)
 """--seed, --set, --skill, --perfect-observer: what `chosen` takes."""
 
@@ -111,10 +114,28 @@ def chosen(
     others: Mapping[str, str | None] | None = None,
 ) -> tuple[Scenario, int]:
     """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
-    loaded = load_scenario(scenario, _overrides(settings, {**(others or {}), "observer.skill": skill}))
+    overrides = _overrides(settings, {**(others or {}), "observer.skill": skill})
+    loaded = load_scenario(scenario, overrides)
     if perfect_observer:
         loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
-    return loaded, loaded.seed if seed is None else seed
+        overrides["observer"] = "perfect"
+    seed = loaded.seed if seed is None else seed
+    return requested(loaded, Request(command_line=_command_line(bare_name(scenario), seed), settings=overrides)), seed
+
+
+def _command_line(scenario: str, seed: int) -> str:
+    """Return the command under way as anybody could type it for the same results."""
+    ctx = click.get_current_context()
+    words = ["a7sim", ctx.info_name or "", scenario, "--seed", str(seed)]
+    for option in ctx.command.params:
+        name = option.name or ""
+        given = ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
+        if given and isinstance(option, click.Option) and name not in _NOT_OF_THE_RESULTS:
+            value = ctx.params[name]
+            flag = max(option.opts, key=len)
+            for each in value if option.multiple else [value]:
+                words += [flag] if option.is_flag else [flag, f"{each:g}" if isinstance(each, float) else str(each)]
+    return shlex.join(words)
 
 
 def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> dict[str, str]:

@@ -1,7 +1,6 @@
 """`a7sim serve`: the instrument of a scenario on TCP, RFC 2217 and pseudo-terminals."""
 
 import asyncio
-import os
 import signal
 import sys
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from typing import Any
 
 import click
 
+from a7sim.cli.links import TOKEN_VARIABLE, token_from
 from a7sim.cli.options import Above, chosen, of_a_folder, of_a_journal, of_a_scenario, resumed_alone
 from a7sim.documents import Document, as_json, head
 from a7sim.instrument import build_autograph
@@ -30,9 +30,6 @@ from a7sim.session.resuming import Begun, begun_in, served_again
 
 USUAL = Address("127.0.0.1", 5025)
 
-TOKEN = "A7SIM_TOKEN"
-"""The environment variable."""
-
 _OF_THE_DOOR = (
     *("tcp", "rfc2217", "pty", "baud", "listen_anyway", "token_file", "clients", "idle", "fault", "fault_seed"),
     "durability",
@@ -50,7 +47,9 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 @click.option("--baud", type=click.IntRange(50, 10_000_000), help="As slow as a wire of so many bits a second.")
 @click.option("--realtime", is_flag=True, help="Movement lasts as long on the wall as on the simulated clock.")
 @click.option("--listen-anyway", is_flag=True, help="Let other machines in; clients must log in with a token.")
-@click.option("--token-file", type=click.Path(path_type=Path), help=f"The token; or in the environment as {TOKEN}.")
+@click.option(
+    "--token-file", type=click.Path(path_type=Path), help=f"The token; or in the environment as {TOKEN_VARIABLE}."
+)
 @click.option("--clients", type=click.IntRange(min=1), default=64, show_default=True, help="Most at a time.")
 @click.option("--idle", type=Above(), default=3600.0, show_default=True, help="Drop who is silent for so many s.")
 @click.option("--fault", metavar="FAULTS", help=f"Fail now and then: {EXAMPLE}")
@@ -91,7 +90,7 @@ def command(
     Example: a7sim serve akwanga --tcp 127.0.0.1:5025 --pty ./a7
     """
     doors = _doors(tcp, rfc2217, pty)
-    token = _token(token_file)
+    token = token_from(token_file)
     _refuse_open_doors(doors, listen_anyway, token)
     terms = Terms(baud, faults_of(fault) if fault is not None else None, fault_seed, idle, most_clients=clients)
     if resume is not None:
@@ -200,21 +199,9 @@ def _doors(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]
     return Doors(sockets, [address_of(text, "--rfc2217") for text in rfc2217], pty)
 
 
-def _token(file: Path | None) -> str | None:
-    if file is None:
-        return os.environ.get(TOKEN) or None
-    try:
-        token = file.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise Mistake(f"--token-file {file}: expected a file with a token: {error}") from error
-    if not token:
-        raise Mistake(f"--token-file {file}: expected a token, got an empty file")
-    return token
-
-
 def _refuse_open_doors(doors: Doors, listen_anyway: bool, token: str | None) -> None:
     for address in (*doors.tcp, *doors.rfc2217):
         if not address.loopback and not listen_anyway:
             raise Mistake(f"{address}: expected an address of this machine alone (--listen-anyway lets others in)")
     if listen_anyway and token is None:
-        raise Mistake(f"--listen-anyway: expected a token, from --token-file or in the environment as {TOKEN}")
+        raise Mistake(f"--listen-anyway: expected a token, from --token-file or in the environment as {TOKEN_VARIABLE}")

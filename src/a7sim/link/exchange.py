@@ -52,7 +52,8 @@ def _expected(client: Client, line: str) -> tuple[Part, ...]:
     client.send("*IDN?")
     if client.reply() is None:
         raise Mistake(f"{line}: expected an answer in time, got none")
-    raise Mistake(f"{line}: expected an answer, got none but to *IDN?: the server asks for a token, or lost the reply")
+    why = "the server asks for a token, or another than was given, or lost the reply"
+    raise Mistake(f"{line}: expected an answer, got none but to *IDN?: {why}")
 
 
 def _errors(client: Client, marker: tuple[Part, ...]) -> tuple[str, ...]:

@@ -32,7 +32,8 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         self._desk = desk
         self._engine: Engine | None = None
         self._replies = bytearray()
-        self._arrived = threading.Condition()
+        self._alone = threading.RLock()
+        self._arrived = threading.Condition(self._alone)
         self._cancelled = False
         super().__init__("in process" if port is None and desk is not None else port, *args, **kwargs)
 
@@ -68,7 +69,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
     def write(self, data: Any) -> int:
         """Send bytes and return how many."""
         received = to_bytes(data)
-        with self._arrived:
+        with self._alone:
             engine = self._opened()
             for start in range(0, len(received), MOST_KEPT_BACK):
                 self._replies += obeyed(engine, received[start : start + MOST_KEPT_BACK], self.clock)
@@ -77,6 +78,9 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
 
     def read(self, size: int = 1) -> bytes:
         """Return `size` bytes, or those there are when the timeout ends."""
+        with self._alone:
+            if self._engine is not None and size <= len(self._replies):
+                return self._taken(size)
         return self._take(lambda: size if len(self._replies) >= size else None, size)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
@@ -99,13 +103,16 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         with self._arrived:
             self._opened()
             self._arrived.wait_for(lambda: length() is not None or self._cancelled, self._timeout)
-            self._cancelled = False
             end = length()
             if end is None:
                 end = len(self._replies) if most is None else min(most, len(self._replies))
-            taken = bytes(self._replies[:end])
-            del self._replies[:end]
-            return taken
+            return self._taken(end)
+
+    def _taken(self, size: int) -> bytes:
+        self._cancelled = False
+        taken = bytes(self._replies[:size])
+        del self._replies[:size]
+        return taken
 
     @property
     def in_waiting(self) -> int:

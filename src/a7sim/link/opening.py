@@ -16,6 +16,9 @@ LARGEST_PORT = 65535
 TIMEOUT_S = 5.0
 """How long a reply is waited for, unless somebody says otherwise."""
 
+_ADDRESS = re.compile(r"[^/\\]+:[0-9]{1,5}")
+"""HOST:PORT, which wants a scheme: no device or pty has such a name."""
+
 _URL = re.compile(r"a7sim://.+|(tcp|socket|rfc2217)://(\[[0-9a-f:.%]+\]|[^/:?#\[\]]+):([0-9]{1,5})/?", re.IGNORECASE)
 
 
@@ -44,7 +47,7 @@ def told(url: str) -> Iterator[None]:
 
 def _is_named(url: str) -> bool:
     if "://" not in url:
-        return url != ""
+        return url != "" and not _ADDRESS.fullmatch(url)
     found = _URL.fullmatch(url)
     return found is not None and (found[3] is None or int(found[3]) <= LARGEST_PORT)
 

@@ -1,6 +1,7 @@
 """The instrument at its doors: TCP, RFC 2217 and pseudo-terminals, one loop, one desk, an engine for every client."""
 
 import asyncio
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,8 +62,7 @@ class Server:
                 lambda: wire(self, self._buffer), address.host, address.port, backlog=ACCEPTED_AT_ONCE
             )
         except OSError as error:
-            why = error.strerror or str(error)
-            raise Mistake(f"--{kind} {address}: expected an address to listen on: {why}") from error
+            raise Mistake(f"--{kind} {address}: expected an address to listen on: {_reason(error)}") from error
         self._listeners.append(listener)
         host, port = listener.sockets[0].getsockname()[:2]
         return {"kind": kind, "host": host, "port": port, "url": f"{scheme}://{Address(host, port)}"}
@@ -105,3 +105,9 @@ class Server:
         """Take note that a wire is no more."""
         self._wires.discard(wire)
         self._turned_away.discard(wire)
+
+
+def _reason(error: OSError) -> str:
+    """Return what the operating system says, without what asyncio adds; a name that leads nowhere is below 0."""
+    number = error.errno or 0
+    return os.strerror(number) if number > 0 else error.strerror or str(error)

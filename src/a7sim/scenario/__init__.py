@@ -3,11 +3,13 @@
 from a7sim.scenario.carried import carried, hash_of, scenario_from
 from a7sim.scenario.loading import (
     ScenarioError,
+    bare_name,
     find_scenario,
     load_scenario,
     scenario_of,
     scenario_schema,
 )
+from a7sim.scenario.requests import Request, RequestedScenario, rephrased, requested
 from a7sim.scenario.schema import (
     SCHEMA_VERSION,
     Camera,
@@ -40,14 +42,19 @@ __all__ = [
     "Photo",
     "Plan",
     "ProjectorCondition",
+    "Request",
+    "RequestedScenario",
     "Scenario",
     "ScenarioError",
     "StripPlan",
+    "bare_name",
     "carried",
     "find_scenario",
     "hash_of",
     "load_scenario",
     "observer_of_skill",
+    "rephrased",
+    "requested",
     "scenario_from",
     "scenario_of",
     "scenario_schema",

@@ -8,6 +8,7 @@ import msgspec
 
 from a7sim.mistakes import Mistake
 from a7sim.scenario.loading import SHELVES
+from a7sim.scenario.requests import RequestedScenario
 from a7sim.scenario.schema import Scenario
 
 
@@ -19,14 +20,20 @@ def carried(scenario: Scenario) -> dict[str, Any]:
 def scenario_from(data: Any) -> Scenario:
     """Return the scenario that was carried. Raises Mistake for data that is none."""
     try:
-        return msgspec.convert(_naming(data, _found), Scenario)
+        kind = RequestedScenario if "request" in data else Scenario
+        return msgspec.convert(_naming(data, _found), kind)
     except (msgspec.ValidationError, TypeError, AttributeError) as error:
         raise Mistake(f"expected a scenario of this version of a7sim, got another: {error}") from error
 
 
 def hash_of(scenario: Scenario) -> str:
-    """Return the SHA-256 of a scenario and of the measurements that it names. Raises Mistake where one is missing."""
-    digest = hashlib.sha256(msgspec.json.encode(carried(scenario), order="sorted"))
+    """Return the SHA-256 of a scenario, whoever asked for it, and of the measurements that it names.
+
+    Raises Mistake where one is missing.
+    """
+    data = carried(scenario)
+    data.pop("request", None)
+    digest = hashlib.sha256(msgspec.json.encode(data, order="sorted"))
     for file in sorted({photo.measured.file for photo in scenario.photos if photo.measured}):
         try:
             digest.update(Path(file).read_bytes())

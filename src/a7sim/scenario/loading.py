@@ -47,6 +47,12 @@ def find_scenario(name: str | Path) -> Path:
     raise ScenarioError(str(name), [f"expected a scenario file or one of {', '.join(known)}, found no such file"])
 
 
+def bare_name(name: str | Path) -> str:
+    """Return what a scenario is called wherever it stands: its bare name if it comes with a7sim, else its file's."""
+    path = find_scenario(name).resolve()
+    return path.stem if path.parent in [shelf.resolve() for shelf in SHELVES] else path.name
+
+
 def load_scenario(name: str | Path, overrides: Mapping[str, str] | None = None) -> Scenario:
     """Return the scenario of a file with overrides such as ``{"plan.case": '"B"'}`` (values in TOML).
 

@@ -7,14 +7,15 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+import a7sim
 from a7sim.documents import Document, as_json, head, of_absolute, of_adjustment
 from a7sim.mistakes import Mistake
 from a7sim.operator.bridging import BridgedModels, bridge
 from a7sim.reduction import Ground, Model, Undetermined, absolute_orientation, strip_adjustment
-from a7sim.scenario import Scenario
+from a7sim.scenario import Scenario, rephrased
 from a7sim.session.folder import MODELS, RESULTS, prepare_folder, write_whole
 from a7sim.session.journal import Journal, header_of
-from a7sim.session.results import models_csv
+from a7sim.session.results import models_csv, of_request
 from a7sim.session.running import Watcher, open_session, run
 from a7sim.session.sitting import sitting
 from a7sim.session.strips import ground_of
@@ -45,7 +46,9 @@ def run_bridge(
         prepare_folder(out, force)
     done: list[Document] = []
     places: dict[str, Places] = {}
-    document = head("bridge") | {"scenario": scenario.title, "seed": seed, "status": "failed", "message": ""}
+    document = head("bridge") | of_request(scenario)
+    document |= {"software": f"a7sim {a7sim.__version__}", "scenario": scenario.title, "seed": seed}
+    document |= {"variant": scenario.instrument.variant, "status": "failed", "message": ""}
     document["bridged"] = {"models": done}
 
     def leaves() -> dict[str, str]:
@@ -62,7 +65,9 @@ def run_bridge(
         "strip": _on_ground(bridged_strip([*places.values()]), ground_of(scenario, session.scene), scenario),
         "hours": round(session.person.clock.now / 3600.0, 3),
     }
-    alone = run(scenario, seed, out / INDEPENDENT if out else None, watcher, force)
+    alone = run(
+        rephrased(scenario, "a7sim bridge", "a7sim run"), seed, out / INDEPENDENT if out else None, watcher, force
+    )
     document |= {"status": alone["status"], "message": alone["message"]}
     document["independent"] = {"strip": alone.get("strip", {}), "hours": alone["operator"]["hours"]}
     if out is not None:

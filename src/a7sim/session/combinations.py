@@ -11,7 +11,7 @@ from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.operator import ModelJob
 from a7sim.reduction import Ground, Model, Undetermined
-from a7sim.scenario import Scenario
+from a7sim.scenario import Scenario, rephrased
 from a7sim.scenario.schema import StripPlan
 from a7sim.scene import build_scene
 from a7sim.session import results
@@ -56,11 +56,10 @@ def run_combinations(
     document = results.header(scenario, seed) | {"case": "all", "status": "complete", "message": ""}
     sessions: dict[str, Document] = {}
     for case in CASES:
-        plan = msgspec.structs.replace(scenario.plan, case=case)
         folder = out / f"case-{case}" if out is not None else None
         begun = folder is not None and (folder / JOURNAL).exists()
         sessions[case] = run(
-            msgspec.structs.replace(scenario, plotting=plan),
+            _in_case(scenario, case),
             seed,
             folder,
             watcher,
@@ -76,6 +75,11 @@ def run_combinations(
         write_whole(out / STRIPS, results.strips_csv(document["strips"]))
         write_whole(out / RESULTS, as_json(document))
     return document
+
+
+def _in_case(scenario: Scenario, case: str) -> Scenario:
+    of_case = msgspec.structs.replace(scenario, plotting=msgspec.structs.replace(scenario.plan, case=case))
+    return rephrased(of_case, "--strips all", f"--case {case}", {"plan.case": f'"{case}"'})
 
 
 def _see_that_strips_can_be_made(scenario: Scenario) -> None:

@@ -19,6 +19,7 @@ from a7sim.scene import Scene
 from a7sim.session.folder import GEOJSON, SVG, prepare_folder
 from a7sim.session.journal import Journal, header_of
 from a7sim.session.map_sheet import as_geojson, as_svg
+from a7sim.session.results import of_request
 from a7sim.session.running import Session, Watcher, open_session
 from a7sim.session.sitting import sitting
 from a7sim.session.strips import given_control
@@ -67,6 +68,7 @@ def compile_model(
     if out is not None:
         prepare_folder(out, force)
     document = head("compile") | {
+        **of_request(scenario),
         "software": f"a7sim {a7sim.__version__}",
         "scenario": scenario.title,
         "seed": seed,

@@ -10,6 +10,7 @@ CARDS, OUTPUT_CARDS, CARD_KEY = "strip.crd", "strip-output.crd", "strip-numbers.
 STRIPS = "strips.csv"
 GEOJSON, SVG = "map.geojson", "map.svg"
 RESIDUALS = "residuals.csv"
+REPORT = "report.html"
 MODELS_OF_WAY, STRIP_OF_WAY = "{}-models.csv", "{}-strip.csv"
 WAYS = ("comparator", "A8")
 FILES = (
@@ -26,6 +27,7 @@ FILES = (
     RESIDUALS,
     GEOJSON,
     SVG,
+    REPORT,
     RESULTS,
     *(name.format(way.lower()) for way in WAYS for name in (MODELS_OF_WAY, STRIP_OF_WAY)),
 )

@@ -22,6 +22,7 @@ from a7sim.reduction.grid_test import UNKNOWNS
 from a7sim.scenario import Condition, Scenario
 from a7sim.session.folder import RESIDUALS, prepare_folder
 from a7sim.session.journal import Journal, header_of
+from a7sim.session.results import of_request
 from a7sim.session.running import Watcher, open_session
 from a7sim.session.sitting import sitting
 from a7sim.sheets import sheet
@@ -67,6 +68,7 @@ def run_grid_test(
 
 def _header(scenario: Scenario, seed: int, order: GridTestOrder, autograph: Autograph) -> Document:
     return head("calibrate") | {
+        **of_request(scenario),
         "software": f"a7sim {a7sim.__version__}",
         "scenario": scenario.title,
         "seed": seed,

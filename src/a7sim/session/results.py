@@ -4,13 +4,15 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import msgspec
+
 import a7sim
 from a7sim.documents import Document, head
 from a7sim.files import csv_text
 from a7sim.operator import ModelRecord, Person
 from a7sim.operator.absolute import OnGround
 from a7sim.reduction import Model, PerspectiveCentre
-from a7sim.scenario import Scenario
+from a7sim.scenario import RequestedScenario, Scenario
 from a7sim.scenario.schema import Published
 from a7sim.scene import RelativeTruth
 from a7sim.session.truth import Relative, Standing, true_centre, true_elements
@@ -33,7 +35,13 @@ def header(scenario: Scenario, seed: int) -> dict[str, Any]:
             "work": scenario.work,
         }
         | ({"method": plan.method, "case": plan.case} if plan else {})
+        | of_request(scenario)
     )
+
+
+def of_request(scenario: Scenario) -> dict[str, Any]:
+    """Return the command that gives a session again, and what it changed in the scenario's file."""
+    return msgspec.structs.asdict(scenario.request) if isinstance(scenario, RequestedScenario) else {}
 
 
 def of_model(

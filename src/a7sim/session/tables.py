@@ -25,22 +25,23 @@ def of_session(document: dict[str, Any]) -> RenderableType:
     """Return the tables of a session."""
     parts: list[RenderableType] = []
     for model in document.get("models", ()):
-        parts.extend(_of_model(model))
+        parts.extend(of_model(model))
     if "strip" in document:
-        parts += [Rule(Text("Strip"), align="left"), *_of_strip(document["strip"]), Text()]
+        parts += [Rule(Text("Strip"), align="left"), *of_strip(document["strip"]), Text()]
     for name, strip in document.get("ways", {}).items():
-        parts += [Rule(Text(f"Strip, {name}"), align="left"), *_of_strip(strip), Text()]
+        parts += [Rule(Text(f"Strip, {name}"), align="left"), *of_strip(strip), Text()]
     if "a8_minus_comparator_m" in document:
         each = document["a8_minus_comparator_m"]
-        parts += [_titled("A8 minus comparator", _accuracy({"points": each})), Text()]
+        parts += [_titled("A8 minus comparator", of_accuracy({"points": each})), Text()]
     if "operator" in document:
-        parts.append(_hours(document["operator"]))
+        parts.append(of_hours(document["operator"]))
     if document["message"]:
         parts.append(Text(f"{document['status']}: {document['message']}", style="bold"))
     return Group(*parts)
 
 
-def _hours(operator: dict[str, Any]) -> Text:
+def of_hours(operator: dict[str, Any]) -> Text:
+    """Return how long an operator took and for what."""
     activities = (f"{name} {hours:.1f}" for name, hours in operator["time_by_activity_h"].items())
     return Text(
         f"{operator['hours']:.1f} hours at the instrument, {operator['lines_over_the_link']} lines over the link, "
@@ -74,7 +75,8 @@ def _worst_join(strip: dict[str, Any]) -> float:
     return max((join["max_residual_mm"] for join in strip["joins"]), default=0.0)
 
 
-def _of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
+def of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
+    """Yield joins, residuals and accuracy of a strip, or why it is not on the ground."""
     if "message" in strip:
         yield Text(f"No strip on the ground: {strip['message']}")
         return
@@ -89,10 +91,10 @@ def _of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
     for point, each in last["residuals_m"].items():
         residuals.add_row(point, each["role"], *("" if each[axis] is None else f"{each[axis]:+.3f}" for axis in "XYZ"))
     yield _titled("Residuals, computed minus given, m", residuals)
-    yield _titled("Accuracy", _accuracy(strip["accuracy_m"]))
+    yield _titled("Accuracy", of_accuracy(strip["accuracy_m"]))
     if "polynomial" in strip:
         adjusted = strip["polynomial"]
-        yield _titled(f"After the polynomial of degree {adjusted['degree']}", _accuracy(adjusted["accuracy_m"]))
+        yield _titled(f"After the polynomial of degree {adjusted['degree']}", of_accuracy(adjusted["accuracy_m"]))
         found = adjusted["deformation"]
         yield Text(
             f"The strip was bent by {found['vertical_sag_m']:+.2f} m in height and by "
@@ -102,7 +104,8 @@ def _of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
     yield from (Text(f"warning: {warning}") for warning in strip["warnings"])
 
 
-def _accuracy(sets: dict[str, Any]) -> Table:
+def of_accuracy(sets: dict[str, Any]) -> Table:
+    """Return rms and largest residuals of sets of points."""
     accuracy = sheet("rms, m", "X", "Y", "Z", "plan", "height", "largest X", "Y", "Z")
     for on, each in sets.items():
         values = [*each["rms"].values(), each["plan"], each["height"], *each["largest"].values()]
@@ -110,17 +113,18 @@ def _accuracy(sets: dict[str, Any]) -> Table:
     return accuracy
 
 
-def _of_model(model: dict[str, Any]) -> Iterator[RenderableType]:
+def of_model(model: dict[str, Any]) -> Iterator[RenderableType]:
+    """Yield the tables of a model."""
     orientation = model["relative_orientation"]
     title = f"Model {model['model']}: {model['left']} and {model['right']}, base {model['base']}"
     yield Rule(Text(title), align="left")
-    yield _rounds(orientation)
-    yield _elements(orientation["elements"], model["truth"].get("elements", {}))
+    yield of_rounds(orientation)
+    yield of_elements(orientation["elements"], model["truth"].get("elements", {}))
     yield _residuals(orientation)
-    yield _centres(model)
+    yield of_centres(model)
     if "absolute_orientation" in model:
-        yield _on_ground(model["absolute_orientation"])
-    yield _truth(model["truth"])
+        yield of_ground(model["absolute_orientation"])
+    yield of_truth(model["truth"])
     yield Text()
 
 
@@ -128,7 +132,8 @@ def _titled(title: str, table: Table) -> RenderableType:
     return Group(Text(), Text(title, style="bold"), table)
 
 
-def _rounds(orientation: dict[str, Any]) -> RenderableType:
+def of_rounds(orientation: dict[str, Any]) -> RenderableType:
+    """Return the iterations of a relative orientation."""
     if orientation["procedure"] == "empirical":
         return _cleared_rounds(orientation)
     table = sheet("iteration", "mean p, mm", "rms, mm")
@@ -152,7 +157,8 @@ def _cleared_rounds(orientation: dict[str, Any]) -> RenderableType:
     )
 
 
-def _elements(elements: dict[str, float], true: dict[str, float]) -> RenderableType:
+def of_elements(elements: dict[str, float], true: dict[str, float]) -> RenderableType:
+    """Return the elements as the counters show them, the true ones beside."""
     table = sheet("", "left '", "true", 'right "', "true", "")
 
     def cells(name: str) -> list[str]:
@@ -177,7 +183,8 @@ def _residuals(orientation: dict[str, Any]) -> RenderableType:
     return _titled(f"Residual y-parallaxes at the standard points, mm (rms {rms:.4f})", table)
 
 
-def _centres(model: dict[str, Any]) -> RenderableType:
+def of_centres(model: dict[str, Any]) -> RenderableType:
+    """Return both perspective centres with their standard deviations, the true ones beside."""
     table = sheet("", "left", "±", "true", "right", "±", "true")
     sides = ("left", "right")
     centres, truth = model["perspective_centres"], model["truth"]["centres"]
@@ -191,7 +198,8 @@ def _centres(model: dict[str, Any]) -> RenderableType:
     return _titled("Perspective centres, counter units", table)
 
 
-def _on_ground(found: dict[str, Any]) -> RenderableType:
+def of_ground(found: dict[str, Any]) -> RenderableType:
+    """Return how a model was levelled and scaled at the instrument."""
     table = sheet("round", "heights, rms m", "scale", "along, gon", "across, gon")
     for number, each in enumerate(found["rounds"], start=1):
         tilts = (f"{tilt:+.3f}" for tilt in each["tilts_gon"])
@@ -211,7 +219,8 @@ def _on_ground(found: dict[str, Any]) -> RenderableType:
     )
 
 
-def _truth(truth: dict[str, Any]) -> Text:
+def of_truth(truth: dict[str, Any]) -> Text:
+    """Return how far the relative orientation is off."""
     if "source" not in truth:
         return Text("\nNo true relative orientation is known.")
     return Text(

@@ -1,0 +1,31 @@
+"""`a7sim compare`: what differs between sessions."""
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from a7sim.documents import as_json
+from a7sim.mistakes import Mistake
+from a7sim.report.comparison import compared, of_comparison, table_of
+from a7sim.report.kept import read_session
+
+
+@click.command("compare")
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="DIR DIR...")
+@click.option("--all", "everything", is_flag=True, help="Also what is the same.")
+@click.option("--json", "as_document", is_flag=True, help="Print the comparison as one JSON document.")
+def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> None:
+    """Lay the results of sessions beside each other: settings, elements, residuals, centres, strips, times, slips.
+
+    Example: a7sim compare runs/akwanga runs/akwanga-e
+    """
+    if len(folders) < 2:
+        raise Mistake(f"compare: expected two folders of sessions or more, got one: {folders[0]}")
+    sessions = [read_session(folder) for folder in folders]
+    rows = compared(sessions, everything)
+    if as_document:
+        click.echo(as_json(of_comparison(sessions, rows)), nl=False)
+    else:
+        console = Console()
+        console.print(table_of(sessions, rows, console.width))

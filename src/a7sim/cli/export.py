@@ -1,0 +1,57 @@
+"""`a7sim export`: a session in the forms that other programs, printers and people take."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from a7sim.cli.options import Above
+from a7sim.mistakes import Mistake
+from a7sim.report.cast import cast_of
+from a7sim.report.decks import deck_of
+from a7sim.report.forms import forms_text
+from a7sim.report.kept import Kept, read_session
+from a7sim.session.folder import BOOK, write_whole
+
+_OPTION_OF = {"speed": "asciicast", "way": "cards"}
+
+
+@click.command("export")
+@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.option(
+    "--to",
+    "kind",
+    required=True,
+    type=click.Choice(["asciicast", "book", "forms", "cards"]),
+    help="A film of the terminal, the observation book as CSV or on printed forms, or N.R.C. cards.",
+)
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Instead of standard output.")
+@click.option("--speed", type=Above(), help="asciicast: how much faster than it happened.  [default: 120]")
+@click.option("--way", metavar="WAY", help="cards: comparator or A8, where the strip was measured so.")
+def command(folder: Path, kind: str, out: Path | None, speed: float | None, way: str | None) -> None:
+    """Write the session in DIR as something else.
+
+    Example: a7sim export runs/akwanga --to asciicast --out akwanga.cast
+    """
+    for name, value in (("speed", speed), ("way", way)):
+        if value is not None and kind != _OPTION_OF[name]:
+            raise Mistake(f"--{name}: expected only with --to {_OPTION_OF[name]}, got it with --to {kind}")
+    kept = read_session(folder)
+    makers: dict[str, Callable[[], str]] = {
+        "asciicast": lambda: cast_of(kept, speed or 120.0),
+        "book": lambda: _book(kept),
+        "forms": lambda: forms_text(kept),
+        "cards": lambda: deck_of(kept, way),
+    }
+    text = makers[kind]()
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        write_whole(out, text)
+        click.echo(str(out))
+
+
+def _book(kept: Kept) -> str:
+    if not kept.book:
+        raise Mistake(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
+    return kept.text(BOOK)

@@ -1,0 +1,26 @@
+"""`a7sim report`: a session on one page of HTML."""
+
+import webbrowser
+from pathlib import Path
+
+import click
+
+from a7sim.report.kept import read_session
+from a7sim.report.writing import report_of
+from a7sim.session.folder import REPORT, write_whole
+
+
+@click.command("report")
+@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Instead of DIR/report.html.")
+@click.option("--open", "shown", is_flag=True, help="Show it in the browser.")
+def command(folder: Path, out: Path | None, shown: bool) -> None:
+    """Write the report of the session in DIR: figures, tables and settings on one page that needs nothing beside it.
+
+    Example: a7sim report runs/akwanga --open
+    """
+    out = out or folder / REPORT
+    write_whole(out, report_of(read_session(folder)))
+    click.echo(str(out))
+    if shown:
+        webbrowser.open(out.resolve().as_uri())

@@ -1,0 +1,133 @@
+"""A session as a film of the terminal: asciicast version 2, with a marker at every model and form."""
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import msgspec
+from rich.console import Console, Group, RenderableType
+from rich.text import Text
+
+from a7sim.documents import Document
+from a7sim.mistakes import Mistake
+from a7sim.operator.book import Entry
+from a7sim.report.kept import Kept
+from a7sim.session import tables
+from a7sim.session.bridge import tables_of as of_bridge
+from a7sim.session.compiled_tables import of_compilation
+from a7sim.session.folder import JOURNAL
+from a7sim.session.grid_test import sheet_of as of_grid_test
+
+COLUMNS, LINES = 100, 32
+
+LONGEST_PAUSE_S = 2.0
+"""A player need not wait longer than this where an operator thinks."""
+
+_NOTE = 'NOTE "'
+
+
+@dataclass(frozen=True)
+class Line:
+    """What appears on the terminal at a simulated time, s; a marker where a model or a form begins."""
+
+    time: float
+    text: str
+    marker: str = ""
+
+
+def cast_of(kept: Kept, speed: float) -> str:
+    """Return the film of a session in which simulated time runs `speed` times as fast. Raises Mistake."""
+    with kept.read():
+        lines = sorted(_lines(kept), key=lambda line: line.time)
+    header = {
+        "version": 2,
+        "width": COLUMNS,
+        "height": LINES,
+        "duration": round(max((line.time for line in lines), default=0.0) / speed, 6),
+        "idle_time_limit": LONGEST_PAUSE_S,
+        "title": f"a7sim: {kept.document['scenario']}, seed {kept.document['seed']}",
+        "env": {"TERM": "xterm-256color"},
+    }
+    if "command_line" in kept.document:
+        header["command"] = kept.document["command_line"]
+    events = (event for line in lines for event in _events(line, speed))
+    return "".join(f"{msgspec.json.encode(each).decode()}\n" for each in (header, *events))
+
+
+def _events(line: Line, speed: float) -> Iterator[tuple[float, str, str]]:
+    time = round(line.time / speed, 6)
+    if line.marker:
+        yield time, "m", line.marker
+    yield time, "o", line.text.replace("\n", "\r\n")
+
+
+def _lines(kept: Kept) -> Iterator[Line]:
+    document = kept.document
+    yield Line(0.0, f"$ {document.get('command_line', 'a7sim ' + kept.command)}\n")
+    notes = list(_notes(kept))
+    if not notes and not kept.book:
+        raise Mistake(
+            f"{kept.folder}: expected the journal or the book of an operator to make a film of, "
+            "got a session with neither"
+        )
+    yield from notes
+    yield from (_reading(entry) for entry in kept.book if entry.reading or not notes)
+    for model in document.get("models", ()):
+        yield Line(model["finished_at_s"], _printed(Group(*tables.of_model(model))))
+    yield Line(3600.0 * document["operator"]["hours"], _printed(_end(kept)))
+
+
+def _notes(kept: Kept) -> Iterator[Line]:
+    """Yield what the operator noted in the journal: forms that begin, and remarks."""
+    models, forms, remarks = ({getattr(entry, name) for entry in kept.book} for name in ("model", "form", "remark"))
+    for event in journal_of(kept):
+        text = event.get("text", "")
+        if event.get("dir") == ">" and text.startswith(_NOTE):
+            note = text.removeprefix(_NOTE).removesuffix('"').replace('""', '"')
+            begins = note in forms or (note.partition(": ")[0] in models and note not in remarks)
+            yield Line(float(event["t"]), f"\x1b[1m{_clock(event['t'])} {note}\x1b[0m\n", note if begins else "")
+
+
+def journal_of(kept: Kept) -> Iterator[Document]:
+    """Yield the events of the journal, the header left out; a torn last line is left out too. Raises Mistake."""
+    path = kept.folder / JOURNAL
+    if not path.is_file():
+        return
+    with path.open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            try:
+                event = msgspec.json.decode(line)
+            except msgspec.DecodeError as error:
+                if not line.endswith(b"\n"):
+                    return
+                raise Mistake(f"{path}, line {number}: expected an event in JSON, got a damaged line") from error
+            if number > 1 and isinstance(event, dict):
+                yield event
+
+
+def _reading(entry: Entry) -> Line:
+    struck = f"  \x1b[9m{entry.reading}\x1b[0m {entry.struck}" if entry.struck else f"  {entry.reading}"
+    words = entry.remark if entry.item == "remark" else f"{entry.point:<10}{entry.item:<28}{struck}"
+    return Line(entry.time, f"{_clock(entry.time)}   {words.rstrip()}\n")
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds) // 3600:02d}:{int(seconds) // 60 % 60:02d}:{int(seconds) % 60:02d}"
+
+
+def _end(kept: Kept) -> RenderableType:
+    """Return what the command shows at its end, but for the models, which have been shown when they were done."""
+    document = kept.document
+    if kept.command == "run":
+        return tables.of_session({**document, "models": ()})
+    shown: RenderableType = {"calibrate": of_grid_test, "compile": of_compilation, "bridge": of_bridge}[kept.command](
+        document
+    )
+    return Group(shown, Text())
+
+
+def _printed(shown: RenderableType) -> str:
+    out = io.StringIO()
+    console = Console(file=out, width=COLUMNS, force_terminal=True, color_system="standard", legacy_windows=False)
+    console.print(shown)
+    return out.getvalue()

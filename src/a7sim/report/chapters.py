@@ -1,0 +1,216 @@
+"""The chapters of a report, by what the session was."""
+
+import base64
+import html
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from rich.text import Text
+
+from a7sim.documents import Document
+from a7sim.reduction.strips import is_centre
+from a7sim.report.figures.grid import grid_residuals
+from a7sim.report.figures.model import (
+    centre_residuals,
+    iterations,
+    parallax_table,
+    perspective_centre,
+    residual_parallaxes,
+)
+from a7sim.report.figures.sessions import all_strips, hours
+from a7sim.report.figures.strip import Places, plan_and_profile, residuals_in_height, residuals_in_plan
+from a7sim.report.forms import forms_of
+from a7sim.report.kept import Kept
+from a7sim.report.page import Chapter, Folded, Part, Picture, Sheet
+from a7sim.report.rays import rays_of
+from a7sim.report.terminal import parts_of
+from a7sim.session import tables
+from a7sim.session.bridge import INDEPENDENT
+from a7sim.session.bridge import tables_of as of_bridge
+from a7sim.session.compiled_tables import of_compilation
+from a7sim.session.folder import RESIDUALS, STRIP, STRIP_OF_WAY, SVG
+from a7sim.session.grid_test import sheet_of as of_grid_test
+
+Chapters = Iterator[Chapter]
+
+
+def chapters_of(kept: Kept) -> Chapters:
+    """Yield the chapters of what a folder keeps."""
+    yield from _OF_COMMAND[kept.command](kept)
+    yield from _of_operator(kept)
+    yield from _of_forms(kept)
+    yield _of_settings(kept)
+
+
+def _of_run(kept: Kept) -> Chapters:
+    document = kept.document
+    for i, model in enumerate(document.get("models", ())):
+        yield _of_model(kept, model, f"m{i}")
+    if "strips" in document:
+        yield _of_all_strips(document)
+    if "strip" in document:
+        yield _of_strip(document["strip"], _places(kept, STRIP), "Strip", "s")
+    for name, strip in document.get("ways", {}).items():
+        yield _of_strip(strip, _places(kept, STRIP_OF_WAY.format(name.lower())), f"Strip, {name}", f"w{name}")
+    if "a8_minus_comparator_m" in document:
+        each = tables.of_accuracy({"points": document["a8_minus_comparator_m"]})
+        yield Chapter("A8 minus comparator", list(parts_of(each, caption="A8 minus comparator, m")))
+
+
+def _of_model(kept: Kept, model: Document, name: str) -> Chapter:
+    orientation = model["relative_orientation"]
+    title = f"Model {model['model']}: {model['left']} and {model['right']}, base {model['base']}"
+    parts: list[Part] = [residual_parallaxes(model, f"{name}p")]
+    if orientation["rounds"]:
+        parts.append(iterations(model, f"{name}i"))
+    parts += parts_of(tables.of_rounds(orientation))
+    parts += [Folded("Residual y-parallaxes in a table", [parallax_table(model)])]
+    parts += parts_of(tables.of_elements(orientation["elements"], model["truth"].get("elements", {})))
+    rays = {side: rays_of(kept, model, side) for side in model["perspective_centres"]}
+    parts += [perspective_centre(model, side, rays[side], f"{name}c{side}") for side in rays]
+    parts += parts_of(tables.of_centres(model))
+    missed = centre_residuals(model, rays)
+    if missed is not None:
+        parts.append(Folded("Rays of the points beside the centres", [missed]))
+    if "absolute_orientation" in model:
+        parts += parts_of(tables.of_ground(model["absolute_orientation"]))
+    parts += parts_of(tables.of_truth(model["truth"]))
+    return Chapter(title, parts)
+
+
+def _of_strip(strip: Document, places: Places, title: str, name: str) -> Chapter:
+    shown = [] if "message" in strip else _strip_figures(strip, places, title, name)
+    return Chapter(title, [*shown, *parts_of(*tables.of_strip(strip), caption=title)])
+
+
+def _strip_figures(strip: Document, places: Places, title: str, name: str) -> list[Part]:
+    figures = (
+        residuals_in_plan(strip, places, f"{name}p", title),
+        residuals_in_height(strip, f"{name}h", title),
+        plan_and_profile(places, strip, f"{name}s", title),
+    )
+    return [figure for figure in figures if figure is not None]
+
+
+def _of_all_strips(document: Document) -> Chapter:
+    figures = [all_strips(document["strips"], "all")] if document["strips"] else []
+    spent = {f"case {case}": each["hours"] for case, each in document["sessions"].items()}
+    times = [hours(spent, "cases", "Hours at the instrument by case")] if spent else []
+    return Chapter("Strips of all cases", [*figures, *parts_of(tables.of_strips(document)), *times])
+
+
+def _of_calibration(kept: Kept) -> Chapters:
+    rows = kept.rows(RESIDUALS)
+    figures = [grid_residuals(rows, side, f"g{side}") for side in kept.document["projectors"]]
+    yield Chapter("Grid test", [*(each for each in figures if each), *parts_of(of_grid_test(kept.document))])
+
+
+def _of_compilation(kept: Kept) -> Chapters:
+    document = kept.document
+    drawn = kept.text(SVG)
+    sheet = [_map(drawn, f"Map of model {document['model']}")] if drawn else []
+    yield Chapter("Map", [*sheet, *parts_of(of_compilation(document), caption="Lines beside the true ground")])
+    if "levelling" in document:
+        yield _of_strip(document["levelling"] | {"joins": []}, {}, "Levelling on the ground control", "l")
+
+
+def _map(svg: str, title: str) -> Picture:
+    """Return a map as a picture of its own, whose styles reach nothing else."""
+    data = base64.b64encode(svg.encode()).decode()
+    return Picture(f'<img src="data:image/svg+xml;base64,{data}" alt="{html.escape(title)}">', title, wide=True)
+
+
+def _of_bridge(kept: Kept) -> Chapters:
+    document = kept.document
+    yield Chapter("Bridge", list(parts_of(of_bridge(document), caption="Bridged models")))
+    independent = _places(kept, f"{INDEPENDENT}/{STRIP}")
+    ground = {point: at for point, at in independent.items() if not is_centre(point)}
+    for way, places in (("bridged", ground), (INDEPENDENT, independent)):
+        strip = document.get(way, {}).get("strip", {})
+        if "residuals_m" in strip:
+            yield _of_strip({"joins": []} | strip, places, f"Strip, {way}", f"b{way}")
+
+
+def _of_operator(kept: Kept) -> Chapters:
+    operator = kept.document.get("operator")
+    if operator is None:
+        return
+    parts: list[Part] = []
+    for key, title in (
+        ("time_by_activity_h", "Time by activity"),
+        ("time_by_act_h", "Time by what the hands and eyes did"),
+    ):
+        if operator[key]:
+            parts.append(hours(operator[key], key, title))
+    for key, title in (("time_by_activity_h", "Hours by activity"), ("time_by_act_h", "Hours by act")):
+        parts.append(
+            Sheet(
+                title,
+                (title.removeprefix("Hours by "), "hours"),
+                [(what, f"{each:.4f}") for what, each in operator[key].items()],
+            )
+        )
+    parts += parts_of(tables.of_hours(operator))
+    parts += parts_of(*(Text(remark) for remark in operator["remarks"]))
+    slips = kept.document["truth"]["slips"]
+    if slips:
+        parts.append(Folded(f"What the operator did wrongly without knowing: {len(slips)}", [_slips(slips)]))
+    yield Chapter("Time at the instrument", parts)
+
+
+def _slips(slips: list[Document]) -> Sheet:
+    columns = tuple(slips[0])
+    rows = [["" if each[key] is None else str(each[key]) for key in columns] for each in slips]
+    return Sheet("Slips", columns, rows, frozenset({2, 4, 5, 6}))
+
+
+def _of_forms(kept: Kept) -> Chapters:
+    forms = [Folded(form.caption, form.as_parts()) for form in forms_of(kept) if form.columns]
+    if forms:
+        yield Chapter("Observation book", list(forms))
+
+
+_SETTINGS = (
+    "command_line",
+    "scenario",
+    "seed",
+    "software",
+    "variant",
+    "serial",
+    "work",
+    "method",
+    "case",
+    "schema_version",
+)
+
+
+def _of_settings(kept: Kept) -> Chapter:
+    document = kept.document
+    rows = [(key.replace("_", " "), _words(document[key])) for key in _SETTINGS if key in document]
+    changed = [(path, value) for path, value in document.get("settings", {}).items()]
+    parts: list[Part] = [Sheet("What gives this session again", ("what", "value"), rows, frozenset({0, 1}))]
+    if changed:
+        parts.append(Sheet("Changed in the scenario's file", ("setting", "value"), changed, frozenset({0, 1})))
+    files = sorted(path.name for path in Path(kept.folder).iterdir())
+    parts.append(Sheet("Files in the folder", ("file", "bytes"), [(name, _size(kept.folder / name)) for name in files]))
+    return Chapter("Settings", parts)
+
+
+def _words(value: object) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _size(path: Path) -> str:
+    return "folder" if path.is_dir() else f"{path.stat().st_size}"
+
+
+def _places(kept: Kept, name: str) -> dict[str, tuple[float, float, float]]:
+    return {row["point"]: (float(row["X"]), float(row["Y"]), float(row["Z"])) for row in kept.rows(name)}
+
+
+_OF_COMMAND: dict[str, Callable[[Kept], Chapters]] = {
+    "run": _of_run,
+    "calibrate": _of_calibration,
+    "compile": _of_compilation,
+    "bridge": _of_bridge,
+}

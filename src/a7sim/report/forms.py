@@ -1,0 +1,215 @@
+"""The observation book on the forms of the thesis (3.2.1): relative orientation, model coordinates, perspective centre.
+
+A form is a table of its own: a line for each point, the readings of an item beside each other with their mean, what was
+set and what was struck out below.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from a7sim.documents import Document
+from a7sim.mistakes import Mistake
+from a7sim.operator.book import Entry
+from a7sim.report.kept import Kept
+from a7sim.report.page import Paragraph, Part, Sheet
+from a7sim.session.folder import BOOK
+
+PAGE_BREAK = "\f"
+
+TITLES = {
+    "relative orientation": "FORM FOR NUMERICAL RELATIVE ORIENTATION",
+    "model coordinates": "FORM FOR RECORDING MODEL COORDINATES",
+    "left perspective centre": "FORM FOR PERSPECTIVE-CENTRE POSITION DETERMINATION",
+    "right perspective centre": "FORM FOR PERSPECTIVE-CENTRE POSITION DETERMINATION",
+}
+
+EMPIRICAL = "FORM FOR EMPIRICAL RELATIVE ORIENTATION"
+
+REPEATED = {"by1", "by2"}
+"""What is read several times over in numerical relative orientation."""
+
+ROMAN = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X")
+
+SIGNS = {"1": "′", "2": "″"}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a form: what was read, which reading of it, and the texts from the top."""
+
+    item: str
+    which: str
+    cells: Sequence[str]
+
+    @property
+    def width(self) -> int:
+        """How wide it is in print; what was read may stand over the next readings of it too."""
+        return max(map(len, [self.which or self.item, *self.cells]))
+
+
+@dataclass(frozen=True)
+class Form:
+    """A filled form: what heads it, its columns, and the lines below."""
+
+    title: str
+    caption: str
+    head: Sequence[str]
+    columns: Sequence[Column]
+    foot: Sequence[str]
+
+    def as_text(self) -> str:
+        """Return the form as plain text."""
+        table = _lines(self.columns) if self.columns else ()
+        return "\n".join([self.title, "", *self.head, "", *table, *self.foot, ""])
+
+    def as_parts(self) -> list[Part]:
+        """Return the form as parts of a page."""
+        parts: list[Part] = [Paragraph("\n".join(self.head))]
+        if self.columns:
+            names = [f"{column.item} {column.which}".strip() for column in self.columns]
+            rows = list(zip(*(column.cells for column in self.columns), strict=True))
+            parts.append(Sheet(self.caption, names, rows))
+        return parts + ([Paragraph("\n".join(self.foot))] if self.foot else [])
+
+
+def forms_text(kept: Kept) -> str:
+    """Return all forms of a session as plain text, a page break between them. Raises Mistake without a book."""
+    if not kept.book:
+        raise Mistake(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
+    with kept.read():
+        return PAGE_BREAK.join(form.as_text() for form in forms_of(kept))
+
+
+def forms_of(kept: Kept) -> Iterator[Form]:
+    """Yield the forms of a session in the order in which they were filled."""
+    for (model, form, number), entries in groupby(kept.book, key=lambda entry: (entry.model, entry.form, entry.round)):
+        yield _filled(kept.document, model, form, number, list(entries))
+
+
+def _filled(document: Document, model: str, form: str, number: int, entries: Sequence[Entry]) -> Form:
+    found = next((each for each in document.get("models", ()) if each["model"] == model), None)
+    round_of = f", round {number}" if number else ""
+    observed = [entry for entry in entries if entry.point and entry.reading]
+    in_order = {entry.item for entry in observed} - REPEATED if form == "relative orientation" else set()
+    title = EMPIRICAL if in_order else TITLES.get(form, f"FORM FOR {form.upper() or 'REMARKS'}")
+    name = f"model {model}, {form}{round_of}" if model else form
+    head = [f"{document['scenario']}    {name}"]
+    if found is not None:
+        head.append(f"photographs {found['left']} and {found['right']}    base {found['base']}")
+    head.append(f"begun {_clock(entries[0].time)}    ended {_clock(entries[-1].time)}    hours of the session")
+    parallaxes = _parallaxes(found, form, number) if found is not None else {}
+    columns = list(_as_it_went(observed) if in_order else _columns(observed, parallaxes)) if observed else []
+    return Form(title, name[:1].upper() + name[1:], head, columns, [*_below(entries), *_result(found, form)])
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds) // 3600:02d}:{int(seconds) // 60 % 60:02d}:{int(seconds) % 60:02d}"
+
+
+def _parallaxes(model: Document, form: str, number: int) -> dict[str, float]:
+    """Return the parallaxes that came of a round, by point; those of the round after the last are what is left."""
+    orientation = model["relative_orientation"]
+    if form != "relative orientation" or orientation["procedure"] != "numerical" or orientation["rough_iterations"]:
+        return {}
+    rounds = orientation["rounds"]
+    by_label = rounds[number - 1]["parallax_mm"] if number <= len(rounds) else orientation["residual_parallax_mm"]
+    return {model["standard_points"].get(label, label): p for label, p in by_label.items()}
+
+
+def _as_it_went(observed: Sequence[Entry]) -> Iterator[Column]:
+    """Yield readings in their order: each is of a model that the one before has changed."""
+    yield Column("point", "", [entry.point for entry in observed])
+    yield Column("time", "", [_clock(entry.time) for entry in observed])
+    yield Column("item", "", [_shown(entry.item) for entry in observed])
+    yield Column("reading", "", [entry.reading for entry in observed])
+
+
+def _columns(observed: Sequence[Entry], parallaxes: Mapping[str, float]) -> Iterator[Column]:
+    points = list(dict.fromkeys(entry.point for entry in observed))
+    yield Column("point", "", points)
+    kept = readings_of(observed)
+    for item in dict.fromkeys(entry.item for entry in observed):
+        by_point = [kept.get((point, item), []) for point in points]
+        most = max(map(len, by_point))
+        for i in range(most):
+            cells = [readings[i] if i < len(readings) else "" for readings in by_point]
+            yield Column(_shown(item), _roman(i) if most > 1 else "", cells)
+        if most > 1:
+            yield Column(_shown(item), "mean", [f"{mean(each):.3f}" if each else "" for each in by_point])
+    if parallaxes:
+        yield Column("p", "", [f"{parallaxes[point]:+.3f}" if point in parallaxes else "" for point in points])
+
+
+def readings_of(entries: Iterable[Entry]) -> dict[tuple[str, str], list[str]]:
+    """Return the readings that were not struck out by point and item."""
+    readings: dict[tuple[str, str], list[str]] = {}
+    for entry in entries:
+        if entry.point and entry.reading and not entry.struck:
+            readings.setdefault((entry.point, entry.item), []).append(entry.reading)
+    return readings
+
+
+def mean(readings: Sequence[str]) -> float:
+    """Return the mean of readings, one or more."""
+    return sum(map(float, readings)) / len(readings)
+
+
+def _roman(i: int) -> str:
+    return ROMAN[i] if i < len(ROMAN) else str(i + 1)
+
+
+def _shown(item: str) -> str:
+    """Return an item as a form heads it: by1 as by′, `X left at Z 4900.00` as X at 4900.00."""
+    for side in ("left", "right"):
+        item = item.replace(f" {side} at Z ", " at ")
+    symbols = {"kappa": "κ", "phi": "φ", "omega": "ω", "by": "by", "bz": "bz", "c": "c"}
+    name, number = item[:-1], item[-1:]
+    return symbols[name] + SIGNS[number] if name in symbols and number in SIGNS else item
+
+
+def _below(entries: Sequence[Entry]) -> Iterator[str]:
+    settings = [entry for entry in entries if not entry.point and entry.reading]
+    if settings:
+        words = (f"{_shown(entry.item.removeprefix('set '))} {entry.reading}" for entry in settings)
+        yield f"set: {'   '.join(words)}"
+    for entry in entries:
+        if entry.struck:
+            yield f"struck out: {entry.reading}  {_shown(entry.item)} of {entry.point or 'no point'}: {entry.struck}"
+    yield from (f"remark: {entry.remark}" for entry in entries if entry.remark)
+
+
+def _result(model: Document | None, form: str) -> Iterator[str]:
+    """Yield the centre that came of a form for it."""
+    side, _, what = form.partition(" ")
+    if model is None or what != "perspective centre":
+        return
+    centre = model["perspective_centres"][side]
+    for name in ("X0", "Y0", "Z0", "T0"):
+        yield f"{name} = {centre[name]:.3f} ± {centre[f'sigma_{name}']:.3f}"
+    yield f"R.M.S. = {centre['rms']:.5f}"
+
+
+def _lines(columns: Sequence[Column]) -> Iterator[str]:
+    """Yield columns as lines under a heading of two: what was read, and which reading of it."""
+    groups = [list(group) for _, group in groupby(columns, key=lambda column: column.item)]
+    widths = [column.width for column in columns]
+    yield "  ".join(_over(group) for group in groups).rstrip()
+    rule = "-" * (sum(widths) + 2 * len(widths) - 2)
+    if any(column.which for column in columns):
+        yield _row([column.which for column in columns], widths)
+    yield rule
+    yield from (_row(cells, widths) for cells in zip(*(column.cells for column in columns), strict=True))
+    yield rule
+
+
+def _row(cells: Sequence[str], widths: Sequence[int]) -> str:
+    first, *others = zip(cells, widths, strict=True)
+    return "  ".join([first[0].ljust(first[1]), *(cell.rjust(width) for cell, width in others)]).rstrip()
+
+
+def _over(group: Sequence[Column]) -> str:
+    """Return what heads all columns of a group, as wide as they are."""
+    width = sum(column.width for column in group) + 2 * len(group) - 2
+    item = group[0].item
+    return item.ljust(width) if item == "point" else item.center(width)

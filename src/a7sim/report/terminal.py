@@ -1,0 +1,49 @@
+"""What a terminal shows, as parts of a page: the same rows, no table is made twice."""
+
+from collections.abc import Iterator
+
+from rich.console import Group, RenderableType
+from rich.rule import Rule
+from rich.table import Table
+from rich.text import Text
+
+from a7sim.report.page import Heading, Paragraph, Part, Sheet
+
+
+def parts_of(*shown: RenderableType, caption: str = "") -> Iterator[Part]:
+    """Yield the parts of a page that say what a terminal shows.
+
+    A bold line is the caption of the table after it; a table without one has the last heading's, else `caption`.
+    """
+    pending = ""
+    for each in _flat(shown):
+        match each:
+            case Table():
+                yield _sheet(each, pending or caption)
+                pending = ""
+            case Rule():
+                caption = str(each.title)
+                yield Heading(caption)
+            case Text():
+                if pending:
+                    yield Paragraph(pending)
+                pending = each.plain.strip() if each.style == "bold" else ""
+                if each.plain.strip() and not pending:
+                    yield Paragraph(each.plain.strip())
+    if pending:
+        yield Paragraph(pending)
+
+
+def _flat(shown: tuple[RenderableType, ...] | list[RenderableType]) -> Iterator[RenderableType]:
+    for each in shown:
+        if isinstance(each, Group):
+            yield from _flat(each.renderables)
+        elif not (isinstance(each, Text) and not each.plain.strip()):
+            yield each
+
+
+def _sheet(table: Table, caption: str) -> Sheet:
+    left = frozenset(i for i, column in enumerate(table.columns) if column.justify == "left")
+    columns = [str(column.header) for column in table.columns]
+    rows = [[str(cell) for cell in row] for row in zip(*(column.cells for column in table.columns), strict=True)]
+    return Sheet(caption, columns, rows, left)

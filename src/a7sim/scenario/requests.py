@@ -1,0 +1,40 @@
+"""A scenario as somebody asked for it, which no file says."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from a7sim.scenario.schema import Scenario
+
+NOTHING: Mapping[str, str] = MappingProxyType({})
+
+
+class Request(Struct, frozen=True):
+    """How somebody asked for a session: the command that gives it again, and what it changed in the scenario's file."""
+
+    command_line: str
+    settings: dict[str, str]
+    """Changed values by their path."""
+
+
+class RequestedScenario(Scenario, frozen=True, kw_only=True):
+    """A scenario with the request that chose it."""
+
+    request: Request
+
+
+def requested(scenario: Scenario, request: Request) -> RequestedScenario:
+    """Return a scenario with the request that chose it."""
+    values = {name: getattr(scenario, name) for name in Scenario.__struct_fields__}
+    return RequestedScenario(**values, request=request)
+
+
+def rephrased(scenario: Scenario, words: str, instead: str, settings: Mapping[str, str] = NOTHING) -> Scenario:
+    """Return a scenario whose request, where it has one, says something instead of words and changes more settings."""
+    if not isinstance(scenario, RequestedScenario):
+        return scenario
+    request = scenario.request
+    changed = Request(request.command_line.replace(words, instead), {**request.settings, **settings})
+    return replace(scenario, request=changed)

@@ -1,0 +1,302 @@
+"""The report of a session: one page that needs nothing beside it and says what the results say."""
+
+import base64
+import json
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from a7sim.report.kept import read_session
+from a7sim.report.rays import rays_of
+from a7sim.report.writing import report_of
+from tests.pages import Page
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+@pytest.fixture(scope="module")
+def results(akwanga_folder):
+    return json.loads((akwanga_folder / "results.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def text(akwanga_folder):
+    return report_of(read_session(akwanga_folder))
+
+
+@pytest.fixture(scope="module")
+def page(text):
+    return Page(text)
+
+
+def changed(folder, results, tmp_path):
+    """A copy of a session's folder with other results."""
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    (copy / "results.json").write_text(json.dumps(results), encoding="utf-8")
+    return copy
+
+
+def test_a_report_is_written_into_the_folder_or_where_it_is_asked_for(short_folder, tmp_path, typed):
+    copy = tmp_path / "session"
+    shutil.copytree(short_folder, copy)
+    code, printed, _ = typed("report", copy)
+    assert (code, printed) == (0, f"{copy / 'report.html'}\n")
+    elsewhere = tmp_path / "elsewhere.html"
+    assert typed("report", short_folder, "--out", elsewhere)[0] == 0
+    assert elsewhere.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert not (short_folder / "report.html").exists()
+
+
+def test_a_report_goes_with_the_session_that_is_written_over(short_folder, tmp_path, typed):
+    copy = tmp_path / "session"
+    shutil.copytree(short_folder, copy)
+    assert typed("report", copy)[0] == 0
+    assert typed("run", "akwanga", "--set", "photos.1.laid=upside down", "--force", "--out", copy)[0] == 1
+    assert not (copy / "report.html").exists()
+
+
+def test_a_report_of_the_same_session_is_the_same_to_the_byte(akwanga_folder, text):
+    assert report_of(read_session(akwanga_folder)) == text
+
+
+def test_a_report_can_be_shown_in_the_browser(short_folder, tmp_path, typed, monkeypatch):
+    shown = []
+    monkeypatch.setattr("webbrowser.open", shown.append)
+    assert typed("report", short_folder, "--open", "--out", tmp_path / "r.html")[0] == 0
+    assert shown == [(tmp_path / "r.html").as_uri()]
+
+
+def test_nothing_on_the_page_comes_from_elsewhere(text, page):
+    assert not re.search(r"https?:|//[a-z]|@import|url\((?!#)", text)
+    for tag, attributes in page.elements:
+        assert tag not in ("script", "iframe", "object")
+        for name in ("src", "href"):
+            assert attributes.get(name, "#").startswith(("#", "data:"))
+
+
+def test_every_name_on_the_page_is_there_once_and_every_reference_leads_somewhere(text, page):
+    assert len(set(page.ids)) == len(page.ids)
+    wanted = {attributes["href"][1:] for _, attributes in page.elements if attributes.get("href", "").startswith("#")}
+    wanted |= set(re.findall(r"url\(#([^)]*)\)", text))
+    assert wanted <= set(page.ids)
+
+
+def test_every_figure_has_an_accessible_name(page):
+    drawn = [attributes for tag, attributes in page.elements if tag == "svg"]
+    assert len(drawn) == 2 * 4 + 3 + 2
+    for attributes in drawn:
+        assert attributes["role"] == "img"
+        assert set(attributes["aria-labelledby"].split()) <= set(page.ids)
+    assert sum(tag == "figcaption" for tag, _ in page.elements) == len(drawn)
+
+
+def test_every_table_has_a_caption_and_headers_with_their_scope(page):
+    assert len(page.tables) > 20
+    for table in page.tables:
+        assert table.caption
+        assert "col" in table.scopes
+        assert table.scopes.count("row") == len(table.rows)
+        assert set(table.scopes) == {"col", "row"}
+        assert {len(row) for row in table.rows} == {len(table.columns)}
+
+
+def test_figures_take_the_colours_of_the_page(text):
+    """None but the page's own colours are drawn, so that figures stay legible in the dark and in print."""
+    drawn = "".join(re.findall(r"<svg.*?</svg>", text, flags=re.DOTALL))
+    assert not re.search(r"#[0-9a-fA-F]{6}\b", drawn)
+    used = set(re.findall(r"var\((--\w+)\)", drawn))
+    for scheme in re.findall(r":root \{(.*?)\}", text, flags=re.DOTALL):
+        assert used <= set(re.findall(r"(--\w+):", scheme))
+
+
+def test_residual_parallaxes_are_those_of_the_results(page, results):
+    tables = [table for table in page.tables if table.caption == "Residual y-parallaxes"]
+    for table, model in zip(tables, results["models"], strict=True):
+        residuals = model["relative_orientation"]["residual_parallax_mm"]
+        assert {row[0]: float(row[2]) for row in table.rows} == residuals
+        assert {row[0]: row[1] for row in table.rows} == model["standard_points"]
+
+
+def test_centres_are_those_of_the_results(page, results):
+    tables = [table for table in page.tables if table.caption == "Perspective centres, counter units"]
+    for table, model in zip(tables, results["models"], strict=True):
+        left, right = (model["perspective_centres"][side] for side in ("left", "right"))
+        for name in ("X0", "Y0", "Z0", "T0"):
+            row = table.row(name)
+            assert (row[1], row[2], row[4], row[5]) == tuple(
+                f"{side[key]:.3f}" for side in (left, right) for key in (name, f"sigma_{name}")
+            )
+
+
+def test_a_prime_is_the_left_projector_also_with_base_out(page):
+    text = "".join(page.text)
+    assert "Model 1: perspective centre O′, left photograph 101" in text
+    assert "Model 2: perspective centre O″, left photograph 102" in text
+
+
+def test_residuals_on_the_ground_are_those_of_the_results(page, results):
+    table = page.table("Residuals, computed minus given, m")
+    expected = results["strip"]["residuals_m"]
+    assert [row[0] for row in table.rows] == list(expected)
+    for point, role, *xyz in table.rows:
+        assert role == expected[point]["role"]
+        assert xyz == [f"{expected[point][axis]:+.3f}" for axis in "XYZ"]
+
+
+def test_hours_are_those_of_the_results(page, results):
+    table = page.table("Hours by activity")
+    assert {row[0]: float(row[1]) for row in table.rows} == results["operator"]["time_by_activity_h"]
+
+
+def test_the_page_says_what_gives_the_session_again(page, results):
+    table = page.table("What gives this session again")
+    assert table.row("command line")[1] == results["command_line"] == "a7sim run akwanga --seed 7"
+    assert table.row("seed")[1] == "7"
+    assert table.row("software")[1] == results["software"]
+
+
+def test_a_request_is_told_with_what_it_changed(short_folder):
+    page = Page(report_of(read_session(short_folder)))
+    line = page.table("What gives this session again").row("command line")[1]
+    assert line == "a7sim run akwanga --seed 1985 --set 'photos.1.laid=upside down' --skill novice"
+    changed = {row[0]: row[1] for row in page.table("Changed in the scenario's file").rows}
+    assert changed == {"photos.1.laid": "upside down", "observer.skill": '"novice"'}
+
+
+def test_a_session_that_does_not_fit_says_so_and_shows_what_there_is(short_folder):
+    page = Page(report_of(read_session(short_folder)))
+    assert "does not fit: picture 102 lies upside down" in "".join(page.text)
+    assert "Hours by activity" in [table.caption for table in page.tables]
+    assert not [table for table in page.tables if "centres" in table.caption]
+
+
+def test_an_interrupted_session_shows_what_there_is(akwanga_folder, results, tmp_path):
+    half = {key: value for key, value in results.items() if key != "strip"}
+    half |= {"status": "interrupted", "message": "the session was interrupted", "models": results["models"][:1]}
+    page = Page(report_of(read_session(changed(akwanga_folder, half, tmp_path))))
+    assert "The session was interrupted" in "".join(page.text)
+    assert sum(table.caption == "Elements as set" for table in page.tables) == 1
+
+
+def test_rays_of_the_points_give_the_rms_of_the_centre(akwanga_folder, results):
+    """What the book says and what the results say of a centre is one thing, second sets and struck entries and all."""
+    kept = read_session(akwanga_folder)
+    for model in results["models"]:
+        for side, found in model["perspective_centres"].items():
+            rays = rays_of(kept, model, side).values()
+            assert len(rays) == 6
+            squares = sum((x - found["X0"]) ** 2 + (y - found["Y0"]) ** 2 for x, y in rays)
+            assert (squares / 9) ** 0.5 == pytest.approx(found["rms"], abs=1e-3)
+
+
+def test_rays_that_do_not_give_the_rms_of_the_results_are_not_drawn(akwanga_folder, results):
+    model = results["models"][0]
+    found = model["perspective_centres"]["left"]
+    other = model | {"perspective_centres": {"left": found | {"rms": found["rms"] + 0.01}}}
+    assert rays_of(read_session(akwanga_folder), other, "left") == {}
+
+
+def test_a_strip_by_comparator_and_readings_has_a_chapter_for_each_way(tmp_path, typed):
+    out = tmp_path / "ways"
+    assert typed("run", "a8-strip", "--quiet", "--out", out)[0] == 0
+    page = Page(report_of(read_session(out)))
+    text = "".join(page.text)
+    for words in ("Strip, comparator", "Strip, A8", "A8 minus comparator"):
+        assert words in text
+    assert sum(tag == "svg" for tag, _ in page.elements) == 6
+    assert not [table for table in page.tables if "Hours" in table.caption]
+
+
+def test_a_grid_test_has_its_residuals_at_the_crosses(tmp_path, typed):
+    out = tmp_path / "grid"
+    assert typed("calibrate", "grid-test", "--points", 9, "--levels", 1, "--quiet", "--out", out)[0] == 0
+    page = Page(report_of(read_session(out)))
+    titles = [table.caption for table in page.tables]
+    assert "left projector" in titles and "right projector" in titles
+    assert "Right projector: residuals at the crosses" in "".join(page.text)
+    assert page.table("What gives this session again").row("command line")[1].endswith("--points 9 --levels 1")
+
+
+def test_a_map_stands_on_the_page_as_a_picture_of_its_own(tmp_path, results):
+    """The styles of a map reach nothing else on the page: it is an image with its data, not a part of the page."""
+    strip = results["strip"]
+    line = {"name": "contour 460", "closed": True, "endings": [], "vertices": 9, "length_m": 80.0}
+    document = {
+        "schema_version": 1, "command": "compile", "scenario": "Akwanga", "seed": 7, "status": "complete",
+        "message": "", "model": "1", "map_scale": 2500.0, "plan_gear": "1-2-1", "spot_heights": 5,
+        "range_m": [440.0, 470.0], "expected": {"sigma_height_m": 0.05, "sigma_plan_m": 0.07},
+        "levelling": {"rounds": 2, "tilt_left_gon": 0.01, "scale_found": 3750.0}
+        | {key: strip[key] for key in ("absolute", "residuals_m", "accuracy_m", "warnings")},
+        "lines": [line | {"rms_height_m": 0.051, "largest_height_m": 0.2}],
+        "beside_the_truth": {"contours": None}, "operator": results["operator"], "truth": {"slips": []},
+    }  # fmt: skip
+    (tmp_path / "results.json").write_text(json.dumps(document), encoding="utf-8")
+    drawn = '<svg xmlns="http://www.w3.org/2000/svg"><style>text { fill: red; }</style></svg>'
+    (tmp_path / "map.svg").write_text(drawn, encoding="utf-8")
+    text = report_of(read_session(tmp_path))
+    page = Page(text)
+    image = next(attributes for tag, attributes in page.elements if tag == "img")
+    assert image["alt"] == "Map of model 1"
+    assert base64.b64decode(image["src"].partition("base64,")[2]).decode() == drawn
+    assert "fill: red" not in text
+    assert page.table("Lines beside the true ground").row("contour 460")[4] == "0.051"
+    assert "Levelling on the ground control: residuals in height" in "".join(page.text)
+
+
+@pytest.mark.parametrize(
+    ("harm", "said"),
+    [
+        (shutil.rmtree, "expected the folder of a session, got none"),
+        (lambda folder: (folder / "results.json").unlink(), "the session was cut off before its end"),
+        (lambda folder: (folder / "results.json").write_text("{"), "expected the results of a session in JSON"),
+        (lambda folder: (folder / "results.json").write_text("[]"), "a document that names no command"),
+        (
+            lambda folder: (folder / "results.json").write_text('{"schema_version": 1, "command": "reduce strip"}'),
+            "got those of reduce strip",
+        ),
+        (
+            lambda folder: (folder / "results.json").write_text('{"schema_version": 2, "command": "run"}'),
+            "expected schema_version 1, got 2",
+        ),
+        (
+            lambda folder: (folder / "results.json").write_text('{"schema_version": 1, "command": "run"}'),
+            "got some that lack or change a part",
+        ),
+        (lambda folder: (folder / "book.csv").write_text("a,b\n1,2\n"), "expected the columns number,time_s"),
+    ],
+)
+def test_a_folder_that_is_no_session_is_told_in_one_sentence(akwanga_folder, tmp_path, typed, harm, said):
+    folder = tmp_path / "harmed"
+    shutil.copytree(akwanga_folder, folder)
+    harm(folder)
+    code, printed, complaint = typed("report", folder, "--out", tmp_path / "r.html")
+    assert (code, printed) == (2, "")
+    assert said in complaint
+    assert complaint.count("\n") == 1
+    assert not (tmp_path / "r.html").exists()
+
+
+def test_without_matplotlib_a_report_says_what_to_install(akwanga_folder, tmp_path, typed, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    code, _, complaint = typed("report", akwanga_folder, "--out", tmp_path / "r.html")
+    assert code == 2
+    assert complaint == "a7sim: a report needs matplotlib for its figures, got none: pip install 'a7sim[report]'\n"
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium to open the page with")
+def test_a_browser_opens_the_page_without_an_error_and_asks_nobody(text, tmp_path):
+    (tmp_path / "r.html").write_text(text, encoding="utf-8")
+    seen = subprocess.run(
+        [
+            CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}",
+            "--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr", "--v=0", "--window-size=400,900",
+            "--dump-dom", (tmp_path / "r.html").as_uri(),
+        ],
+        capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    assert "CONSOLE" not in seen.stderr
+    assert seen.stdout.count("<figure>") == text.count("<figure>")
