@@ -22,6 +22,7 @@ _VERBS = {
     "prepare": "a7sim.cli.prepare",
     "bridge": "a7sim.cli.bridge",
     "serve": "a7sim.cli.serve",
+    "console": "a7sim.cli.console",
 }
 
 
