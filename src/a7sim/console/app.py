@@ -32,9 +32,9 @@ from a7sim.link.client import Client
 FLICKER_S = 0.25
 
 WELCOME = """\
-You see the same ground through two eyes; the dot is the floating mark, and the picture moves under it.
-Turn it with the arrows and PgUp PgDn; take up an element by its letter and turn it with + and -.
-Press l to lay pictures, g to go to a point, Enter to record, ? for help. This goes with your first key."""
+Two eyes, one ground; the dot is the floating mark.
+Arrows and PgUp PgDn move it; y, then + and -: by'.
+l lays pictures, g goes to a point, Enter records."""
 
 PANELS = ("elements", "fittings", "side1", "side2")
 """What a narrow screen shows at its right, one at a time."""

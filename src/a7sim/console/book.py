@@ -3,8 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from a7sim.console.hands import title
 from a7sim.link.client import Client
-from a7sim.link.headers import quoted
+from a7sim.link.headers import quoted, recorded_as
+from a7sim.manual import VARIANTS
+
+ELEMENTS = tuple(dict.fromkeys(name for variant in VARIANTS.values() for name in variant.elements))
 
 COUNTERS = 5
 """Values of a registration before its elements: number, point, X, Y, Z."""
@@ -18,7 +22,7 @@ class Entry:
     point: str
     counters: tuple[str, ...]
     elements: tuple[tuple[str, str], ...] = ()
-    """Word of the language, such as BY1, and reading."""
+    """Element as the field writes it, such as by', and its reading."""
     struck: bool = False
 
     @classmethod
@@ -26,18 +30,22 @@ class Entry:
         """Return the entry that the values of `REC:LAST?` show."""
         number, point, *counters = values[:COUNTERS]
         rest = [each for each in values[COUNTERS:] if not each.startswith("struck:")]
-        elements = tuple(zip(rest[0::2], rest[1::2], strict=True))
+        elements = tuple((_title(word), reading) for word, reading in zip(rest[0::2], rest[1::2], strict=True))
         return cls(int(number), point, tuple(counters), elements, len(rest) < len(values) - COUNTERS)
 
     def as_line(self) -> str:
         """Return the entry for people."""
-        readings = " ".join(f"{reading:>9}" for reading in self.counters)
+        readings = "".join(f"{reading:>9}" for reading in self.counters)
         elements = "".join(f"  {word} {reading}" for word, reading in self.elements)
-        return f"{self.number:>3}  {self.point:<6}{readings}{elements}{'  struck out' if self.struck else ''}"
+        return f"{self.number:>3}  {self.point:<5}{readings}{elements}{'  struck out' if self.struck else ''}"
 
     def struck_out(self) -> "Entry":
         """Return the entry struck out; it stays."""
         return replace(self, struck=True)
+
+
+def _title(word: str) -> str:
+    return next((title(element) for element in ELEMENTS if recorded_as(element) == word), word)
 
 
 def record(client: Client, point: str, elements: Sequence[str]) -> Entry | None:

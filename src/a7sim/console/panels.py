@@ -403,7 +403,9 @@ class Book(Panel):
         room = max(1, self.content_size.height)
         if not self._entries:
             return Text("nothing is recorded yet", self.like("faint"))
+        width = self.content_size.width
         lines = [
-            Text(entry.as_line(), self.like("struck" if entry.struck else "word")) for entry in self._entries[-room:]
+            Text(entry.as_line()[:width], self.like("struck" if entry.struck else "word"))
+            for entry in self._entries[-room:]
         ]
-        return Text("\n", no_wrap=True, overflow="ellipsis").join(lines)
+        return Text("\n", no_wrap=True).join(lines)
