@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import click
+from msgspec import structs
 
 from a7sim.cli.links import token_from
 from a7sim.cli.prompt import data_folder
@@ -71,7 +72,7 @@ def command(
         _write(keymap or usual, sample())
         return
     keys = load_keymap(keymap or usual) if keymap or usual.exists() else default_keymap()
-    loaded = load_scenario(scenario or USUAL, _variant(variant)) if scenario or not connect else None
+    loaded = _scenario(scenario or USUAL, variant) if scenario or not connect else None
     began, clock = time.monotonic(), Clock()
 
     def at_the_instrument() -> float:
@@ -96,8 +97,12 @@ def command(
     ).run()
 
 
-def _variant(name: str | None) -> dict[str, str]:
-    return {} if name is None else {"instrument.variant": f'"{name.upper()}"'}
+def _scenario(name: str, variant: str | None) -> Scenario:
+    """Return a scenario at the plotter that is asked for; nobody works its plan here, so any will do."""
+    loaded = load_scenario(name)
+    if variant is None:
+        return loaded
+    return structs.replace(loaded, instrument=structs.replace(loaded.instrument, variant=variant.upper()))
 
 
 def _see_that_textual_is_there() -> None:

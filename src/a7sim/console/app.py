@@ -31,6 +31,9 @@ from a7sim.link.client import Client
 
 FLICKER_S = 0.25
 
+ROOMY = 100
+"""Columns from which the masthead says all."""
+
 WELCOME = """\
 Two eyes, one ground; the dot is the floating mark.
 Arrows and PgUp PgDn move it; y, then + and -: by'.
@@ -172,9 +175,10 @@ class Console(Deeds, App[None]):
             self.seat.sheet.title or self.seat.where,
             lying,
             f"base {dials.base}" if dials else "",
-            f"{elapsed(self.seat.time())} at the instrument",
+            elapsed(self.seat.time()),
         ]
-        text = "    ".join(part for part in parts if part)
+        roomy = self.size.width >= ROOMY
+        text = ("    " if roomy else "  ").join(part for part in parts if part) + (" at the instrument" if roomy else "")
         masthead = self.main.query_one("#masthead", Static)
         if str(masthead.content) != text:
             masthead.update(text)
@@ -290,8 +294,9 @@ class Console(Deeds, App[None]):
         words: list[tuple[str, str]] = []
         keys = {name: shown(keys[0], not self.utf8) for name, keys in self.seat.keymap.items()}
         loaded = self.dials is not None and any(self.dials.pictures)
-        words.append(("l" if keys["bench"] == "l" else keys["bench"], "bench"))
-        words.append((f"{keys['x_down']}{keys['x_up']}{keys['y_down']}{keys['y_up']}", "X Y"))
+        words.append((keys["bench"], "bench"))
+        arrows = keys["x_down"] + keys["x_up"] + keys["y_down"] + keys["y_up"]
+        words.append((arrows if len(arrows) == 4 else f"{keys['x_up']} {keys['y_up']} ...", "X Y"))
         words.append((f"{keys['z_up']} {keys['z_down']}", "Z"))
         words.append((f"{keys['turn_up']} {keys['turn_down']}", title(self.hands.element)))
         words.append((f"{keys['finer']} {keys['coarser']}", f"step {self.hands.step:g}"))

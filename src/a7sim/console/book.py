@@ -35,9 +35,9 @@ class Entry:
 
     def as_line(self) -> str:
         """Return the entry for people."""
-        readings = "".join(f"{reading:>9}" for reading in self.counters)
+        readings = "".join(f"{reading:>8}" for reading in self.counters)
         elements = "".join(f"  {word} {reading}" for word, reading in self.elements)
-        return f"{self.number:>3}  {self.point:<5}{readings}{elements}{'  struck out' if self.struck else ''}"
+        return f"{self.number:>3} {self.point:<5}{readings}{elements}{'  struck out' if self.struck else ''}"
 
     def struck_out(self) -> "Entry":
         """Return the entry struck out; it stays."""

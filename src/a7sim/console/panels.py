@@ -76,6 +76,7 @@ class Panel(Widget):
         "panel--drum",
         "panel--decimals",
         "panel--hand",
+        "panel--lever",
         "panel--mark",
         "panel--struck",
     }
@@ -255,7 +256,8 @@ class Elements(Panel):
         row = Text(f"{shown:<{name_width}}", self.like("word"))
         for element in [name] if name in BARE else [f"{name}1", f"{name}2"]:
             lit = element == self._hands.element
-            row.append(f"{self._readings.get(element, ''):>7} ", self.like("hand" if lit else "drum"))
+            reading = self._readings.get(element, "")
+            row.append(f">{reading:>6} " if lit else f"{reading:>7} ", self.like("hand" if lit else "drum"))
             row.append(f"{self._bar(element, bar_width)} ", self.like("faint"))
         return row
 
@@ -327,7 +329,7 @@ class Fittings(Panel):
         text = Text(f"{name:<9}", self.like("word"))
         both = sum(map(len, positions)) + 5 <= self.content_size.width - 9
         for position in positions if both else (at,):
-            text.append(f" {position} ", self.like("drum" if position == at else "faint")).append(" ")
+            text.append(f" {position} ", self.like("lever" if position == at else "faint")).append(" ")
         return text
 
 

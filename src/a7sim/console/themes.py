@@ -12,6 +12,8 @@ DRUMS: Mapping[str, str] = {
     "faint": "#56645b",
     "mark": "#ffd23f",
     "eyepiece": "#000000",
+    "lever": "#16181a",
+    "lever-word": "#f2ead2",
 }
 """What every theme says beside the usual colours, as `enamel` has it."""
 
@@ -82,6 +84,8 @@ THEMES = (
             "engraving": "#ffffff",
             "faint": "#d0d0d0",
             "mark": "#ffff00",
+            "lever": "#ffffff",
+            "lever-word": "#000000",
         },
     ),
 )
