@@ -188,7 +188,7 @@ def main() -> None:
     for across, down in ((25, 22), (29, 26), (53, 50)):
         rendered, drawn = frame_times(across, down)
         print(f"  {across:>3} x {down:<3} rendered {rendered:6.2f} ms   drawn {drawn:5.2f} ms")
-    console = [sys.executable, "-m", "a7sim", "console", "akwanga", "--seed", "7"]
+    console = [sys.executable, "-m", "a7sim", "console", "akwanga", "--seed", "7", "--theme", "enamel"]
     floor = [sys.executable, __file__, FLOOR, str(2 * 29), "13"]
     print(f"{'':<22}first paint   key to frame   CPU at 20/s     drawn    idle 3 s")
     for name, command, there, load in (("console", console, b"elements", True), ("bare Textual widget", floor, "▀".encode(), False)):

@@ -105,6 +105,8 @@ class Console(Deeds, App[None]):
         self.silent: Silent | None = None
         self.station = Station(seat.connect, lambda news: self.post_message(Told(news)), seat.alone)
         self._by_key = deeds_by_key(seat.keymap)
+        self._hinted: tuple[tuple[str, str], ...] = ()
+        self._sketch_panels: list[SketchPanel] = []
         self._flicker: Timer | None = None
         self._flicker_eye = 1
         for theme in THEMES:
@@ -149,10 +151,11 @@ class Console(Deeds, App[None]):
         for counter in self.query(Counter):
             counter.rolling = self.view.drawing is not Drawing.WORDS
         self.query_one(Elements).plain = not self.utf8
-        for sketch in self.query(SketchPanel):
+        self._sketch_panels = list(self.query(SketchPanel))
+        for sketch in self._sketch_panels:
             sketch.dot = "·" if self.utf8 else "."
         self.say(f"sitting down at {self.seat.where or 'the instrument'} ...")
-        self.station.start()
+        self.call_after_refresh(self.station.start)
         self.set_interval(1.0, self._masthead)
 
     def on_unmount(self) -> None:
@@ -193,6 +196,7 @@ class Console(Deeds, App[None]):
         at = next(index for index, name in enumerate(PANELS) if self.main.query_one(f"#{name}").has_class("-chosen"))
         for index, name in enumerate(PANELS):
             self.main.query_one(f"#{name}").set_class(index == (at + 1) % len(PANELS), "-chosen")
+        self.call_after_refresh(self.refresh_panels)
 
     # --- keys -----------------------------------------------------------------------------------------
 
@@ -282,38 +286,42 @@ class Console(Deeds, App[None]):
             counter.turn_to(dials.counters[counter.axis])
         main.query_one(Elements).show(met.variant, dials.elements, self.hands)
         main.query_one(Fittings).show(met.variant, dials)
-        for sketch in main.query(SketchPanel):
-            picture = dials.pictures[sketch.projector - 1]
-            mark = on_print(met.variant, dials, self.presets, sketch.projector) if picture else None
-            sketch.show(picture, self.sketches[sketch.projector], mark, self.point)
+        self._show_sketches(met, dials)
         main.query_one(Book).show(self.entries)
         self._hints()
         self._masthead()
 
+    def _show_sketches(self, met: Met, dials: Dials) -> None:
+        for projector, picture in enumerate(dials.pictures, start=1):
+            shown = [each for each in self._sketch_panels if each.projector == projector and each.region]
+            mark = on_print(met.variant, dials, self.presets, projector) if picture and shown else None
+            for sketch in shown:
+                sketch.show(picture, self.sketches[projector], mark, self.point)
+
     def _hints(self) -> None:
-        words: list[tuple[str, str]] = []
+        """Show which keys do something now."""
         keys = {name: shown(keys[0], not self.utf8) for name, keys in self.seat.keymap.items()}
-        loaded = self.dials is not None and any(self.dials.pictures)
-        words.append((keys["bench"], "bench"))
         arrows = keys["x_down"] + keys["x_up"] + keys["y_down"] + keys["y_up"]
-        words.append((arrows if len(arrows) == 4 else f"{keys['x_up']} {keys['y_up']} ...", "X Y"))
-        words.append((f"{keys['z_up']} {keys['z_down']}", "Z"))
-        words.append((f"{keys['turn_up']} {keys['turn_down']}", title(self.hands.element)))
-        words.append((f"{keys['finer']} {keys['coarser']}", f"step {self.hands.step:g}"))
-        if any(self.sketches.values()):
-            words.append((keys["go_to"], "go to"))
-        if loaded:
-            words.append((keys["record"], f"record {self.point}" if self.point else "record"))
-            words.append((keys["magnify"], f"x{self.view.magnification:g}"))
-        if any(not entry.struck for entry in self.entries):
-            words.append((keys["strike"], "strike out"))
-        if self.hands.free:
-            words.append((keys["free_hand"], "back to the wheels"))
-        words.append((keys["help"], "help"))
-        text = Text("  ", no_wrap=True).join(Text(key, "bold").append(f" {word}", "not bold") for key, word in words)
-        hints = self.main.query_one("#hints", Static)
-        if str(hints.content) != str(text):
-            hints.update(text)
+        pricked = any(self.sketches.values())
+        unstruck = any(not entry.struck for entry in self.entries)
+        offered = (
+            (True, keys["bench"], "bench"),
+            (True, arrows if len(arrows) == 4 else f"{keys['x_up']} {keys['y_up']} ...", "X Y"),
+            (True, f"{keys['z_up']} {keys['z_down']}", "Z"),
+            (True, f"{keys['turn_up']} {keys['turn_down']}", title(self.hands.element)),
+            (True, f"{keys['finer']} {keys['coarser']}", f"step {self.hands.step:g}"),
+            (pricked, keys["go_to"], "go to"),
+            (pricked, keys["record"], f"record {self.point}" if self.point else "record"),
+            (pricked, keys["magnify"], f"x{self.view.magnification:g}"),
+            (unstruck, keys["strike"], "strike out"),
+            (self.hands.free, keys["free_hand"], "back to the wheels"),
+            (True, keys["help"], "help"),
+        )
+        words = tuple((key, word) for applies, key, word in offered if applies)
+        if words != self._hinted:
+            self._hinted = words
+            text = Text("  ", no_wrap=True).join(Text(key, "bold").append(f" {word}", "not bold") for key, word in words)
+            self.main.query_one("#hints", Static).update(text)
 
     # --- eyepieces ------------------------------------------------------------------------------------
 
@@ -342,6 +350,7 @@ class Console(Deeds, App[None]):
     @on(Eyepiece.Resized)
     def _resized(self) -> None:
         self.look()
+        self.refresh_panels()
 
     def draw(self) -> None:
         """Draw what the eyes see."""

@@ -1,8 +1,8 @@
 """Grey bytes of an eyepiece as characters of a terminal: pure functions on arrays."""
 
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -40,8 +40,7 @@ class Drawing(StrEnum):
 _CELLS = {Drawing.HALVES: (1, 2), Drawing.SHADES: (1, 2), Drawing.BRAILLE: (2, 4), Drawing.ASCII: (1, 2)}
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+class Run(NamedTuple):
     """Neighbouring cells of a row that look alike: text, level of the ink and of the paper (or None, the screen's)."""
 
     text: str

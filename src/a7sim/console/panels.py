@@ -1,6 +1,6 @@
 """The panels of the console: each shows what it is given and draws only when that changes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from textwrap import wrap
 from typing import ClassVar
@@ -65,6 +65,22 @@ def _of_both(level: int | None) -> Color | None:
         return None
     left, right = (each * 255 // (COLOUR_LEVELS - 1) for each in divmod(level, COLOUR_LEVELS))
     return Color.from_rgb(left, right, right)
+
+
+def _strip_of(
+    row: list[Run], width: int, look: Callable[[int | None, int | None], Style], dark: Style, mark: Style
+) -> Strip:
+    segments = []
+    room = width
+    for text, ink, paper in row:
+        if ink == MARK:
+            segments.append(Segment(text, dark + look(None, paper) + mark))
+        else:
+            segments.append(Segment(text, dark if ink is None else look(ink, paper)))
+        room -= len(text)
+    if room > 0:
+        segments.append(Segment(" " * room, dark))
+    return Strip(segments, max(width, width - room))
 
 
 class Panel(Widget):
@@ -133,17 +149,10 @@ class Eyepiece(Widget):
 
     def _lay(self) -> None:
         width, dark = self.content_size.width, self.rich_style
-        self._strips = [
-            Strip([Segment(run.text, dark + self._style(run)) for run in row]).adjust_cell_length(width, dark)
-            for row in self._rows
-        ]
-        self.refresh()
-
-    def _style(self, run: Run) -> Style:
         look = _red_and_cyan if self._in_colours else _grey
-        if run.ink != MARK:
-            return look(run.ink, run.paper)
-        return look(None, run.paper) + self.get_component_rich_style("eyepiece--mark", partial=True)
+        mark = self.get_component_rich_style("eyepiece--mark", partial=True)
+        self._strips = [_strip_of(row, width, look, dark, mark) for row in self._rows]
+        self.refresh()
 
     def render_line(self, y: int) -> Strip:
         """Return a line of the picture on the dark of the eyepiece."""
@@ -175,10 +184,11 @@ class Counter(Panel):
         self._from, self._to, self._frame = "", "", ROLLING_FRAMES
 
     def turn_to(self, reading: str) -> None:
-        """Show another reading."""
+        """Show another reading; a drum that is still rolling goes straight on to it."""
         if reading != self._to:
-            self._from, self._to = rolled(self._from, self._to, self._frame), reading
-            self._frame = 0 if self.rolling and self._from else ROLLING_FRAMES
+            still = self._frame >= ROLLING_FRAMES
+            self._from, self._to = self._to, reading
+            self._frame = 0 if self.rolling and still and self._from else ROLLING_FRAMES
             self._roll()
 
     def _roll(self) -> None:
@@ -346,26 +356,37 @@ class SketchPanel(Panel):
         self.border_title = "sketch"
         self.tooltip = "Points pricked on the print, + the mark. Click one, or press g, to drive near it."
         self.dot = "·"
-        self._shown: tuple[Mapping[str, Place], Place | None, str | None] = ({}, None, None)
+        self._given: tuple[Mapping[str, Place], Place | None] = ({}, None)
+        self._going_to: str | None = None
+        self._title = ""
+        self._sketch = Sketch([], None, {})
 
     def show(self, picture: str, points: Mapping[str, Place], mark: Place | None, going_to: str | None) -> None:
         """Show a print's points, where the mark stands, and which point is worked at."""
-        near = None if mark is None else (round(mark[0]), round(mark[1]))
-        if (points, near, going_to) != self._shown:
-            self._shown = (points, near, going_to)
-            self.border_title = f"sketch {picture}" if picture else "no picture"
-            self.refresh()
+        self._given = points, mark
+        title = f"sketch {picture}" if picture else "no picture"
+        if title != self._title:
+            self._title = self.border_title = title
+        self._draw(going_to)
 
-    def _drawn(self) -> Sketch:
-        points, mark, _ = self._shown
-        return sketched(points, mark, max(1, self.content_size.width), max(1, self.content_size.height), self.dot)
+    def on_resize(self) -> None:
+        """Draw the print in the new room."""
+        self._draw(self._going_to)
+
+    def _draw(self, going_to: str | None) -> None:
+        width, height = self.content_size
+        if not self.display or not width or not height:
+            return
+        sketch = sketched(*self._given, width, height, self.dot)
+        if (sketch, going_to) != (self._sketch, self._going_to):
+            self._sketch, self._going_to = sketch, going_to
+            self.refresh()
 
     def render(self) -> Text:
         """Return the sketch."""
-        sketch = self._drawn()
+        sketch, going_to = self._sketch, self._going_to
         text = Text("\n", no_wrap=True).join(Text(row, self.like("word")) for row in sketch.rows)
         line = self.content_size.width + 1
-        going_to = self._shown[2]
         if going_to is not None and going_to in sketch.points:
             column, row = sketch.points[going_to]
             text.stylize(self.like("hand"), row * line + column, row * line + column + 1)
@@ -380,7 +401,7 @@ class SketchPanel(Panel):
     def on_click(self, event: events.Click) -> None:
         """Tell which point was clicked."""
         offset = event.get_content_offset(self)
-        point = self._drawn().nearest(offset.x, offset.y) if offset is not None else None
+        point = self._sketch.nearest(offset.x, offset.y) if offset is not None else None
         if point is not None:
             self.post_message(Pointed(self.projector, point))
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from a7sim.geometry import GON
 from a7sim.link.client import Client
-from a7sim.reduction import Undetermined, picture_lie
 from a7sim.scenario import Camera
 
 TURNED_MM = 50.0
@@ -47,6 +46,8 @@ def centre(client: Client, projector: int, sheet: JobSheet) -> Centred:
 
 
 def _lie(names: list[str], off: np.ndarray[tuple[int, ...], np.dtype[np.float64]], certificate: Camera | None) -> tuple[Centred, tuple[float, float, float]]:
+    from a7sim.reduction import Undetermined, picture_lie  # noqa: PLC0415 # not before the screen is there
+
     marks = {each.name: (each.x, each.y) for each in certificate.fiducials} if certificate else {}
     if certificate is None or not set(names) <= set(marks):
         dx, dy = off.mean(axis=1)
