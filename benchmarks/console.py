@@ -134,7 +134,10 @@ def floor_app(columns: int, rows: int) -> None:
     from textual.strip import Strip
     from textual.widget import Widget
 
-    styles = [[Style(color=Color.from_rgb(i, i, i), bgcolor=Color.from_rgb(j, j, j)) for i in range(0, 256, 8)] for j in range(0, 256, 8)]
+    styles = [
+        [Style(color=Color.from_rgb(i, i, i), bgcolor=Color.from_rgb(j, j, j)) for i in range(0, 256, 8)]
+        for j in range(0, 256, 8)
+    ]
     noise = np.random.default_rng(0)
 
     class Noise(Widget):
@@ -159,7 +162,9 @@ def floor_app(columns: int, rows: int) -> None:
     Floor().run()
 
 
-def measured(command: list[str], columns: int, rows: int, there: bytes, load: bool) -> tuple[float, float, float, float, int]:
+def measured(
+    command: list[str], columns: int, rows: int, there: bytes, load: bool
+) -> tuple[float, float, float, float, int]:
     """Return first paint s, key to frame ms, CPU share at 20 keys a second, kB/s, and bytes drawn in 3 idle s."""
     terminal = Terminal(command, columns, rows)
     paint = terminal.until(there)
@@ -191,7 +196,10 @@ def main() -> None:
     console = [sys.executable, "-m", "a7sim", "console", "akwanga", "--seed", "7", "--theme", "enamel"]
     floor = [sys.executable, __file__, FLOOR, str(2 * 29), "13"]
     print(f"{'':<22}first paint   key to frame   CPU at 20/s     drawn    idle 3 s")
-    for name, command, there, load in (("console", console, b"elements", True), ("bare Textual widget", floor, "▀".encode(), False)):
+    for name, command, there, load in (
+        ("console", console, b"elements", True),
+        ("bare Textual widget", floor, "▀".encode(), False),
+    ):
         paint, frame, share, kilobytes, idle = measured(command, columns, rows, there, load)
         print(f"  {name:<20}{paint:9.2f} s {frame:11.0f} ms {share:11.0%} {kilobytes:7.0f} kB/s {idle:7d} B")
 

@@ -55,6 +55,8 @@ class Person:
     async def settle(self) -> None:
         """Wait until all that was ordered is said and shown."""
         await self.until(lambda: self.console.dials is not None and self._quiet() and self.console.station.at_rest)
+        for _ in range(5):
+            await asyncio.sleep(0.0)
         await self.until(self._quiet)
 
     def _quiet(self) -> bool:
@@ -107,9 +109,8 @@ class Person:
         """Return what the message line says."""
         return str(self.console.main.query_one("#message").content)  # type: ignore[attr-defined]
 
-    def frame(self) -> list[str]:
-        """Return the rows of the screen as text."""
+    async def frame(self) -> list[str]:
+        """Return the rows of the screen as text, once they are laid out."""
+        await self.pilot.pause()
         compositor = self.console.screen._compositor
         return ["".join(segment.text for segment in strip) for strip in compositor.render_strips()]
-
-

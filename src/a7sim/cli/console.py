@@ -29,7 +29,9 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 @click.option("--seed", type=click.IntRange(min=0), help="Draws film and instrument.")
 @click.option("--variant", type=click.Choice(["A7", "A8"], case_sensitive=False), help="Another plotter.")
 @click.option("--theme", type=click.Choice(THEMES), help="Colours  [default: enamel]")
-@click.option("--drawing", type=click.Choice(list(Drawing)), help="How pictures are drawn  [default: the best there is]")
+@click.option(
+    "--drawing", type=click.Choice(list(Drawing)), help="How pictures are drawn  [default: the best there is]"
+)
 @click.option("--plain", is_flag=True, help="Say in words what the eyes see; nothing rolls. For screen readers.")
 @click.option(
     "--acuity",

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 from rich.text import Text
 from textual import events, on
@@ -84,8 +84,8 @@ class Console(Deeds, App[None]):
 
     CSS_PATH = "app.tcss"
     TITLE = "a7sim console"
-    HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [(0, "-narrow"), (100, "-usual"), (140, "-wide")]
-    VERTICAL_BREAKPOINTS: ClassVar[list[tuple[int, str]]] = [(0, "-low"), (28, "-tall"), (44, "-high")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (100, "-usual"), (140, "-wide")]  # noqa: RUF012 # as the library declares it
+    VERTICAL_BREAKPOINTS = [(0, "-low"), (28, "-tall"), (44, "-high")]  # noqa: RUF012
 
     def __init__(self, seat: Seat) -> None:
         super().__init__()
@@ -103,10 +103,12 @@ class Console(Deeds, App[None]):
         self.dials: Dials | None = None
         self.sight: Sight | None = None
         self.silent: Silent | None = None
-        self.station = Station(seat.connect, lambda news: self.post_message(Told(news)), seat.alone)
+        self.station = Station(seat.connect, self._tell, seat.alone)
         self._by_key = deeds_by_key(seat.keymap)
         self._hinted: tuple[tuple[str, str], ...] = ()
         self._sketch_panels: list[SketchPanel] = []
+        self._counters: list[Counter] = []
+        self._eyes: dict[int, Eyepiece] = {}
         self._flicker: Timer | None = None
         self._flicker_eye = 1
         for theme in THEMES:
@@ -148,7 +150,9 @@ class Console(Deeds, App[None]):
 
     def on_mount(self) -> None:
         """Begin the conversation."""
-        for counter in self.query(Counter):
+        self._counters = list(self.query(Counter))
+        self._eyes = {each.eye: each for each in self.query(Eyepiece)}
+        for counter in self._counters:
             counter.rolling = self.view.drawing is not Drawing.WORDS
         self.query_one(Elements).plain = not self.utf8
         self._sketch_panels = list(self.query(SketchPanel))
@@ -169,7 +173,7 @@ class Console(Deeds, App[None]):
         message.set_class(refused, "-refused")
 
     def _masthead(self) -> None:
-        if self.met is None or not self.screen_stack:
+        if self.met is None or not self._there:
             return
         dials, identity = self.dials, self.met.identity
         lying = " | ".join(name or "-" for name in dials.pictures) if dials else ""
@@ -181,10 +185,16 @@ class Console(Deeds, App[None]):
             elapsed(self.seat.time()),
         ]
         roomy = self.size.width >= ROOMY
-        text = ("    " if roomy else "  ").join(part for part in parts if part) + (" at the instrument" if roomy else "")
+        text = ("    " if roomy else "  ").join(part for part in parts if part) + (
+            " at the instrument" if roomy else ""
+        )
         masthead = self.main.query_one("#masthead", Static)
         if str(masthead.content) != text:
             masthead.update(text)
+
+    @property
+    def _there(self) -> bool:
+        return bool(self._counters) and self._counters[0].is_attached
 
     @property
     def main(self) -> Screen[Any]:
@@ -228,12 +238,22 @@ class Console(Deeds, App[None]):
 
         self.station.order(order)
 
+    def afterwards(self, then: Callable[[], None]) -> None:
+        """Go on when all that was ordered so far is said, and what came of it is known."""
+        self.ask(lambda _: None, lambda _: then())
+
+    def _tell(self, news: News) -> None:
+        self.post_message(Told(news))
+
     def on_done(self, done: Done) -> None:
-        """Go on with an answer."""
-        done.then()
+        """Go on with an answer, unless the screen is gone."""
+        if self._there:
+            done.then()
 
     def on_told(self, told: Told) -> None:
-        """Show what the station tells."""
+        """Show what the station tells, unless the screen is gone."""
+        if not self._there:
+            return
         match told.news:
             case Met():
                 self._meet(told.news)
@@ -279,10 +299,10 @@ class Console(Deeds, App[None]):
     def refresh_panels(self) -> None:
         """Show the dials, the hands and the book as they are."""
         met, dials = self.met, self.dials
-        if met is None or dials is None:
+        if met is None or dials is None or not self._there:
             return
         main = self.main
-        for counter in main.query(Counter):
+        for counter in self._counters:
             counter.turn_to(dials.counters[counter.axis])
         main.query_one(Elements).show(met.variant, dials.elements, self.hands)
         main.query_one(Fittings).show(met.variant, dials)
@@ -305,6 +325,7 @@ class Console(Deeds, App[None]):
         pricked = any(self.sketches.values())
         unstruck = any(not entry.struck for entry in self.entries)
         offered = (
+            (True, keys["help"], "help"),
             (True, keys["bench"], "bench"),
             (True, arrows if len(arrows) == 4 else f"{keys['x_up']} {keys['y_up']} ...", "X Y"),
             (True, f"{keys['z_up']} {keys['z_down']}", "Z"),
@@ -315,23 +336,24 @@ class Console(Deeds, App[None]):
             (pricked, keys["magnify"], f"x{self.view.magnification:g}"),
             (unstruck, keys["strike"], "strike out"),
             (self.hands.free, keys["free_hand"], "back to the wheels"),
-            (True, keys["help"], "help"),
         )
         words = tuple((key, word) for applies, key, word in offered if applies)
         if words != self._hinted:
             self._hinted = words
-            text = Text("  ", no_wrap=True).join(Text(key, "bold").append(f" {word}", "not bold") for key, word in words)
+            text = Text("  ", no_wrap=True).join(
+                Text(key, "bold").append(f" {word}", "not bold") for key, word in words
+            )
             self.main.query_one("#hints", Static).update(text)
 
     # --- eyepieces ------------------------------------------------------------------------------------
 
     def look(self) -> None:
         """Ask for the pictures that the eyepieces have room for."""
-        if self.met is None:
+        if self.met is None or not self._there:
             return
         view = self.view
         one = view.merged != "side by side" and view.drawing is Drawing.HALVES
-        for eyepiece in self.main.query(Eyepiece):
+        for eyepiece in self._eyes.values():
             closed = eyepiece.eye == 2 if one else eyepiece.eye not in view.eyes
             eyepiece.set_class(closed, "-closed")
             eyepiece.border_title = view.merged if one else ("left eye", "right eye")[eyepiece.eye - 1]
@@ -340,7 +362,7 @@ class Console(Deeds, App[None]):
 
     def _ask_for_pictures(self, one: bool) -> None:
         view = self.view
-        open_ones = [each for each in self.main.query(Eyepiece) if not each.has_class("-closed")]
+        open_ones = [each for each in self._eyes.values() if not each.has_class("-closed")]
         cells = min((each.cells for each in open_ones), default=(0, 0))
         columns, rows = picture_size(view.drawing, *cells)
         eyes = (1, 2) if one else view.eyes
@@ -355,7 +377,7 @@ class Console(Deeds, App[None]):
     def draw(self) -> None:
         """Draw what the eyes see."""
         sight, view = self.sight, self.view
-        if sight is None:
+        if sight is None or not self._there:
             return
         if view.drawing is Drawing.WORDS:
             self._in_words(sight)
@@ -364,19 +386,19 @@ class Console(Deeds, App[None]):
         pictures = {eye: vignetted(greys) for eye, greys in sight.pictures.items()}
         if view.merged == "anaglyph" and view.drawing is Drawing.HALVES and len(pictures) == 2:
             both = anaglyph(pictures[1], pictures[2])
-            self.main.query_one("#eye1", Eyepiece).show(with_mark(both, mark), in_colours=True)
+            self._eyes[1].show(with_mark(both, mark), in_colours=True)
             return
         if view.merged == "flicker" and view.drawing is Drawing.HALVES and len(pictures) == 2:
             pictures = {1: pictures[self._flicker_eye]}
         for eye, greys in pictures.items():
             rows = with_mark(drawn(view.drawing, greys), mark)
-            self.main.query_one(f"#eye{eye}", Eyepiece).show(rows)
+            self._eyes[eye].show(rows)
 
     def _in_words(self, sight: Sight) -> None:
         acuity = self.seat.acuity_um
         said = [f"{self.point or 'no point'}: {image_in_words(sight.seen.get(eye), acuity)}" for eye in (1, 2)]
         for eye, words in zip((1, 2), said, strict=True):
-            self.main.query_one(f"#eye{eye}", Eyepiece).say(words if self.point else "go to a point first")
+            self._eyes[eye].say(words if self.point else "go to a point first")
         left, right = sight.seen.get(1), sight.seen.get(2)
         if self.point:
             both = (left[0] - right[0], left[1] - right[1]) if left and right else None

@@ -34,10 +34,10 @@ class Entry:
         return cls(int(number), point, tuple(counters), elements, len(rest) < len(values) - COUNTERS)
 
     def as_line(self) -> str:
-        """Return the entry for people."""
+        """Return the entry for people; an x stands before one that is struck out."""
         readings = "".join(f"{reading:>8}" for reading in self.counters)
         elements = "".join(f"  {word} {reading}" for word, reading in self.elements)
-        return f"{self.number:>3} {self.point:<5}{readings}{elements}{'  struck out' if self.struck else ''}"
+        return f"{'x' if self.struck else ' '}{self.number:>3} {self.point:<5}{readings}{elements}"
 
     def struck_out(self) -> "Entry":
         """Return the entry struck out; it stays."""

@@ -125,7 +125,9 @@ class Deeds:
             self.move(drum, way)
             return
         bare = drum in ("bx", "common_phi")
-        self._hold(replace(console.hands, name=drum if bare else drum[:-1], side=console.hands.side if bare else int(drum[-1])))
+        self._hold(
+            replace(console.hands, name=drum if bare else drum[:-1], side=console.hands.side if bare else int(drum[-1]))
+        )
         if way:
             console.station.say(console.hands.turned(way))
 
@@ -134,7 +136,11 @@ class Deeds:
         console = self._console
         free = not console.hands.free
         self._hold(replace(console.hands, free=free))
-        console.say("free hand: X and Y move without the wheels; click a place to bring it under the mark" if free else "hands at the wheels")
+        console.say(
+            "free hand: X and Y move without the wheels; click a place to bring it under the mark"
+            if free
+            else "hands at the wheels"
+        )
 
     def clicked(self, across: int, up: int) -> None:
         """In free hand, bring a place of the left eyepiece's picture under the mark."""
@@ -160,7 +166,9 @@ class Deeds:
         element = console.hands.element
         data = variant.elements[element]
         note = f"{data.low:g} to {data.high:g} {unit(variant, element)}; it stands at {dials.elements[element]}"
-        self._ask_number(f"set {title(element)} to", note, lambda value: console.station.say(f"{header(element)} {value:g}"))
+        self._ask_number(
+            f"set {title(element)} to", note, lambda value: console.station.say(f"{header(element)} {value:g}")
+        )
 
     def _ask_number(self, question: str, note: str, then: Callable[[float], None]) -> None:
         console = self._console
@@ -205,7 +213,9 @@ class Deeds:
         if line is not None:
 
             def shown(exchange: Any) -> None:
-                console.say(exchange.shown or " ".join(exchange.errors) or f"said {line}", refused=bool(exchange.errors))
+                console.say(
+                    exchange.shown or " ".join(exchange.errors) or f"said {line}", refused=bool(exchange.errors)
+                )
 
             console.ask(lambda client: say(client, line), shown)
 
@@ -238,7 +248,10 @@ class Deeds:
         console.point = point
 
         def arrived(there: bool) -> None:
-            console.say(f"near point {point}" if there else f"point {point} is not to be seen where the sketch shows it", refused=not there)
+            console.say(
+                f"near point {point}" if there else f"point {point} is not to be seen where the sketch shows it",
+                refused=not there,
+            )
             console.look()
             console.refresh_panels()
 
@@ -270,7 +283,10 @@ class Deeds:
             console.refresh_panels()
 
     def do_strike(self) -> None:
-        """Strike the last reading out that is not struck yet."""
+        """Strike the last reading out that is not struck yet, once all that was ordered before is in the book."""
+        self._console.afterwards(self._strike_last)
+
+    def _strike_last(self) -> None:
         console = self._console
         last = next((entry for entry in reversed(console.entries) if not entry.struck), None)
         if last is None:
@@ -304,10 +320,14 @@ class Deeds:
         choices: list[tuple[str, Callable[[], Any]]] = []
         for projector, picture in enumerate(dials.pictures, start=1):
             side = PROJECTORS[projector]
-            choices.append((f"{side} projector: lay a picture ({picture or 'empty'})", partial(self._lay, projector, catalogue)))
+            choices.append(
+                (f"{side} projector: lay a picture ({picture or 'empty'})", partial(self._lay, projector, catalogue))
+            )
             if picture:
                 choices.append((f"{side} projector: centre {picture}", partial(self._centre, projector)))
-                choices.append((f"{side} projector: take {picture} off", partial(console.station.say, f"PHOT{projector}:UNL")))
+                choices.append(
+                    (f"{side} projector: take {picture} off", partial(console.station.say, f"PHOT{projector}:UNL"))
+                )
             if projector in console.principal_distances:
                 c = console.principal_distances[projector]
                 words = f"{title(f'c{projector}')} to {c:.2f}, by certificate and film"
@@ -315,10 +335,17 @@ class Deeds:
         choices += [self._lever(name, at) for name, at in dials.fittings.items()]
         if len(variant.base_modes) > 1:
             other = next(mode for mode in variant.base_modes if mode != dials.base)
-            choices.append((f"base {dials.base}: put it {other}", partial(console.station.say, f"BASE:MODE {short(other)}")))
+            choices.append(
+                (f"base {dials.base}: put it {other}", partial(console.station.say, f"BASE:MODE {short(other)}"))
+            )
         choices.append((f"height gear {dials.height_gear}: another", self._height_gear))
         choices.append((f"plan gear {dials.plan_gear}: another", self._plan_gear))
-        choices.append(("preset counters", partial(self._ask_axes, "make counters show", "such as: X 5000 Y 5000 Z 4967", self._preset)))
+        choices.append(
+            (
+                "preset counters",
+                partial(self._ask_axes, "make counters show", "such as: X 5000 Y 5000 Z 4967", self._preset),
+            )
+        )
         choices.append(("all elements to their zeros (*RST)", self._reset))
         self._offer("bench", choices)
 
@@ -370,7 +397,9 @@ class Deeds:
         try:
             units = known.units_per_mm if known else float(gear)
         except ValueError:
-            console.say(f"height gear: expected {', '.join(variant.height_gears)} or a number, got {gear!r}", refused=True)
+            console.say(
+                f"height gear: expected {', '.join(variant.height_gears)} or a number, got {gear!r}", refused=True
+            )
             return
         console.presets.regeared(variant, dials, units)
         console.station.say(f"GEAR:HEIG {quoted(gear) if known else gear}")

@@ -62,7 +62,7 @@ def picture_size(drawing: Drawing, columns: int, rows: int) -> tuple[int, int]:
 @lru_cache(maxsize=16)
 def _vignette(rows: int, columns: int) -> npt.NDArray[np.float32]:
     y, x = np.ogrid[-1.0 : 1.0 : rows * 1j, -1.0 : 1.0 : columns * 1j]
-    return (1.0 - _CORNER * ((x * x + y * y) / 2.0) ** 2).astype(np.float32)
+    return np.asarray(1.0 - _CORNER * ((x * x + y * y) / 2.0) ** 2, dtype=np.float32)
 
 
 def vignetted(greys: Greys) -> Greys:

@@ -125,7 +125,9 @@ class Eyepiece(Widget):
         super().__init__(id=f"eye{eye}")
         self.eye = eye
         self.border_title = name
-        self.tooltip = "What this eye sees about the floating mark. m, M: magnify. e: one eye or both. v: another drawing."
+        self.tooltip = (
+            "What this eye sees about the floating mark. m, M: magnify. e: one eye or both. v: another drawing."
+        )
         self._strips: list[Strip] = []
         self._rows: list[list[Run]] = []
         self._in_colours = False
@@ -257,7 +259,12 @@ class Elements(Panel):
         name_width = 6
         room = (width - name_width) // 2
         bar_width = room - 9 if room >= 13 else 0
-        lines = [Text(" " * name_width + f"{chr(39):>7} {' ' * bar_width} {chr(34):>7}"[: width - name_width], self.like("faint"))]
+        lines = [
+            Text(
+                " " * name_width + f"{chr(39):>7} {' ' * bar_width} {chr(34):>7}"[: width - name_width],
+                self.like("faint"),
+            )
+        ]
         lines += [self._row(name, name_width, bar_width) for name in self._names]
         return Text("\n", no_wrap=True).join(lines)
 
@@ -305,7 +312,13 @@ class Elements(Panel):
             self.post_message(Wheeled(element, way))
 
 
-LEVERS = {"dove": "Dove", "triangulation": "triang.", "diapositive": "diap.", "xcollar": "X collar", "ycollar": "Y collar"}
+LEVERS = {
+    "dove": "Dove",
+    "triangulation": "triang.",
+    "diapositive": "diap.",
+    "xcollar": "X collar",
+    "ycollar": "Y collar",
+}
 
 
 class Fittings(Panel):

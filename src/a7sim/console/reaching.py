@@ -32,7 +32,9 @@ class Presets:
 
     def frame(self, variant: Variant, dials: Dials) -> Array:
         """Return where the mark stands in the frame ``(3,)``, mm, as the counters show it."""
-        return np.array([(dials.counter(axis) - self.origin(variant, axis)) / self.unit(variant, axis) for axis in "XYZ"])
+        return np.array(
+            [(dials.counter(axis) - self.origin(variant, axis)) / self.unit(variant, axis) for axis in "XYZ"]
+        )
 
     def origin(self, variant: Variant, axis: str) -> float:
         """Return what a counter shows in the origin."""

@@ -22,7 +22,7 @@ class Seat:
     """Whether nobody else can turn at this instrument."""
     where: str = ""
     """The scenario or the address, as errors name it."""
-    sheet: JobSheet = JobSheet()
+    sheet: JobSheet = field(default_factory=JobSheet)
     keymap: Keymap = field(default_factory=default_keymap)
     drawing: Drawing | None = None
     """How pictures are drawn; None for the best that the terminal can."""

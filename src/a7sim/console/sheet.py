@@ -45,7 +45,9 @@ def centre(client: Client, projector: int, sheet: JobSheet) -> Centred:
     return lie
 
 
-def _lie(names: list[str], off: np.ndarray[tuple[int, ...], np.dtype[np.float64]], certificate: Camera | None) -> tuple[Centred, tuple[float, float, float]]:
+def _lie(
+    names: list[str], off: np.ndarray[tuple[int, ...], np.dtype[np.float64]], certificate: Camera | None
+) -> tuple[Centred, tuple[float, float, float]]:
     from a7sim.reduction import Undetermined, picture_lie  # noqa: PLC0415 # not before the screen is there
 
     marks = {each.name: (each.x, each.y) for each in certificate.fiducials} if certificate else {}

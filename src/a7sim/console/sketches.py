@@ -54,6 +54,6 @@ def _cell(place: Place, width: int, height: int) -> Cell | None:
 def _write(row: list[str], column: int, name: str) -> None:
     for begin in (column + 1, column - len(name)):
         end = begin + len(name)
-        if 0 <= begin and end <= len(row) and all(each == " " for each in row[max(0, begin) : end]):
+        if begin >= 0 and end <= len(row) and all(each == " " for each in row[max(0, begin) : end]):
             row[begin:end] = name
             return

@@ -117,7 +117,6 @@ class Station:
     def say(self, *lines: str) -> None:
         """Have lines said that ask nothing."""
 
-
         def said(client: Client) -> None:
             for line in lines:
                 client.send(line)

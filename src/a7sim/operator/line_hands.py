@@ -12,6 +12,7 @@ from a7sim.operator.crew import Who
 from a7sim.operator.hands import Truths
 from a7sim.operator.person import Person
 
+
 class LineHands:
     """`Hands` of one person, by lines of text over the link."""
 
