@@ -20,12 +20,14 @@ from a7sim.console.dials import Dials
 from a7sim.console.eyepiece import Drawing, anaglyph, drawn, picture_size, vignetted, with_mark
 from a7sim.console.hands import Hands, title
 from a7sim.console.keymap import DEEDS, deeds_by_key, pressed, shown
-from a7sim.console.panels import Book, Counter, Elements, Eyepiece, Fittings, Pointed, SketchPanel, Wheeled
+from a7sim.console.panels import Book, Counter, Elements, Fittings, Wheeled
+from a7sim.console.prints import Pointed, SketchPanel
 from a7sim.console.reaching import Presets, on_print
 from a7sim.console.seat import Seat, best_drawing, speaks_utf8
 from a7sim.console.sketches import Place
 from a7sim.console.station import Look, Met, News, Refused, Sight, Silent, Station, elapsed
 from a7sim.console.themes import DRUMS, THEMES
+from a7sim.console.window import Eyepiece
 from a7sim.console.words import image_in_words, parallax_in_words
 from a7sim.link.client import Client
 

@@ -1,31 +1,22 @@
 """What every key does: a method a deed, each one order to the station or one change of the view."""
 
-import re
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from a7sim.console.bench import BenchDeeds
 from a7sim.console.book import Entry, record
 from a7sim.console.dialogs import Ask, Choose, HelpPage
-from a7sim.console.dials import Dials
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.hands import title, unit
-from a7sim.console.panels import LEVERS
 from a7sim.console.reaching import Reach
-from a7sim.console.sheet import Centred, centre
 from a7sim.link.client import Client
 from a7sim.link.exchange import say
-from a7sim.link.headers import FITTING_NODES, header, quoted, recorded_as, short
-from a7sim.manual import POSITIONS_OF, Variant
-
-if TYPE_CHECKING:
-    from a7sim.console.app import Console
+from a7sim.link.headers import header, quoted, recorded_as
 
 MAGNIFICATIONS = (1.0, 2.0, 4.0, 8.0, 12.0, 20.0, 40.0)
 EYES = ((1, 2), (1,), (2,))
 MERGED = ("side by side", "anaglyph", "flicker")
-PROJECTORS = {1: "left", 2: "right"}
 WHY = "struck out at the console"
 
 _TURNS = {
@@ -40,12 +31,8 @@ _TAKEN = ("kappa", "phi", "omega", "by", "bz", "c", "bx", "common_phi")
 _BEFORE_ANYTHING_ANSWERS = ("quit", "help")
 
 
-class Deeds:
+class Deeds(BenchDeeds):
     """The deeds of a console."""
-
-    @property
-    def _console(self) -> "Console":
-        return self  # type: ignore[return-value] # the only class that has these deeds
 
     def do(self, name: str) -> None:
         """Do what a key or the palette asks for."""
@@ -58,11 +45,6 @@ class Deeds:
             self.take_up(name)
         else:
             getattr(self, f"do_{name}")()
-
-    def _at(self) -> tuple[Variant, Dials]:
-        console = self._console
-        assert console.met is not None and console.dials is not None
-        return console.met.variant, console.dials
 
     # --- hands ----------------------------------------------------------------------------------------
 
@@ -86,11 +68,6 @@ class Deeds:
             console.say(f"an {variant.name} has no {name.replace('_', ' ')}", refused=True)
             return
         self._hold(taken)
-
-    def _hold(self, hands: Any) -> None:
-        console = self._console
-        console.hands = hands
-        console.refresh_panels()
 
     def do_left_side(self) -> None:
         """Take the left projector's."""
@@ -170,36 +147,9 @@ class Deeds:
             f"set {title(element)} to", note, lambda value: console.station.say(f"{header(element)} {value:g}")
         )
 
-    def _ask_number(self, question: str, note: str, then: Callable[[float], None]) -> None:
-        console = self._console
-
-        def answered(answer: str | None) -> None:
-            if answer is None:
-                return
-            try:
-                then(float(answer))
-            except ValueError:
-                console.say(f"{question}: expected a number, got {answer!r}", refused=True)
-
-        console.push_screen(Ask(question, note=note), answered)
-
     def do_drive(self) -> None:
         """Run carriages to readings."""
         self._ask_axes("run to readings", "such as: X 97.5 Y -12 Z -325.71", self._drive)
-
-    def _ask_axes(self, question: str, note: str, then: Callable[[list[tuple[str, str]]], None]) -> None:
-        console = self._console
-
-        def answered(answer: str | None) -> None:
-            if answer is None:
-                return
-            found = re.findall(r"([XYZ])\s*=?\s*([-+]?[0-9]*\.?[0-9]+)", answer.upper())
-            if not found or re.sub(r"([XYZ])\s*=?\s*([-+]?[0-9]*\.?[0-9]+)[\s,;]*", "", answer.upper()).strip():
-                console.say(f"{question}: expected readings {note}, got {answer!r}", refused=True)
-            else:
-                then(found)
-
-        console.push_screen(Ask(question, note=note), answered)
 
     def _drive(self, readings: list[tuple[str, str]]) -> None:
         self._console.station.say(*(f"DRIV:{axis} {reading}" for axis, reading in readings))
@@ -307,123 +257,6 @@ class Deeds:
                 console.say(f"noted: {text}")
 
         console.push_screen(Ask("note"), noted)
-
-    # --- the bench ------------------------------------------------------------------------------------
-
-    def do_bench(self) -> None:
-        """Offer all that is done at the bench rather than at the wheels."""
-        self._console.ask(lambda client: client.fields("PHOT:CAT?"), self._bench)
-
-    def _bench(self, catalogue: list[str]) -> None:
-        variant, dials = self._at()
-        console = self._console
-        choices: list[tuple[str, Callable[[], Any]]] = []
-        for projector, picture in enumerate(dials.pictures, start=1):
-            side = PROJECTORS[projector]
-            choices.append(
-                (f"{side} projector: lay a picture ({picture or 'empty'})", partial(self._lay, projector, catalogue))
-            )
-            if picture:
-                choices.append((f"{side} projector: centre {picture}", partial(self._centre, projector)))
-                choices.append(
-                    (f"{side} projector: take {picture} off", partial(console.station.say, f"PHOT{projector}:UNL"))
-                )
-            if projector in console.principal_distances:
-                c = console.principal_distances[projector]
-                words = f"{title(f'c{projector}')} to {c:.2f}, by certificate and film"
-                choices.append((words, partial(console.station.say, f"PROJ{projector}:PDIS {c:.2f}")))
-        choices += [self._lever(name, at) for name, at in dials.fittings.items()]
-        if len(variant.base_modes) > 1:
-            other = next(mode for mode in variant.base_modes if mode != dials.base)
-            choices.append(
-                (f"base {dials.base}: put it {other}", partial(console.station.say, f"BASE:MODE {short(other)}"))
-            )
-        choices.append((f"height gear {dials.height_gear}: another", self._height_gear))
-        choices.append((f"plan gear {dials.plan_gear}: another", self._plan_gear))
-        choices.append(
-            (
-                "preset counters",
-                partial(self._ask_axes, "make counters show", "such as: X 5000 Y 5000 Z 4967", self._preset),
-            )
-        )
-        choices.append(("all elements to their zeros (*RST)", self._reset))
-        self._offer("bench", choices)
-
-    def _offer(self, question: str, choices: list[tuple[str, Callable[[], Any]]]) -> None:
-        def chosen(number: str | None) -> None:
-            if number is not None:
-                choices[int(number.removeprefix("n"))][1]()
-
-        listed = [(f"n{number}", words) for number, (words, _) in enumerate(choices)]
-        self._console.push_screen(Choose(question, listed), chosen)
-
-    def _lay(self, projector: int, catalogue: list[str]) -> None:
-        console = self._console
-
-        def chosen(name: str | None) -> None:
-            if name is not None:
-                console.principal_distances.pop(projector, None)
-                console.station.say(f"PHOT{projector}:LOAD {quoted(catalogue[int(name.removeprefix('n'))])}")
-
-        listed = [(f"n{number}", name) for number, name in enumerate(catalogue)]
-        console.push_screen(Choose(f"lay in the {PROJECTORS[projector]} projector", listed), chosen)
-
-    def _centre(self, projector: int) -> None:
-        console = self._console
-
-        def centred(lie: Centred) -> None:
-            if lie.principal_distance is not None:
-                console.principal_distances[projector] = lie.principal_distance
-            console.say(f"{PROJECTORS[projector]} picture: {lie.words}")
-
-        console.ask(lambda client: centre(client, projector, console.seat.sheet), centred)
-
-    def _lever(self, name: str, at: str) -> tuple[str, Callable[[], Any]]:
-        other = next(position for position in POSITIONS_OF[name] if position != at)
-        line = f"FITT:{FITTING_NODES[name]} {short(other)}"
-        return f"{LEVERS[name]} {at}: put it {other}", partial(self._console.station.say, line)
-
-    def _height_gear(self) -> None:
-        variant, _ = self._at()
-        note = f"{', '.join(variant.height_gears)} or units a mm"
-        self._console.push_screen(Ask("height gear", note=note), self._gear_in)
-
-    def _gear_in(self, gear: str | None) -> None:
-        console = self._console
-        if gear is None:
-            return
-        variant, dials = self._at()
-        known = variant.height_gears.get(gear)
-        try:
-            units = known.units_per_mm if known else float(gear)
-        except ValueError:
-            console.say(
-                f"height gear: expected {', '.join(variant.height_gears)} or a number, got {gear!r}", refused=True
-            )
-            return
-        console.presets.regeared(variant, dials, units)
-        console.station.say(f"GEAR:HEIG {quoted(gear) if known else gear}")
-
-    def _plan_gear(self) -> None:
-        console = self._console
-
-        def chosen(gear: str | None) -> None:
-            if gear is not None:
-                console.station.say(f"GEAR:PLAN {quoted(gear)}")
-
-        console.push_screen(Ask("plan gear", note="such as 1-2-1"), chosen)
-
-    def _preset(self, readings: list[tuple[str, str]]) -> None:
-        console = self._console
-        variant, dials = self._at()
-        for axis, reading in readings:
-            if variant.scales[axis].preset:
-                console.presets.preset(variant, dials, axis, float(reading))
-            console.station.say(f"COUN:{axis}:PRES {reading}")
-
-    def _reset(self) -> None:
-        self._console.presets.origins.clear()
-        self._console.station.say("*RST")
 
     # --- eyes and screen ------------------------------------------------------------------------------
 

@@ -1,26 +1,19 @@
 """The panels of the console: each shows what it is given and draws only when that changes."""
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
-from textwrap import wrap
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from rich.color import Color
-from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 from textual import events
 from textual.geometry import Size
 from textual.message import Message
-from textual.strip import Strip
 from textual.widget import Widget
 
 from a7sim.console.book import Entry
 from a7sim.console.dials import Dials
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
-from a7sim.console.eyepiece import COLOUR_LEVELS, LEVELS, MARK, Run, window
 from a7sim.console.hands import BARE, Hands
-from a7sim.console.sketches import Place, Sketch, sketched
 from a7sim.manual import POSITIONS_OF, Variant
 
 ROLLING_S = 0.04
@@ -34,53 +27,6 @@ class Wheeled(Message):
         super().__init__()
         self.drum = drum
         self.way = way
-
-
-class Pointed(Message):
-    """A point of a sketch was clicked."""
-
-    def __init__(self, projector: int, point: str) -> None:
-        super().__init__()
-        self.projector = projector
-        self.point = point
-
-
-@lru_cache(maxsize=4096)
-def _grey(ink: int | None, paper: int | None) -> Style:
-    return Style(color=_of_level(ink), bgcolor=_of_level(paper))
-
-
-@lru_cache(maxsize=LEVELS + 1)
-def _of_level(level: int | None) -> Color | None:
-    return None if level is None else Color.from_rgb(*(level * 255 // (LEVELS - 1),) * 3)
-
-
-@lru_cache(maxsize=8192)
-def _red_and_cyan(ink: int | None, paper: int | None) -> Style:
-    return Style(color=_of_both(ink), bgcolor=_of_both(paper))
-
-
-def _of_both(level: int | None) -> Color | None:
-    if level is None:
-        return None
-    left, right = (each * 255 // (COLOUR_LEVELS - 1) for each in divmod(level, COLOUR_LEVELS))
-    return Color.from_rgb(left, right, right)
-
-
-def _strip_of(
-    row: list[Run], width: int, look: Callable[[int | None, int | None], Style], dark: Style, mark: Style
-) -> Strip:
-    segments = []
-    room = width
-    for text, ink, paper in row:
-        if ink == MARK:
-            segments.append(Segment(text, dark + look(None, paper) + mark))
-        else:
-            segments.append(Segment(text, dark if ink is None else look(ink, paper)))
-        room -= len(text)
-    if room > 0:
-        segments.append(Segment(" " * room, dark))
-    return Strip(segments, max(width, width - room))
 
 
 class Panel(Widget):
@@ -103,75 +49,6 @@ class Panel(Widget):
     def like(self, part: str) -> Style:
         """Return the style of a part."""
         return self.get_component_rich_style(f"panel--{part}", partial=True)
-
-
-class Eyepiece(Widget):
-    """What one eye sees: the picture about the floating mark, which never leaves the middle."""
-
-    COMPONENT_CLASSES: ClassVar[set[str]] = {"eyepiece--mark"}
-
-    class Resized(Message):
-        """There is another room for the picture."""
-
-    class Clicked(Message):
-        """A place of the picture was clicked: cells to the right of the mark and above it."""
-
-        def __init__(self, across: int, up: int) -> None:
-            super().__init__()
-            self.across = across
-            self.up = up
-
-    def __init__(self, eye: int, name: str) -> None:
-        super().__init__(id=f"eye{eye}")
-        self.eye = eye
-        self.border_title = name
-        self.tooltip = (
-            "What this eye sees about the floating mark. m, M: magnify. e: one eye or both. v: another drawing."
-        )
-        self._strips: list[Strip] = []
-        self._rows: list[list[Run]] = []
-        self._in_colours = False
-
-    @property
-    def cells(self) -> tuple[int, int]:
-        """Columns and rows of the picture."""
-        return window(self.content_size.width, self.content_size.height)
-
-    def show(self, rows: list[list[Run]], in_colours: bool = False) -> None:
-        """Draw rows of runs, if they are not those that are shown."""
-        if rows == self._rows and in_colours == self._in_colours and self._strips:
-            return
-        self._rows, self._in_colours = rows, in_colours
-        self._lay()
-
-    def say(self, words: str) -> None:
-        """Show words instead of a picture, wrapped to the room."""
-        lines = wrap(words, max(8, self.content_size.width))
-        self.show([[Run(line)] for line in lines])
-
-    def _lay(self) -> None:
-        width, dark = self.content_size.width, self.rich_style
-        look = _red_and_cyan if self._in_colours else _grey
-        mark = self.get_component_rich_style("eyepiece--mark", partial=True)
-        self._strips = [_strip_of(row, width, look, dark, mark) for row in self._rows]
-        self.refresh()
-
-    def render_line(self, y: int) -> Strip:
-        """Return a line of the picture on the dark of the eyepiece."""
-        if y < len(self._strips):
-            return self._strips[y]
-        return Strip.blank(self.content_size.width, self.rich_style)
-
-    def on_resize(self) -> None:
-        """Ask for a picture of the new size."""
-        self.post_message(self.Resized())
-
-    def on_click(self, event: events.Click) -> None:
-        """Tell which place of the picture was clicked."""
-        columns, rows = self.cells
-        offset = event.get_content_offset(self)
-        if offset is not None:
-            self.post_message(self.Clicked(offset.x - columns // 2, rows // 2 - offset.y))
 
 
 class Counter(Panel):
@@ -358,65 +235,6 @@ class Fittings(Panel):
 
 def _fitted(dials: Dials) -> tuple[object, ...]:
     return dials.fittings, dials.base, dials.height_gear, dials.plan_gear
-
-
-class SketchPanel(Panel):
-    """The print of a photograph: pricked points, and the mark."""
-
-    def __init__(self, projector: int, id: str) -> None:
-        super().__init__(id=id)
-        self.projector = projector
-        self.border_title = "sketch"
-        self.tooltip = "Points pricked on the print, + the mark. Click one, or press g, to drive near it."
-        self.dot = "·"
-        self._given: tuple[Mapping[str, Place], Place | None] = ({}, None)
-        self._going_to: str | None = None
-        self._title = ""
-        self._sketch = Sketch([], None, {})
-
-    def show(self, picture: str, points: Mapping[str, Place], mark: Place | None, going_to: str | None) -> None:
-        """Show a print's points, where the mark stands, and which point is worked at."""
-        self._given = points, mark
-        title = f"sketch {picture}" if picture else "no picture"
-        if title != self._title:
-            self._title = self.border_title = title
-        self._draw(going_to)
-
-    def on_resize(self) -> None:
-        """Draw the print in the new room."""
-        self._draw(self._going_to)
-
-    def _draw(self, going_to: str | None) -> None:
-        width, height = self.content_size
-        if not self.display or not width or not height:
-            return
-        sketch = sketched(*self._given, width, height, self.dot)
-        if (sketch, going_to) != (self._sketch, self._going_to):
-            self._sketch, self._going_to = sketch, going_to
-            self.refresh()
-
-    def render(self) -> Text:
-        """Return the sketch."""
-        sketch, going_to = self._sketch, self._going_to
-        text = Text("\n", no_wrap=True).join(Text(row, self.like("word")) for row in sketch.rows)
-        line = self.content_size.width + 1
-        if going_to is not None and going_to in sketch.points:
-            column, row = sketch.points[going_to]
-            text.stylize(self.like("hand"), row * line + column, row * line + column + 1)
-            at = sketch.rows[row].find(going_to)
-            if at >= 0:
-                text.stylize(self.like("hand"), row * line + at, row * line + at + len(going_to))
-        if sketch.mark is not None:
-            at = sketch.mark[1] * line + sketch.mark[0]
-            text.stylize(self.like("mark"), at, at + 1)
-        return text
-
-    def on_click(self, event: events.Click) -> None:
-        """Tell which point was clicked."""
-        offset = event.get_content_offset(self)
-        point = self._sketch.nearest(offset.x, offset.y) if offset is not None else None
-        if point is not None:
-            self.post_message(Pointed(self.projector, point))
 
 
 class Book(Panel):
