@@ -182,7 +182,7 @@ class Deeds(BenchDeeds):
         other = console.sketches[3 - projector]
         common = sorted((name for name in points if name in other), key=str)
         lone = sorted((name for name in points if name not in other), key=str)
-        choices = [(name, f"{name}    in both pictures") for name in common] + [(name, name) for name in lone]
+        choices = [(name, f"{name:<8}in both pictures") for name in common] + [(name, name) for name in lone]
 
         def chosen(name: str | None) -> None:
             if name is not None:

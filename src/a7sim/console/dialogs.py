@@ -86,16 +86,23 @@ class HelpPage(ModalScreen[None]):
 
 
 _HOW_TO = """\
-Two eyes look at two photographs of the same ground. The dot in the middle is the floating mark; the pictures
-move under it. Where a projector is not oriented, the two images of a point differ in height: that is y-parallax.
-Take up an element, turn it until they agree, record.
+Two eyes look at two photographs of the same ground. The dot in the
+middle is the floating mark; the pictures move under it. Where a
+projector is not oriented, the two images of a point differ in height:
+that is y-parallax. Take up an element and turn it until they agree.
 
-A beginning:  l load both pictures, centre them, set c   g go to a point   PgUp PgDn until the images agree
-sideways   y take up by'   + - until they agree in height   Enter record   x strikes a reading out
+A BEGINNING
+  l          lay both pictures, centre them, set c
+  b s        bx, to the base of the model; d runs Z to its height
+  g          drive near a point
+  PgUp PgDn  until the images agree sideways
+  y + -      by', until they agree in height
+  Enter      record; x strikes a reading out
 
-Every press of a key is one step; [ and ] change the step. 0.002 turns a drum between two counts, as the eye
-wants it. With free hand X and Y move without the handwheels and their collars.
-Ctrl+P lists everything by name, themes too. Ctrl+Q leaves from anywhere. The mouse wheel turns any drum.
+Every press of a key is one step; [ and ] change the step. 0.002 turns a
+drum between two counts, as the eye wants it. With free hand X and Y
+move without the handwheels and their collars. The mouse wheel turns any
+drum. Ctrl+P lists everything by name, themes too; Ctrl+Q leaves.
 """
 
 
