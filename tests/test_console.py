@@ -150,11 +150,30 @@ def test_what_the_instrument_refuses_is_one_sentence_and_nothing_moves() -> None
             await person.settle()
             await person.press("y", "s")
             await person.type_in("60")
-            assert person.message() == "by1 expected -50 to 50 mm, got 60" or "expected" in person.message()
+            assert person.message() == "expected -50.00 to 50.00, got 60"
             assert console.dials.elements["by1"] == "0.00"
             await person.press("s")
             await person.type_in("sixty")
             assert person.message() == "set by' to: expected a number, got 'sixty'"
+
+    played(sit_down())
+
+
+def test_a_question_that_is_refused_does_not_break_the_conversation() -> None:
+    door = with_photographs()
+    port = InProcessSerial(desk=door.desk, clock=door.clock, timeout=0.1)
+    console = Console(Seat(lambda: Client(port), lambda: 0.0))
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            answers: list[object] = []
+            console.ask(lambda client: client.fields("PHOT1:FID?"), answers.append)
+            await person.press("right")
+            assert answers == [] and console.silent is None
+            assert person.message() == "there is no picture in projector 1"
+            assert console.dials.counters["X"] == "1.00"
 
     played(sit_down())
 

@@ -2,7 +2,9 @@
 
 import time
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from msgspec import structs
@@ -13,8 +15,12 @@ from a7sim.console.eyepiece import Drawing
 from a7sim.console.words import ACUITY_UM
 from a7sim.link.client import Client
 from a7sim.link.clock import Clock
+from a7sim.link.opening import TIMEOUT_S
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario, load_scenario
+
+if TYPE_CHECKING:
+    from a7sim.instrument.language import Desk
 
 USUAL = "akwanga"
 """The scenario when nothing is named."""
@@ -123,16 +129,20 @@ def _at_a_line(url: str, token_file: Path | None) -> Callable[[], Client]:
 def _in_process(scenario: Scenario | None, seed: int | None, clock: Clock) -> Callable[[], Client]:
     """Return what builds the instrument when it is first spoken to, while the screen is already there."""
     assert scenario is not None
+    drawn_by = scenario.seed if seed is None else seed
 
-    def opened() -> Client:
+    @cache
+    def desk() -> "Desk":
         from a7sim.instrument import build_autograph  # noqa: PLC0415 # beside the first paint of the screen
         from a7sim.instrument.language import Desk  # noqa: PLC0415
-        from a7sim.link.inprocess import InProcessSerial  # noqa: PLC0415
         from a7sim.scene import build_scene  # noqa: PLC0415
 
-        drawn_by = scenario.seed if seed is None else seed
-        desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, drawn_by).drawer, drawn_by))
-        return Client(InProcessSerial(desk=desk, clock=clock, timeout=5.0))
+        return Desk(build_autograph(scenario.instrument, build_scene(scenario, drawn_by).drawer, drawn_by))
+
+    def opened() -> Client:
+        from a7sim.link.inprocess import InProcessSerial  # noqa: PLC0415
+
+        return Client(InProcessSerial(desk=desk(), clock=clock, timeout=TIMEOUT_S))
 
     return opened
 

@@ -1,5 +1,6 @@
 """The console: the screen, what it knows, and what the station tells it."""
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -447,7 +448,7 @@ def sketch_of(projector: int, picture: str, client: Client) -> dict[str, Place]:
 
 
 def in_words(error: str) -> str:
-    """Return an entry of the instrument's error queue as people read it."""
+    """Return an entry of the instrument's error queue as people read it, without number and header."""
     _, _, text = error.partition(",")
     message, _, detail = text.strip().strip('"').partition(";")
-    return detail or message
+    return re.sub(r"^[A-Z]+[A-Z0-9:?]*( \S+)?: ", "", detail) or message

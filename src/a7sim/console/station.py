@@ -149,7 +149,7 @@ class Station:
                 self._leaving.wait(RETRY_S)
 
     def _forget_orders(self) -> None:
-        """What was turned at a dead instrument is not turned when it answers again."""
+        """Drop what was ordered of an instrument that did not answer: it is not turned when it does again."""
         while not self._orders.empty():
             self._orders.get()
         with self._counting:
@@ -161,6 +161,7 @@ class Station:
         variant = VARIANTS.get(identity.model)
         if variant is None:
             raise Lost(f"expected an A7 or A8, got {identity.model or 'an instrument that does not say what it is'}")
+        self._forget_orders()
         self._tell(Met(identity, variant))
         self._shown = None
         asked = question(variant)
@@ -179,12 +180,21 @@ class Station:
         obeyed = 0
         while True:
             if order is not None:
-                order(client)
+                self._obey(client, order)
                 obeyed += 1
             try:
                 order = self._orders.get_nowait()
             except queue.Empty:
                 return obeyed
+
+    def _obey(self, client: Client, order: Order) -> None:
+        """Say one thing; what the instrument refuses to answer is told, and only silence breaks the conversation."""
+        try:
+            order(client)
+        except InstrumentRefused as refused:
+            if not refused.errors:
+                raise
+            self._tell(Refused(tuple(refused.errors)))
 
     def _refresh(self, client: Client, variant: Variant, asked: str, obeyed: int) -> None:
         look = self._look
