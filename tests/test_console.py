@@ -35,6 +35,7 @@ def played(sitting: Coroutine[Any, Any, None]) -> None:
     asyncio.run(sitting)
 
 
+@pytest.mark.slow
 def test_a_person_orients_by_eye_and_what_is_recorded_is_what_the_same_lines_give_over_a_link() -> None:
     heard: list[LinkEvent] = []
     door = with_photographs(heard.append)

@@ -24,6 +24,9 @@ POLL_S = 0.5
 RETRY_S = 1.0
 """How often a line that broke is tried again."""
 
+SLOW_S = 0.05
+"""Pictures that take longer are not waited for with the dials."""
+
 Order = Callable[[Client], None]
 """Something to say to the instrument."""
 
@@ -91,6 +94,7 @@ class Station:
         self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
         self._look = Look()
         self._shown: tuple[Dials, Look] | None = None
+        self._sight_took_s = 0.0
         self._leaving = threading.Event()
         self._at_rest = threading.Event()
         self._waiting = 0
@@ -204,16 +208,27 @@ class Station:
             raise Lost("no answer")
         dials = read_dials(variant, reply)
         if obeyed or (dials, look) != self._shown:
-            if self._shown is None or dials != self._shown[0]:
-                self._tell(dials)
-            self._shown = dials, look
-            self._tell(self._sight(client, look))
+            self._show(client, dials, look)
         if dials.errors:
             self._tell(Refused(tuple(client.errors())))
         with self._counting:
             self._waiting = max(0, self._waiting - obeyed)
             if self._waiting == 0:
                 self._at_rest.set()
+
+    def _show(self, client: Client, dials: Dials, look: Look) -> None:
+        """Tell dials and pictures in one go where pictures come quickly, else the dials before the pictures."""
+        changed = self._shown is None or dials != self._shown[0]
+        self._shown = dials, look
+        if changed and self._sight_took_s > SLOW_S:
+            self._tell(dials)
+        began = time.monotonic()
+        sight = self._sight(client, look)
+        quick = self._sight_took_s <= SLOW_S
+        self._sight_took_s = time.monotonic() - began
+        if changed and quick:
+            self._tell(dials)
+        self._tell(sight)
 
     def _sight(self, client: Client, look: Look) -> Sight:
         pictures = {eye: self._picture(client, look, eye) for eye in look.eyes if look.columns and look.rows}
