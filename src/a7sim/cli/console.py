@@ -1,5 +1,6 @@
 """`a7sim console`: sit down at the instrument."""
 
+import sys
 import time
 from collections.abc import Callable
 from functools import cache
@@ -88,6 +89,8 @@ def command(
         return clock.now
 
     opened = _at_a_line(connect, token_file) if connect else _in_process(loaded, seed, clock)
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        raise Mistake("console: expected a terminal to sit at, got a file or a pipe (a7sim send takes lines from one)")
     sheet = JobSheet(loaded.title, loaded.camera) if loaded else JobSheet()
     Console(
         Seat(
