@@ -45,7 +45,7 @@ def by_socket(port):
 
 def by_pyserial(device):
     """Return what asks a terminal by pyserial."""
-    import serial  # noqa: PLC0415 # a peer's environment has none
+    import serial  # a peer's environment has none
 
     port = serial.Serial(device, timeout=PATIENCE)
     line = QUERY + b"\n"
@@ -59,10 +59,10 @@ def by_pyserial(device):
 
 def by_visa(resource, library):
     """Return what asks a VISA resource."""
-    import pyvisa  # noqa: PLC0415
+    import pyvisa
 
     if "a7sim://" in resource:
-        import a7sim  # noqa: F401, PLC0415 # teaches pyserial the URL
+        import a7sim  # noqa: F401 # teaches pyserial the URL
     instrument = pyvisa.ResourceManager(library).open_resource(
         resource, read_termination="\n", write_termination="\n", timeout=1000 * PATIENCE
     )

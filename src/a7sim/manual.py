@@ -26,6 +26,10 @@ NOT_VISIBLE = "9.91E37"
 """What the command language answers for what cannot be seen or measured (SCPI's not-a-number)."""
 
 
+SCPI_VERSION = "1999.0"
+"""The edition of SCPI that the command language follows, as it answers."""
+
+
 @dataclass(frozen=True, slots=True)
 class Element:
     """An orientation element: its range and its counter zero, in mm or gon."""

@@ -27,6 +27,7 @@ _VERBS = {
     "report": "a7sim.cli.report",
     "export": "a7sim.cli.export",
     "compare": "a7sim.cli.compare",
+    "console": "a7sim.cli.console",
 }
 
 

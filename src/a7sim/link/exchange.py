@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from a7sim.instrument.language.commands import SCPI_VERSION
 from a7sim.link.client import Client
 from a7sim.link.replies import Part, as_text
+from a7sim.manual import SCPI_VERSION
 from a7sim.mistakes import Mistake
 
 _MARKER = ":SYST:ERR:COUN?;:SYST:VERS?"

@@ -6,33 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array
+from a7sim.link.headers import FITTING_NODES, header, short
 from a7sim.manual import NOT_VISIBLE, POSITIONS_OF
 from a7sim.operator.crew import Who
 from a7sim.operator.hands import Truths
 from a7sim.operator.person import Person
-
-ELEMENT_NODES: Mapping[str, str] = {
-    "kappa": "KAPP",
-    "phi": "PHI",
-    "omega": "OMEG",
-    "by": "BY",
-    "bz": "BZ",
-    "c": "PDIS",
-}
-
-_FITTING_NODES: Mapping[str, str] = {
-    "dove": "DOVE",
-    "triangulation": "TRI",
-    "diapositive": "DIAP",
-    "xcollar": "XCOL",
-    "ycollar": "YCOL",
-}
-_SHORT = {"inside": "IN", "outside": "OUT", "front": "FRON", "right": "RIGH"}
-
-
-def _short(position: str) -> str:
-    """Return the short form of a position, as it is said and shown."""
-    return _SHORT.get(position, position.upper())
 
 
 class LineHands:
@@ -58,14 +36,14 @@ class LineHands:
         self._send(f'GEAR:PLAN "{plan_gear}"')
 
     def set_base_mode(self, who: Who, mode: str) -> None:
-        self._send(f"BASE:MODE {_SHORT[mode]}")
+        self._send(f"BASE:MODE {short(mode)}")
 
     def set_fitting(self, who: Who, name: str, position: str) -> None:
-        self._send(f"FITT:{_FITTING_NODES[name]} {_short(position)}")
+        self._send(f"FITT:{FITTING_NODES[name]} {short(position)}")
 
     def fitting(self, who: Who, name: str) -> npt.NDArray[np.str_]:
-        shown = self._person.client.ask(f"FITT:{_FITTING_NODES[name]}?")
-        return np.array([each for each in POSITIONS_OF[name] if _short(each) == shown])
+        shown = self._person.client.ask(f"FITT:{FITTING_NODES[name]}?")
+        return np.array([each for each in POSITIONS_OF[name] if short(each) == shown])
 
     def set_element(self, who: Who, name: str, values: Array) -> None:
         self._send(f"{header(name)} {values[0]:.2f}")
@@ -145,12 +123,3 @@ class LineHands:
     def refused(self, who: Who) -> dict[int, list[str]]:
         errors = self._person.client.errors()
         return {0: errors} if errors else {}
-
-
-def header(element: str) -> str:
-    """Return the header of an element such as kappa1 or bx."""
-    if element == "bx":
-        return "BASE:BX"
-    if element == "common_phi":
-        return "COMM:PHI"
-    return f"PROJ{element[-1]}:{ELEMENT_NODES[element[:-1]]}"

@@ -30,10 +30,21 @@ def _value_noise(x: Array, y: Array, salt: int) -> Array:
     x0, y0 = np.floor(x), np.floor(y)
     fx, fy = x - x0, y - y0
     wx, wy = fx * fx * (3.0 - 2.0 * fx), fy * fy * (3.0 - 2.0 * fy)
-    corner = [[_hashed(x0 + i, y0 + j, salt) for j in (0, 1)] for i in (0, 1)]
+    corner = _corners(x0, y0, salt)
     low = corner[0][0] * (1.0 - wx) + corner[1][0] * wx
     high = corner[0][1] * (1.0 - wx) + corner[1][1] * wx
     return np.asarray(low * (1.0 - wy) + high * wy)
+
+
+def _corners(x0: Array, y0: Array, salt: int) -> list[list[Array]]:
+    """Return the values at the four corners of every place's cell, by x and y; each knot is hashed but once."""
+    low_x, low_y = x0.min(initial=np.inf), y0.min(initial=np.inf)
+    across, up = (int(at.max(initial=low) - low) + 2 for at, low in ((x0, low_x), (y0, low_y)))
+    if not x0.size or across * up > x0.size:
+        return [[_hashed(x0 + i, y0 + j, salt) for j in (0, 1)] for i in (0, 1)]
+    knots = _hashed(low_x + np.arange(across)[:, None], low_y + np.arange(up), salt).ravel()
+    at = ((x0 - low_x) * up + (y0 - low_y)).astype(np.intp)
+    return [[knots[at + (i * up + j)] for j in (0, 1)] for i in (0, 1)]
 
 
 def _hashed(i: Array, j: Array, salt: int) -> Array:
@@ -53,7 +64,9 @@ def signals(points: Marks) -> Callable[[Array], Array]:
 
     def covered(xy: Array) -> Array:
         cover = np.zeros(xy.shape[1:])
-        for i in range(points.xy.shape[1]):
+        places = xy.reshape(2, -1)
+        low, high = places.min(axis=1)[:, None] - SIGNAL_MM, places.max(axis=1)[:, None] + SIGNAL_MM
+        for i in np.flatnonzero(((points.xy > low) & (points.xy < high)).all(axis=0)):
             offset = np.abs(xy - points.xy[:, i].reshape((2,) + (1,) * (xy.ndim - 1)))
             near = (offset.max(axis=0) < SIGNAL_MM) & (offset.min(axis=0) < SIGNAL_MM / 4.0)
             cover[near & (length_of(offset) > SIGNAL_MM / 4.0)] = 1.0

@@ -21,13 +21,12 @@ from a7sim.instrument.language.table import (
     QuotedOrNumber,
     short_form,
 )
-from a7sim.manual import NOT_VISIBLE
+from a7sim.manual import NOT_VISIBLE, SCPI_VERSION
 
 if TYPE_CHECKING:
     from a7sim.instrument.autograph import Autograph
     from a7sim.instrument.language.engine import Engine
 
-SCPI_VERSION = "1999.0"
 
 LARGEST_PICTURE = 1024
 """Columns or rows of an eyepiece picture."""

@@ -1,0 +1,55 @@
+"""The book of whoever sits there: what was recorded, in order, struck out or not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from a7sim.console.hands import title
+from a7sim.link.client import Client
+from a7sim.link.headers import quoted, recorded_as
+from a7sim.manual import VARIANTS
+
+ELEMENTS = tuple(dict.fromkeys(name for variant in VARIANTS.values() for name in variant.elements))
+
+COUNTERS = 5
+"""Values of a registration before its elements: number, point, X, Y, Z."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A registration as the recorder keeps it."""
+
+    number: int
+    point: str
+    counters: tuple[str, ...]
+    elements: tuple[tuple[str, str], ...] = ()
+    """Element as the field writes it, such as by', and its reading."""
+    struck: bool = False
+
+    @classmethod
+    def read(cls, values: Sequence[str]) -> "Entry":
+        """Return the entry that the values of `REC:LAST?` show."""
+        number, point, *counters = values[:COUNTERS]
+        rest = [each for each in values[COUNTERS:] if not each.startswith("struck:")]
+        elements = tuple((_title(word), reading) for word, reading in zip(rest[0::2], rest[1::2], strict=True))
+        return cls(int(number), point, tuple(counters), elements, len(rest) < len(values) - COUNTERS)
+
+    def as_line(self) -> str:
+        """Return the entry for people; an x stands before one that is struck out."""
+        readings = "".join(f"{reading:>8}" for reading in self.counters)
+        elements = "".join(f"  {word} {reading}" for word, reading in self.elements)
+        return f"{'x' if self.struck else ' '}{self.number:>3} {self.point:<5}{readings}{elements}"
+
+    def struck_out(self) -> "Entry":
+        """Return the entry struck out; it stays."""
+        return replace(self, struck=True)
+
+
+def _title(word: str) -> str:
+    return next((title(element) for element in ELEMENTS if recorded_as(element) == word), word)
+
+
+def record(client: Client, point: str, elements: Sequence[str]) -> Entry | None:
+    """Register the counters and elements under a point; return the entry, None where the instrument refused."""
+    words = "".join(f",{word}" for word in elements)
+    before, after = client.numbers(f"REC:COUN?;:REC {quoted(point)}{words};:REC:COUN?")
+    return Entry.read(client.fields("REC:LAST?")) if after > before else None

@@ -1,0 +1,119 @@
+"""What comes up over the screen: a question, a choice, and help."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import BindingType
+from textual.containers import Vertical, VerticalScroll
+from textual.screen import ModalScreen
+from textual.widgets import Input, OptionList, Static
+from textual.widgets.option_list import Option
+
+from a7sim.console.keymap import DEEDS, Keymap, shown
+
+_LEAVING: list[BindingType] = [("escape", "leave", "back")]
+
+
+class Ask(ModalScreen[str | None]):
+    """A question with a line to answer it; escape leaves without an answer."""
+
+    BINDINGS: ClassVar[list[BindingType]] = _LEAVING
+
+    def __init__(self, question: str, answer: str = "", note: str = "") -> None:
+        super().__init__()
+        self._question, self._answer, self._note = question, answer, note
+
+    def compose(self) -> ComposeResult:
+        """Lay out the question."""
+        with Vertical(id="dialog") as dialog:
+            dialog.border_title = self._question
+            yield Input(self._answer, compact=True)
+            yield Static(self._note or "Enter does it, Esc leaves it", classes="note", markup=False)
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Give the answer."""
+        self.dismiss(event.value.strip() or None)
+
+    def action_leave(self) -> None:
+        """Give none."""
+        self.dismiss(None)
+
+
+class Choose(ModalScreen[str | None]):
+    """A choice among named things; escape leaves without one."""
+
+    BINDINGS: ClassVar[list[BindingType]] = _LEAVING
+
+    def __init__(self, question: str, choices: Sequence[tuple[str, str]]) -> None:
+        super().__init__()
+        self._question, self._choices = question, choices
+
+    def compose(self) -> ComposeResult:
+        """Lay out the choices: pairs of what is returned and how it reads."""
+        with Vertical(id="dialog") as dialog:
+            dialog.border_title = self._question
+            yield OptionList(*(Option(Text(words), id=name) for name, words in self._choices))
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Return what is chosen."""
+        self.dismiss(event.option.id)
+
+    def action_leave(self) -> None:
+        """Return nothing."""
+        self.dismiss(None)
+
+
+class HelpPage(ModalScreen[None]):
+    """All keys, by what they are for."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [*_LEAVING, ("q", "leave", "back"), ("question_mark", "leave", "back")]
+
+    def __init__(self, keymap: Keymap, plain: bool) -> None:
+        super().__init__()
+        self._keymap, self._plain = keymap, plain
+
+    def compose(self) -> ComposeResult:
+        """Lay out the page."""
+        with VerticalScroll(id="dialog") as dialog:
+            dialog.border_title = "help"
+            yield Static(help_text(self._keymap, self._plain), markup=False)
+
+    def action_leave(self) -> None:
+        """Go back."""
+        self.dismiss(None)
+
+
+_HOW_TO = """\
+Two eyes look at two photographs of the same ground. The dot in the
+middle is the floating mark; the pictures move under it. Where a
+projector is not oriented, the two images of a point differ in height:
+that is y-parallax. Take up an element and turn it until they agree.
+
+A BEGINNING
+  l          lay both pictures, centre them, set c
+  b s        bx, to the base of the model; d runs Z to its height
+  g          drive near a point
+  PgUp PgDn  until the images agree sideways
+  y + -      by', until they agree in height
+  Enter      record; x strikes a reading out
+
+Every press of a key is one step; [ and ] change the step. 0.002 turns a
+drum between two counts, as the eye wants it. With free hand X and Y
+move without the handwheels and their collars. The mouse wheel turns any
+drum. Ctrl+P lists everything by name, themes too; Ctrl+Q leaves.
+"""
+
+
+def help_text(keymap: Keymap, plain: bool) -> str:
+    """Return the page of help."""
+    lines = [_HOW_TO]
+    for group in dict.fromkeys(deed.group for deed in DEEDS):
+        lines.append(group.upper())
+        for deed in DEEDS:
+            if deed.group == group:
+                keys = " ".join(shown(key, plain) for key in keymap[deed.name])
+                lines.append(f"  {keys:<10} {deed.about}")
+        lines.append("")
+    return "\n".join(lines)

@@ -1,0 +1,157 @@
+"""Grey bytes of an eyepiece as characters of a terminal: pure functions on arrays."""
+
+from enum import StrEnum
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Greys = npt.NDArray[np.uint8]
+"""Grey values 0..255, rows from the top."""
+
+LEVELS = 32
+"""Greys that half-blocks show."""
+
+COLOUR_LEVELS = 16
+"""Levels of each eye in an anaglyph."""
+
+MARK = -1
+"""The ink of the floating mark."""
+
+_SHADES = " ░▒▓█"
+_ASCII = " .:-=+*#%@"
+_BAYER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16.0 + 1.0 / 32.0
+_DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
+_CORNER = 0.45
+"""Share of the light that an eyepiece loses in the corners of its window."""
+
+
+class Drawing(StrEnum):
+    """Ways to draw grey on a terminal."""
+
+    HALVES = "halves"
+    SHADES = "shades"
+    BRAILLE = "braille"
+    ASCII = "ascii"
+    WORDS = "words"
+
+
+_CELLS = {Drawing.HALVES: (1, 2), Drawing.SHADES: (1, 2), Drawing.BRAILLE: (2, 4), Drawing.ASCII: (1, 2)}
+
+
+class Run(NamedTuple):
+    """Neighbouring cells of a row that look alike: text, level of the ink and of the paper (or None, the screen's)."""
+
+    text: str
+    ink: int | None = None
+    paper: int | None = None
+
+
+def window(width: int, height: int) -> tuple[int, int]:
+    """Return columns and rows of the cells drawn in a room of so many cells: odd, so that the mark has the middle."""
+    return max(1, width - (width + 1) % 2), max(1, height - (height + 1) % 2)
+
+
+def picture_size(drawing: Drawing, columns: int, rows: int) -> tuple[int, int]:
+    """Return columns and rows of the picture that fills so many cells; (0, 0) where nothing is drawn."""
+    across, down = _CELLS.get(drawing, (0, 0))
+    return columns * across, rows * down
+
+
+@lru_cache(maxsize=16)
+def _vignette(rows: int, columns: int) -> npt.NDArray[np.float32]:
+    y, x = np.ogrid[-1.0 : 1.0 : rows * 1j, -1.0 : 1.0 : columns * 1j]
+    return np.asarray(1.0 - _CORNER * ((x * x + y * y) / 2.0) ** 2, dtype=np.float32)
+
+
+def vignetted(greys: Greys) -> Greys:
+    """Return a picture ``(rows, columns)`` as the eyepiece shows it, darker towards the corners."""
+    return (greys * _vignette(*greys.shape)).astype(np.uint8)
+
+
+def levels(greys: Greys, count: int = LEVELS) -> Greys:
+    """Return which of so many levels each grey is shown as."""
+    return (greys.astype(np.uint16) * count >> 8).astype(np.uint8)
+
+
+def half_blocks(greys: Greys) -> list[list[Run]]:
+    """Return the rows of runs that show a picture ``(2 rows, columns)`` in half-blocks at 32 greys."""
+    shown = levels(greys)
+    return [_runs_of_halves(upper, lower) for upper, lower in zip(shown[0::2], shown[1::2], strict=True)]
+
+
+def anaglyph(left: Greys, right: Greys) -> list[list[Run]]:
+    """Return the runs of both pictures ``(2 rows, columns)`` in one; levels are 16 x left + right."""
+    both = levels(left, COLOUR_LEVELS).astype(np.uint16) * COLOUR_LEVELS + levels(right, COLOUR_LEVELS)
+    return [_runs_of_halves(upper, lower) for upper, lower in zip(both[0::2], both[1::2], strict=True)]
+
+
+def _runs_of_halves(
+    upper: npt.NDArray[np.unsignedinteger[npt.NBitBase]], lower: npt.NDArray[np.unsignedinteger[npt.NBitBase]]
+) -> list[Run]:
+    changes = np.flatnonzero((upper[1:] != upper[:-1]) | (lower[1:] != lower[:-1])) + 1
+    begins = [0, *changes.tolist()]
+    ends = [*begins[1:], len(upper)]
+    ink, paper = upper.tolist(), lower.tolist()
+    return [
+        Run((" " if ink[begin] == paper[begin] else "▀") * (end - begin), ink[begin], paper[begin])
+        for begin, end in zip(begins, ends, strict=True)
+    ]
+
+
+def shades(greys: Greys, ramp: str = _SHADES) -> list[list[Run]]:
+    """Return the runs of a picture ``(2 rows, columns)`` in shades that need no colour, light as ink."""
+    cells = (greys[0::2].astype(float) + greys[1::2]) / 512.0 * (len(ramp) - 1)
+    dither = np.tile(_BAYER, (cells.shape[0] // 4 + 1, cells.shape[1] // 4 + 1))[: cells.shape[0], : cells.shape[1]]
+    steps = np.clip(np.floor(cells + dither).astype(int), 0, len(ramp) - 1)
+    return [[Run("".join(ramp[step] for step in row))] for row in steps.tolist()]
+
+
+def ascii_shades(greys: Greys) -> list[list[Run]]:
+    """Return the runs of a picture ``(2 rows, columns)`` in ten characters of ASCII."""
+    return shades(greys, _ASCII)
+
+
+def braille(greys: Greys) -> list[list[Run]]:
+    """Return the runs of a picture ``(4 rows, 2 columns)`` in dots, light as ink."""
+    rows, columns = greys.shape
+    dither = np.tile(_BAYER, (rows // 4 + 1, columns // 4 + 1))[:rows, :columns]
+    lit = greys / 256.0 > dither
+    cells = lit.reshape(rows // 4, 4, columns // 2, 2).transpose(0, 2, 1, 3)
+    codes = 0x2800 + (cells * _DOTS).sum(axis=(2, 3))
+    return [[Run("".join(map(chr, row)))] for row in codes.tolist()]
+
+
+def drawn(drawing: Drawing, greys: Greys) -> list[list[Run]]:
+    """Return the rows of runs that show a picture of `picture_size`."""
+    if drawing is Drawing.HALVES:
+        return half_blocks(greys)
+    if drawing is Drawing.BRAILLE:
+        return braille(greys)
+    return ascii_shades(greys) if drawing is Drawing.ASCII else shades(greys)
+
+
+def with_mark(rows: list[list[Run]], mark: str) -> list[list[Run]]:
+    """Return the rows with the floating mark in the middle cell, on the paper that lies about it."""
+    middle = len(rows) // 2
+    row = rows[middle]
+    at = sum(len(run.text) for run in row) // 2
+    before, after = _cut(row, at)
+    _, after = _cut(after, 1)
+    around = before[-1] if before else Run("")
+    return [*rows[:middle], [*before, Run(mark, MARK, around.paper), *after], *rows[middle + 1 :]]
+
+
+def _cut(row: list[Run], at: int) -> tuple[list[Run], list[Run]]:
+    before: list[Run] = []
+    after: list[Run] = []
+    begin = 0
+    for run in row:
+        head = max(0, min(len(run.text), at - begin))
+        if head:
+            before.append(Run(run.text[:head], run.ink, run.paper))
+        if head < len(run.text):
+            after.append(Run(run.text[head:], run.ink, run.paper))
+        begin += len(run.text)
+    return before, after

@@ -1,0 +1,154 @@
+"""Which key does what: the keys that the console comes with, and a person's own in TOML."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from textual.keys import Keys
+
+from a7sim.mistakes import Mistake
+
+Keymap = Mapping[str, tuple[str, ...]]
+"""Names of keys, by deed."""
+
+MODIFIERS = ("ctrl", "alt", "shift")
+
+
+@dataclass(frozen=True, slots=True)
+class Deed:
+    """Something that a key does: its name, the keys it has by default, what it does, and where help lists it."""
+
+    name: str
+    keys: tuple[str, ...]
+    about: str
+    group: str
+
+
+DEEDS = (
+    Deed("x_up", ("right",), "X handwheel, forward", "hands"),
+    Deed("x_down", ("left",), "X handwheel, back", "hands"),
+    Deed("y_up", ("up",), "Y handwheel, forward", "hands"),
+    Deed("y_down", ("down",), "Y handwheel, back", "hands"),
+    Deed("z_up", ("pageup",), "foot disc, mark up", "hands"),
+    Deed("z_down", ("pagedown",), "foot disc, mark down", "hands"),
+    Deed("turn_up", ("+", "="), "turn the element in hand, forward", "hands"),
+    Deed("turn_down", ("-",), "turn the element in hand, back", "hands"),
+    Deed("finer", ("[",), "a smaller step", "hands"),
+    Deed("coarser", ("]",), "a larger step", "hands"),
+    Deed("free_hand", ("h",), "free hand on and off", "hands"),
+    Deed("left_side", ("'",), "the left projector's element", "elements"),
+    Deed("right_side", ('"',), "the right projector's element", "elements"),
+    Deed("kappa", ("k",), "take up kappa", "elements"),
+    Deed("phi", ("f",), "take up phi", "elements"),
+    Deed("omega", ("w",), "take up omega", "elements"),
+    Deed("by", ("y",), "take up by", "elements"),
+    Deed("bz", ("z",), "take up bz", "elements"),
+    Deed("c", ("c",), "take up the principal distance", "elements"),
+    Deed("bx", ("b",), "take up bx", "elements"),
+    Deed("common_phi", ("p",), "take up the common phi", "elements"),
+    Deed("set", ("s",), "set the element in hand to a reading", "elements"),
+    Deed("drive", ("d",), "run X, Y or Z to a reading", "bench"),
+    Deed("go_to", ("g",), "drive near a point of the sketch", "bench"),
+    Deed("bench", ("l",), "pictures, base, fittings, gears", "bench"),
+    Deed("magnify", ("m",), "magnify more", "eyes"),
+    Deed("reduce", ("M",), "magnify less", "eyes"),
+    Deed("eyes", ("e",), "both eyes, left, right", "eyes"),
+    Deed("merge", ("a",), "side by side, anaglyph, flicker", "eyes"),
+    Deed("drawing", ("v",), "half-blocks, shades, braille, words", "eyes"),
+    Deed("record", ("enter",), "record a reading", "book"),
+    Deed("strike", ("x", "backspace"), "strike the last reading out", "book"),
+    Deed("note", ("n",), "a remark into the journal", "book"),
+    Deed("panel", ("tab",), "the next panel at the right", "screen"),
+    Deed("say", (":",), "say a line of the command language", "screen"),
+    Deed("help", ("?",), "help", "screen"),
+    Deed("quit", ("q",), "leave", "screen"),
+)
+"""All that keys do. Same keys on every plotter that has the part."""
+
+
+def default_keymap() -> Keymap:
+    """Return the keys that the console comes with."""
+    return {deed.name: deed.keys for deed in DEEDS}
+
+
+def sample() -> str:
+    """Return a file of all keys as they are by default."""
+    lines = ["# Keys of a7sim console: one or more for every deed; a deed that is left out keeps its own.", "[keys]"]
+    width = max(len(deed.name) for deed in DEEDS)
+    for deed in DEEDS:
+        keys = ", ".join(f"'{key}'" if '"' in key else f'"{key}"' for key in deed.keys)
+        lines.append(f"{deed.name:<{width}} = [{keys}]  # {deed.about}")
+    return "\n".join(lines) + "\n"
+
+
+def load_keymap(path: Path) -> Keymap:
+    """Return the keymap of a file; deeds it does not name keep their keys. Raises Mistake in one sentence."""
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise Mistake(f"{path}: expected a keymap in TOML: {error}") from error
+    unknown = sorted(set(content) - {"keys"})
+    table = content.get("keys", {})
+    if unknown or not isinstance(table, dict):
+        raise Mistake(f"{path}: expected one table [keys], got {', '.join(unknown) or 'something else of that name'}")
+    keymap = {**default_keymap(), **{name: _keys(path, name, given) for name, given in table.items()}}
+    _refuse_shared(path, keymap)
+    return keymap
+
+
+def _keys(path: Path, name: str, given: object) -> tuple[str, ...]:
+    if name not in default_keymap():
+        raise Mistake(f"{path}: keys.{name}: expected one of {', '.join(default_keymap())}")
+    keys = [given] if isinstance(given, str) else given
+    if not (isinstance(keys, list) and keys and all(isinstance(key, str) for key in keys)):
+        raise Mistake(f"{path}: keys.{name}: expected a key or a list of keys, got {given!r}")
+    for key in keys:
+        if not _is_key(key):
+            raise Mistake(f"{path}: keys.{name}: expected a key such as k, +, pageup, f5 or ctrl+k, got {key!r}")
+    return tuple(keys)
+
+
+def _is_key(key: str) -> bool:
+    *modifiers, bare = key.split("+") if len(key) > 1 else [key]
+    if any(modifier not in MODIFIERS for modifier in modifiers):
+        return False
+    return (len(bare) == 1 and bare.isprintable()) or bare in set(Keys) or bare == "space"
+
+
+def _refuse_shared(path: Path, keymap: Keymap) -> None:
+    deeds: dict[str, str] = {}
+    for name, keys in keymap.items():
+        for key in keys:
+            other = deeds.setdefault(key, name)
+            if other != name:
+                raise Mistake(f"{path}: expected every key once, got {key!r} for both {other} and {name}")
+
+
+def deeds_by_key(keymap: Keymap) -> dict[str, str]:
+    """Return the name of the deed that every key does."""
+    return {key: name for name, keys in keymap.items() for key in keys}
+
+
+def pressed(key: str, character: str | None) -> str:
+    """Return how a keymap writes a key that the terminal reports by its name and, maybe, its character."""
+    return character if character and character.isprintable() and character != " " else key
+
+
+_SHOWN = {
+    "right": "→",
+    "left": "←",
+    "up": "↑",
+    "down": "↓",
+    "pageup": "PgUp",
+    "pagedown": "PgDn",
+    "enter": "Enter",
+    "tab": "Tab",
+    "backspace": "Bksp",
+}
+
+
+def shown(key: str, plain: bool = False) -> str:
+    """Return a key as help writes it; plain is without any character beyond ASCII."""
+    written = _SHOWN.get(key, key)
+    return key.capitalize() if plain and not written.isascii() else written

@@ -1,0 +1,47 @@
+"""What the console is given when somebody sits down: the instrument, the sheet, the keys, and the terminal's limits."""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from a7sim.console.eyepiece import Drawing
+from a7sim.console.keymap import Keymap, default_keymap
+from a7sim.console.sheet import JobSheet
+from a7sim.console.words import ACUITY_UM
+from a7sim.link.client import Client
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Everything that a console is made of."""
+
+    connect: Callable[[], Client]
+    time: Callable[[], float]
+    """Seconds at the instrument since somebody sat down."""
+    alone: bool = True
+    """Whether nobody else can turn at this instrument."""
+    where: str = ""
+    """The scenario or the address, as errors name it."""
+    sheet: JobSheet = field(default_factory=JobSheet)
+    keymap: Keymap = field(default_factory=default_keymap)
+    drawing: Drawing | None = None
+    """How pictures are drawn; None for the best that the terminal can."""
+    acuity_um: float = ACUITY_UM
+    theme: str = "enamel"
+    welcome: bool = False
+    """Whether to tell a first-time visitor what there is."""
+
+
+def speaks_utf8(environment: Mapping[str, str] = os.environ) -> bool:
+    """Whether a terminal shows more than ASCII, as the locale tells it; where none is named it is taken to."""
+    named = next((environment[name] for name in ("LC_ALL", "LC_CTYPE", "LANG") if environment.get(name)), "utf-8")
+    return "utf" in named.lower()
+
+
+def best_drawing(utf8: bool, no_color: bool, colour_system: str | None) -> Drawing:
+    """Return the best drawing for a terminal: without UTF-8 in ASCII, with 16 colours or none in shades."""
+    if not utf8:
+        return Drawing.ASCII
+    if no_color or colour_system in (None, "standard", "windows"):
+        return Drawing.SHADES
+    return Drawing.HALVES

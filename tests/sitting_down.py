@@ -1,0 +1,116 @@
+"""A person at the console, for the tests: keys pressed, and the screen read when all is said and shown."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from textual.events import Key
+from textual.keys import _character_to_key
+from textual.pilot import Pilot
+from textual.widgets import Input, OptionList
+
+from a7sim.console.app import Console
+from a7sim.console.eyepiece import Drawing
+from a7sim.console.hands import LADDER
+from a7sim.console.seat import Seat
+from a7sim.console.sheet import JobSheet
+from a7sim.instrument.language import Listener
+from a7sim.link.client import Client
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.scenario import load_scenario
+from tests.door import Door, with_photographs
+
+PATIENCE_S = 20.0
+
+
+def at(door: Door, **others: Any) -> Console:
+    """Return a console at a door's instrument, pictures in half-blocks."""
+    akwanga = load_scenario("akwanga")
+    port = InProcessSerial(desk=door.desk, clock=door.clock, timeout=5.0)
+    drawing = others.pop("drawing", Drawing.HALVES)
+    sheet = JobSheet(akwanga.title, akwanga.camera)
+    return Console(Seat(lambda: Client(port), lambda: 0.0, sheet=sheet, drawing=drawing, **others))
+
+
+def at_akwanga(listener: Listener | None = None, **others: Any) -> Console:
+    """Return a console at Akwanga's instrument."""
+    return at(with_photographs(listener), **others)
+
+
+class Person:
+    """Who sits at a console."""
+
+    def __init__(self, pilot: Pilot[None]) -> None:
+        self.pilot = pilot
+        console = pilot.app
+        assert isinstance(console, Console)
+        self.console = console
+
+    async def until(self, holds: Callable[[], object]) -> None:
+        """Wait until something holds."""
+        async with asyncio.timeout(PATIENCE_S):
+            while not holds():
+                await asyncio.sleep(0.002)
+
+    async def settle(self) -> None:
+        """Wait until all that was ordered is said and shown."""
+        await self.until(lambda: self.console.dials is not None and self._quiet() and self.console.station.at_rest)
+        for _ in range(5):
+            await asyncio.sleep(0.0)
+        await self.until(self._quiet)
+
+    def _quiet(self) -> bool:
+        """Whether no message waits to be dealt with."""
+        console = self.console
+        pumps = [console, *console.screen_stack, *console.screen.walk_children()]
+        return all(pump._message_queue.empty() for pump in pumps)
+
+    async def press(self, *keys: str) -> None:
+        """Press keys and wait for what comes of them."""
+        self.strike(*keys)
+        await self.settle()
+
+    def strike(self, *keys: str) -> None:
+        """Press keys as a keyboard does: one event each, without waiting."""
+        for key in keys:
+            name = _character_to_key(key) if len(key) == 1 else key
+            self.console.post_message(Key(name, key if len(key) == 1 else None))
+
+    async def choose(self, words: str) -> None:
+        """Choose from the list that is shown, with the arrow keys."""
+        await self.until(lambda: self.console.screen.query(OptionList))
+        listed = self.console.screen.query_one(OptionList)
+        number = next(i for i in range(listed.option_count) if words in str(listed.get_option_at_index(i).prompt))
+        self.strike("home", *["down"] * number, "enter")
+        await self.settle()
+
+    async def type_in(self, text: str) -> None:
+        """Type an answer and send it."""
+        await self.until(lambda: self.console.screen.query(Input))
+        self.strike(*text, "enter")
+        await self.settle()
+
+    async def turn(self, amount: float, forward: str, back: str, finest: float = 0.01) -> None:
+        """Turn by an amount, step by step from the largest rung of the ladder to the finest that is wanted."""
+        for step in sorted(LADDER, reverse=True):
+            times = int(abs(amount) / step + 1e-6) if step > finest * 1.5 else round(abs(amount) / step)
+            if step < finest or not times:
+                continue
+            await self.step_of(step)
+            await self.press(*[forward if amount > 0 else back] * times)
+            amount -= times * step * (1 if amount > 0 else -1)
+
+    async def step_of(self, step: float) -> None:
+        """Take a step of the ladder."""
+        away = LADDER.index(step) - self.console.hands.rung
+        await self.press(*["]" if away > 0 else "["] * abs(away))
+
+    def message(self) -> str:
+        """Return what the message line says."""
+        return str(self.console.main.query_one("#message").content)  # type: ignore[attr-defined]
+
+    async def frame(self) -> list[str]:
+        """Return the rows of the screen as text, once they are laid out."""
+        await self.pilot.pause()
+        compositor = self.console.screen._compositor
+        return ["".join(segment.text for segment in strip) for strip in compositor.render_strips()]

@@ -1,0 +1,354 @@
+"""The console at its door: keys in, the screen out, and nothing said but the command language."""
+
+import asyncio
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from a7sim.console.app import Console
+from a7sim.console.eyepiece import Drawing
+from a7sim.console.panels import Book
+from a7sim.console.seat import Seat
+from a7sim.console.window import Eyepiece
+from a7sim.instrument import build_autograph
+from a7sim.instrument.language import Desk, LinkEvent
+from a7sim.link.addresses import Address
+from a7sim.link.client import Client
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.link.serving import Doors
+from a7sim.scenario import load_scenario
+from tests.door import Door, with_model, with_photographs
+from tests.served import Served
+from tests.sitting_down import Person, at, at_akwanga
+
+POINTS = ("1021", "1011", "1023", "1013", "1025", "1015")
+
+
+def played(sitting: Coroutine[Any, Any, None]) -> None:
+    asyncio.run(sitting)
+
+
+@pytest.mark.slow
+def test_a_person_orients_by_eye_and_what_is_recorded_is_what_the_same_lines_give_over_a_link() -> None:
+    heard: list[LinkEvent] = []
+    door = with_photographs(heard.append)
+    console = at(door)
+    eye = Client(InProcessSerial(desk=door.desk, clock=door.clock, timeout=5.0))
+
+    def parallaxes(point: str) -> tuple[float, float]:
+        px, py = eye.numbers(f'EYEP:STER? "{point}"')
+        return px, py
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            for side, picture in (("left", "101"), ("right", "102")):
+                await person.press("l")
+                await person.choose(f"{side} projector: lay")
+                await person.choose(picture)
+                await person.press("l")
+                await person.choose(f"{side} projector: centre")
+                assert "with the film's shrinkage c is 152." in person.message()
+            for c in ("c'", 'c"'):
+                await person.press("l")
+                await person.choose(f"{c} to 152.")
+            await person.press("b", "s")
+            await person.type_in("194.99")
+            await person.press("d")
+            await person.type_in("Z -317.5")
+            await person.press("y", "'")
+            for point in POINTS:
+                await person.press("g")
+                await person.choose(f"{point}  ")
+                assert person.message() == f"near point {point}"
+                px, _ = parallaxes(point)
+                await person.turn(round(px * 1e-3 * 3.55, 1), "pageup", "pagedown", finest=0.1)
+                _, before = parallaxes(point)
+                await person.turn(round(before * 1e-3 * 2.08, 2), "+", "-")
+                _, left = parallaxes(point)
+                assert abs(left) < 0.05 * abs(before) + 12.0
+                await person.press("enter")
+            entries = console.entries
+            assert [entry.point for entry in entries] == list(POINTS)
+            assert all(name == "by'" for entry in entries for name, _ in entry.elements)
+            shown = str(console.query_one(Book).render())
+            assert all(point in shown for point in POINTS)
+            await pilot.press("q")
+        assert console.return_code == 0
+
+    played(sit_down())
+    _same_over_a_link(heard)
+
+
+def _same_over_a_link(heard: list[LinkEvent]) -> None:
+    """Every line that the console said gets the same reply from another instrument over TCP."""
+    mine = next(event.client for event in heard)
+    said = [event for event in heard if event.client == mine and "PICT" not in event.text]
+    pictures = sum(event.direction == ">" and "PICT" in event.text for event in heard)
+    assert pictures > 20
+    replayed = 0
+    with Served(with_photographs().desk) as served:
+        line = served.line()
+        replies = iter([event.text for event in said if event.direction == "<" and not event.text.startswith("#")])
+        for event in said:
+            if event.direction == ">" and "?" in event.text:
+                assert line.ask(event.text) == next(replies)
+                replayed += "REC:LAST?" in event.text
+            elif event.direction == ">":
+                line.send(event.text.encode() + b"\n")
+    assert replayed == len(POINTS)
+
+
+def test_a_key_is_a_step_and_holding_it_is_many() -> None:
+    console = at_akwanga()
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            await person.press("right", "right", "]", "right", "up", "down", "pageup")
+            assert dict(console.dials.counters) == {"X": "12.00", "Y": "0.00", "Z": "-290.00"}
+            await person.press("[", "[", "[", "[", "w", '"', "+", "+", "-")
+            assert console.dials.elements["omega2"] == "100.01"
+            await person.press("[", "+")
+            assert console.dials.elements["omega2"] == "100.01", "a drum stands between two counts"
+
+    played(sit_down())
+
+
+def test_free_hand_is_a_state_of_its_own_that_goes_past_the_collars() -> None:
+    console = at_akwanga()
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            console.station.say("FITT:XCOL OUT")
+            await person.press("right")
+            assert console.dials.counters["X"] == "-1.00"
+            await person.press("h", "right", "right")
+            assert console.dials.counters["X"] == "1.00"
+            await person.press("h", "right")
+            assert console.dials.counters["X"] == "0.00"
+
+    played(sit_down())
+
+
+def test_what_the_instrument_refuses_is_one_sentence_and_nothing_moves() -> None:
+    console = at_akwanga()
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            await person.press("y", "s")
+            await person.type_in("60")
+            assert person.message() == "expected -50.00 to 50.00, got 60"
+            assert console.dials.elements["by1"] == "0.00"
+            await person.press("s")
+            await person.type_in("sixty")
+            assert person.message() == "set by' to: expected a number, got 'sixty'"
+
+    played(sit_down())
+
+
+def test_a_question_that_is_refused_does_not_break_the_conversation() -> None:
+    door = with_photographs()
+    port = InProcessSerial(desk=door.desk, clock=door.clock, timeout=0.1)
+    console = Console(Seat(lambda: Client(port), lambda: 0.0))
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            answers: list[object] = []
+            console.ask(lambda client: client.fields("PHOT1:FID?"), answers.append)
+            await person.press("right")
+            assert answers == [] and console.silent is None
+            assert person.message() == "there is no picture in projector 1"
+            assert console.dials.counters["X"] == "1.00"
+
+    played(sit_down())
+
+
+def test_the_book_strikes_out_and_never_erases() -> None:
+    door = with_model()
+    console = at(door)
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            await person.press("enter")
+            await person.type_in("P1")
+            await person.press("enter", "x", "x", "x")
+            assert [entry.struck for entry in console.entries] == [True, True]
+            assert person.message() == "there is nothing in the book to strike out"
+            assert str(console.query_one(Book).render()).startswith("x  1 P1")
+
+    played(sit_down())
+    assert door.say("REC:COUN?;:REC:LAST?").endswith('"struck: struck out at the console"')
+
+
+def test_a8_has_the_same_hands_and_says_what_it_lacks() -> None:
+    akwanga = load_scenario("akwanga-a8")
+    desk = Desk(build_autograph(akwanga.instrument, {}, 7))
+    console = at(Door(desk))
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            assert console.hands.element == "kappa1", "an A8 has no by"
+            await person.press("y")
+            assert person.message() == "an A8 has no by"
+            await person.press("p", "+")
+            assert console.dials.elements["common_phi"] == "101.00"
+
+    played(sit_down())
+
+
+@pytest.mark.parametrize("size", [(80, 24), (100, 30), (160, 48)])
+def test_eyepieces_and_counters_are_on_every_screen(size: tuple[int, int]) -> None:
+    console = at(with_model())
+
+    async def sit_down() -> None:
+        async with console.run_test(size=size) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            frame = "\n".join(await person.frame())
+            for words in ("left eye", "right eye", " X ", " Y ", " Z ", "elements", "book", "kappa", "? help"):
+                assert words in frame
+            assert ("sketch 101" in frame) == (size[0] >= 100), "sketches go first"
+            assert ("fittings" in frame) == (size[0] >= 100), "then the fittings"
+            assert all(eye.cells[0] % 2 and eye.cells[1] % 2 for eye in console.query(Eyepiece))
+            await person.press("tab", "tab")
+            assert size[0] >= 100 or "sketch 101" in "\n".join(await person.frame())
+
+    played(sit_down())
+
+
+def test_a_resize_in_mid_turn_only_changes_the_size() -> None:
+    console = at(with_model())
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            person.strike("right", "right")
+            await pilot.resize_terminal(80, 24)
+            person.strike("right")
+            await pilot.resize_terminal(160, 48)
+            await person.settle()
+            assert console.dials.counters["X"] == "3.00"
+            assert console.sight.look.columns == console.query(Eyepiece).first().cells[0]
+
+    played(sit_down())
+
+
+def test_nothing_is_drawn_when_nothing_changes() -> None:
+    console = at(with_model())
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            await asyncio.sleep(0.3)
+            drawn: list[object] = []
+            for widget in console.screen.walk_children():
+                widget.refresh = lambda *_, widget=widget, **__: drawn.append(widget)
+            console.refresh_panels()
+            console.draw()
+            assert drawn == []
+
+    played(sit_down())
+
+
+def test_plain_says_in_words_what_the_eyes_see() -> None:
+    console = at(with_model(), drawing=Drawing.WORDS)
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            await person.press("g")
+            await person.choose("1011  ")
+            frame = "\n".join(await person.frame())
+            assert "1011: image is about" in frame
+            assert "1011: left image is about" in person.message()
+            assert "▀" not in frame
+
+    played(sit_down())
+
+
+def test_a_dead_link_is_a_banner_and_a_new_one_is_taken_up() -> None:
+    first = Served(with_photographs().desk)
+    first.__enter__()
+    second = Served(with_photographs().desk, doors=Doors(tcp=[Address("127.0.0.1", first.port)]))
+    url = f"tcp://127.0.0.1:{first.port}"
+    console = Console(Seat(lambda: Client.open(url, timeout=1.0), lambda: 0.0, alone=False))
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            await asyncio.to_thread(first.__exit__, None, None, None)
+            person.strike("right")
+            await person.until(lambda: console.silent is not None)
+            assert "The instrument does not answer" in "\n".join(await person.frame())
+            await asyncio.to_thread(second.__enter__)
+            await person.until(lambda: console.silent is None)
+            await person.press("up")
+            assert console.dials.counters == {"X": "0.00", "Y": "1.00", "Z": "-300.00"}, "nothing is turned twice"
+            assert "does not answer" not in "\n".join(await person.frame())
+        await asyncio.to_thread(second.__exit__, None, None, None)
+
+    played(sit_down())
+
+
+@pytest.mark.skipif(shutil.which("tmux") is None, reason="there is no tmux")
+def test_real_keys_in_a_real_terminal(tmp_path: Path) -> None:
+    def tmux(*words: str) -> str:
+        done = subprocess.run(["tmux", "-L", name, *words], capture_output=True, text=True, check=True)
+        return done.stdout
+
+    def shows(words: str) -> str:
+        end = time.monotonic() + 20.0
+        while words not in (screen := tmux("capture-pane", "-p", "-t", "seat")):
+            assert time.monotonic() < end, f"expected {words!r} on the screen, got\n{screen}"
+            time.sleep(0.05)
+        return screen
+
+    name = f"a7sim-{os.getpid()}"
+    options = "akwanga --seed 7"
+    command = (
+        f"env -u COLUMNS -u LINES XDG_DATA_HOME={tmp_path} LC_ALL=C.UTF-8 {sys.executable} -m a7sim console {options}"
+    )
+    size = ("-x", "100", "-y", "30")
+    tmux("-f", "/dev/null", "new-session", "-d", "-s", "seat", *size, f"{command}; echo left $?; cat")
+    try:
+        assert "Two eyes, one ground" in shows("l lays pictures; ? is help")
+        tmux("send-keys", "-t", "seat", "l")
+        shows("left projector: lay")
+        tmux("send-keys", "-t", "seat", "Enter")
+        shows("lay in the left projector")
+        tmux("send-keys", "-t", "seat", "Enter")
+        screen = shows("sketch 101")
+        assert "Two eyes" not in screen, "the welcome goes with the first key"
+        assert "▀" in screen
+        tmux("send-keys", "-t", "seat", "Right", "Right", "NPage")
+        shows("- 3 0 1 . 0 0")
+        shows("  2 . 0 0")
+        tmux("resize-window", "-t", "seat", "-x", "80", "-y", "24")
+        tmux("send-keys", "-t", "seat", "q")
+        assert "Traceback" not in shows("left 0")
+    finally:
+        tmux("kill-server")

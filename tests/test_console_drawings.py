@@ -1,0 +1,226 @@
+"""What the console draws, as pure functions: eyepieces, drums, sketches, words and the keymap."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from a7sim.cli import main
+from a7sim.console import eyepiece
+from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
+from a7sim.console.eyepiece import Drawing, Run
+from a7sim.console.hands import LADDER, Hands
+from a7sim.console.keymap import DEEDS, default_keymap, load_keymap, pressed, sample
+from a7sim.console.seat import best_drawing, speaks_utf8
+from a7sim.console.sketches import sketched
+from a7sim.console.words import image_in_words, parallax_in_words
+from a7sim.manual import VARIANTS
+from a7sim.mistakes import Mistake
+
+STAIRS = np.array([[0, 7, 8, 255], [0, 8, 8, 0]], dtype=np.uint8)
+"""Two rows of pixels: one row of cells."""
+
+
+def text(rows: list[list[Run]]) -> list[str]:
+    return ["".join(run.text for run in row) for row in rows]
+
+
+def test_half_blocks_show_two_pixels_a_cell_at_32_greys() -> None:
+    assert eyepiece.half_blocks(STAIRS) == [
+        [Run(" ", 0, 0), Run("▀", 0, 1), Run(" ", 1, 1), Run("▀", 31, 0)],
+    ]
+
+
+def test_neighbours_that_look_alike_are_one_run() -> None:
+    assert eyepiece.half_blocks(np.full((2, 9), 128, dtype=np.uint8)) == [[Run(" " * 9, 16, 16)]]
+
+
+def test_shades_and_ascii_go_from_dark_to_light() -> None:
+    ramp = np.tile(np.linspace(0, 255, 64).astype(np.uint8), (2, 1))
+    assert text(eyepiece.shades(ramp))[0].startswith("   ") and text(eyepiece.shades(ramp))[0].endswith("█")
+    steps = [" .:-=+*#%@".index(each) for each in text(eyepiece.ascii_shades(ramp))[0]]
+    assert max(np.diff(steps)) <= 2 and steps[0] == 0 and steps[-1] >= 8
+
+
+def test_braille_lights_the_dots_of_the_pixels() -> None:
+    dots = np.zeros((4, 4), dtype=np.uint8)
+    dots[0, 0] = dots[3, 3] = 255
+    assert text(eyepiece.braille(dots)) == ["\u2801\u2880"]
+
+
+@given(st.integers(1, 90), st.integers(1, 50))
+def test_the_mark_has_the_middle_cell(width: int, height: int) -> None:
+    columns, rows = eyepiece.window(width, height)
+    assert columns % 2 and rows % 2 and width - columns <= 1 and height - rows <= 1
+    across, down = eyepiece.picture_size(Drawing.HALVES, columns, rows)
+    shown = eyepiece.with_mark(eyepiece.half_blocks(np.zeros((down, across), dtype=np.uint8)), "o")
+    assert text(shown)[rows // 2] == " " * (columns // 2) + "o" + " " * (columns // 2)
+    assert sum(run.ink == eyepiece.MARK for row in shown for run in row) == 1
+
+
+def test_an_anaglyph_holds_both_eyes() -> None:
+    left, right = np.full((2, 1), 255, dtype=np.uint8), np.zeros((2, 1), dtype=np.uint8)
+    assert eyepiece.anaglyph(left, right) == [[Run(" ", 240, 240)]]
+    assert eyepiece.anaglyph(right, left) == [[Run(" ", 15, 15)]]
+
+
+def test_the_optics_darken_the_corners_alone() -> None:
+    seen = eyepiece.vignetted(np.full((31, 31), 200, dtype=np.uint8))
+    assert seen[15, 15] == 200 and seen[0, 0] < 120 and seen[0, 0] == seen[30, 30]
+
+
+@given(st.integers(0, 99999), st.integers(0, 99999))
+def test_a_drum_passes_its_neighbours_and_then_stands(before: int, after: int) -> None:
+    old, new = f"{before:08.2f}", f"{after:08.2f}"
+    assert rolled(old, new, 0) == old
+    assert rolled(old, new, ROLLING_FRAMES) == new
+    for a, b, between in zip(old, new, rolled(old, new, 1), strict=True):
+        if a.isdigit():
+            ways = {(int(between) - int(a)) % 10, (int(a) - int(between)) % 10}
+            assert min(ways) <= 2, f"{a} to {b} by {between}"
+
+
+def test_a_bar_shows_where_an_element_stands() -> None:
+    assert bar(-50.0, -50.0, 50.0, 5) == "┃────"
+    assert bar(0.0, -50.0, 50.0, 5) == "──┃──"
+    assert bar(70.0, -50.0, 50.0, 5, "-", "|") == "----|"
+
+
+def test_a_sketch_shows_points_names_and_the_mark() -> None:
+    drawn = sketched({"1011": (-80.0, 0.0), "C1": (80.0, 80.0)}, (0.0, -80.0), 25, 7)
+    assert drawn.rows == [
+        "                         ",
+        "                    ·C1  ",
+        "                         ",
+        "    ·1011                ",
+        "                         ",
+        "            +            ",
+        "                         ",
+    ]
+    assert drawn.nearest(5, 4) == "1011" and drawn.mark == (12, 5)
+    assert sketched({}, (500.0, 0.0), 9, 3).mark is None
+
+
+@pytest.mark.parametrize(
+    ("seen", "words"),
+    [
+        ((-43.0, 17.0), "image is about 40 um left of and 20 um above the mark"),
+        ((1234.0, -2.0), "image is about 1.2 mm right of the mark"),
+        ((3.0, -4.0), "image is on the mark"),
+        (None, "image not in the field of view"),
+    ],
+)
+def test_an_eye_says_no_more_than_it_can_tell(seen: tuple[float, float] | None, words: str) -> None:
+    assert image_in_words(seen, acuity=10.0) == words
+
+
+def test_two_eyes_say_which_image_is_higher() -> None:
+    assert parallax_in_words((0.0, 512.0)) == "left image is about 510 um higher, no x-parallax"
+    assert parallax_in_words((95.0, -61.0)) == "left image is about 60 um lower, x-parallax about 100 um"
+
+
+def test_the_ladder_has_ends() -> None:
+    assert Hands().stepping(-99).step == LADDER[0] and Hands().stepping(99).step == LADDER[-1]
+
+
+def test_hands_say_lines_of_the_language() -> None:
+    hands = Hands("omega", 2).stepping(-1)
+    assert hands.turned(-1) == "PROJ2:OMEG:TURN -0.1"
+    assert hands.moved("X", 1, 12.0) == "WHE:X 0.1"
+    assert Hands(free=True).moved("Y", -1, 12.0) == "DRIV:Y 11.0000"
+    assert Hands().on(VARIANTS["A8"]).element == "kappa1"
+
+
+@pytest.mark.parametrize(
+    ("utf8", "no_color", "colours", "best"),
+    [
+        (True, False, "truecolor", Drawing.HALVES),
+        (True, False, "256", Drawing.HALVES),
+        (True, False, "standard", Drawing.SHADES),
+        (True, True, "truecolor", Drawing.SHADES),
+        (False, False, "truecolor", Drawing.ASCII),
+    ],
+)
+def test_every_terminal_has_a_drawing(utf8: bool, no_color: bool, colours: str, best: Drawing) -> None:
+    assert best_drawing(utf8, no_color, colours) is best
+
+
+def test_the_locale_tells_whether_there_is_utf8() -> None:
+    assert speaks_utf8({"LANG": "C.UTF-8"}) and speaks_utf8({})
+    assert not speaks_utf8({"LC_ALL": "C", "LANG": "en_US.UTF-8"})
+
+
+def test_the_sample_keymap_is_the_default_one(tmp_path: Path) -> None:
+    file = tmp_path / "keys.toml"
+    file.write_text(sample(), encoding="utf-8")
+    assert load_keymap(file) == default_keymap()
+    keys = [key for deed in DEEDS for key in deed.keys]
+    assert len(keys) == len(set(keys))
+
+
+def test_a_deed_that_a_keymap_leaves_out_keeps_its_keys(tmp_path: Path) -> None:
+    file = tmp_path / "keys.toml"
+    file.write_text('[keys]\nrecord = ["space", "f5"]\n', encoding="utf-8")
+    assert load_keymap(file) == {**default_keymap(), "record": ("space", "f5")}
+    assert pressed("space", " ") == "space" and pressed("plus", "+") == "+"
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("[keys", "expected a keymap in TOML"),
+        ("[key]\n", "expected one table [keys], got key"),
+        ('[keys]\nfly = "f"\n', "keys.fly: expected one of x_up"),
+        ("[keys]\nrecord = 3\n", "keys.record: expected a key or a list of keys, got 3"),
+        ("[keys]\nrecord = []\n", "keys.record: expected a key or a list of keys, got []"),
+        ('[keys]\nrecord = "enterr"\n', "keys.record: expected a key such as k, +, pageup, f5 or ctrl+k, got 'enterr'"),
+        ('[keys]\nrecord = "k"\n', "expected every key once, got 'k' for both kappa and record"),
+    ],
+)
+def test_a_bad_keymap_is_one_sentence(content: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "keys.toml"
+    file.write_text(content, encoding="utf-8")
+    with pytest.raises(Mistake) as mistake:
+        load_keymap(file)
+    assert words in str(mistake.value) and str(mistake.value).startswith(str(file))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--keymap", "{folder}/none.toml"], "expected a keymap in TOML"),
+        (["nowhere"], "nowhere"),
+        ([], "expected a terminal to sit at"),
+        (["--connect", "tcp://127.0.0.1:1"], "expected an instrument to answer there"),
+        (["--connect", "tcp://127.0.0.1:1", "--seed", "7"], "expected neither --seed nor --variant"),
+    ],
+)
+def test_what_cannot_be_sat_down_at_is_one_sentence_and_exit_2(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["a7sim", "console", *(each.format(folder=tmp_path) for each in arguments)])
+    with pytest.raises(SystemExit) as left:
+        main()
+    said = capsys.readouterr().err
+    assert left.value.code == 2 and words in said and said.count("\n") == 1
+
+
+def test_the_keymap_is_written_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "deep" / "keys.toml"
+    monkeypatch.setattr(sys, "argv", ["a7sim", "console", "--write-keymap", "--keymap", str(file)])
+    for code in (0, 2):
+        with pytest.raises(SystemExit) as left:
+            main()
+        assert left.value.code == code
+    assert load_keymap(file) == default_keymap()
+    assert "expected to write a new file" in capsys.readouterr().err
