@@ -16,6 +16,13 @@ WORK_FILES = {"session.jsonl", "session.states.jsonl", "book.csv", "models.csv",
 STRIP_FILES = {"strip.csv", "strip.crd", "strip-output.crd", "strip-numbers.csv"}
 FILES = WORK_FILES | STRIP_FILES
 
+HEEDING_CTRL_C = """
+import runpy, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+runpy.run_module("a7sim", run_name="__main__")
+"""
+"""The command line, which heeds SIGINT also where the test run was started in the background and ignores it."""
+
 
 def a7sim(*arguments, cwd=ROOT):
     return subprocess.run(
@@ -266,7 +273,7 @@ def test_a_session_that_does_not_fit_ends_with_1_and_says_why(tmp_path):
 def test_ctrl_c_leaves_whole_files_and_exit_code_130(tmp_path):
     out = tmp_path / "out"
     settings = ["--case", "E", "--set", "plan.parallax_readings=20"]
-    command = [sys.executable, "-m", "a7sim", "run", "akwanga", *settings, "--out", str(out)]
+    command = [sys.executable, "-c", HEEDING_CTRL_C, "run", "akwanga", *settings, "--out", str(out)]
     running = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 30.0
     journal = out / "session.jsonl"

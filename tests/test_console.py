@@ -90,7 +90,7 @@ def test_a_person_orients_by_eye_and_what_is_recorded_is_what_the_same_lines_giv
 
 def _same_over_a_link(heard: list[LinkEvent]) -> None:
     """Every line that the console said gets the same reply from another instrument over TCP."""
-    mine = next(event.client for event in heard)
+    mine = next(event.client for event in heard if event.direction == ">")
     said = [event for event in heard if event.client == mine and "PICT" not in event.text]
     pictures = sum(event.direction == ">" and "PICT" in event.text for event in heard)
     assert pictures > 20

@@ -328,7 +328,7 @@ def test_slips_are_told_in_the_results_and_nowhere_else(tmp_path):
     assert told["struck"]
     assert json.loads((tmp_path / "out" / "results.json").read_text())["truth"]["slips"] == [told]
     for file in ("book.csv", "session.jsonl"):
-        text = (tmp_path / "out" / file).read_text()
+        text = (tmp_path / "out" / file).read_text().partition("\n")[2]
         assert not any(word in text for word in ("transposed", "slip", "planted"))
     hours = document["operator"]["time_by_activity_h"]
     assert sum(hours.values()) == pytest.approx(document["operator"]["hours"], abs=1e-3)
