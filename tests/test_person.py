@@ -319,7 +319,8 @@ def test_a_planted_slip_happens_once_and_one_that_fits_nowhere_not_at_all():
     assert len(planted("transposed digits")[0].slips) == 1
 
 
-def test_slips_are_told_in_the_results_and_nowhere_else(tmp_path):
+def test_slips_are_told_in_the_results_and_in_no_entry_of_book_or_journal(tmp_path):
+    """Only below the journal's header: that carries the scenario, a planted slip with it (decision 12, To mend)."""
     slip = CertainSlip(kind="transposed digits", form="model coordinates", point="C1")
     observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=[slip])
     document = run(one_model(observer), 1, tmp_path / "out")

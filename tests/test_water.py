@@ -238,7 +238,7 @@ SPACING = 4.0
 
 @pytest.mark.slow
 def test_on_water_no_spot_is_set_and_no_contour_followed():
-    """Contours end within 8 m of the shore, half of what is looked at for one match, and spot heights stand on land."""
+    """Contours end within 4 m of the shore, half of what is looked at most closely for a match; spots stand on land."""
     scenario = without_errors(load_scenario(LAKE))
     session = open_session(scenario, 1)
     person = session.person
@@ -269,5 +269,5 @@ def test_on_water_no_spot_is_set_and_no_contour_followed():
     lines = [line for height in np.linspace(low, high, 5)[1:-1] for line in work.contour(float(height), spots)]
     assert any("lost" in line.endings for line in lines)
     followed = model.on_ground(np.concatenate([line.readings for line in lines], axis=1))[:2]
-    off_shore = np.all([ground.under_water(followed + 2.0 * shift[:, None]) for shift in away], axis=0)
+    off_shore = np.all([ground.under_water(followed + shift[:, None]) for shift in away], axis=0)
     assert not off_shore.any()
