@@ -36,7 +36,8 @@ def all_strips(tmp_path_factory):
 def test_without_errors_the_strip_returns_the_ground_within_what_the_counters_leave():
     """Counters leave 0.02 gon in a model and 0.12 mm in the height of a centre; no film or eye adds to it.
 
-    0.02 gon over a base are 0.23 m in plan; 0.15 is a bound to this session (0.122), which was 0.12 before drums were fine.
+    0.02 gon over a base are 0.23 m in plan; 0.15 is a bound to this session, which has 0.122 (below 0.12 before drums
+    were turned finely).
     """
     strip = run(tilted_flight([(0.4, -0.3, 0.2), (-0.5, 0.6, -0.4), (0.2, 0.1, 0.5)]), 5)["strip"]
     everywhere = np.concatenate([residuals(strip, "control"), residuals(strip, "check")])
