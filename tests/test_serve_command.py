@@ -54,6 +54,13 @@ def test_the_document_says_where_it_listens_and_all_doors_lead_to_one_instrument
             assert client.ask(f"COUN:X?;:DRIV:X {n + 1};:COUN:X?") == f"{n}.00;{n + 1}.00"
 
 
+def test_no_second_server_takes_the_terminal_of_one_that_serves(everywhere):
+    link = next(door["path"] for door in everywhere.document["listening"] if door["kind"] == "pty")
+    device = Path(link).readlink()
+    assert f"--pty {link}: expected a path of its own" in refused("akwanga", "--tcp", "127.0.0.1:0", "--pty", link)
+    assert Path(link).readlink() == device
+
+
 def test_no_line_without_end_of_64_mib_makes_the_server_grow(everywhere):
     with everywhere.line() as line:
         piece = b"x" * (1 << 20)
@@ -167,6 +174,7 @@ def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
         (["--tcp", "5025"], "--tcp: expected HOST:PORT such as 127.0.0.1:5025, got '5025'"),
         (["--rfc2217", "127.0.0.1:99999"], "--rfc2217: expected HOST:PORT"),
         (["--pty", os.devnull], "expected nothing there or an old link"),
+        (["--pty", "a7", "--pty", "a7"], "--pty: expected a path of its own for each, got a7, a7"),
         (["--fault", "often"], "--fault: expected drop-reply, delay, garble or disconnect"),
         (["--baud", "1"], "--baud"),
     ],

@@ -19,6 +19,7 @@ from a7sim.link.addresses import Address, address_of
 from a7sim.link.clock import Clock, WallClock
 from a7sim.link.conversation import Terms
 from a7sim.link.faults import EXAMPLE, faults_of
+from a7sim.link.loops import run
 from a7sim.link.serving import Doors, Server
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
@@ -104,7 +105,7 @@ def command(
             prepare_folder(out, force)
         served = _served_anew(loaded, seed, token, realtime, out, Keeping(durability))
     with served.journal:
-        asyncio.run(_serve(served, doors, terms, _Told(served.head, as_document, quiet)))
+        run(_serve(served, doors, terms, _Told(served.head, as_document, quiet)))
 
 
 @dataclass(frozen=True)
@@ -196,6 +197,8 @@ def _doors(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]
     sockets = [address_of(text, "--tcp") for text in tcp]
     if not (tcp or rfc2217 or pty):
         sockets = [USUAL]
+    if len({path.absolute() for path in pty}) < len(pty):
+        raise Mistake(f"--pty: expected a path of its own for each, got {', '.join(map(str, pty))}")
     return Doors(sockets, [address_of(text, "--rfc2217") for text in rfc2217], pty)
 
 

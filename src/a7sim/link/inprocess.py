@@ -31,7 +31,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         self.clock = clock or Clock()
         self._desk = desk
         self._engine: Engine | None = None
-        self._replies = bytearray()
+        self._unread, self._read_up_to = b"", 0
         self._alone = threading.RLock()
         self._arrived = threading.Condition(self._alone)
         self._cancelled = False
@@ -49,7 +49,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         if self.is_open:
             raise SerialException(f"expected a closed port, got {self.port}, which is open")
         self._engine = self._connect().open(time=self.clock.now)
-        self._replies.clear()
+        self._unread, self._read_up_to = b"", 0
         self._cancelled = False
         self.is_open = True
 
@@ -71,25 +71,30 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         received = to_bytes(data)
         with self._alone:
             engine = self._opened()
+            replies = b""
             for start in range(0, len(received), MOST_KEPT_BACK):
-                self._replies += obeyed(engine, received[start : start + MOST_KEPT_BACK], self.clock)
-            self._arrived.notify_all()
+                replies += obeyed(engine, received[start : start + MOST_KEPT_BACK], self.clock)
+            if replies:
+                self._unread, self._read_up_to = self._unread[self._read_up_to :] + replies, 0
+                self._arrived.notify_all()
         return len(received)
 
     def read(self, size: int = 1) -> bytes:
         """Return `size` bytes, or those there are when the timeout ends."""
         with self._alone:
-            if self._engine is not None and size <= len(self._replies):
-                return self._taken(size)
-        return self._take(lambda: size if len(self._replies) >= size else None, size)
+            start = self._read_up_to
+            if size <= len(self._unread) - start and self._engine is not None:
+                self._read_up_to = start + size
+                return self._unread[start : start + size]
+        return self._take(lambda: size if self._left() >= size else None, size)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
         """Return the bytes up to and with `expected`, at most `size`, or those there are at the timeout."""
 
         def length() -> int | None:
-            found = self._replies.find(expected)
-            end = found + len(expected) if found >= 0 else None
-            if size is not None and len(self._replies) >= size:
+            found = self._unread.find(expected, self._read_up_to)
+            end = found + len(expected) - self._read_up_to if found >= 0 else None
+            if size is not None and self._left() >= size:
                 return min(size, end) if end is not None else size
             return end
 
@@ -105,20 +110,19 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
             self._arrived.wait_for(lambda: length() is not None or self._cancelled, self._timeout)
             end = length()
             if end is None:
-                end = len(self._replies) if most is None else min(most, len(self._replies))
-            return self._taken(end)
+                end = self._left() if most is None else min(most, self._left())
+            self._cancelled = False
+            start, self._read_up_to = self._read_up_to, self._read_up_to + end
+            return self._unread[start : self._read_up_to]
 
-    def _taken(self, size: int) -> bytes:
-        self._cancelled = False
-        taken = bytes(self._replies[:size])
-        del self._replies[:size]
-        return taken
+    def _left(self) -> int:
+        return len(self._unread) - self._read_up_to
 
     @property
     def in_waiting(self) -> int:
         """Number of bytes that can be read at once."""
         self._opened()
-        return len(self._replies)
+        return self._left()
 
     @property
     def out_waiting(self) -> int:
@@ -134,7 +138,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         """Forget replies that were not read."""
         with self._arrived:
             self._opened()
-            self._replies.clear()
+            self._read_up_to = len(self._unread)
 
     def reset_output_buffer(self) -> None:
         """Forget what was not yet sent: nothing."""

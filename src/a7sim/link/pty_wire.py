@@ -1,14 +1,18 @@
 """A pseudo-terminal as a wire: a serial port of this machine under a name of one's own."""
 
 import asyncio
+import fcntl
 import os
 import termios
 import tty
 from pathlib import Path
 
 from a7sim.link.conversation import Conversation
-from a7sim.link.wires import LARGEST_READ, MOST_UNREAD, Host
+from a7sim.link.wires import MOST_UNREAD, Host
 from a7sim.mistakes import Mistake
+
+LARGEST_READ = 4096
+"""Bytes that a terminal of Linux holds."""
 
 OF_ITS_KIND = "/dev/pts/"
 """Where the links lead that may be overwritten."""
@@ -34,6 +38,7 @@ class PtyWire:
         os.set_blocking(self._near, False)
         self.device = os.ttyname(self._far)
         try:
+            fcntl.lockf(self._far, fcntl.LOCK_EX | fcntl.LOCK_NB)
             _make_link(link, self.device)
         except BaseException:
             self._close_ends()
@@ -86,9 +91,10 @@ class PtyWire:
     def write(self, data: bytes) -> None:
         """Send bytes, now or as soon as they can go."""
         if not self._unsent:
-            data = data[self._sent(data) :]
-            if not data:
+            sent = self._sent(data)
+            if sent == len(data):
                 return
+            data = data[sent:]
             self._loop.add_writer(self._near, self._writable)
         self._unsent += data
         if not self._clogged and len(self._unsent) > MOST_UNREAD:
@@ -127,9 +133,26 @@ def _make_link(link: Path, device: str) -> None:
     try:
         if os.path.lexists(link) and not (link.is_symlink() and str(link.readlink()).startswith(OF_ITS_KIND)):
             raise Mistake(f"--pty {link}: expected nothing there or an old link to a terminal, got something else")
+        if _is_served(link):
+            raise Mistake(f"--pty {link}: expected a path of its own, got that of another instrument, which is served")
         temporary.unlink(missing_ok=True)
         temporary.symlink_to(device)
         temporary.replace(link)
     except OSError as error:
         temporary.unlink(missing_ok=True)
         raise Mistake(f"--pty {link}: expected a place where a link can be made: {error.strerror}") from error
+
+
+def _is_served(link: Path) -> bool:
+    """Whether somebody holds the lock that every server has on its terminal; `flock` is left to clients."""
+    try:
+        terminal = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        fcntl.lockf(terminal, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(terminal)
+    return False
