@@ -106,7 +106,7 @@ def test_results_hold_what_is_promised(akwanga_run):
 def test_the_journal_holds_every_line_in_order_with_simulated_time(akwanga_run):
     _, out = akwanga_run
     header, *lines = map(json.loads, (out / "session.jsonl").read_text(encoding="utf-8").splitlines())
-    assert header["schema_version"] == 2
+    assert header["schema_version"] == 3
     assert (header["seed"], header["variant"], header["command"]) == (7, "A7", "run")
     assert [line["t"] for line in lines] == sorted(line["t"] for line in lines)
     assert {line.get("kind") for line in lines} == {None, "entry", "strike", "state"}

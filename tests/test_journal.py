@@ -19,15 +19,16 @@ from a7sim.cli.replay import Pace
 from a7sim.instrument.language import LinkEvent
 from a7sim.link.clock import Clock
 from a7sim.mistakes import Mistake
-from a7sim.scenario import carried, find_scenario, load_scenario, scenario_from
+from a7sim.scenario import carried, find_scenario, hash_of, load_scenario, scenario_from
 from a7sim.session import combinations, durable, run
 from a7sim.session.checkpoints import read_checkpoints
 from a7sim.session.durable import DurableFile, JournalStopped
-from a7sim.session.journal import Journal, Keeping, header_of, header_of_unknown
+from a7sim.session.journal import Header, Journal, Keeping, header_of, header_of_unknown
 from a7sim.session.lines import Chain, read_journal
 from a7sim.session.replaying import Replay, replayed
 from a7sim.session.resuming import begun_in
 from a7sim.session.running import Watcher
+from a7sim.session.scripts import find_script, read_script
 from tests.processes import ANYWHERE, COMMAND, Running, a7sim, said_here
 from tests.served import Line
 
@@ -74,12 +75,15 @@ def forged(journalled, header=None, change=lambda number, data: data):
 # --- what it holds ----------------------------------------------------------------------------------------
 
 
-def test_the_header_stands_alone(whole):
+def test_the_header_says_what_a_session_follows_from_and_names_the_scenario_by_its_hash(whole):
     header = read_journal(whole / "session.jsonl").header
     assert header["software"] == f"a7sim {__version__}"
     assert (header["command"], header["seed"], header["variant"]) == ("run", 7, "A7")
-    assert header["scenario"]["photos"][0]["measured"]["file"] == "dewitt-pair.csv"
-    assert not any(str(part) in json.dumps(header) for part in (ROOT, Path.home()))
+    assert header["scenario_hash"] == hash_of(load_scenario("dewitt-pair", LIGHT))
+    assert "scenario" not in header
+    scenario = (whole / "session.scenario.json").read_text()
+    assert json.loads(scenario)["photos"][0]["measured"]["file"] == "dewitt-pair.csv"
+    assert not any(str(part) in json.dumps(header) + scenario for part in (ROOT, Path.home()))
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "scenarios").glob("*.toml")))
@@ -160,7 +164,7 @@ def test_a_flipped_last_line_end_is_no_torn_line(whole, tmp_path, flipped):
         (b'{"schema_version":2', "got no whole line: nothing was observed yet"),
         (
             b'{"schema_version":1,"software":"a7sim 0.1.0"}\n{}\n',
-            "line 1: expected a journal of schema_version 2, got 1",
+            "line 1: expected a journal of schema_version 2 or 3, got 1",
         ),
         (b"hello\n", "line 1: expected the checksum"),
         (b"\xff\xfe\n\n", "line 1: expected the checksum"),
@@ -184,6 +188,7 @@ def test_a_run_that_was_cut_off_leaves_what_an_uninterrupted_one_leaves(whole, t
     header = data.index(b"\n") + 1
     cut = data[: header + int(share * (len(data) - header))]
     (tmp_path / "session.jsonl").write_bytes(cut)
+    shutil.copy(whole / "session.scenario.json", tmp_path)
     resumed(tmp_path)
     torn = cut[cut.rfind(b"\n") + 1 :]
     expected = files_of(whole) | ({"session.jsonl.torn": torn} if torn else {})
@@ -210,7 +215,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_bytes(whole, tmp_path, capsys)
 
 def test_a_journal_of_another_seed_is_refused_at_its_line(copied):
     journalled = read_journal(copied / "session.jsonl")
-    header = header_of("run", load_scenario("dewitt-pair", LIGHT), 8)
+    header = header_of("run", load_scenario("dewitt-pair", LIGHT), 8).line
     (copied / "session.jsonl").write_bytes(forged(journalled, header))
     first = next(n for n in range(2, len(journalled)) if "FID?" in journalled.event(n).text) + 1
     with pytest.raises(Mistake, match=rf"session\.jsonl, line {first}: expected what this session does again"):
@@ -223,7 +228,7 @@ def test_a_journal_of_another_seed_is_refused_at_its_line(copied):
         ("software", "a7sim 0.0.1", "line 1: expected a session of a7sim .*, got one of a7sim 0.0.1"),
         ("command", "serve", "line 1: expected a session of run to go on with, got one of serve"),
         ("scenario_hash", "0" * 64, "line 1: expected the scenario and the measurements that the session began with"),
-        ("scenario", {"photos": []}, "line 1: expected a scenario of this version of a7sim"),
+        ("schema_version", 2, "line 1: expected schema_version 3 to go on with, got 2, which can be replayed only"),
     ],
 )
 def test_a_journal_of_something_else_is_refused_at_line_1(copied, key, value, sentence):
@@ -231,6 +236,35 @@ def test_a_journal_of_something_else_is_refused_at_line_1(copied, key, value, se
     (copied / "session.jsonl").write_bytes(forged(journalled, journalled.header | {key: value, "crc": ""}))
     with pytest.raises(Mistake, match=sentence):
         resumed(copied)
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (None, "expected the scenario of the session: No such file"),
+        ("{", "expected the scenario of the session as JSON, got something else"),
+        ('{"photos": []}', "expected a scenario of this version of a7sim"),
+    ],
+)
+def test_a_scenario_that_is_none_is_said_and_another_may_be_named(copied, content, sentence, capsys):
+    file = copied / "session.scenario.json"
+    file.unlink() if content is None else file.write_text(content)
+    done = said_here(capsys, "replay", copied, "--quiet")
+    assert done.returncode == 2
+    assert f"{file}: {sentence}" in done.stderr
+    named = ["replay", copied, "--verify", "--quiet", "--scenario"]
+    assert "expected the scenario and the measurements that" in said_here(capsys, *named, "akwanga").stderr
+
+
+def test_a_journal_without_its_scenario_replays_with_one_that_is_named(tmp_path, capsys):
+    assert said_here(capsys, "replay", "interior", "--out", tmp_path / "out", "--quiet").returncode == 0
+    script = read_script(find_script("interior"))
+    (tmp_path / "out" / "session.scenario.json").unlink()
+    name = next(
+        path.stem for path in (ROOT / "scenarios").glob("*.toml") if load_scenario(path.stem) == script.scenario
+    )
+    done = said_here(capsys, "replay", tmp_path / "out", "--verify", "--quiet", "--scenario", name)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_line_left_over_is_named(copied):
@@ -458,7 +492,7 @@ def test_always_and_none_are_what_they_say(tmp_path, monkeypatch):
 def test_what_registers_is_known_by_its_line(tmp_path, monkeypatch, line, registers):
     at_once = []
     monkeypatch.setattr(DurableFile, "add", lambda self, line, now=False: at_once.append(now))
-    journal = Journal().opened(tmp_path, {"schema_version": 2}, None)
+    journal = Journal().opened(tmp_path, Header({"schema_version": 3}), None)
     journal.heard(LinkEvent(0.0, "client1", ">", line))
     assert at_once == [False, registers]
 

@@ -4,7 +4,6 @@ import signal
 import socket
 import threading
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -18,7 +17,7 @@ from a7sim.mistakes import Mistake
 from a7sim.scenario import load_scenario
 from a7sim.session.durable import Durability
 from a7sim.session.folder import prepare_folder
-from a7sim.session.journal import Journal, Keeping, header_of, header_of_unknown
+from a7sim.session.journal import Header, Journal, Keeping, header_of, header_of_unknown
 
 _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
@@ -66,7 +65,7 @@ def command(
             Between(url, journal.heard, WallClock(), stop).serve(door)
 
 
-def _header(url: str, scenario: str | None, seed: int | None) -> dict[str, Any]:
+def _header(url: str, scenario: str | None, seed: int | None) -> Header:
     if scenario is None:
         if seed is not None:
             raise Mistake("--seed: expected a --scenario beside it, got none")

@@ -12,13 +12,14 @@ from a7sim.cli import EXIT_DIFFERS
 from a7sim.cli.options import of_a_folder
 from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
+from a7sim.scenario import load_scenario
 from a7sim.session.checkpoints import Differing
 from a7sim.session.conversation import Told, line_of_event
 from a7sim.session.folder import JOURNAL, prepare_folder
 from a7sim.session.journal import Journal, header_of
 from a7sim.session.lines import Journalled, read_journal
 from a7sim.session.playing import Player
-from a7sim.session.replaying import Difference, Replay, replayed
+from a7sim.session.replaying import Difference, Replay, names_scenario, replayed
 from a7sim.session.scripts import SUFFIX, find_script, read_script
 
 _MOST_PARTS = 20
@@ -42,6 +43,7 @@ _TIME = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:\.\d*)?)")
     metavar="T|@LINE|TEXT",
     help="Tell from a time on (s, or h:mm:ss), a line, or the first note with a text, such as the name of a form.",
 )
+@click.option("--scenario", metavar="SCENARIO", help="What the session was of, where it does not stand beside it.")
 @of_a_folder
 @click.option("--json", "as_document", is_flag=True, help="Print how it ended as one JSON document.")
 @click.option("--quiet", is_flag=True, help="Do not print the conversation.")
@@ -50,6 +52,7 @@ def command(
     verify: bool,
     speed: str,
     begin: str | None,
+    scenario: str | None,
     out: Path | None,
     force: bool,
     as_document: bool,
@@ -66,6 +69,8 @@ def command(
     if _is_script(session):
         if begin is not None:
             raise Mistake("--from: expected a journal to seek in, got a script")
+        if scenario is not None:
+            raise Mistake("--scenario: expected a journal, got a script, which says its own")
         played(session, pace, out, force, silent, as_document)
         return
     if out is not None:
@@ -73,10 +78,11 @@ def command(
     path = Path(session)
     journalled = read_journal(path / JOURNAL if path.is_dir() else path)
     first = 2 if begin is None else _line(journalled, begin)
-    if journalled.header.get("scenario") is None and not verify:
+    if not (names_scenario(journalled) or verify):
         _told(journalled, first, pace, silent, as_document)
     else:
-        _replayed(journalled, first, verify, pace, silent, as_document)
+        replay = Replay(journalled, load_scenario(scenario) if scenario is not None else None)
+        _replayed(replay, first, verify, pace, silent, as_document)
 
 
 class Pace:
@@ -131,8 +137,8 @@ def _told(journalled: Journalled, first: int, pace: Pace, silent: bool, as_docum
     _ended(journalled, 0, None, 0, as_document, silent)
 
 
-def _replayed(journalled: Journalled, first: int, verify: bool, pace: Pace, silent: bool, as_document: bool) -> None:
-    replay = Replay(journalled)
+def _replayed(replay: Replay, first: int, verify: bool, pace: Pace, silent: bool, as_document: bool) -> None:
+    journalled = replay.journalled
     begins = replay.seek(first) if first > 2 else 2
     known = len(replay.checkpoints)
     differing = 0

@@ -5,6 +5,8 @@ from pathlib import Path
 from a7sim.mistakes import Mistake
 
 JOURNAL, STATES, TORN = "session.jsonl", "session.states.jsonl", "session.jsonl.torn"
+SCENARIO_SUFFIX = ".scenario.json"
+"""Of the scenario beside a journal, in place of its own suffix."""
 BOOK, MODELS, STRIP, RESULTS = "book.csv", "models.csv", "strip.csv", "results.json"
 CARDS, OUTPUT_CARDS, CARD_KEY = "strip.crd", "strip-output.crd", "strip-numbers.csv"
 STRIPS = "strips.csv"
@@ -15,6 +17,7 @@ MODELS_OF_WAY, STRIP_OF_WAY = "{}-models.csv", "{}-strip.csv"
 WAYS = ("comparator", "A8")
 FILES = (
     JOURNAL,
+    Path(JOURNAL).with_suffix(SCENARIO_SUFFIX).name,
     STATES,
     TORN,
     BOOK,

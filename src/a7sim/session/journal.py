@@ -7,6 +7,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import msgspec
+
 import a7sim
 from a7sim.instrument.language import Desk, LinkEvent
 from a7sim.mistakes import Mistake
@@ -14,7 +16,7 @@ from a7sim.operator.book import Entry
 from a7sim.scenario import Scenario, carried, hash_of
 from a7sim.session.checkpoints import EVERY, Checkpoint, as_lines, hash_of_state
 from a7sim.session.durable import Durability, DurableFile, JournalStopped, stopped
-from a7sim.session.folder import JOURNAL, STATES, TORN
+from a7sim.session.folder import JOURNAL, SCENARIO_SUFFIX, STATES, TORN
 from a7sim.session.lines import SCHEMA_VERSION, Chain, Event, Journalled, read_journal
 
 _REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
@@ -27,25 +29,33 @@ def software() -> str:
     return f"a7sim {a7sim.__version__}"
 
 
-def header_of(command: str, scenario: Scenario, seed: int, **settings: Any) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Header:
+    """What a journal says first, and the scenario, which stands in a file of its own since it holds truth."""
+
+    line: dict[str, Any]
+    scenario: Scenario | None = None
+
+
+def header_of(command: str, scenario: Scenario, seed: int, **settings: Any) -> Header:
     """Return what a journal says first: all that a session follows from, beside what is said in it."""
-    return {
+    line = {
         "schema_version": SCHEMA_VERSION,
         "software": software(),
         "command": command,
         "title": scenario.title,
-        "scenario": carried(scenario),
         "scenario_hash": hash_of(scenario),
         "seed": seed,
         "variant": scenario.instrument.variant,
         "settings": settings,
     }
+    return Header(line, scenario)
 
 
-def header_of_unknown(command: str, **settings: Any) -> dict[str, Any]:
+def header_of_unknown(command: str, **settings: Any) -> Header:
     """Return what a journal says first where nobody knows what the instrument is of."""
     first = {"schema_version": SCHEMA_VERSION, "software": software(), "command": command}
-    return first | {"scenario": None, "settings": settings}
+    return Header(first | {"scenario_hash": None, "settings": settings})
 
 
 @dataclass(frozen=True)
@@ -77,7 +87,7 @@ class Journal:
         self._since_checkpoint = 0
         self._changes = 0
 
-    def opened(self, folder: Path | None, header: dict[str, Any], desk: Desk | None) -> "Journal":
+    def opened(self, folder: Path | None, header: Header, desk: Desk | None) -> "Journal":
         """Begin to write, where there is a folder; about a desk, where there is one.
 
         A session that is resumed sets aside what is torn of its journal. Raises Mistake where it cannot be written.
@@ -89,7 +99,9 @@ class Journal:
                 set_aside(self._there)
             self._begin(folder, self._there.size if self._there else 0, b"")
             try:
-                self._write(header)
+                if self._there is None:
+                    _leave_scenario(folder, header)
+                self._write(header.line)
                 for event in self._unwritten:
                     self.heard(event)
             except BaseException:
@@ -207,11 +219,22 @@ class Journal:
             self.stopped(error)
 
 
-def begin_folder(folder: Path, header: dict[str, Any]) -> None:
+def begin_folder(folder: Path, header: Header) -> None:
     """Leave a journal of nothing but its header: what is worked in a folder's folders. Raises Mistake."""
     file = DurableFile(folder / JOURNAL)
-    file.add(Chain().line(header) + b"\n")
+    _leave_scenario(folder, header)
+    file.add(Chain().line(header.line) + b"\n")
     file.close()
+
+
+def _leave_scenario(folder: Path, header: Header) -> None:
+    if header.scenario is not None:
+        data = msgspec.json.format(msgspec.json.encode(carried(header.scenario))) + b"\n"
+        file = DurableFile((folder / JOURNAL).with_suffix(SCENARIO_SUFFIX), "always")
+        try:
+            file.add(data)
+        finally:
+            file.close()
 
 
 def set_aside(there: Journalled) -> None:

@@ -9,7 +9,10 @@ import msgspec
 
 from a7sim.mistakes import Mistake
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
+
+READABLE = (2, 3)
+"""Schema versions that are read; version 2 had the whole scenario in its header."""
 
 _END_OF_LINE = b',"crc":"%08x"}'
 _LENGTH_OF_END = len(_END_OF_LINE % 0)
@@ -116,7 +119,7 @@ def read_journal(path: Path) -> Journalled:
 
 def _header(path: Path, line: bytes) -> dict[str, Any]:
     header = msgspec.json.decode(line)
-    if header.get("schema_version") != SCHEMA_VERSION:
+    if header.get("schema_version") not in READABLE:
         raise Mistake(f"{path}, line 1: {_other_version(header)}")
     return dict(header)
 
@@ -127,13 +130,13 @@ def _damage(line: bytes, number: int) -> str:
             header = msgspec.json.decode(line)
         except (msgspec.DecodeError, UnicodeDecodeError):
             header = None
-        if isinstance(header, dict) and header.get("schema_version", SCHEMA_VERSION) != SCHEMA_VERSION:
+        if isinstance(header, dict) and header.get("schema_version", SCHEMA_VERSION) not in READABLE:
             return _other_version(header)
     return "expected the checksum that follows from the lines before and this one, got another: the journal is damaged"
 
 
 def _other_version(header: dict[str, Any]) -> str:
     return (
-        f"expected a journal of schema_version {SCHEMA_VERSION}, got {header['schema_version']!r}: "
+        f"expected a journal of schema_version {' or '.join(map(str, READABLE))}, got {header['schema_version']!r}: "
         f"this version of a7sim cannot replay or resume it"
     )

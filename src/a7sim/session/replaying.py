@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
+
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import LONGEST_LINE, Desk, LinkEvent
 from a7sim.instrument.language.desk import POLL_TAKES
@@ -15,20 +17,23 @@ from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario, hash_of, scenario_from
 from a7sim.scene import build_scene
 from a7sim.session.checkpoints import Checkpoint, Differing, differences, hash_of_state, read_checkpoints
-from a7sim.session.folder import STATES
+from a7sim.session.folder import SCENARIO_SUFFIX, STATES
 from a7sim.session.lines import Event, Journalled
 
 RECORDED = "record"
 """The command whose journals hold what crossed a line, and nothing of how the instrument waited."""
 
 
-def scenario_of_journal(journalled: Journalled) -> tuple[Scenario, int]:
-    """Return the scenario and the seed of a session. Raises Mistake where they are not those it was begun with."""
+def scenario_of_journal(journalled: Journalled, known: Scenario | None = None) -> tuple[Scenario, int]:
+    """Return the scenario and the seed of a session, the scenario from beside the journal unless it is known.
+
+    Raises Mistake where they are not those the session was begun with.
+    """
     header = journalled.header
-    if header.get("scenario") is None:
+    if not names_scenario(journalled):
         raise Mistake(f"{journalled.where(1)}: expected a session whose scenario is known, got one that names none")
+    scenario = known or _scenario_beside(journalled)
     try:
-        scenario = scenario_from(header["scenario"])
         found = hash_of(scenario)
     except Mistake as mistake:
         raise Mistake(f"{journalled.where(1)}: {mistake}") from mistake
@@ -38,6 +43,29 @@ def scenario_of_journal(journalled: Journalled) -> tuple[Scenario, int]:
             f"(hash {str(header.get('scenario_hash'))[:12]}), got others ({found[:12]})"
         )
     return scenario, header["seed"]
+
+
+def names_scenario(journalled: Journalled) -> bool:
+    """Whether it is said of what scenario the instrument is."""
+    return journalled.header.get("scenario_hash") is not None
+
+
+def _scenario_beside(journalled: Journalled) -> Scenario:
+    """Return the scenario of a journal, which in version 2 stood in its header. Raises Mistake where there is none."""
+    path, where = journalled.path.with_suffix(SCENARIO_SUFFIX), journalled.where(1)
+    data = journalled.header.get("scenario")
+    if data is None:
+        where = str(path)
+        try:
+            data = msgspec.json.decode(path.read_bytes())
+        except OSError as error:
+            raise Mistake(f"{path}: expected the scenario of the session: {error.strerror}") from error
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise Mistake(f"{path}: expected the scenario of the session as JSON, got something else") from error
+    try:
+        return scenario_from(data)
+    except Mistake as mistake:
+        raise Mistake(f"{where}: {mistake}") from mistake
 
 
 @dataclass(frozen=True)
@@ -54,8 +82,8 @@ class Difference:
 class Replay:
     """A fresh instrument to which the lines of a journal are said again, from the first or from a checkpoint."""
 
-    def __init__(self, journalled: Journalled) -> None:
-        scenario, seed = scenario_of_journal(journalled)
+    def __init__(self, journalled: Journalled, known: Scenario | None = None) -> None:
+        scenario, seed = scenario_of_journal(journalled, known)
         header = journalled.header
         settings = header.get("settings", {})
         autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)

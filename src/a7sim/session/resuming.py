@@ -9,7 +9,7 @@ from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
 from a7sim.session.folder import JOURNAL
 from a7sim.session.journal import Journal, software
-from a7sim.session.lines import Journalled, read_journal
+from a7sim.session.lines import SCHEMA_VERSION, Journalled, read_journal
 from a7sim.session.replaying import Difference, Replay, replayed, scenario_of_journal
 
 
@@ -33,6 +33,12 @@ def begun_in(folder: Path, command: str) -> Begun:
         got = journalled.header.get(name)
         if got != expected:
             raise Mistake(f"{journalled.where(1)}: expected a session of {expected} to go on with, got one of {got}")
+    version = journalled.header["schema_version"]
+    if version != SCHEMA_VERSION:
+        raise Mistake(
+            f"{journalled.where(1)}: expected schema_version {SCHEMA_VERSION} to go on with, got {version}, "
+            "which can be replayed only"
+        )
     return Begun(journalled, *scenario_of_journal(journalled))
 
 

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from a7sim.documents import Document, as_json
 from a7sim.instrument.language import Desk
@@ -12,7 +12,7 @@ from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit, Person
 from a7sim.reduction import Undetermined
 from a7sim.session.folder import BOOK, RESULTS, write_whole
-from a7sim.session.journal import Journal
+from a7sim.session.journal import Header, Journal
 from a7sim.session.results import of_operator, of_slips
 
 
@@ -28,7 +28,7 @@ def sitting(
     document: Document,
     seated: Seated,
     journal: Journal,
-    header: Mapping[str, Any],
+    header: Header,
     out: Path | None = None,
     leaves: Callable[[], Mapping[str, str]] = dict,
     called: str = "session",
@@ -41,7 +41,7 @@ def sitting(
     """
     document |= {"status": "failed", "message": ""}
     person = seated.person
-    with journal.opened(out, dict(header), seated.desk):
+    with journal.opened(out, header, seated.desk):
         person.book.listener = lambda entry: journal.written(entry, person.clock.now)
         try:
             yield
