@@ -140,3 +140,12 @@ def _outward() -> list[Place]:
     span = range(-SEARCH_RINGS, SEARCH_RINGS + 1)
     places = [(SEARCH_STEP_MM * i, SEARCH_STEP_MM * j) for i in span for j in span]
     return sorted(places, key=lambda place: place[0] ** 2 + place[1] ** 2)
+
+
+def sketch_of(projector: int, picture: str, client: Client) -> dict[str, Place]:
+    """Ask for the points that are pricked on the print in a projector."""
+    if not picture:
+        return {}
+    fields = client.fields(f"PHOT{projector}:SKET?")
+    places = zip(map(float, fields[1::3]), map(float, fields[2::3]), strict=True)
+    return dict(zip(fields[0::3], places, strict=True))
