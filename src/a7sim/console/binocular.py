@@ -47,6 +47,11 @@ class Binocular(Horizontal):
         """Lay the eyepieces side by side."""
         yield from self._eyes.values()
 
+    @property
+    def is_there(self) -> bool:
+        """Whether the eyepieces are there, and not yet gone."""
+        return all(each.is_attached for each in self._eyes.values())
+
     def set_view(self, **changes: Any) -> None:
         """Change how the eyepieces show what they see."""
         self.view = replace(self.view, **changes)

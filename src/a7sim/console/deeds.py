@@ -9,6 +9,7 @@ from a7sim.console.looking import LookingDeeds
 from a7sim.console.reaching import Reach
 from a7sim.console.recording import RecordingDeeds
 from a7sim.console.turning import TurningDeeds
+from a7sim.console.watching import WatchingDeeds
 from a7sim.link.exchange import say
 
 _TURNS = {
@@ -20,16 +21,15 @@ _TURNS = {
     "z_down": ("Z", -1),
 }
 _TAKEN = ("kappa", "phi", "omega", "by", "bz", "c", "bx", "common_phi")
-_BEFORE_ANYTHING_ANSWERS = ("quit", "help")
+BEFORE_ANYTHING_ANSWERS = ("quit", "help")
 
 
-class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds):
+class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeeds):
     """The deeds of a console."""
 
     def do(self, name: str) -> None:
         """Do what a key or the palette asks for."""
-        console = self._console
-        if console.dials is None and name not in _BEFORE_ANYTHING_ANSWERS:
+        if (self._console.dials is None and name not in BEFORE_ANYTHING_ANSWERS) or self.hands_off(name):
             return
         if name in _TURNS:
             self.move(*_TURNS[name])
@@ -97,7 +97,7 @@ class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds):
     def do_help(self) -> None:
         """Show all keys."""
         console = self._console
-        console.push_screen(HelpPage(console.seat.keymap, not console.utf8))
+        console.push_screen(HelpPage(console.seat.keymap, not console.utf8, console.seat.watching))
 
     def do_quit(self) -> None:
         """Leave; everything is in the book and the journal."""

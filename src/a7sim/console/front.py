@@ -61,6 +61,7 @@ class Front(Screen[None]):
         with Horizontal(id="lower"):
             yield from self._sketches[2:]
             yield Book()
+        yield Static(id="progress", markup=False)
         yield Static(id="message", markup=False)
         yield Static(id="hints", markup=False)
         yield Static(id="banner", markup=False)
@@ -87,7 +88,7 @@ class Front(Screen[None]):
     @property
     def is_there(self) -> bool:
         """Whether the panels are there, and not yet gone."""
-        return self._counters[0].is_attached
+        return self._counters[0].is_attached and self._binocular.is_there
 
     # --- lines ----------------------------------------------------------------------------------------
 
@@ -102,6 +103,12 @@ class Front(Screen[None]):
         banner = self.query_one("#banner", Static)
         banner.update(words or "")
         banner.set_class(words is not None, "-shown")
+
+    def progress(self, words: str) -> None:
+        """Show how far a film is."""
+        progress = self.query_one("#progress", Static)
+        progress.update(words)
+        progress.set_class(True, "-shown")
 
     def head(self, words: str) -> None:
         """Show the masthead."""

@@ -61,6 +61,19 @@ def hints(
     return tuple((key, word) for applies, key, word in offered if applies)
 
 
+def hints_to_watch(keys: Mapping[str, str], magnification: float, playing: bool | None) -> Hints:
+    """Return the keys that do something while one watches; `playing` is None where there is no film."""
+    film = (
+        (keys["play"], "pause" if playing else "play"),
+        (f"{keys['step_back']} {keys['step_on']}", "step"),
+        (f"{keys['last_record']} {keys['next_record']}", "registration"),
+        (f"{keys['slower']} {keys['faster']}", "speed"),
+        (keys["jump"], "jump"),
+    )
+    eyes = ((keys["magnify"], f"x{magnification:g}"), (keys["drawing"], "drawing"), (keys["quit"], "leave"))
+    return ((keys["help"], "help"), *(film if playing is not None else ()), *eyes)
+
+
 def line_of(offered: Iterable[tuple[str, str]]) -> Text:
     """Return hints as a line."""
     return Text("  ", no_wrap=True).join(Text(key, "bold").append(f" {word}", "not bold") for key, word in offered)

@@ -45,7 +45,9 @@ class Presets:
         return self.units.get(axis, variant.scales[axis].units_per_mm)
 
     def preset(self, variant: Variant, dials: Dials, axis: str, reading: float) -> None:
-        """Take note that a counter is made to show a reading where it stands."""
+        """Take note that a counter is made to show a reading where it stands, if it is one that can be."""
+        if not variant.scales[axis].preset:
+            return
         self.origins[axis] = self.origin(variant, axis) + reading - dials.counter(axis)
 
     def regeared(self, variant: Variant, dials: Dials, units: float) -> None:

@@ -60,7 +60,8 @@ class Station:
         """End the conversation once what was ordered is said."""
         self._leaving.set()
         self._orders.put(None)
-        self._thread.join(timeout=2.0)
+        if self._thread.is_alive():
+            self._thread.join(timeout=2.0)
 
     def order(self, order: Order) -> None:
         """Have something said; the dials are read afterwards."""
