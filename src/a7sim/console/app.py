@@ -270,7 +270,7 @@ class Console(Deeds, App[None]):
         met, dials = self.met, self.dials
         if met is None or dials is None or not self.main.is_there:
             return
-        self.main.show(met.variant, dials, self.hands, self.entries)
+        self.main.show(met.variant, dials, None if self.seat.watching else self.hands, self.entries)
         for projector, picture in enumerate(dials.pictures, start=1):
             mark = partial(on_print, met.variant, dials, self.presets, projector)
             self.main.show_sketch(projector, picture, self.sketches[projector], mark, self.point)

@@ -85,14 +85,15 @@ class Elements(Panel):
         self.plain = False
         self._variant: Variant | None = None
         self._readings: Mapping[str, str] = {}
-        self._hands = Hands()
+        self._hands: Hands | None = None
 
-    def show(self, variant: Variant, readings: Mapping[str, str], hands: Hands) -> None:
-        """Show readings, and what is in hand."""
+    def show(self, variant: Variant, readings: Mapping[str, str], hands: Hands | None) -> None:
+        """Show readings, and what is in hand, None where hands are off."""
         if (variant, readings, hands) != (self._variant, self._readings, self._hands):
             anew = self._variant is not variant
             self._variant, self._readings, self._hands = variant, readings, hands
-            self.border_subtitle = f"step {hands.step:g}" + (" free hand" if hands.free else "")
+            free = " free hand" if hands and hands.free else ""
+            self.border_subtitle = f"step {hands.step:g}{free}" if hands else "hands off"
             self.refresh(layout=anew)
 
     @property
@@ -123,7 +124,7 @@ class Elements(Panel):
         shown = "Phi" if name == "common_phi" else name
         row = Text(f"{shown:<{name_width}}", self.like("word"))
         for element in [name] if name in BARE else [f"{name}1", f"{name}2"]:
-            lit = element == self._hands.element
+            lit = self._hands is not None and element == self._hands.element
             reading = self._readings.get(element, "")
             row.append(f">{reading:>6} " if lit else f"{reading:>7} ", self.like("hand" if lit else "drum"))
             row.append(f"{self._bar(element, bar_width)} ", self.like("faint"))

@@ -130,8 +130,8 @@ class Front(Screen[None]):
         for index, name in enumerate(PANELS):
             self.query_one(f"#{name}").set_class(index == (at + 1) % len(PANELS), "-chosen")
 
-    def show(self, variant: Variant, dials: Dials, hands: Hands, entries: tuple[Entry, ...]) -> None:
-        """Show the dials, the hands and the book."""
+    def show(self, variant: Variant, dials: Dials, hands: Hands | None, entries: tuple[Entry, ...]) -> None:
+        """Show the dials, the hands unless they are off, and the book."""
         for counter in self._counters:
             counter.turn_to(dials.counters[counter.axis])
         self.query_one(Elements).show(variant, dials.elements, hands)

@@ -39,7 +39,8 @@ class Playback:
         self.speed = SPEEDS[0]
         self._asks = asks
         self._shown = shown
-        self._running = False
+        self._aim = film.frame.step
+        self._running = 0
         self._since: tuple[float, float] | None = None
 
     def play_or_pause(self) -> None:
@@ -58,18 +59,18 @@ class Playback:
     def go_to(self, step: int) -> None:
         """Run to a step, as far as there is one."""
         self._since = None
-        reached = min(max(step, 0), self.film.steps)
-        self._run(lambda _: self.film.run_to(reached))
+        aim = self._aim = min(max(step, 0), self.film.steps)
+        self._run(lambda _: self.film.run_to(aim))
 
     def go_by(self, steps: int) -> None:
         """Pause, and run on or back by so many steps."""
         self.playing = False
-        self.go_to(self.frame.step + steps)
+        self.go_to(self._aim + steps)
 
     def go_to_record(self, way: int) -> bool:
         """Pause, and run to the next registration, on or back; return whether there is one."""
         self.playing = False
-        step = self.film.next_record(self.frame.step, way)
+        step = self.film.next_record(self._aim, way)
         if step is not None:
             self.go_to(step)
         return step is not None
@@ -104,17 +105,19 @@ class Playback:
         return filmed + (time.monotonic() - wall) * self.speed
 
     def _run(self, work: "Callable[[Client], Frame]") -> None:
-        self._running = True
+        self._running += 1
         self._asks(work, self._come_to)
 
     def _come_to(self, frame: "Frame") -> None:
-        self._running = False
+        self._running = max(0, self._running - 1)
         self.frame = frame
+        if not self._running:
+            self._aim = frame.step
         self._shown(frame)
 
     def interrupted(self) -> None:
         """Forget what was asked of a film that did not answer."""
-        self.playing = self._running = False
+        self.playing, self._running = False, 0
 
     @property
     def progress(self) -> str:

@@ -23,6 +23,9 @@ from a7sim.session.seeking import line_sought
 
 _SAID = (">", "!")
 
+_DRAWS = re.compile(r"EYEP\w*:PICT\w*\?|COUN\?;:PROJ1:", re.IGNORECASE)
+"""A line by which a screen is drawn: it is said again, and is no step."""
+
 _POINT = re.compile(r'(?:EYEP\w*(?::STER\w*)?\?|REC(?:ORD)?)\s+"((?:[^"]|"")+)"', re.IGNORECASE)
 
 _LOOKED_BACK = 200
@@ -31,7 +34,7 @@ _LOOKED_BACK = 200
 
 @dataclass(frozen=True)
 class Frame:
-    """Where a film stands: steps are lines that were said, 0 before the first of them."""
+    """Where a film stands: steps are the lines that were said, but for those that drew a screen; 0 is before them."""
 
     step: int
     time: float
@@ -74,7 +77,7 @@ class Film:
     def _list(self, number: int, event: Event) -> None:
         if event.kind == "state":
             self._checkpoints.append(number)
-        elif event.dir in _SAID:
+        elif event.dir in _SAID and not _DRAWS.match(event.text):
             self._numbers.append(number)
             self._times.append(event.t)
             if registers(event.text):
@@ -82,7 +85,7 @@ class Film:
 
     @property
     def steps(self) -> int:
-        """How many lines were said."""
+        """How many lines were said that drew no screen."""
         return len(self._numbers)
 
     def opened(self) -> Client:
