@@ -1,8 +1,8 @@
 """A film at its pace: played, paused, stepped through and jumped in, as the wall's clock and the keys have it."""
 
 import math
-import time
 from collections.abc import Callable
+from time import monotonic
 from typing import TYPE_CHECKING, Protocol
 
 from a7sim.console.margins import elapsed
@@ -94,15 +94,15 @@ class Playback:
                 self._run(lambda _: self.film.run_to(step))
 
     def _run_on(self, _: Client) -> "Frame":
-        until = time.monotonic() + RUN_S
-        return self.film.run_on(lambda: time.monotonic() >= until)
+        until = monotonic() + RUN_S
+        return self.film.run_on(lambda: monotonic() >= until)
 
     def _due(self) -> float:
         """Return how late it is in the film by the wall's clock, counted from when it was last set going."""
         if self._since is None:
-            self._since = time.monotonic(), self.frame.time
+            self._since = monotonic(), self.frame.time
         wall, filmed = self._since
-        return filmed + (time.monotonic() - wall) * self.speed
+        return filmed + (monotonic() - wall) * self.speed
 
     def _run(self, work: "Callable[[Client], Frame]") -> None:
         self._running += 1

@@ -28,6 +28,9 @@ _DRAWS = re.compile(r"EYEP\w*:PICT\w*\?|COUN\?;:PROJ1:", re.IGNORECASE)
 
 _POINT = re.compile(r'(?:EYEP\w*(?::STER\w*)?\?|REC(?:ORD)?)\s+"((?:[^"]|"")+)"', re.IGNORECASE)
 
+LEAP = 200
+"""Lines that are said again rather than a checkpoint behind them sought."""
+
 _LOOKED_BACK = 200
 """Steps back in which the point is looked for that is worked at."""
 
@@ -95,7 +98,7 @@ class Film:
     def run_to(self, step: int) -> Frame:
         """Run on, or back, until a step is done with all that came of it; 0 is the beginning."""
         end = self._numbers[step] if step < self.steps else len(self.journalled) + 1
-        if end < self._next or self._has_checkpoint_between(self._next, end):
+        if self._leaps_to(end):
             self._replay = Replay(self.journalled)
             self._next = self._replay.seek(end)
             self._front.autograph = self._replay.desk.autograph
@@ -108,9 +111,10 @@ class Film:
         self.frame = self._framed(step)
         return self.frame
 
-    def _has_checkpoint_between(self, first: int, end: int) -> bool:
-        at = bisect_left(self._checkpoints, first)
-        return at < len(self._checkpoints) and self._checkpoints[at] < end
+    def _leaps_to(self, end: int) -> bool:
+        """Whether it is quicker to go on from a checkpoint than from here."""
+        at = bisect_left(self._checkpoints, end) - 1
+        return end < self._next or (at >= 0 and self._checkpoints[at] - self._next > LEAP)
 
     def run_on(self, enough: Callable[[], bool]) -> Frame:
         """Run on, a step at least if there is one, until that is enough."""
@@ -140,7 +144,8 @@ class Film:
                 f"jump to {words}: expected a step up to {self.steps}, a time up to {self._times[-1]:.0f}s, "
                 f"@{len(self.journalled)} or the text of a note"
             )
-        return bisect_right(self._numbers, line)
+        answers = self.journalled.event(line).dir == "<"
+        return min(bisect_left(self._numbers, line) + (not answers), self.steps)
 
     def _framed(self, step: int) -> Frame:
         scales = self._front.autograph.counter_scales
@@ -160,9 +165,9 @@ class Film:
 
     def _point_at(self, step: int) -> str | None:
         for number in reversed(self._numbers[max(0, step - _LOOKED_BACK) : step]):
-            found = _POINT.search(self.journalled.event(number).text)
-            if found is not None:
-                return found[1].replace('""', '"')
+            named = _POINT.findall(self.journalled.event(number).text)
+            if named:
+                return str(named[-1]).replace('""', '"')
         return None
 
 
