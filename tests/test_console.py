@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Coroutine
 from pathlib import Path
@@ -120,6 +121,33 @@ def test_a_key_is_a_step_and_holding_it_is_many() -> None:
             assert console.dials.elements["omega2"] == "100.01"
             await person.press("[", "+")
             assert console.dials.elements["omega2"] == "100.01", "a drum stands between two counts"
+
+    played(sit_down())
+
+
+def test_keys_pressed_before_anything_answers_are_done_when_it_does() -> None:
+    door = with_photographs()
+    answers = threading.Event()
+
+    def connected() -> Client:
+        assert answers.wait(20.0)
+        return Client(InProcessSerial(desk=door.desk, clock=door.clock, timeout=5.0))
+
+    console = Console(Seat(connected, lambda: 0.0, drawing=Drawing.HALVES))
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            person.strike("right", "right", "y", "s", *"12.5", "enter", "up", "]", "right")
+            await pilot.pause()
+            assert console.dials is None
+            answers.set()
+            await person.until(lambda: console.dials is not None and console.dials.counters["X"] == "12.00")
+            await person.settle()
+            assert console.dials.counters == {"X": "12.00", "Y": "1.00", "Z": "-300.00"}
+            assert console.dials.elements["by1"] == "12.50"
+            await person.press("left")
+            assert console.dials.counters["X"] == "2.00"
 
     played(sit_down())
 

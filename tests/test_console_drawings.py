@@ -13,7 +13,7 @@ from a7sim.console import eyepiece
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
 from a7sim.console.eyepiece import Drawing, Run
 from a7sim.console.hands import LADDER, Hands
-from a7sim.console.keymap import DEEDS, default_keymap, load_keymap, pressed, sample
+from a7sim.console.keymap import deeds_of, default_keymap, load_keymap, pressed, sample
 from a7sim.console.seat import best_drawing, speaks_utf8
 from a7sim.console.sketches import sketched
 from a7sim.console.words import image_in_words, parallax_in_words
@@ -157,8 +157,9 @@ def test_the_sample_keymap_is_the_default_one(tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.write_text(sample(), encoding="utf-8")
     assert load_keymap(file) == default_keymap()
-    keys = [key for deed in DEEDS for key in deed.keys]
-    assert len(keys) == len(set(keys))
+    for watching in (False, True):
+        keys = [key for deed in deeds_of(watching) for key in deed.keys]
+        assert len(keys) == len(set(keys))
 
 
 def test_a_deed_that_a_keymap_leaves_out_keeps_its_keys(tmp_path: Path) -> None:
@@ -195,7 +196,7 @@ def test_a_bad_keymap_is_one_sentence(content: str, words: str, tmp_path: Path) 
         (["nowhere"], "nowhere"),
         ([], "expected a terminal to sit at"),
         (["--connect", "tcp://127.0.0.1:1"], "expected an instrument to answer there"),
-        (["--connect", "tcp://127.0.0.1:1", "--seed", "7"], "expected neither --seed nor --variant"),
+        (["--connect", "tcp://127.0.0.1:1", "--seed", "7"], "expected no --seed beside it"),
     ],
 )
 def test_what_cannot_be_sat_down_at_is_one_sentence_and_exit_2(
