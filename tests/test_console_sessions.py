@@ -60,7 +60,7 @@ def sat_at(here: InProcess, sitting: Callable[[Person], Coroutine[Any, Any, None
 
 
 async def a_beginning(person: Person) -> None:
-    """Lay a picture, make counters show what the job has, turn, record, strike out."""
+    """Lay a picture, make counters show what the job has, change the height gear, turn, record, strike out."""
     await person.settle()
     await person.press("l")
     await person.choose("left projector: lay")
@@ -68,6 +68,10 @@ async def a_beginning(person: Person) -> None:
     await person.press("l")
     await person.choose("preset counters")
     await person.type_in("X 5000 Y 5000")
+    await person.press("l")
+    await person.choose("height gear")
+    await person.type_in("Dc")
+    assert set(person.console.presets.units) == {"Z"} and set(person.console.presets.origins) == set("XYZ")
     await person.press("right", "right", "y", "+", "enter")
     await person.type_in("P1")
     await person.press("up", "enter", "x")

@@ -1,59 +1,42 @@
 """The console: the screen, what it knows, and what the station tells it."""
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
 from textual import events, on
 from textual.app import App, SystemCommand
-from textual.message import Message
 from textual.screen import Screen
 
 from a7sim.console.binocular import Binocular, View
-from a7sim.console.book import Entry, read_book
+from a7sim.console.book import Entry
 from a7sim.console.deeds import BEFORE_ANYTHING_ANSWERS, Deeds
 from a7sim.console.dialogs import Choose
 from a7sim.console.dials import Dials
 from a7sim.console.drum_panels import Wheeled
 from a7sim.console.front import Front
 from a7sim.console.hands import Hands
+from a7sim.console.hearing import Hearing
 from a7sim.console.keymap import deeds_by_key, deeds_of, pressed, shown
 from a7sim.console.margins import hints, hints_to_watch, keys_shown, masthead
-from a7sim.console.news import Met, News, Refused, Sight, Silent
-from a7sim.console.playback import TICK_S, Playback
+from a7sim.console.news import Met, Sight, Silent
+from a7sim.console.playback import Playback
 from a7sim.console.prints import Pointed
-from a7sim.console.reaching import Presets, on_print, sketch_of
-from a7sim.console.recalling import recalled
+from a7sim.console.reaching import Presets, on_print
 from a7sim.console.seat import Resumable, Seat, best_drawing, speaks_utf8
 from a7sim.console.sketches import Place
 from a7sim.console.station import Station
 from a7sim.console.themes import DRUMS, THEMES
 from a7sim.console.window import Eyepiece
-from a7sim.console.words import error_in_words
-from a7sim.link.client import Client
 
-
-class Told(Message):
-    """The station tells something."""
-
-    def __init__(self, news: News) -> None:
-        super().__init__()
-        self.news = news
-
-
-class Done(Message):
-    """Something that was asked has been answered: what is to be done with it."""
-
-    def __init__(self, then: Callable[[], None]) -> None:
-        super().__init__()
-        self.then = then
-
+SETTLING_S = 0.02
+"""Between two keys for a dialog, where they were pressed before anything answered."""
 
 GO_ON = (("go_on", "go on where it stood"), ("anew", "begin anew; the old session is kept"))
 
 
-class Console(Deeds, App[None]):
+class Console(Hearing, Deeds, App[None]):
     """The instrument for a person."""
 
     CSS_PATH = "app.tcss"
@@ -147,123 +130,44 @@ class Console(Deeds, App[None]):
             self.do(name)
         return True
 
-    def _press_early(self) -> None:
+    def press_early_keys(self) -> None:
         """Press a key that was pressed before anything answered, and the next when all is done that came of it."""
         if not self._early:
             self._early = None
-            return
-        event = self._early.popleft()
-        name = self._by_key.get(pressed(event.key, event.character))
-        if self.screen is not self.main:
-            self.post_message(events.Key(event.key, event.character))
-        elif name is not None:
-            self.do(name)
-        self.afterwards(self._press_early)
+        elif not self._settled:
+            self.set_timer(SETTLING_S, self.press_early_keys)
+        else:
+            event = self._early.popleft()
+            name = self._by_key.get(pressed(event.key, event.character))
+            if self.screen is not self.main:
+                self.post_message(events.Key(event.key, event.character))
+                self.set_timer(SETTLING_S, self.press_early_keys)
+            else:
+                if name is not None:
+                    self.do(name)
+                self.afterwards(self.press_early_keys)
+
+    @property
+    def _settled(self) -> bool:
+        """Whether what lies over the screen, if anything does, is ready for a key, and has dealt with the last."""
+        if self.screen is self.main:
+            return True
+        focused = self.screen.focused
+        return focused is not None and not (self.screen.message_queue_size or focused.message_queue_size)
+
+    def forget_early_keys(self) -> None:
+        """Press none of the keys that wait: nobody wants to turn an instrument that did not answer."""
+        if self._early:
+            self._early.clear()
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
         """Return what the palette lists: every deed by its name, and the library's own."""
-        for deed in deeds_of(self.seat.watching):
+        for deed in deeds_of(self.seat.watching, self.seat.film is not None):
             keys = " ".join(shown(key, not self.utf8) for key in self.seat.keymap[deed.name])
             yield SystemCommand(deed.about, f"{deed.group}, {keys}", partial(self.do, deed.name))
         yield from super().get_system_commands(screen)
 
-    # --- news -----------------------------------------------------------------------------------------
-
-    def ask(self, work: Callable[[Client], Any], then: Callable[[Any], None]) -> None:
-        """Have something asked in the station's thread, and go on with the answer in the screen's."""
-
-        def order(client: Client) -> None:
-            answer = work(client)
-            self.post_message(Done(partial(then, answer)))
-
-        self.station.order(order)
-
-    def afterwards(self, then: Callable[[], None]) -> None:
-        """Go on when all that was ordered so far is said, and what came of it is known."""
-        self.ask(lambda _: None, lambda _: then())
-
-    def _tell(self, news: News) -> None:
-        self.post_message(Told(news))
-
-    def on_done(self, done: Done) -> None:
-        """Go on with an answer, unless the screen is gone."""
-        if self.main.is_there:
-            done.then()
-
-    def on_told(self, told: Told) -> None:
-        """Show what the station tells, unless the screen is gone."""
-        if not self.main.is_there:
-            return
-        match told.news:
-            case Met():
-                self._meet(told.news)
-            case Dials():
-                self._read(told.news)
-            case Sight():
-                self.sight = told.news
-                self.draw()
-            case Refused():
-                self.say(" · ".join(error_in_words(error) for error in told.news.errors), refused=True)
-            case Silent():
-                self._lose(told.news)
-
-    def _meet(self, met: Met) -> None:
-        first = self.met is None
-        self.met = met
-        self.hands = self.hands.on(met.variant)
-        if self.silent is not None:
-            self.silent = None
-            self.say("the instrument answers again")
-        else:
-            self.say(self.seat.greeting() or "l lays pictures; ? is help")
-        if first:
-            self._begin(met)
-        self.main.warn(None)
-        self.call_after_refresh(self.look)
-
-    def _begin(self, met: Met) -> None:
-        """Take up what was there before anybody sat down here."""
-        past = self.seat.past
-        self.ask(lambda _: recalled(met.variant, past()), self._recall)
-        if self.playback is not None:
-            self.playback.go_to(0)
-            self.set_interval(TICK_S, self.playback.tick)
-
-    def _recall(self, presets: Presets) -> None:
-        self.presets = presets
-
-    def _lose(self, silent: Silent) -> None:
-        if silent != self.silent:
-            self.silent = silent
-            if self._early:
-                self._early.clear()
-            if self.playback is not None:
-                self.playback.interrupted()
-            self.main.warn(f"The instrument does not answer: {silent.why}. Trying again every second; q leaves.")
-
-    def _read(self, dials: Dials) -> None:
-        before, self.dials = self.dials, dials
-        for projector, picture in enumerate(dials.pictures, start=1):
-            if before is None or before.pictures[projector - 1] != picture:
-                self.ask(partial(sketch_of, projector, picture), partial(self._sketch, projector))
-        if self.seat.watching or (before is None and self.seat.alone):
-            self._keep_book(dials)
-        self.refresh_panels()
-        if before is None:
-            self._press_early()
-
-    def _keep_book(self, dials: Dials) -> None:
-        """Have the book as the recorder has it."""
-        if (dials.records, dials.struck) != (len(self.entries), sum(entry.struck for entry in self.entries)):
-            self.ask(partial(read_book, records=dials.records), self._open_book)
-
-    def _open_book(self, entries: tuple[Entry, ...]) -> None:
-        self.entries = entries
-        self.refresh_panels()
-
-    def _sketch(self, projector: int, points: dict[str, Place]) -> None:
-        self.sketches[projector] = points
-        self.refresh_panels()
+    # --- panels ---------------------------------------------------------------------------------------
 
     def refresh_panels(self) -> None:
         """Show the dials, the hands and the book as they are."""

@@ -97,7 +97,9 @@ class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeed
     def do_help(self) -> None:
         """Show all keys."""
         console = self._console
-        console.push_screen(HelpPage(console.seat.keymap, not console.utf8, console.seat.watching))
+        console.push_screen(
+            HelpPage(console.seat.keymap, not console.utf8, console.seat.watching, console.seat.film is not None)
+        )
 
     def do_quit(self) -> None:
         """Leave; everything is in the book and the journal."""

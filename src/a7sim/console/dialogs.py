@@ -72,15 +72,15 @@ class HelpPage(ModalScreen[None]):
 
     BINDINGS: ClassVar[list[BindingType]] = [*_LEAVING, ("q", "leave", "back"), ("question_mark", "leave", "back")]
 
-    def __init__(self, keymap: Keymap, plain: bool, watching: bool) -> None:
+    def __init__(self, keymap: Keymap, plain: bool, watching: bool, film: bool) -> None:
         super().__init__()
-        self._keymap, self._plain, self._watching = keymap, plain, watching
+        self._text = help_text(keymap, plain, watching, film)
 
     def compose(self) -> ComposeResult:
         """Lay out the page."""
         with VerticalScroll(id="dialog") as dialog:
             dialog.border_title = "help"
-            yield Static(help_text(self._keymap, self._plain, self._watching), markup=False)
+            yield Static(self._text, markup=False)
 
     def action_leave(self) -> None:
         """Go back."""
@@ -114,10 +114,10 @@ counters, elements and book. Your hands are off; your eyes are your own.
 """
 
 
-def help_text(keymap: Keymap, plain: bool, watching: bool = False) -> str:
+def help_text(keymap: Keymap, plain: bool, watching: bool = False, film: bool = True) -> str:
     """Return the page of help."""
     lines = [_HOW_TO_WATCH if watching else _HOW_TO]
-    deeds = deeds_of(watching)
+    deeds = deeds_of(watching, film)
     for group in dict.fromkeys(deed.group for deed in deeds):
         lines.append(group.upper())
         for deed in deeds:

@@ -81,9 +81,14 @@ DEEDS = (
 """All that keys do. Same keys on every plotter that has the part."""
 
 
-def deeds_of(watching: bool) -> tuple[Deed, ...]:
-    """Return what keys do at the instrument, or while one watches."""
-    return tuple(deed for deed in DEEDS if deed.group in LOOKING or (deed.group == WATCHING) == watching)
+def deeds_of(watching: bool, film: bool = True) -> tuple[Deed, ...]:
+    """Return what keys do at the instrument, or while one watches, be it a film or what is done now."""
+    played = {WATCHING} if film else set()
+    return tuple(
+        deed
+        for deed in DEEDS
+        if deed.group in LOOKING or (deed.group in played if watching else deed.group != WATCHING)
+    )
 
 
 def default_keymap() -> Keymap:
