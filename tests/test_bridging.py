@@ -132,9 +132,8 @@ def test_the_shipped_strip_is_bridged_and_worked_as_independent_models_to_its_en
 def test_a_bridge_leaves_its_files(shipped):
     _, document, out = shipped
     assert json.loads((out / "results.json").read_text()) == json.loads(json.dumps(document))
-    assert {"independent", "book.csv", "models.csv", "session.jsonl", "session.states.jsonl", "results.json"} == {
-        p.name for p in out.iterdir()
-    }
+    journal = {"session.jsonl", "session.scenario.json", "session.states.jsonl"}
+    assert {"independent", "book.csv", "models.csv", "results.json", *journal} == {p.name for p in out.iterdir()}
     assert json.loads((out / "independent" / "results.json").read_text())["strip"] == document["independent"]["strip"]
 
 

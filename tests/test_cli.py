@@ -12,7 +12,21 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-WORK_FILES = {"session.jsonl", "session.states.jsonl", "book.csv", "models.csv", "results.json"}
+WORK_FILES = {
+    "session.jsonl",
+    "session.scenario.json",
+    "session.states.jsonl",
+    "book.csv",
+    "models.csv",
+    "results.json",
+}
+    "session.jsonl",
+    "session.scenario.json",
+    "session.states.jsonl",
+    "book.csv",
+    "models.csv",
+    "results.json",
+}
 STRIP_FILES = {"strip.csv", "strip.crd", "strip-output.crd", "strip-numbers.csv"}
 FILES = WORK_FILES | STRIP_FILES
 

@@ -468,6 +468,7 @@ def test_calibrate_files_a_sheet(tmp_path):
     document = json.loads(done.stdout)
     assert {path.name for path in out.iterdir()} == {
         "session.jsonl",
+        "session.scenario.json",
         "session.states.jsonl",
         "book.csv",
         "residuals.csv",

@@ -14,25 +14,25 @@ import serial
 
 import a7sim
 from a7sim.link.client import Client
-from tests.processes import ANYWHERE, SERVE, Running
+from tests.processes import ANYWHERE, SERVE, Running, said_here
 from tests.served import PATIENCE
 
 IDENTITY = f"WILD HEERBRUGG,A7,3268,{a7sim.__version__}"
 
 
-def refused(*arguments, **environment):
+@pytest.fixture
+def refused(capsys, monkeypatch):
     """Return what a server that does not begin says."""
-    done = subprocess.run(
-        [*SERVE, *arguments],
-        capture_output=True,
-        check=False,
-        text=True,
-        timeout=30,
-        env={**os.environ, **environment},
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "Traceback" not in done.stderr
-    return done.stderr
+
+    def told(*arguments, **environment):
+        for name, value in environment.items():
+            monkeypatch.setenv(name, value)
+        done = said_here(capsys, "serve", *arguments)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert "Traceback" not in done.stderr
+        return done.stderr
+
+    return told
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_the_document_says_where_it_listens_and_all_doors_lead_to_one_instrument
             assert client.ask(f"COUN:X?;:DRIV:X {n + 1};:COUN:X?") == f"{n}.00;{n + 1}.00"
 
 
-def test_no_second_server_takes_the_terminal_of_one_that_serves(everywhere):
+def test_no_second_server_takes_the_terminal_of_one_that_serves(everywhere, refused):
     link = next(door["path"] for door in everywhere.document["listening"] if door["kind"] == "pty")
     device = Path(link).readlink()
     assert f"--pty {link}: expected a path of its own" in refused("akwanga", "--tcp", "127.0.0.1:0", "--pty", link)
@@ -179,11 +179,11 @@ def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
         (["--baud", "1"], "--baud"),
     ],
 )
-def test_what_cannot_be_served_is_said_in_a_sentence(arguments, sentence):
+def test_what_cannot_be_served_is_said_in_a_sentence(arguments, sentence, refused):
     assert sentence in refused("akwanga", *arguments, A7SIM_TOKEN="")
 
 
-def test_an_address_that_is_taken_is_said_and_nothing_stays_behind(tmp_path):
+def test_an_address_that_is_taken_is_said_and_nothing_stays_behind(tmp_path, refused):
     link = tmp_path / "a7"
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"127.0.0.1:{taken.getsockname()[1]}"
