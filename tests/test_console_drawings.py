@@ -194,6 +194,7 @@ def test_a_bad_keymap_is_one_sentence(content: str, words: str, tmp_path: Path) 
         (["--keymap", "{folder}/none.toml"], "expected a keymap in TOML"),
         (["nowhere"], "nowhere"),
         ([], "expected a terminal to sit at"),
+        (["--drawing", "halves", "--theme", "dark"], "expected a terminal to sit at"),
         (["--connect", "tcp://127.0.0.1:1"], "expected an instrument to answer there"),
         (["--connect", "tcp://127.0.0.1:1", "--seed", "7"], "expected neither --seed nor --variant"),
     ],

@@ -5,11 +5,12 @@ import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from msgspec import structs
 
+from a7sim.cli.browser import drawn_by_a_browser, in_a_browser, served_instead
 from a7sim.cli.links import token_from
 from a7sim.cli.prompt import data_folder
 from a7sim.console.eyepiece import Drawing
@@ -37,7 +38,9 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 @click.option("--variant", type=click.Choice(["A7", "A8"], case_sensitive=False), help="Another plotter.")
 @click.option("--theme", type=click.Choice(THEMES), help="Colours  [default: enamel]")
 @click.option(
-    "--drawing", type=click.Choice(list(Drawing)), help="How pictures are drawn  [default: the best there is]"
+    "--drawing",
+    type=click.Choice([each.value for each in Drawing]),
+    help="How pictures are drawn  [default: the best there is]",
 )
 @click.option("--plain", is_flag=True, help="Say in words what the eyes see; nothing rolls. For screen readers.")
 @click.option(
@@ -51,7 +54,11 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 @click.option("--keymap", type=click.Path(path_type=Path, dir_okay=False), help="File with keys of your own.")
 @click.option("--write-keymap", is_flag=True, help="Write all keys to --keymap, or to the usual file, and end.")
 @click.option("--token-file", type=click.Path(path_type=Path, dir_okay=False), help="File with a server's token.")
+@in_a_browser
+@click.pass_context
 def command(
+    context: click.Context,
+    /,
     scenario: str | None,
     connect: str | None,
     seed: int | None,
@@ -63,6 +70,7 @@ def command(
     keymap: Path | None,
     write_keymap: bool,
     token_file: Path | None,
+    **_browser: Any,
 ) -> None:
     """Sit down at the instrument of SCENARIO, or at a served one: the plotter on a terminal, for a person.
 
@@ -89,7 +97,9 @@ def command(
         return clock.now
 
     opened = _at_a_line(connect, token_file) if connect else _in_process(loaded, seed, clock)
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+    if served_instead(context):
+        return
+    if not (drawn_by_a_browser() or (sys.stdin.isatty() and sys.stderr.isatty())):
         raise Mistake("console: expected a terminal to sit at, got a file or a pipe (a7sim send takes lines from one)")
     sheet = JobSheet(loaded.title, loaded.camera) if loaded else JobSheet()
     Console(
