@@ -225,3 +225,31 @@ def test_the_keymap_is_written_once(
         assert left.value.code == code
     assert load_keymap(file) == default_keymap()
     assert "expected to write a new file" in capsys.readouterr().err
+
+
+SLOPE = (np.add.outer(np.arange(8), np.arange(8)) * 18).astype(np.uint8)
+"""Light from the top left, 0, to the bottom right, 252."""
+
+
+@pytest.mark.parametrize(
+    ("drawing", "golden"),
+    [
+        (Drawing.SHADES, ["   ░░▒░▒", "░░▒░▒▒▓▓", "░▒░▒▒▓▓▓", "▒▒▓▓▓▓██"]),
+        (Drawing.ASCII, [" ..::==+", "::--=+**", "-==++**#", "++**##%%"]),
+        (Drawing.BRAILLE, ["⠀⢄⢕⢵", "⢕⢵⢽⣽"]),
+    ],
+)
+def test_a_slope_in_every_drawing_without_colours(drawing: Drawing, golden: list[str]) -> None:
+    assert text(eyepiece.drawn(drawing, SLOPE)) == golden
+
+
+def test_a_slope_in_an_eyepiece_at_32_greys() -> None:
+    """Levels of ink and paper by cell; the corners are darkened."""
+    shown = eyepiece.half_blocks(eyepiece.vignetted(SLOPE))
+    cells = [[(run.ink, run.paper) for run in row for _ in run.text] for row in shown]
+    assert cells == [
+        [(0, 1), (1, 3), (3, 6), (5, 8), (7, 10), (9, 12), (10, 13), (8, 13)],
+        [(3, 5), (6, 8), (8, 11), (11, 13), (13, 15), (15, 17), (17, 19), (17, 19)],
+        [(7, 9), (10, 12), (13, 15), (15, 17), (17, 20), (20, 22), (21, 23), (21, 22)],
+        [(10, 8), (13, 13), (17, 17), (19, 19), (21, 21), (23, 22), (23, 21), (21, 17)],
+    ]
