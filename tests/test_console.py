@@ -8,7 +8,7 @@ import pytest
 
 from a7sim.console.app import Console
 from a7sim.console.eyepiece import Drawing
-from a7sim.console.panels import Book
+from a7sim.console.panels import Book, Elements
 from a7sim.console.seat import Seat
 from a7sim.console.window import Eyepiece
 from a7sim.instrument import build_autograph
@@ -304,5 +304,27 @@ def test_a_dead_link_is_a_banner_and_a_new_one_is_taken_up() -> None:
             assert console.dials.counters == {"X": "0.00", "Y": "1.00", "Z": "-300.00"}, "nothing is turned twice"
             assert "does not answer" not in "\n".join(await person.frame())
         await asyncio.to_thread(second.__exit__, None, None, None)
+
+    played(sit_down())
+
+
+def test_another_theme_repaints_drums_and_mark() -> None:
+    console = at(with_model())
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.look_on()
+            elements, eye = console.query_one(Elements), console.query(Eyepiece).first()
+
+            def colours() -> tuple[str, str]:
+                strip = eye.render_line(eye.cells[1] // 2)
+                mark = next(segment.style for segment in strip if segment.text == "•")
+                return elements.like("drum").bgcolor.name, mark.color.name
+
+            assert colours() == ("#16181a", "#ffd23f")
+            console.theme = "contrast"
+            await pilot.pause()
+            assert colours() == ("#000000", "#ffff00")
 
     played(sit_down())

@@ -15,7 +15,7 @@ from a7sim.console.eyepiece import Drawing, Run
 from a7sim.console.hands import LADDER, Hands
 from a7sim.console.keymap import DEEDS, default_keymap, load_keymap, pressed, sample
 from a7sim.console.seat import best_drawing, speaks_utf8
-from a7sim.console.sketches import sketched
+from a7sim.console.sketches import marked, pricked
 from a7sim.console.words import image_in_words, parallax_in_words
 from a7sim.manual import VARIANTS
 from a7sim.mistakes import Mistake
@@ -90,7 +90,7 @@ def test_a_bar_shows_where_an_element_stands() -> None:
 
 
 def test_a_sketch_shows_points_names_and_the_mark() -> None:
-    drawn = sketched({"1011": (-80.0, 0.0), "C1": (80.0, 80.0)}, (0.0, -80.0), 25, 7)
+    drawn = marked(pricked({"1011": (-80.0, 0.0), "C1": (80.0, 80.0)}, 25, 7), (0.0, -80.0), 25, 7)
     assert drawn.rows == [
         "                         ",
         "                    ·C1  ",
@@ -101,7 +101,7 @@ def test_a_sketch_shows_points_names_and_the_mark() -> None:
         "                         ",
     ]
     assert drawn.nearest(5, 4) == "1011" and drawn.mark == (12, 5)
-    assert sketched({}, (500.0, 0.0), 9, 3).mark is None
+    assert marked(pricked({}, 9, 3), (500.0, 0.0), 9, 3).mark is None
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 
 from a7sim.console.app import Console
-from a7sim.console.eyepiece import Drawing, Greys, picture_size
+from a7sim.console.eyepiece import Drawing, Greys
 from a7sim.console.keymap import default_keymap
 from a7sim.console.station import Silent, Station
 from a7sim.instrument import build_autograph
@@ -45,21 +45,12 @@ def card(rows: int, columns: int) -> Greys:
     return greys
 
 
-def _fills_the_windows(console: Console) -> bool:
-    sight, view = console.sight, console.view
-    cells = {eyepiece.cells for eyepiece in console._eyes.values()}
-    return sight is not None and {(sight.look.columns, sight.look.rows)} == {
-        picture_size(view.drawing, *each) for each in cells
-    }
-
-
 def shown_as_before(compare: Compared, console: Console, size: tuple[int, int], play: Played | None = None) -> bool:
     """Whether a console looks as it did, once somebody has done something at it and all drums stand."""
 
     async def before(pilot: Pilot[None]) -> None:
         person = Person(pilot)
-        await person.until(lambda: _fills_the_windows(console))
-        await person.settle()
+        await person.look_on()
         if play is not None:
             await play(person)
         await person.until(lambda: all(counter._frame >= 3 for counter in console._counters))

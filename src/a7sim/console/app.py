@@ -1,7 +1,7 @@
 """The console: the screen, what it knows, and what the station tells it."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -10,6 +10,7 @@ from rich.text import Text
 from textual import events, on
 from textual.app import App, ComposeResult, SystemCommand
 from textual.containers import Horizontal, Vertical
+from textual.filter import ANSIToTruecolor, LineFilter
 from textual.message import Message
 from textual.screen import Screen
 from textual.timer import Timer
@@ -109,6 +110,7 @@ class Console(Deeds, App[None]):
         self.station = Station(seat.connect, self._tell, seat.alone)
         self._by_key = deeds_by_key(seat.keymap)
         self._hinted: tuple[tuple[str, str], ...] = ()
+        self._welcoming = seat.welcome
         self._sketch_panels: list[SketchPanel] = []
         self._counters: list[Counter] = []
         self._eyes: dict[int, Eyepiece] = {}
@@ -127,6 +129,10 @@ class Console(Deeds, App[None]):
     def get_theme_variable_defaults(self) -> dict[str, str]:
         """Return the colours that themes of the library do not have."""
         return dict(DRUMS)
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Return what all lines go through: not what translates the terminal's own colours, which no theme has."""
+        return [each for each in super().get_line_filters() if not isinstance(each, ANSIToTruecolor)]
 
     def compose(self) -> ComposeResult:
         """Lay out the screen."""
@@ -215,8 +221,9 @@ class Console(Deeds, App[None]):
 
     def key_pressed(self, key: str) -> bool:
         """Do the deed of a key; return whether it has one."""
-        for welcome in self.query("#welcome"):
-            welcome.remove()
+        if self._welcoming:
+            self._welcoming = False
+            self.main.query_one("#welcome").remove()
         name = self._by_key.get(key)
         if name is None:
             return False
