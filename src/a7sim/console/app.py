@@ -203,7 +203,7 @@ class Console(Deeds, App[None]):
 
     @property
     def _there(self) -> bool:
-        return bool(self._counters) and self._counters[0].is_attached
+        return self.is_running and bool(self._counters) and self._counters[0].is_attached
 
     @property
     def main(self) -> Screen[Any]:
