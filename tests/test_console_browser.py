@@ -19,6 +19,9 @@ from tests.conftest import Typed
 from tests.processes import COMMAND
 from tests.served import PATIENCE
 
+LONG_S = 3.0 * PATIENCE
+"""A console is a process of its own, which begins and ends slowly where others work too."""
+
 FETCHED = re.compile(r"""(?:src|href)=["']?([^"'> ]+)|url\(["']?([^"')]+)|@import ["']?([^"';]+)""")
 
 
@@ -75,7 +78,7 @@ def test_the_page_and_all_it_fetches_are_of_this_server(address: str) -> None:
 
 def test_a_page_shows_the_console_and_its_keys_work(address: str) -> None:
     async def visit() -> None:
-        async with asyncio.timeout(2 * PATIENCE), page_of(address) as page:
+        async with asyncio.timeout(LONG_S), page_of(address) as page:
 
             async def until(words: str) -> None:
                 screen = b""
@@ -105,24 +108,24 @@ def test_pages_of_other_sites_are_refused(address: str, headers: dict[str, str])
 
 def test_it_ends_when_no_browser_has_come_for_so_long() -> None:
     with serving("--idle-exit", "0.005") as (process, _):
-        said, errors = process.communicate(timeout=PATIENCE)
+        said, errors = process.communicate(timeout=LONG_S)
         assert (process.returncode, said, errors) == (0, "no browser for 0.005 min: ended\n", "")
 
 
 def test_an_open_page_keeps_it_and_a_signal_ends_both() -> None:
-    with serving("--idle-exit", "0.02") as (process, url):
+    with serving("--idle-exit", "0.03") as (process, url):
 
         async def visit() -> None:
-            async with asyncio.timeout(PATIENCE), page_of(url) as page:
+            async with asyncio.timeout(LONG_S), page_of(url) as page:
                 assert (await page.receive()).type is aiohttp.WSMsgType.BINARY
-                await asyncio.sleep(1.3)
-                assert process.poll() is None, "1.2 s without a browser would have ended it"
+                await asyncio.sleep(1.9)
+                assert process.poll() is None, "1.8 s without a browser would have ended it"
                 process.send_signal(signal.SIGTERM)
                 while not page.closed:
                     await page.receive()
 
         asyncio.run(visit())
-        _, errors = process.communicate(timeout=PATIENCE)
+        _, errors = process.communicate(timeout=LONG_S)
         assert (process.returncode, errors) == (0, "")
 
 
