@@ -20,13 +20,6 @@ WORK_FILES = {
     "models.csv",
     "results.json",
 }
-    "session.jsonl",
-    "session.scenario.json",
-    "session.states.jsonl",
-    "book.csv",
-    "models.csv",
-    "results.json",
-}
 STRIP_FILES = {"strip.csv", "strip.crd", "strip-output.crd", "strip-numbers.csv"}
 FILES = WORK_FILES | STRIP_FILES
 

@@ -3,9 +3,11 @@
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 
+from a7sim.cli.browser import drawn_by_a_browser, in_a_browser, served_instead
 from a7sim.cli.prompt import data_folder
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.words import ACUITY_UM
@@ -26,7 +28,9 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 @click.option("--variant", type=click.Choice(["A7", "A8"], case_sensitive=False), help="Another plotter.")
 @click.option("--theme", type=click.Choice(THEMES), help="Colours  [default: enamel]")
 @click.option(
-    "--drawing", type=click.Choice(list(Drawing)), help="How pictures are drawn  [default: the best there is]"
+    "--drawing",
+    type=click.Choice([each.value for each in Drawing]),
+    help="How pictures are drawn  [default: the best there is]",
 )
 @click.option("--plain", is_flag=True, help="Say in words what the eyes see; nothing rolls. For screen readers.")
 @click.option(
@@ -52,7 +56,11 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
     help="Watch a session (folder, .jsonl, .a7s), or a served instrument that somebody works.",
 )
 @click.option("--token-file", type=click.Path(path_type=Path, dir_okay=False), help="File with a server's token.")
+@in_a_browser
+@click.pass_context
 def command(
+    context: click.Context,
+    /,
     scenario: str | None,
     connect: str | None,
     seed: int | None,
@@ -67,6 +75,7 @@ def command(
     go_on: bool | None,
     watch: str | None,
     token_file: Path | None,
+    **_browser: Any,
 ) -> None:
     """Sit down at the instrument of SCENARIO, or at a served one: the plotter on a terminal, for a person.
 
@@ -100,7 +109,9 @@ def command(
         overrides = {"instrument.variant": f'"{variant.upper()}"'} if variant else {}
         here = InProcess(name, load_scenario(name, overrides), seed, out, go_on)
         seat = here.seat
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+    if served_instead(context):
+        return
+    if not (drawn_by_a_browser() or (sys.stdin.isatty() and sys.stderr.isatty())):
         raise Mistake("console: expected a terminal to sit at, got a file or a pipe (a7sim send takes lines from one)")
     Console(
         replace(

@@ -1,12 +1,13 @@
 """The console: the screen, what it knows, and what the station tells it."""
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
 from textual import events, on
 from textual.app import App, SystemCommand
+from textual.filter import ANSIToTruecolor, LineFilter
 from textual.screen import Screen
 
 from a7sim.console.binocular import Binocular, View
@@ -70,6 +71,10 @@ class Console(Hearing, Deeds, App[None]):
         self.theme = seat.theme
 
     # --- the screen -----------------------------------------------------------------------------------
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Return what all lines go through: not what translates the terminal's own colours, which no theme has."""
+        return [each for each in super().get_line_filters() if not isinstance(each, ANSIToTruecolor)]
 
     def get_default_screen(self) -> Screen[Any]:
         """Return the main screen."""

@@ -1,11 +1,15 @@
 """The panels of what is turned: counters and elements as drums, under the mouse too."""
 
 from collections.abc import Mapping
+from time import monotonic
 
+from rich.segment import Segment
 from rich.text import Text
 from textual import events
 from textual.geometry import Size
 from textual.message import Message
+from textual.strip import Strip
+from textual.timer import Timer
 
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
 from a7sim.console.hands import BARE, Hands
@@ -14,6 +18,9 @@ from a7sim.manual import Variant
 
 ROLLING_S = 0.04
 """Between two frames of a drum that rolls."""
+
+HURRIED_S = 0.15
+"""A drum that is turned again so soon does not roll."""
 
 
 class Wheeled(Message):
@@ -35,33 +42,38 @@ class Counter(Panel):
         self.tooltip = f"The {axis} counter. Turn it with the mouse wheel, or with its keys."
         self.rolling = True
         self._from, self._to, self._frame = "", "", ROLLING_FRAMES
+        self._turned_at = -HURRIED_S
+        self._next: Timer | None = None
 
     def turn_to(self, reading: str) -> None:
-        """Show another reading; a drum that is still rolling goes straight on to it."""
+        """Show another reading; a drum that is turned on and on does not roll, but goes straight on to it."""
         if reading != self._to:
-            still = self._frame >= ROLLING_FRAMES
-            self._from, self._to = self._to, reading
-            self._frame = 0 if self.rolling and still and self._from else ROLLING_FRAMES
+            now, before = monotonic(), self._turned_at
+            rolls = self.rolling and self._to and now - before >= HURRIED_S
+            self._from, self._to, self._turned_at = self._to, reading, now
+            self._frame = 0 if rolls else ROLLING_FRAMES
+            if self._next is not None:
+                self._next.stop()
             self._roll()
 
     def _roll(self) -> None:
         self.refresh()
+        self._next = None
         if self._frame < ROLLING_FRAMES:
             self._frame += 1
-            self.set_timer(ROLLING_S, self._roll)
+            self._next = self.set_timer(ROLLING_S, self._roll)
 
-    def render(self) -> Text:
+    def render_line(self, y: int) -> Strip:
         """Return the digits in their windows."""
         shown = rolled(self._from, self._to, self._frame)
         width = self.content_size.width
         apart = " " if width >= 2 * len(shown) + 1 else ""
         whole, point, decimals = shown.partition(".")
         drum = apart + apart.join(whole + point) + apart
-        text = Text(drum, self.like("drum"), no_wrap=True)
-        text.append(apart.join(decimals) + apart, self.like("decimals"))
-        padding = max(0, width - text.cell_len)
-        left = Text(" " * padding, self.like("drum"))
-        return left + text
+        fine = apart.join(decimals) + apart
+        padding = " " * (width - len(drum) - len(fine))
+        digits = Segment(padding + drum, self.like("drum")), Segment(fine, self.like("decimals"))
+        return Strip(digits, len(padding + drum + fine))
 
     def on_mouse_scroll_up(self) -> None:
         """Turn forward."""

@@ -79,8 +79,9 @@ class Front(Screen[None]):
 
     def on_key(self, event: events.Key) -> None:
         """Do what the keymap says."""
-        for welcome in self.query("#welcome"):
-            welcome.remove()
+        if self._welcome:
+            self._welcome = False
+            self.query_one("#welcome").remove()
         if self._pressed(event):
             event.stop()
             event.prevent_default()
@@ -88,7 +89,7 @@ class Front(Screen[None]):
     @property
     def is_there(self) -> bool:
         """Whether the panels are there, and not yet gone."""
-        return self._counters[0].is_attached and self._binocular.is_there
+        return self.app.is_running and self._counters[0].is_attached and self._binocular.is_there
 
     # --- lines ----------------------------------------------------------------------------------------
 

@@ -28,10 +28,18 @@ class Panel(Widget):
 
     def __init__(self, *, id: str | None = None, classes: str = "") -> None:
         super().__init__(id=id, classes=f"panel {classes}".strip())
+        self._likes: dict[str, Style] = {}
 
     def like(self, part: str) -> Style:
         """Return the style of a part."""
-        return self.get_component_rich_style(f"panel--{part}", partial=True)
+        if part not in self._likes:
+            self._likes[part] = self.get_component_rich_style(f"panel--{part}", partial=True)
+        return self._likes[part]
+
+    def notify_style_update(self) -> None:
+        """Forget the colours of another theme."""
+        super().notify_style_update()
+        self._likes.clear()
 
 
 LEVERS = {

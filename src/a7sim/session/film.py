@@ -13,6 +13,7 @@ from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import TIMEOUT_S
 from a7sim.mistakes import Mistake
+from a7sim.scenario import Scenario
 from a7sim.session.folder import JOURNAL
 from a7sim.session.journal import header_of, registers
 from a7sim.session.lines import Chain, Event, Journalled, read_journal
@@ -61,8 +62,10 @@ class Film:
     looks do so one after the other.
     """
 
-    def __init__(self, journalled: Journalled) -> None:
+    def __init__(self, journalled: Journalled, scenario: Scenario | None = None) -> None:
+        """Make the film of a journal, whose scenario stands beside it unless it is given. Raises Mistake."""
         self.journalled = journalled
+        self._scenario = scenario
         self._numbers: list[int] = []
         self._times: list[float] = []
         self._records: list[int] = []
@@ -71,7 +74,7 @@ class Film:
             self._list(number, journalled.event(number))
         if not self._numbers:
             raise Mistake(f"{journalled.path}: expected a session in which something was said, got none")
-        self._replay = Replay(journalled)
+        self._replay = Replay(journalled, scenario)
         self._front = Desk(self._replay.desk.autograph)
         self._next = 2
         self._trouble = ""
@@ -99,7 +102,7 @@ class Film:
         """Run on, or back, until a step is done with all that came of it; 0 is the beginning."""
         end = self._numbers[step] if step < self.steps else len(self.journalled) + 1
         if self._leaps_to(end):
-            self._replay = Replay(self.journalled)
+            self._replay = Replay(self.journalled, self._scenario)
             self._next = self._replay.seek(end)
             self._front.autograph = self._replay.desk.autograph
         while self._next < end:
@@ -177,16 +180,16 @@ def film_of(session: str) -> Film:
     if path.is_dir():
         return Film(read_journal(path / JOURNAL))
     if session.endswith(SUFFIX) or not path.exists():
-        return Film(_played(find_script(session)))
+        return _played(find_script(session))
     return Film(read_journal(path))
 
 
-def _played(file: Path) -> Journalled:
-    """Return the journal of a script that is played up to its end, or to where it and the instrument part."""
+def _played(file: Path) -> Film:
+    """Return the film of a script that is played up to its end, or to where it and the instrument part."""
     script = read_script(file)
     heard: list[LinkEvent] = []
     Player(script, heard.append).play()
     chain = Chain()
-    header = chain.line(header_of("replay", script.scenario, script.seed, script=file.name))
+    header = chain.line(header_of("replay", script.scenario, script.seed, script=file.name).line)
     lines = [chain.line(Event(each.time, each.client, each.direction, each.text)) for each in heard]
-    return Journalled(file, msgspec.json.decode(header), [header, *lines], b"", chain.crc)
+    return Film(Journalled(file, msgspec.json.decode(header), [header, *lines], b"", chain.crc), script.scenario)
