@@ -49,6 +49,8 @@ def served_again(begun: Begun, journal: Journal) -> tuple[Desk, float]:
             raise Mistake(f"{begun.journalled.where(number)}: {_not_again(difference)}")
     desk = replay.desk
     desk.listener = journal.continued(begun.journalled, desk, replay.checkpoints).heard
+    for event in replay.unsaid():
+        journal.heard(event)
     for client in [*desk.clients]:
         desk.close(client, replay.time)
     return desk, replay.time

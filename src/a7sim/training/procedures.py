@@ -1,0 +1,132 @@
+"""What the virtual operator can do of an exercise, for references, openings and the skill study: by name."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from a7sim.link.client import Client
+from a7sim.link.headers import quoted, recorded_as
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.mistakes import Mistake
+from a7sim.operator import DoesNotFit, ModelJob, Person, work
+from a7sim.operator.bench import Bench
+from a7sim.operator.book import Entry
+from a7sim.operator.crew import Crew
+from a7sim.operator.interior import InteriorOrientations
+from a7sim.operator.line_hands import LineHands
+from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
+from a7sim.reduction import Undetermined
+from a7sim.session.running import job_of
+from a7sim.training.exercise import Played
+from a7sim.training.room import Room
+
+
+@dataclass(frozen=True)
+class Seated:
+    """The virtual operator at the instrument of an exercise."""
+
+    person: Person
+    bench: Bench
+    model: ModelJob
+
+    def set_up(self) -> None:
+        """Bring the instrument to the settings of the job sheet, mount and centre pictures, take up the prints."""
+        bench = self.bench
+        who = bench.crew.everybody
+        self.begin("preparation")
+        bench.seat.prepare(who)
+        self.begin("interior orientation")
+        set_base_and_fittings(bench, self.model.base, self.model.polarity)
+        found: dict[str, InteriorOrientations] = {}
+        mount(bench, self.model, found)
+        bench.begin(who, self.model, take_up_prints(bench, self.model))
+
+    def begin(self, form: str) -> None:
+        """Begin a form of the book."""
+        self.bench.crew.begin(self.bench.crew.everybody, self.model.name, form)
+        self.person.note(f"{self.model.name}: {form}")
+
+
+Procedure = Callable[..., None]
+"""What takes `Seated` and the options of an exercise."""
+
+PROCEDURES: dict[str, Procedure] = {}
+"""All procedures by the names that exercises use."""
+
+
+def procedure(name: str) -> Callable[[Procedure], Procedure]:
+    """Register a procedure under a name."""
+
+    def registered(does: Procedure) -> Procedure:
+        PROCEDURES[name] = does
+        return does
+
+    return registered
+
+
+def play(room: Room, played: Played, client: str) -> str:
+    """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake."""
+    port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
+    person = Person(Client(port), room.clock, room.scenario.observer, room.seed)
+    job = job_of(room.scenario, room.scene)
+    model = next(each for each in job.models if each.name == room.shelved.exercise.model)
+    bench = Bench(Crew.of_one(person), LineHands(person), job)
+    person.book.listener = _Button(person.client).written
+    try:
+        PROCEDURES[played.procedure](Seated(person, bench, model), **played.options)
+    except (DoesNotFit, Undetermined) as trouble:
+        return str(trouble) or type(trouble).__name__
+    except TypeError as error:
+        if "argument" not in str(error):
+            raise
+        raise Mistake(f"{played.procedure}: expected the options of this procedure: {error}") from error
+    finally:
+        port.close()
+    return ""
+
+
+class _Button:
+    """The button of the recording device: what is written into the book is registered as well."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._numbers: dict[int, int] = {}
+
+    def written(self, entry: Entry) -> None:
+        if entry.struck:
+            if entry.number in self._numbers:
+                self._client.send(f"REC:STR {self._numbers[entry.number]},{quoted(entry.struck[:60])}")
+        elif entry.point and not entry.item.startswith(("set ", "Y ")):
+            words = [] if entry.item[:2] in ("X ", "X") else [recorded_as(entry.item)]
+            self._client.send(",".join([f"REC {quoted(entry.point)}", *words]))
+            self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
+
+
+@procedure("interior orientation")
+def interior_orientation(seated: Seated) -> None:
+    """Fittings, both pictures mounted and centred, principal distances."""
+    seated.set_up()
+
+
+@procedure("measure parallaxes")
+def measure_parallaxes(seated: Seated, points: list[str] | None = None, readings: int = 3) -> None:
+    """Clear the y-parallax at standard points with by', then with by\", so many times each."""
+    seated.set_up()
+    labels = points or seated.model.points_of_case(seated.bench.job.plan.case)
+    seated.begin("y-parallaxes")
+    who = seated.bench.crew.everybody
+    seated.bench.parallaxes(who, [seated.model.standard_points[label] for label in labels], readings)
+
+
+@procedure("relative orientation")
+def relative_orientation(seated: Seated) -> None:
+    """Relative orientation as the scenario's plan has it."""
+    seated.set_up()
+    seated.begin("relative orientation")
+    oriented(seated.bench, seated.model)
+
+
+@procedure("day's work")
+def days_work(seated: Seated) -> None:
+    """All models of the scenario from the first picture to the last centre."""
+    for _ in work(seated.person, seated.bench.job):
+        pass
