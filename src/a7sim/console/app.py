@@ -145,6 +145,8 @@ class Console(Deeds, App[None]):
         with Horizontal(id="lower"):
             yield from (SketchPanel(projector, f"sketch{projector}") for projector in (1, 2))
             yield Book()
+        if self.seat.tasks is not None:
+            yield Static(id="tasks", markup=False)
         yield Static(id="message", markup=False)
         yield Static(id="hints", markup=False)
         yield Static(id="banner", markup=False)
@@ -164,6 +166,8 @@ class Console(Deeds, App[None]):
         self.say(f"sitting down at {self.seat.where or 'the instrument'} ...")
         self.call_after_refresh(self.station.start)
         self.set_interval(1.0, self._masthead)
+        if self.seat.tasks is not None:
+            self.set_interval(1.0, self._show_tasks)
 
     def on_unmount(self) -> None:
         """End the conversation."""
@@ -194,6 +198,10 @@ class Console(Deeds, App[None]):
         masthead = self.main.query_one("#masthead", Static)
         if str(masthead.content) != text:
             masthead.update(text)
+
+    def _show_tasks(self) -> None:
+        if self.seat.tasks is not None and self._there:
+            self.main.query_one("#tasks", Static).update("\n".join(self.seat.tasks()))
 
     @property
     def _there(self) -> bool:
