@@ -7,7 +7,7 @@ from a7sim.link.client import Client
 from a7sim.link.headers import quoted, recorded_as
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit, ModelJob, Person, work
+from a7sim.operator import DoesNotFit, Job, ModelJob, Person, work
 from a7sim.operator.bench import Bench
 from a7sim.operator.book import Entry
 from a7sim.operator.crew import Crew
@@ -27,6 +27,12 @@ class Seated:
     person: Person
     bench: Bench
     model: ModelJob
+
+    @classmethod
+    def at(cls, person: Person, job: Job, model: str) -> "Seated":
+        """Return an operator who is to work on a model of a job."""
+        bench = Bench(Crew.of_one(person), LineHands(person), job)
+        return cls(person, bench, next(each for each in job.models if each.name == model))
 
     def set_up(self) -> None:
         """Bring the instrument to the settings of the job sheet, mount and centre pictures, take up the prints."""
@@ -67,12 +73,10 @@ def play(room: Room, played: Played, client: str) -> str:
     """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake."""
     port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
     person = Person(Client(port), room.clock, room.scenario.observer, room.seed)
-    job = job_of(room.scenario, room.scene)
-    model = next(each for each in job.models if each.name == room.shelved.exercise.model)
-    bench = Bench(Crew.of_one(person), LineHands(person), job)
+    seated = Seated.at(person, job_of(room.scenario, room.scene), room.shelved.exercise.model)
     person.book.listener = _Button(person.client).written
     try:
-        PROCEDURES[played.procedure](Seated(person, bench, model), **played.options)
+        PROCEDURES[played.procedure](seated, **played.options)
     except (DoesNotFit, Undetermined) as trouble:
         return str(trouble) or type(trouble).__name__
     except TypeError as error:

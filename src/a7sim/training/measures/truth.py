@@ -314,8 +314,7 @@ class AnswerWrong(Measure, frozen=True, kw_only=True):
 
 
 def _plain(text: str) -> str:
-    words = text.lower().replace("-", " ").replace("_", " ").strip().strip("\"'")
     try:
-        return f"{float(words):.6g}"
+        return f"{float(text):.6g}"
     except ValueError:
-        return words
+        return text.lower().replace("-", " ").replace("_", " ").strip().strip("\"'")
