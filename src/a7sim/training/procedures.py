@@ -20,7 +20,6 @@ from a7sim.session.running import job_of
 from a7sim.training.exercise import Played
 from a7sim.training.room import Room
 
-
 ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)
 
 _REGISTERED = ("X left at", "X right at", "parallax seen")
