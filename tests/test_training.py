@@ -74,7 +74,7 @@ def _fields(event):
 
 def test_the_journal_of_an_attempt_holds_no_truth(left_standing):
     header = read_journal(left_standing / "session.jsonl").header
-    assert header["scenario"] is None
+    assert "scenario" not in header
     assert [each.name for each in left_standing.iterdir()] == ["session.jsonl"]
 
 
