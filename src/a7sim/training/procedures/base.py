@@ -1,6 +1,6 @@
 """What the virtual operator can do of an exercise, for references, openings and the skill study: by name."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from a7sim.link.client import Client
@@ -13,9 +13,11 @@ from a7sim.operator.book import Entry
 from a7sim.operator.crew import Crew
 from a7sim.operator.interior import InteriorOrientations
 from a7sim.operator.line_hands import LineHands
+from a7sim.operator.seat import side
 from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
 from a7sim.reduction import Undetermined
 from a7sim.session.running import job_of
+from a7sim.training.account import ANSWER
 from a7sim.training.exercise import Played
 from a7sim.training.room import Room
 
@@ -39,6 +41,18 @@ class Seated:
         found: dict[str, InteriorOrientations] = {}
         mount(bench, self.model, found)
         bench.begin(who, self.model, take_up_prints(bench, self.model))
+
+    def sit_down(self) -> None:
+        """Take the instrument over as the opening leaves it, and take up the prints."""
+        bench = self.bench
+        who = bench.crew.everybody
+        bench.seat.take_over(who)
+        bench.begin(who, self.model, take_up_prints(bench, self.model))
+
+    def answer(self, answers: Mapping[str, float], decimals: int = 2) -> None:
+        """Note answers down at the instrument."""
+        for key, value in answers.items():
+            self.person.note(f"{ANSWER}{key}={value:.{decimals}f}")
 
     def begin(self, form: str) -> None:
         """Begin a form of the book."""
@@ -70,7 +84,7 @@ def play(room: Room, played: Played, client: str) -> str:
     job = job_of(room.scenario, room.scene)
     model = next(each for each in job.models if each.name == room.shelved.exercise.model)
     bench = Bench(Crew.of_one(person), LineHands(person), job)
-    person.book.listener = _Button(person.client).written
+    person.book.listener = _Button(person.client, model).written
     try:
         PROCEDURES[played.procedure](Seated(person, bench, model), **played.options)
     except (DoesNotFit, Undetermined) as trouble:
@@ -84,21 +98,36 @@ def play(room: Room, played: Played, client: str) -> str:
     return ""
 
 
-class _Button:
-    """The button of the recording device: what is written into the book is registered as well."""
+REGISTERED_ALREADY = "X"
+"""Of a point measured with both eyes the operator has registered all three coordinates before they are entered."""
 
-    def __init__(self, client: Client) -> None:
+
+class _Button:
+    """The button of the recording device: what is written into the book is registered as well.
+
+    With the item that is read; a pointing with one eye together with by of its projector, which says whose it is.
+    """
+
+    def __init__(self, client: Client, model: ModelJob) -> None:
         self._client = client
+        self._model = model
         self._numbers: dict[int, int] = {}
 
     def written(self, entry: Entry) -> None:
         if entry.struck:
             if entry.number in self._numbers:
                 self._client.send(f"REC:STR {self._numbers[entry.number]},{quoted(entry.struck[:60])}")
-        elif entry.point and not entry.item.startswith(("set ", "Y ")):
-            words = [] if entry.item[:2] in ("X ", "X") else [recorded_as(entry.item)]
-            self._client.send(",".join([f"REC {quoted(entry.point)}", *words]))
+        elif entry.point and not entry.item.startswith(("set ", "Y", "Z", "parallax seen")):
+            if entry.item != REGISTERED_ALREADY:
+                self._client.send(f"REC {quoted(entry.point)},{recorded_as(self._element(entry.item))}")
             self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
+
+    def _element(self, item: str) -> str:
+        """Return the element that is registered with an item of the book."""
+        if not item.startswith("X "):
+            return item
+        left = item.startswith(f"X {side(1)}")
+        return f"by{self._model.left_projector if left else self._model.right_projector}"
 
 
 @procedure("interior orientation")

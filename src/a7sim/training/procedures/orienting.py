@@ -1,0 +1,96 @@
+"""What the virtual operator can do of the exercises in orienting a model: clearing, computing, perspective centres."""
+
+import numpy as np
+
+from a7sim.operator.centres import centre_of, observe_centre
+from a7sim.operator.empirical import empirical_orientation
+from a7sim.operator.relative import corrections_of, unknowns_of
+from a7sim.operator.work import preset_counters
+from a7sim.standard_points import CASES
+from a7sim.training.account import ANSWER
+from a7sim.training.procedures.base import Seated, procedure
+
+INDEPENDENT = "independent"
+
+
+@procedure("clear the model")
+def clear_the_model(
+    seated: Seated,
+    method: str = INDEPENDENT,
+    over_correction: float | str = "computed",
+    case: str = "A",
+    names_missing: bool = False,
+    missing: str = "",
+) -> None:
+    """Clear the y-parallaxes point by point, registering each element at the point that it cleared.
+
+    With `names_missing` the operator answers which of the points 1 to 6 are not there, or by mistake `missing`.
+    """
+    seated.sit_down()
+    seated.begin("relative orientation")
+    bench = seated.bench
+    if names_missing:
+        gone = sorted(set(CASES["A"]) - set(seated.model.points_of_case("A")))
+        seated.person.note(f"{ANSWER}missing={missing or ','.join(gone)}")
+    empirical_orientation(
+        bench,
+        bench.crew.everybody,
+        seated.model,
+        method,
+        case,
+        over_correction,
+        1,
+        bench.job.tolerated_parallax_mm,
+    )
+
+
+@procedure("numerical orientation")
+def numerical_orientation(
+    seated: Seated,
+    cases: str = "AE",
+    readings: int = 3,
+    sense: float = 1.0,
+    slip_gon: float = 0.0,
+    mean_on_by: bool = True,
+) -> None:
+    """Measure, compute, answer and set in one case after the other, the mean at last on by'.
+
+    `sense` is that in which the corrections are set, `slip_gon` by how much the sum for phi' is out.
+    """
+    seated.sit_down()
+    bench, model = seated.bench, seated.model
+    who, unknowns = bench.crew.everybody, unknowns_of(INDEPENDENT, model)
+    mean = 0.0
+    for i, case in enumerate(cases, start=1):
+        seated.begin(f"relative orientation, case {case}")
+        bench.begin_round(who, i)
+        settings = bench.seat.elements(who, unknowns)
+        labels = model.points_of_case(case)
+        seen = bench.parallaxes(who, [model.standard_points[label] for label in labels], readings)
+        mean = float(seen.p.mean())
+        base = np.full(who.size, bench.job.plan.bx)
+        found, _ = corrections_of(bench, who, model, seen.places, seen.p - mean, unknowns, base, labels)
+        found["phi1"] = found["phi1"] + slip_gon
+        seated.answer({f"{case.lower()}-{name}": float(found[name][0]) for name in unknowns})
+        noted = bench.crew.notes(who, settings, {})
+        bench.seat.set_elements(who, {name: noted[name] + sense * found[name] for name in unknowns})
+    if mean_on_by:
+        by = bench.seat.elements(who, ["by1"])["by1"]
+        bench.seat.set_elements(who, {"by1": by + mean})
+
+
+@procedure("perspective centres")
+def perspective_centres(seated: Seated, swapped: bool = False) -> None:
+    """Preset the counters at point 1, point at two levels with each eye, and answer both centres.
+
+    `swapped` writes the centres down under each other's names.
+    """
+    seated.sit_down()
+    bench, model = seated.bench, seated.model
+    seated.begin("model coordinates")
+    preset_counters(bench, model)
+    for hand in (1, 2):
+        seated.begin(f"{'left' if hand == 1 else 'right'} perspective centre")
+        centre = centre_of(observe_centre(bench, bench.crew.everybody, model, hand), 0)
+        named = 3 - hand if swapped else hand
+        seated.answer({f"{axis}{named}": float(getattr(centre, f"{axis.upper()}0")) for axis in "xyz"})
