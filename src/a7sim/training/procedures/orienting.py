@@ -1,7 +1,11 @@
 """What the virtual operator can do of the exercises in orienting a model: clearing, computing, perspective centres."""
 
+from typing import Literal
+
 import numpy as np
 
+from a7sim.geometry import Array
+from a7sim.operator.bench import Parallaxes
 from a7sim.operator.centres import centre_of, observe_centre
 from a7sim.operator.empirical import empirical_orientation
 from a7sim.operator.relative import corrections_of, unknowns_of
@@ -51,32 +55,48 @@ def numerical_orientation(
     readings: int = 3,
     sense: float = 1.0,
     slip_gon: float = 0.0,
-    mean_on_by: bool = True,
+    mean_on_by: Literal["in the end", "at once", "never"] = "in the end",
 ) -> None:
-    """Measure, compute, answer and set in one case after the other, the mean at last on by'.
+    """Measure, compute, answer and set in one case after the other; then the mean of what is left goes on by'.
 
     `sense` is that in which the corrections are set, `slip_gon` by how much the sum for phi' is out.
     """
     seated.sit_down()
     bench, model = seated.bench, seated.model
     who, unknowns = bench.crew.everybody, unknowns_of(INDEPENDENT, model)
-    mean = 0.0
-    for i, case in enumerate(cases, start=1):
+    for number, case in enumerate(cases, start=1):
         seated.begin(f"relative orientation, case {case}")
-        bench.begin_round(who, i)
+        bench.begin_round(who, number)
         settings = bench.seat.elements(who, unknowns)
         labels = model.points_of_case(case)
-        seen = bench.parallaxes(who, [model.standard_points[label] for label in labels], readings)
-        mean = float(seen.p.mean())
+        seen = _parallaxes(seated, case, readings)
+        mean = seen.p.mean(axis=0)
         base = np.full(who.size, bench.job.plan.bx)
         found, _ = corrections_of(bench, who, model, seen.places, seen.p - mean, unknowns, base, labels)
         found["phi1"] = found["phi1"] + slip_gon
         seated.answer({f"{case.lower()}-{name}": float(found[name][0]) for name in unknowns})
         noted = bench.crew.notes(who, settings, {})
         bench.seat.set_elements(who, {name: noted[name] + sense * found[name] for name in unknowns})
-    if mean_on_by:
-        by = bench.seat.elements(who, ["by1"])["by1"]
-        bench.seat.set_elements(who, {"by1": by + mean})
+        if mean_on_by == "at once":
+            _put_on_by(seated, mean)
+    if mean_on_by == "in the end":
+        bench.begin_round(who, len(cases) + 1)
+        _put_on_by(seated, _parallaxes(seated, "A", 1).p.mean(axis=0))
+
+
+def _parallaxes(seated: Seated, case: str, readings: int) -> Parallaxes:
+    bench, model = seated.bench, seated.model
+    points = [model.standard_points[label] for label in model.points_of_case(case)]
+    seen = bench.parallaxes(bench.crew.everybody, points, readings)
+    bench.crew.give_up(seen.parted(bench.crew.everybody), f"{model.name}: images too far apart to be fused")
+    return seen
+
+
+def _put_on_by(seated: Seated, mean: Array) -> None:
+    """Set by of the left-hand photograph's projector on by a mean parallax."""
+    bench, by = seated.bench, f"by{seated.model.left_projector}"
+    who = bench.crew.everybody
+    bench.seat.set_elements(who, {by: bench.seat.elements(who, [by])[by] + mean})
 
 
 @procedure("perspective centres")
