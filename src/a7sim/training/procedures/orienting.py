@@ -1,5 +1,6 @@
 """What the virtual operator can do of the exercises in orienting a model: clearing, computing, perspective centres."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -9,7 +10,7 @@ from a7sim.operator.bench import Parallaxes
 from a7sim.operator.centres import centre_of, observe_centre
 from a7sim.operator.empirical import empirical_orientation
 from a7sim.operator.relative import corrections_of, unknowns_of
-from a7sim.operator.work import preset_counters
+from a7sim.operator.seat import side
 from a7sim.standard_points import CASES
 from a7sim.training.account import ANSWER
 from a7sim.training.procedures.base import Seated, procedure
@@ -100,17 +101,24 @@ def _put_on_by(seated: Seated, mean: Array) -> None:
 
 
 @procedure("perspective centres")
-def perspective_centres(seated: Seated, swapped: bool = False) -> None:
-    """Preset the counters at point 1, point at two levels with each eye, and answer both centres.
+def perspective_centres(
+    seated: Seated, hands: Sequence[int] = (1, 2), swapped: bool = False, height_in_mm: bool = False
+) -> None:
+    """Preset the counters on the ground at point 1, point at two levels with each eye, and answer both centres.
 
-    `swapped` writes the centres down under each other's names.
+    By mistake only with some eyes (`hands`, 1 for the left-hand photograph), each centre under the other's name
+    (`swapped`), or the height above the lower level in mm instead of counter units.
     """
     seated.sit_down()
-    bench, model = seated.bench, seated.model
+    bench, model, plan = seated.bench, seated.model, seated.bench.job.plan
     seated.begin("model coordinates")
-    preset_counters(bench, model)
-    for hand in (1, 2):
-        seated.begin(f"{'left' if hand == 1 else 'right'} perspective centre")
+    bench.parallaxes_seen(bench.crew.everybody, [model.standard_points["1"]])
+    bench.seat.preset(bench.crew.everybody, plan.preset)
+    for hand in hands:
+        seated.begin(f"{side(hand)} perspective centre")
         centre = centre_of(observe_centre(bench, bench.crew.everybody, model, hand), 0)
-        named = 3 - hand if swapped else hand
-        seated.answer({f"{axis}{named}": float(getattr(centre, f"{axis.upper()}0")) for axis in "xyz"})
+        X, Y, Z = (float(each) for each in (centre.X0, centre.Y0, centre.Z0))
+        if height_in_mm:
+            Z = plan.centre_levels[0] + (Z - plan.centre_levels[0]) / bench.seat.units_per_mm
+        projector = bench.seat.projector(3 - hand if swapped else hand)
+        seated.answer({f"x{projector}": X, f"y{projector}": Y, f"z{projector}": Z})
