@@ -7,10 +7,15 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
+from a7sim.geometry import GON
 from a7sim.link.client import Client
-from a7sim.link.headers import header, recorded_as
+from a7sim.link.headers import header, recorded_as, short
 from a7sim.link.inprocess import InProcessSerial
+from a7sim.manual import RIGHT_FITTINGS
 from a7sim.training.attempts import open_
+from a7sim.training.handouts import handed_out
 from a7sim.training.room import entered
 from a7sim.training.shelf import find_exercise
 
@@ -99,12 +104,40 @@ class Driver:
             self.client.send(f"{header(element)} {at:.2f}")
         return at
 
+    def turn_to_clear(self, element, position):
+        """Turn a drum between its counts until a point is clear; return by how much."""
+        point, turned, probe = self.name(position), 0.0, 0.02
+        for _ in range(LOOKS):
+            before = self._parallax(point)
+            self.client.send(f"{header(element)}:TURN {probe:.4f}")
+            turned += probe
+            after = self._parallax(point)
+            if abs(after) < 0.3 or after == before:
+                break
+            probe = round(max(-1.0, min(1.0, -after * probe / (after - before))), 4)
+            if probe == 0.0:
+                break
+        return turned
+
+    def _parallax(self, point):
+        self.fuse(point, tell=False)
+        _, left, _, right = self.seen(point)
+        return left - right
+
+    def fiducials(self, projector):
+        """Look at the fiducials, and write down that it was done and what was seen."""
+        fields = self.client.fields(f"PHOT{projector}:FID?")
+        shown = ", ".join(f'"{each}"' if i % 3 == 0 else each for i, each in enumerate(fields))
+        self.lines.append(f"expect PHOT{projector}:FID? = {shown} +- 0.001")
+        return {fields[i]: (float(fields[i + 1]), float(fields[i + 2])) for i in range(0, len(fields), 3)}
+
     def record(self, point, element=""):
         self.say(f'REC "{point}"' + (f",{recorded_as(element)}" if element else ""))
         self.readings += 1
 
     def finish(self, path):
-        self.lines += ["", f"expect REC:COUN? = {self.readings}"]
+        if self.readings:
+            self.lines += ["", f"expect REC:COUN? = {self.readings}"]
         path.write_text("\n".join(self.lines) + "\n", encoding="utf-8")
 
 
@@ -200,8 +233,117 @@ def counters(driver, otherwise):
     driver.say(f'NOTE "answer play={play:.2f}"')
 
 
+CASES = {
+    "A": ("negative", "inside", "101n", "102n"),
+    "B": ("negative", "outside", "103n", "102n"),
+    "C": ("positive", "outside", "103", "102"),
+    "D": ("positive", "inside", "101", "102"),
+}
+
+
+def fittings(driver, otherwise):
+    nodes = {"dove": "DOVE", "triangulation": "TRI", "diapositive": "DIAP", "xcollar": "XCOL", "ycollar": "YCOL"}
+    forgotten = {"y collar": ("A", "ycollar"), "dove": ("B", "dove"), "diapositive": ("C", "diapositive")}
+    forgotten["triangulation"] = ("D", "triangulation")
+    lying = ["", ""]
+    for letter, (polarity, base, left, right) in CASES.items():
+        driver.remark(f"{letter}: {polarity}s, base {base[:-4]}, {left} on the left and {right} on the right")
+        for projector, name in ((1, left), (2, right)):
+            if lying[projector - 1] != name:
+                driver.say(f'PHOT{projector}:LOAD "{name}"')
+                lying[projector - 1] = name
+        driver.wait(200, "to lay pictures takes its time")
+        driver.say(f"BASE:MODE {short(base)}")
+        for fitting, position in RIGHT_FITTINGS[polarity, base].as_words().items():
+            if (letter, fitting) != forgotten.get(otherwise):
+                driver.say(f"FITT:{nodes[fitting]} {short(position)}")
+        if otherwise != "blind" or letter == "A":
+            driver.lines += ["# Look, turn a handwheel, and look again.", "expect EYEP1:PICT? 1,1,8 = *"]
+            driver.client.block("EYEP1:PICT? 1,1,8")
+            driver.say("WHE:X 1;Y 1")
+        driver.record(letter)
+
+
+def interior(driver, otherwise):
+    camera = driver.room.scenario.camera
+    places = {each.name: (each.x, each.y) for each in camera.fiducials}
+    pictures = {1: "101", 2: "102"} if otherwise != "exchanged" else {1: "102", 2: "101"}
+    for projector, picture in pictures.items():
+        driver.remark(f"{picture}: laid, its fiducials looked at, centred")
+        driver.say(f'PHOT{projector}:LOAD "{picture}"')
+        driver.wait(300, "laying it takes five minutes")
+        displaced = driver.fiducials(projector)
+        driver.lines.append("# The mean displacement is the shift, how they go round is the turn; both are taken away.")
+        xy, d = np.array([places[name] for name in displaced]).T, np.array(list(displaced.values())).T
+        turn = float((xy[0] * d[1] - xy[1] * d[0]).sum() / (xy**2).sum()) / GON
+        shift = -(d.mean(axis=1) + camera.principal_point)
+        if otherwise == "sign" and projector == 1:
+            shift = -shift
+        driver.say(f"PHOT{projector}:CENT {shift[0]:.3f},{shift[1]:.3f},{-turn:.3f}")
+        left = displaced if otherwise == "not checked" else driver.fiducials(projector)
+        scale = float((xy * np.array(list(left.values())).T).sum() / (xy**2).sum())
+        driver.wait(60, "to compute")
+        driver.lines.append(
+            f"# The film is smaller by {-1e6 * scale:.0f} parts in a million, and so is the principal distance."
+        )
+        c = camera.c if otherwise == "certificate" else camera.c * (1.0 + scale)
+        driver.say(f"PROJ{projector}:PDIS {c:.2f}")
+
+
+STEPS = (("2", "by2"), ("1", "kappa2"), ("4", "bz2"), ("3", "phi2"), ("6", "omega2"))
+
+
+def one_projector(driver, otherwise):
+    steps = [STEPS[4], *STEPS[:4]] if otherwise == "omega first" else STEPS
+    if otherwise == "left turned":
+        steps = [(at, "by1" if element == "by2" else element) for at, element in steps]
+    rounds = 1 if otherwise == "one round" else 4
+    for number in range(1, rounds + 1):
+        driver.remark(f"Round {number}")
+        driver.wait(600, "five points to go to, to look at and to turn at")
+        for position, element in steps:
+            driver.come_to(position, ROUGH[position])
+            amount = driver.turn_to_clear(element, position)
+            if element == "omega2" and otherwise not in ("one round", "omega first"):
+                _, y, z = driver.client.numbers("COUN?")
+                n = (1.0 + (z / y) ** 2) / 2.0
+                driver.client.send(f"{header(element)}:TURN {(n - 1.0) * amount:.4f}")
+                told = f"point 6 asks for {amount:.4f}; {n:.2f} times that"
+                amount *= n
+            else:
+                told = f"clears point {position}"
+            driver.lines.append(f"{f'{header(element)}:TURN {amount:.4f}':<34}# {told}")
+    if otherwise == "last point":
+        driver.remark("Knocked by the sleeve")
+        driver.say("PROJ2:PHI:TURN 0.06")
+    if otherwise != "not checked":
+        driver.remark("All six points once more, hands off the elements")
+        driver.wait(300)
+        for position in "123456":
+            driver.come_to(position, ROUGH[position])
+            driver.record(driver.name(position))
+
+
+def slip(driver, otherwise):
+    made = handed_out("book with a slip", driver.room.scenario, driver.room.seed, {})
+    kind, entry, right = made.hidden["kind"], made.hidden["entry"], made.hidden["right"][0]
+    wrong = made.papers["book.csv"].splitlines()[entry].split(",")
+    driver.lines += ["# What follows from the copy that the seed above makes.", ""]
+    if otherwise == "entry":
+        entry += 1
+    if otherwise == "kind":
+        kind = "gross" if kind != "gross" else "last digit"
+    if otherwise == "right":
+        right = wrong[3] if kind == "wrong point" else wrong[5]
+    driver.say(f'NOTE "answer kind={kind.replace(" ", "-")} entry={entry} right={right}"')
+
+
 INTRO = "The y-parallaxes of model 1 at its six standard points, with by' and with by\", twice each."
 
+FITTED = "The four cases of the table of fittings, one after the other."
+LAID = "Interior orientation of 101 and 102: fiducials to their marks, principal distances for the shrunken film."
+CLEARED = "Relative orientation of model 1 with the right projector alone, point by point."
+FOUND = "Answers to: find the slip."
 COUNTERS = "Counters, handwheels, drums, and the play of a spindle."
 
 ALL = {
@@ -228,6 +370,59 @@ ALL = {
                 [COUNTERS, "By mistake the carriages are run to C instead of turned there."],
             ),
             ("faulty-one-side.a7s", "one side", [COUNTERS, "By mistake point 1 is come to from one side only."]),
+        ],
+    ),
+    "fittings": (
+        "02-fittings",
+        2,
+        fittings,
+        [
+            ("reference.a7s", "", [FITTED]),
+            ("faulty-y-collar.a7s", "y collar", [FITTED, "By mistake the Y collar stays out in A."]),
+            ("faulty-dove.a7s", "dove", [FITTED, "By mistake the Dove prisms stay as they are in B."]),
+            ("faulty-diapositive.a7s", "diapositive", [FITTED, "By mistake the diapositive lever stays in C."]),
+            ("faulty-triangulation.a7s", "triangulation", [FITTED, "By mistake the triangulation lever stays in D."]),
+            ("faulty-blind.a7s", "blind", [FITTED, "By mistake nobody looks into the eyepieces from B on."]),
+        ],
+    ),
+    "interior": (
+        "03-interior",
+        3,
+        interior,
+        [
+            ("reference.a7s", "", [LAID]),
+            ("faulty-sign.a7s", "sign", [LAID, "By mistake the shift of the left picture has the wrong sign."]),
+            ("faulty-certificate.a7s", "certificate", [LAID, "By mistake the film's shrinkage is forgotten."]),
+            ("faulty-exchanged.a7s", "exchanged", [LAID, "By mistake the photographs have changed places."]),
+            ("faulty-not-checked.a7s", "not checked", [LAID, "By mistake nobody looks again after centring."]),
+        ],
+    ),
+    "one-projector": (
+        "05-one-projector",
+        5,
+        one_projector,
+        [
+            ("reference.a7s", "", [CLEARED, 'by" at 2, kappa" at 1, bz" at 4, phi" at 3, omega" at 6.']),
+            (
+                "faulty-one-round.a7s",
+                "one round",
+                [CLEARED, "By mistake omega is not over-corrected, and all ends after a round."],
+            ),
+            ("faulty-left-turned.a7s", "left turned", [CLEARED, "By mistake by' is turned instead of by\"."]),
+            ("faulty-omega-first.a7s", "omega first", [CLEARED, 'By mistake omega" comes first.']),
+            ("faulty-not-checked.a7s", "not checked", [CLEARED, "By mistake no point is looked at again in the end."]),
+            ("faulty-last-point.a7s", "last point", [CLEARED, 'By mistake phi" is knocked in the end.']),
+        ],
+    ),
+    "slip": (
+        "14-slip",
+        14,
+        slip,
+        [
+            ("reference.a7s", "", [FOUND]),
+            ("faulty-entry.a7s", "entry", [FOUND, "By mistake the next entry is blamed."]),
+            ("faulty-kind.a7s", "kind", [FOUND, "By mistake it is taken for another slip."]),
+            ("faulty-right.a7s", "right", [FOUND, "By mistake the wrong entry is given as the right one."]),
         ],
     ),
     "parallax": (

@@ -109,11 +109,22 @@ def test_answers_written_down_count_before_those_noted(tmp_path):
     assert [each.id for each in graded(counters, 1, tmp_path).failed] == ["play"]
 
 
+def test_pictures_are_not_drawn_again_for_a_grade_and_all_else_is_compared(parallax, tmp_path):
+    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+        engine = room.desk.open("client2")
+        first = engine.feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 1.0)
+        engine.feed(b'REC "1011",BY1\n', 2.0)
+    assert len(set(first)) > 20, "expected a picture that is not black"
+    assert graded(parallax, 4, tmp_path).marks
+    with gone_on(parallax, 4, tmp_path) as room:
+        assert room.desk.open(time=3.0).feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 3.0) == first
+
+
 BAD = {
     'measure = "minutes"': ('measure = "minuets"', r"criterion\[6\]\.measure: expected one of"),
     'measure = "not-opposed"\ndone': ('measure = "parallax-left"\ndone', r"step\[3\]\.measure: .* the truth"),
     'fails = "cleared"': ('fails = "clear"', r"faulty\[1\]\.fails: expected one of complete"),
-    "away = 0.05": ('away = "far"', r"criterion\[4\]\.options\.away: expected a number, got \"far\""),
+    "away = 0.02": ('away = "far"', r"criterion\[4\]\.options\.away: expected a number, got \"far\""),
 }
 
 

@@ -50,7 +50,7 @@ def _drawn(value: float, within: float, rng: np.random.Generator) -> float:
 def _at(data: Any, path: str) -> float:
     for key in path.split("."):
         try:
-            data = data[int(key)] if isinstance(data, list) else data[key]
+            data = data[int(key)] if isinstance(data, list | tuple) else data[key]
         except (KeyError, IndexError, ValueError, TypeError):
             raise Mistake(f"vary: expected the path of a number of the scenario, got {path!r}") from None
     if not isinstance(data, int | float) or isinstance(data, bool):

@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import LinkEvent
 from a7sim.instrument.language.commands import recorded_element
-from a7sim.instrument.language.program import Step, program_of
+from a7sim.instrument.language.program import Fault, Step, program_of
 from a7sim.instrument.recorder import Recorder, Registration
 from a7sim.training.exercise import OPENING
 
@@ -22,8 +24,8 @@ class Deed:
     """Something done at the instrument, with where a handle stood before and after, as its counter counts.
 
     `what` is 'set' or 'turn' of an element, 'drive' or 'wheel' of an axis, 'preset', 'fit', 'base', 'gear', 'load',
-    'unload', 'centre', 'reset', 'record', 'strike', 'look' (through an eyepiece or both), 'note'; `name` the element,
-    axis, fitting, projector or point.
+    'unload', 'centre', 'fiducials' (asked for), 'reset', 'record', 'strike', 'look' (through an eyepiece or both),
+    'note'; `name` the element, axis, fitting, projector or point.
     """
 
     place: int
@@ -59,6 +61,8 @@ class Reading:
     """px, py in um at photo scale of the point, exactly; None where it is not seen with both eyes."""
     eyes: tuple[tuple[float, float] | None, tuple[float, float] | None]
     """dx, dy in um of its image from the mark in either eyepiece, exactly."""
+    pictures: tuple[str | None, str | None]
+    """What lay in the projectors."""
     mark: tuple[float, float, float]
     """Where the mark truly stood in the frame, mm."""
     struck: bool = False
@@ -85,10 +89,15 @@ class Witness:
         self.now, self.client = event.time, event.client
         if event.direction == "-" and event.client == OPENING:
             self.began, self.opened = event.time, True
-        if event.direction == ">" and "note" in event.text.lower():
+        if event.direction == ">" and any(word in event.text.lower() for word in ("note", "fid")):
             for unit in program_of(event.text.encode("latin-1", "replace")):
-                if isinstance(unit, Step) and unit.command.header == "NOTE" and unit.given:
-                    self.did("note", text=str(getattr(unit.given[0], "value", "")))
+                self._take_note(unit)
+
+    def _take_note(self, unit: Step | Fault) -> None:
+        if isinstance(unit, Step) and unit.command.header == "NOTE" and unit.given:
+            self.did("note", text=str(getattr(unit.given[0], "value", "")))
+        if isinstance(unit, Step) and unit.command.header == "PHOTo<n>:FIDucial?":
+            self.did("fiducials", str(unit.suffix))
 
     def did(self, what: str, name: str = "", before: float = 0.0, after: float = 0.0, text: str = "") -> None:
         """Take note of a deed."""
@@ -118,6 +127,7 @@ class Witness:
                 autograph.base_mode,
                 stereo,
                 (left, right),
+                (autograph.loaded(1), autograph.loaded(2)),
                 (x, y, z),
             )
         )
@@ -150,6 +160,8 @@ class WitnessedAutograph(Autograph):
         super().__init__(*args, **kwargs)
         self.witness = Witness()
         self.recorder = _WitnessedRecorder(self)
+        self.blind = False
+        """Whether pictures are left black, for who only works a journal again: they take longer than all the rest."""
 
     def _counted(self, axis: str) -> float:
         counter = self._counters[axis]
@@ -221,8 +233,12 @@ class WitnessedAutograph(Autograph):
 
     def reset(self) -> None:
         """Run everything to its zero."""
+        before = {name: spindle.at for name, spindle in self._spindles.items()}
         super().reset()
         self.witness.did("reset")
+        for name, spindle in self._spindles.items():
+            if spindle.at != before[name]:
+                self.witness.did("set", name, before[name], spindle.at)
 
     def eyepiece(self, eyepiece: int, name: str) -> tuple[float, float] | None:
         """Look at a point through an eyepiece."""
@@ -238,4 +254,6 @@ class WitnessedAutograph(Autograph):
     def picture(self, eyepiece: int, columns: int, rows: int, magnification: float) -> Any:
         """Look at the picture that an eyepiece shows."""
         self.witness.did("look")
+        if self.blind:
+            return np.zeros((rows, columns))
         return super().picture(eyepiece, columns, rows, magnification)

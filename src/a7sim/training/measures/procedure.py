@@ -10,7 +10,7 @@ from a7sim.manual import RIGHT_FITTINGS
 from a7sim.scenario import Scenario
 from a7sim.training.account import Account
 from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, listed, measure, title, where
-from a7sim.training.witness import AXES, Reading
+from a7sim.training.witness import AXES, PLAIN, Reading
 
 
 def _with(account: Account, element: str, points: Sequence[str] = ()) -> list[Reading]:
@@ -30,21 +30,27 @@ class MissingReadings(Measure, frozen=True, kw_only=True):
     points: list[str]
     elements: list[str] = field(default_factory=list)
     each: int = 1
+    after: list[str] = field(default_factory=list)
+    """Only those count that were made after the last movement of these handles."""
 
     def of(self, account: Account) -> Found:
         """Return their number."""
         short: dict[str, list[str]] = {}
         missing = 0
+        moved = [each.place for each in account.deeds if each.name in self.after and each.what in PLAIN]
+        last = max(moved, default=-1)
         for point in self.points:
             for element in self.elements or [""]:
-                lacks = self.each - len(_with(account, element, [point]))
+                readings = [each for each in _with(account, element, [point]) if each.place > last]
+                lacks = self.each - len(readings)
                 if lacks > 0:
                     missing += lacks
                     short.setdefault(f"{title(element) + ' at ' if element else ''}{point}", []).append(str(lacks))
         wanted = len(self.points) * max(1, len(self.elements)) * self.each
         if not missing:
             return Found(0.0, f"all {wanted} registrations are there")
-        return Found(float(missing), f"{missing} of {wanted} registrations are missing: {listed(short)}")
+        late = f" after the last turn of {listed(map(title, self.after))}" if self.after else ""
+        return Found(float(missing), f"{missing} of {wanted} registrations are missing{late}: {listed(short)}")
 
 
 @measure("wrong-approach")
@@ -291,59 +297,120 @@ class WrongFittings(Measure, frozen=True, kw_only=True):
     point: str = ""
     base: str = ""
     polarity: str = ""
+    pictures: list[str] = field(default_factory=list)
+    """What must lie in the left and the right projector; what else lies there is counted too."""
 
     def of(self, account: Account) -> Found:
         """Return their number, the base counted where it is not as it should be."""
         autograph = account.autograph
         fittings, base = autograph.fittings.as_words(), autograph.base_mode
+        lying = autograph.loaded(1), autograph.loaded(2)
         if self.point:
             readings = _with(account, "", [self.point])
             if not readings:
                 return Found(None, f"nothing was registered as {self.point}")
-            fittings, base = dict(readings[-1].fittings), readings[-1].base
+            fittings, base, lying = dict(readings[-1].fittings), readings[-1].base, readings[-1].pictures
         polarity = self.polarity or account.model.polarity
         right = RIGHT_FITTINGS[polarity, self.base or base].as_words()
         wrong = [f"{name} stands {at} and belongs {right[name]}" for name, at in fittings.items() if at != right[name]]
         if self.base and base != self.base:
             wrong.append(f"the base is {base} and belongs {self.base}")
+        wrong += [
+            f"{there or 'no picture'} lies in projector {projector} and {wanted} belongs there"
+            for projector, (there, wanted) in enumerate(zip(lying, self.pictures, strict=False), start=1)
+            if there != wanted
+        ]
         picture = f"{'at ' + self.point + ' ' if self.point else ''}for a {polarity} with base {self.base or base}"
         return Found(float(len(wrong)), f"{picture}: {listed(wrong) if wrong else 'all is as it belongs'}")
 
 
 @measure("out-of-order")
 class OutOfOrder(Measure, frozen=True, kw_only=True):
-    """How many deeds of a procedure are missing or came too early.
+    """How many deeds of a procedure are missing or came too early: in each of some chains, its own order.
 
-    Deeds are written 'load 1', 'centre 1', 'set c1', 'record', 'turn by1', 'drive': what, and of what where it
-    matters; 'move X' is any way of moving it. The last deed of a kind counts, or the first where it ends in '!'.
+    Deeds are written 'load 1', 'fiducials 1', 'centre 1', 'set c1', 'turn by1', 'record 3': what, and of what where it
+    matters; 'move X' is any way of moving it, 'adjust by1' setting or turning it. The last deed of a kind counts, or
+    the first where it ends in '!'.
     """
 
     unit = "deeds"
-    deeds: list[str]
+    chains: list[list[str]]
 
     def of(self, account: Account) -> Found:
         """Return their number."""
-        places = [self._place(account, deed) for deed in self.deeds]
-        missing = [deed for deed, place in zip(self.deeds, places, strict=True) if place is None]
-        early, last = [], -1
-        for deed, place in zip(self.deeds, places, strict=True):
-            if place is not None and place < last:
-                early.append(deed)
-            last = max(last, -1 if place is None else place)
-        told = [f"not done: {listed(missing)}"] if missing else []
-        told += [f"done too early: {listed(early)}"] if early else []
-        words = "; ".join(told).replace("!", "")
-        return Found(float(len(missing) + len(early)), words or "everything was done, in its order")
+        missing: list[str] = []
+        early: list[str] = []
+        for chain in self.chains:
+            last, before = -1, ""
+            for deed in chain:
+                place = self._place(account, deed)
+                if place is None:
+                    missing.append(_plainly(deed))
+                elif place < last:
+                    early.append(f"{_plainly(deed)} (before {_plainly(before)})")
+                elif place > last:
+                    last, before = place, deed
+        told = [f"not done: {listed(dict.fromkeys(missing))}"] if missing else []
+        told += [f"done too early: {listed(dict.fromkeys(early))}"] if early else []
+        return Found(float(len(missing) + len(early)), "; ".join(told) or "everything was done, in its order")
 
     def _place(self, account: Account, deed: str) -> int | None:
         what, _, name = deed.removesuffix("!").partition(" ")
-        kinds = {"move": ("set", "turn", "drive", "wheel"), "adjust": ("set", "turn")}.get(what, (what,))
+        kinds = {"move": PLAIN, "adjust": ("set", "turn")}.get(what, (what,))
         places = [
             each.place
             for each in account.deeds
-            if each.what in kinds and (not name or account.name_of(name) == each.name or name == each.text)
+            if each.what in kinds and (not name or account.name_of(name) == each.name or name in (each.name, each.text))
         ]
         return (places[0] if deed.endswith("!") else places[-1]) if places else None
+
+
+def _plainly(deed: str) -> str:
+    what, _, name = deed.removesuffix("!").partition(" ")
+    return f"{what} {title(name)}".strip()
+
+
+@measure("handles-moved")
+class HandlesMoved(Measure, frozen=True, kw_only=True):
+    """How many elements do not stand in the end where the opening left them."""
+
+    unit = "elements"
+    handles: list[str]
+    within: float = HALF_A_COUNT
+
+    def of(self, account: Account) -> Found:
+        """Return their number."""
+        moved = [handle for handle in self.handles if self._by_how_much(account, handle) > self.within + 1e-9]
+        told = f"{listed(map(title, moved))} moved" if moved else "all of it stands where it stood"
+        return Found(float(len(moved)), told)
+
+    def _by_how_much(self, account: Account, handle: str) -> float:
+        deeds = [each for each in account.deeds if each.name == handle and each.what in PLAIN]
+        if not deeds:
+            return 0.0
+        moved = abs(deeds[-1].after - deeds[0].before)
+        return min(moved, abs(400.0 - moved)) if handle.startswith("kappa") else moved
+
+
+@measure("not-looked")
+class NotLooked(Measure, frozen=True, kw_only=True):
+    """How many points were registered without a look through an eyepiece since the last lever was put over."""
+
+    unit = "points"
+    points: list[str]
+
+    def of(self, account: Account) -> Found:
+        """Return their number."""
+        blind = []
+        for point in self.points:
+            readings = _with(account, "", [point])
+            before = [each for each in account.deeds if readings and each.place < readings[-1].place]
+            looks = [each.place for each in before if each.what == "look"]
+            levers = [each.place for each in before if each.what in ("fit", "base", "load")]
+            if not readings or max(looks, default=-1) < max(levers, default=0):
+                blind.append(point)
+        told = f"at {listed(blind)} nobody looked after the last lever" if blind else "looked every time"
+        return Found(float(len(blind)), told)
 
 
 @measure("run-by-motor")

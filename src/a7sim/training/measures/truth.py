@@ -240,8 +240,9 @@ class PrincipalDistanceOff(Measure, frozen=True, kw_only=True):
                 return Found(None, f"no photograph lies in projector {projector}")
             wanted = account.scenario.camera.c * (1.0 + _lie(account, projector)[2])
             shown = account.autograph.element(f"c{projector}")
+            side = "long" if shown > wanted else "short"
             told = (
-                f"{title(f'c{projector}')} stands at {shown:.2f}; with the film as it lies it belongs at {wanted:.2f}"
+                f"{title(f'c{projector}')} stands at {shown:.2f}: {abs(shown - wanted):.3f} mm too {side} for the film"
             )
             off.append((abs(shown - wanted), told))
         value, told = max(off)
@@ -314,8 +315,7 @@ class AnswerWrong(Measure, frozen=True, kw_only=True):
 
 
 def _plain(text: str) -> str:
-    words = text.lower().replace("-", " ").replace("_", " ").strip().strip("\"'")
     try:
-        return f"{float(words):.6g}"
+        return f"{float(text):.6g}"
     except ValueError:
-        return words
+        return text.lower().replace("-", " ").replace("_", " ").strip().strip("\"'")

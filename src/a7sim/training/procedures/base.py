@@ -6,20 +6,29 @@ from dataclasses import dataclass
 from a7sim.link.client import Client
 from a7sim.link.headers import quoted, recorded_as
 from a7sim.link.inprocess import InProcessSerial
+from a7sim.manual import VARIANTS
 from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit, ModelJob, Person, work
+from a7sim.operator import DoesNotFit, Job, ModelJob, Person, work
 from a7sim.operator.bench import Bench
 from a7sim.operator.book import Entry
 from a7sim.operator.crew import Crew
 from a7sim.operator.interior import InteriorOrientations
 from a7sim.operator.line_hands import LineHands
-from a7sim.operator.seat import side
 from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
 from a7sim.reduction import Undetermined
 from a7sim.session.running import job_of
 from a7sim.training.account import ANSWER
 from a7sim.training.exercise import Played
 from a7sim.training.room import Room
+from a7sim.training.variation import scenario_for
+
+ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)
+
+_POINTED = {1: "X left at", 2: "X right at"}
+"""How items of pointings with one eye begin, by the hand of the photograph."""
+
+_REGISTERED = (*_POINTED.values(), "parallax seen")
+"""Items at which counters are registered beside those of elements."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +38,17 @@ class Seated:
     person: Person
     bench: Bench
     model: ModelJob
+
+    @classmethod
+    def at(cls, person: Person, job: Job, model: str) -> "Seated":
+        """Return an operator who is to work on a model of a job."""
+        bench = Bench(Crew.of_one(person), LineHands(person), job)
+        return cls(person, bench, next(each for each in job.models if each.name == model))
+
+    def points(self) -> list[str]:
+        """Return the names of the standard points that the job sheet asks for."""
+        labels = self.model.points_of_case(self.bench.job.plan.case)
+        return [self.model.standard_points[label] for label in labels]
 
     def set_up(self) -> None:
         """Bring the instrument to the settings of the job sheet, mount and centre pictures, take up the prints."""
@@ -42,12 +62,12 @@ class Seated:
         mount(bench, self.model, found)
         bench.begin(who, self.model, take_up_prints(bench, self.model))
 
-    def sit_down(self) -> None:
-        """Take the instrument over as the opening leaves it, and take up the prints."""
-        bench = self.bench
-        who = bench.crew.everybody
-        bench.seat.take_over(who)
-        bench.begin(who, self.model, take_up_prints(bench, self.model))
+    def take_over(self) -> None:
+        """Sit down at an instrument that stands ready: base and pictures set, its counters as `*RST` leaves them."""
+        who = self.bench.crew.everybody
+        self.bench.seat.take_over(who)
+        self.bench.seat.counters(who)
+        self.bench.begin(who, self.model, take_up_prints(self.bench, self.model))
 
     def answer(self, answers: Mapping[str, float], decimals: int = 2) -> None:
         """Note answers down at the instrument."""
@@ -80,13 +100,12 @@ def procedure(name: str) -> Callable[[Procedure], Procedure]:
 def play(room: Room, played: Played, client: str) -> str:
     """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake."""
     port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
-    person = Person(Client(port), room.clock, room.scenario.observer, room.seed)
-    job = job_of(room.scenario, room.scene)
-    model = next(each for each in job.models if each.name == room.shelved.exercise.model)
-    bench = Bench(Crew.of_one(person), LineHands(person), job)
-    person.book.listener = _Button(person.client, model).written
+    observer = scenario_for(room.shelved, room.seed, played.observer).observer
+    person = Person(Client(port), room.clock, observer, room.seed)
+    seated = Seated.at(person, job_of(room.scenario, room.scene), room.shelved.exercise.model)
+    person.book.listener = _Button(person.client, seated.model).written
     try:
-        PROCEDURES[played.procedure](Seated(person, bench, model), **played.options)
+        PROCEDURES[played.procedure](seated, **played.options)
     except (DoesNotFit, Undetermined) as trouble:
         return str(trouble) or type(trouble).__name__
     except TypeError as error:
@@ -105,29 +124,31 @@ REGISTERED_ALREADY = "X"
 class _Button:
     """The button of the recording device: what is written into the book is registered as well.
 
-    With the item that is read; a pointing with one eye together with by of its projector, which says whose it is.
+    With the element that is read; a pointing with one eye with by of its projector, which says whose it is.
     """
 
     def __init__(self, client: Client, model: ModelJob) -> None:
         self._client = client
-        self._model = model
         self._numbers: dict[int, int] = {}
+        self._named = {
+            _POINTED[1]: f"by{model.left_projector}",
+            _POINTED[2]: f"by{model.right_projector}",
+        }
 
     def written(self, entry: Entry) -> None:
         if entry.struck:
             if entry.number in self._numbers:
                 self._client.send(f"REC:STR {self._numbers[entry.number]},{quoted(entry.struck[:60])}")
-        elif entry.point and not entry.item.startswith(("set ", "Y", "Z", "parallax seen")):
+        elif entry.point and (entry.item in {REGISTERED_ALREADY, *ELEMENTS} or entry.item.startswith(_REGISTERED)):
             if entry.item != REGISTERED_ALREADY:
-                self._client.send(f"REC {quoted(entry.point)},{recorded_as(self._element(entry.item))}")
+                self._client.send(",".join([f"REC {quoted(entry.point)}", *self._words(entry.item)]))
             self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
 
-    def _element(self, item: str) -> str:
-        """Return the element that is registered with an item of the book."""
-        if not item.startswith("X "):
-            return item
-        left = item.startswith(f"X {side(1)}")
-        return f"by{self._model.left_projector if left else self._model.right_projector}"
+    def _words(self, item: str) -> list[str]:
+        """Return the elements that are registered with an item of the book."""
+        if item in ELEMENTS:
+            return [recorded_as(item)]
+        return [recorded_as(by) for pointed, by in self._named.items() if item.startswith(pointed)]
 
 
 @procedure("interior orientation")
@@ -137,21 +158,22 @@ def interior_orientation(seated: Seated) -> None:
 
 
 @procedure("measure parallaxes")
-def measure_parallaxes(seated: Seated, points: list[str] | None = None, readings: int = 3) -> None:
-    """Clear the y-parallax at standard points with by', then with by\", so many times each."""
-    seated.set_up()
-    labels = points or seated.model.points_of_case(seated.bench.job.plan.case)
+def measure_parallaxes(seated: Seated, readings: int = 2) -> None:
+    """Clear the y-parallax at the standard points with by', then with by\", coming back to each so many times."""
+    seated.take_over()
     seated.begin("y-parallaxes")
-    who = seated.bench.crew.everybody
-    seated.bench.parallaxes(who, [seated.model.standard_points[label] for label in labels], readings)
+    for _ in range(readings):
+        seated.bench.parallaxes(seated.bench.crew.everybody, seated.points(), 1)
 
 
 @procedure("relative orientation")
 def relative_orientation(seated: Seated) -> None:
-    """Relative orientation as the scenario's plan has it."""
-    seated.set_up()
+    """Relative orientation as the scenario's plan has it, of pictures that lie ready; then a look at every point."""
+    seated.take_over()
     seated.begin("relative orientation")
     oriented(seated.bench, seated.model)
+    seated.begin("last look")
+    seated.bench.parallaxes_seen(seated.bench.crew.everybody, seated.points())
 
 
 @procedure("day's work")

@@ -31,7 +31,7 @@ def clear_the_model(
 
     With `names_missing` the operator answers which of the points 1 to 6 are not there, or by mistake `missing`.
     """
-    seated.sit_down()
+    seated.take_over()
     seated.begin("relative orientation")
     bench = seated.bench
     if names_missing:
@@ -62,7 +62,7 @@ def numerical_orientation(
 
     `sense` is that in which the corrections are set, `slip_gon` by how much the sum for phi' is out.
     """
-    seated.sit_down()
+    seated.take_over()
     bench, model = seated.bench, seated.model
     who, unknowns = bench.crew.everybody, unknowns_of(INDEPENDENT, model)
     for number, case in enumerate(cases, start=1):
@@ -109,7 +109,7 @@ def perspective_centres(
     By mistake only with some eyes (`hands`, 1 for the left-hand photograph), each centre under the other's name
     (`swapped`), or the height above the lower level in mm instead of counter units.
     """
-    seated.sit_down()
+    seated.take_over()
     bench, model, plan = seated.bench, seated.model, seated.bench.job.plan
     seated.begin("model coordinates")
     bench.parallaxes_seen(bench.crew.everybody, [model.standard_points["1"]])

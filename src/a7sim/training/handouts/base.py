@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from a7sim.scenario import Scenario
-from a7sim.training.forms import form_of
 
 
 @dataclass(frozen=True)
@@ -36,9 +35,3 @@ def handout(name: str) -> Callable[[Maker], Maker]:
 def handed_out(name: str, scenario: Scenario, seed: int, options: Mapping[str, Any]) -> Handout:
     """Return the papers of an exercise, the same for the same seed; none where it has no maker."""
     return HANDOUTS[name](scenario, seed, **options) if name else Handout()
-
-
-@handout("orientation forms")
-def orientation_forms(scenario: Scenario, seed: int, cases: str = "AE") -> Handout:
-    """Return a computation form for every case."""
-    return Handout({f"form-{case}.txt": form_of(scenario, case) for case in cases})
