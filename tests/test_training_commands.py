@@ -56,7 +56,7 @@ def test_who_has_done_nothing_is_told_what_is_missing_and_ends_in_one(train, tmp
     assert next(m["reason"] for m in document["marks"] if m["id"] == "complete").startswith("24 of 24 registrations")
 
 
-def test_hints_come_in_their_order_cost_points_and_end(train):
+def test_hints_come_in_their_order_cost_points_and_end(train, tmp_path):
     assert train("hint", 4)[0] == 2
     at_the_references_seed(train)
     hints = find_exercise("4").exercise.hints
@@ -65,6 +65,8 @@ def test_hints_come_in_their_order_cost_points_and_end(train):
     code, _, err = train("hint", 4)
     assert code == 2 and "all 3 were given" in err
     assert "passed, 90 of 100 points" in train("verify", 4)[1]
+    (journal,) = (tmp_path / "home").rglob("session.jsonl")
+    assert "passed, 90 of 100 points" in train("verify", "--journal", journal.parent, "--seed", 4)[1]
 
 
 def test_a_damaged_journal_ends_in_three(train, tmp_path):

@@ -11,8 +11,8 @@ import msgspec
 
 from a7sim.mistakes import Mistake
 from a7sim.session.folder import JOURNAL
-from a7sim.training.attempts import mode_of
-from a7sim.training.grading import Grade, graded
+from a7sim.training.attempts import mode_of, written_hints
+from a7sim.training.grading import Grade, HintsTaken, graded
 from a7sim.training.shelf import find_exercise
 from a7sim.training.variation import seed_of
 
@@ -59,7 +59,8 @@ def graded_folder(folder: Path, seed: int | None = None) -> HandedIn:
     except Mistake as mistake:
         return HandedIn(str(folder), trouble=str(mistake))
     try:
-        grade = graded(find_exercise(exercise), seed_of(student, exercise, mode) if seed is None else seed, folder)
+        drawn = seed_of(student, exercise, mode) if seed is None else seed
+        grade = graded(find_exercise(exercise), drawn, folder, HintsTaken(*written_hints(folder)))
     except Mistake as mistake:
         return HandedIn(str(folder), student, exercise, trouble=str(mistake))
     return HandedIn(str(folder), student, exercise, grade)
