@@ -163,6 +163,11 @@ class WitnessedAutograph(Autograph):
         counter = self._counters[axis]
         return counter.offset + counter.units_per_mm * self._carriages[axis].at
 
+    @property
+    def z_units_per_mm(self) -> float:
+        """Return the units of the Z counter a mm, as it is geared."""
+        return self._counters["Z"].units_per_mm
+
     def play(self, handle: str) -> float:
         """Return the play of a carriage or an element: part of the truth."""
         return self._carriages[handle].play if handle in self._carriages else self._spindle(handle).play

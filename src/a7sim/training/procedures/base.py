@@ -18,6 +18,7 @@ from a7sim.reduction import Undetermined
 from a7sim.session.running import job_of
 from a7sim.training.exercise import Played
 from a7sim.training.room import Room
+from a7sim.training.variation import scenario_for
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ def procedure(name: str) -> Callable[[Procedure], Procedure]:
 def play(room: Room, played: Played, client: str) -> str:
     """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake."""
     port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
-    person = Person(Client(port), room.clock, room.scenario.observer, room.seed)
+    observer = scenario_for(room.shelved, room.seed, played.observer).observer
+    person = Person(Client(port), room.clock, observer, room.seed)
     seated = Seated.at(person, job_of(room.scenario, room.scene), room.shelved.exercise.model)
     person.book.listener = _Button(person.client).written
     try:
@@ -88,6 +90,10 @@ def play(room: Room, played: Played, client: str) -> str:
     return ""
 
 
+REGISTERED_ALREADY = "X"
+"""Of a point measured with both eyes the operator has registered all three coordinates before they are entered."""
+
+
 class _Button:
     """The button of the recording device: what is written into the book is registered as well."""
 
@@ -99,9 +105,10 @@ class _Button:
         if entry.struck:
             if entry.number in self._numbers:
                 self._client.send(f"REC:STR {self._numbers[entry.number]},{quoted(entry.struck[:60])}")
-        elif entry.point and not entry.item.startswith(("set ", "Y ")):
-            words = [] if entry.item[:2] in ("X ", "X") else [recorded_as(entry.item)]
-            self._client.send(",".join([f"REC {quoted(entry.point)}", *words]))
+        elif entry.point and not entry.item.startswith(("set ", "Y", "Z", "parallax seen")):
+            if entry.item != REGISTERED_ALREADY:
+                words = [] if entry.item.startswith("X ") else [recorded_as(entry.item)]
+                self._client.send(",".join([f"REC {quoted(entry.point)}", *words]))
             self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
 
 
