@@ -113,7 +113,7 @@ BAD = {
     'measure = "minutes"': ('measure = "minuets"', r"criterion\[6\]\.measure: expected one of"),
     'measure = "not-opposed"\ndone': ('measure = "parallax-left"\ndone', r"step\[3\]\.measure: .* the truth"),
     'fails = "cleared"': ('fails = "clear"', r"faulty\[1\]\.fails: expected one of complete"),
-    "away = 0.05": ('away = "far"', r"criterion\[4\]\.options\.away: expected a number, got \"far\""),
+    "away = 0.02": ('away = "far"', r"criterion\[4\]\.options\.away: expected a number, got \"far\""),
 }
 
 

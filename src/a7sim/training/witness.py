@@ -234,8 +234,12 @@ class WitnessedAutograph(Autograph):
 
     def reset(self) -> None:
         """Run everything to its zero."""
+        before = {name: spindle.at for name, spindle in self._spindles.items()}
         super().reset()
         self.witness.did("reset")
+        for name, spindle in self._spindles.items():
+            if spindle.at != before[name]:
+                self.witness.did("set", name, before[name], spindle.at)
 
     def eyepiece(self, eyepiece: int, name: str) -> tuple[float, float] | None:
         """Look at a point through an eyepiece."""

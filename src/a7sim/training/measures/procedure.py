@@ -372,18 +372,24 @@ def _plainly(deed: str) -> str:
 
 @measure("handles-moved")
 class HandlesMoved(Measure, frozen=True, kw_only=True):
-    """How many handles were moved that should have been left alone."""
+    """How many elements do not stand in the end where the opening left them."""
 
-    unit = "handles"
+    unit = "elements"
     handles: list[str]
+    within: float = HALF_A_COUNT
 
     def of(self, account: Account) -> Found:
         """Return their number."""
-        moved = {each.name for each in account.deeds if each.what in PLAIN and each.before != each.after}
-        if any(each.what == "reset" for each in account.deeds):
-            return Found(float(len(self.handles)), "*RST moved everything")
-        touched = [title(each) for each in self.handles if each in moved]
-        return Found(float(len(touched)), f"{listed(touched)} moved" if touched else "all of it was left alone")
+        moved = [handle for handle in self.handles if self._by_how_much(account, handle) > self.within + 1e-9]
+        told = f"{listed(map(title, moved))} moved" if moved else "all of it stands where it stood"
+        return Found(float(len(moved)), told)
+
+    def _by_how_much(self, account: Account, handle: str) -> float:
+        deeds = [each for each in account.deeds if each.name == handle and each.what in PLAIN]
+        if not deeds:
+            return 0.0
+        moved = abs(deeds[-1].after - deeds[0].before)
+        return min(moved, abs(400.0 - moved)) if handle.startswith("kappa") else moved
 
 
 @measure("not-looked")

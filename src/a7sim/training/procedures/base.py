@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from a7sim.link.client import Client
 from a7sim.link.headers import quoted, recorded_as
 from a7sim.link.inprocess import InProcessSerial
+from a7sim.manual import VARIANTS
 from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit, Job, ModelJob, Person, work
 from a7sim.operator.bench import Bench
@@ -19,6 +20,12 @@ from a7sim.session.running import job_of
 from a7sim.training.exercise import Played
 from a7sim.training.room import Room
 from a7sim.training.variation import scenario_for
+
+
+ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)
+
+_REGISTERED = ("X left at", "X right at", "parallax seen")
+"""Items at which counters are registered beside those of elements."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,11 @@ class Seated:
         bench = Bench(Crew.of_one(person), LineHands(person), job)
         return cls(person, bench, next(each for each in job.models if each.name == model))
 
+    def points(self) -> list[str]:
+        """Return the names of the standard points that the job sheet asks for."""
+        labels = self.model.points_of_case(self.bench.job.plan.case)
+        return [self.model.standard_points[label] for label in labels]
+
     def set_up(self) -> None:
         """Bring the instrument to the settings of the job sheet, mount and centre pictures, take up the prints."""
         bench = self.bench
@@ -46,6 +58,12 @@ class Seated:
         found: dict[str, InteriorOrientations] = {}
         mount(bench, self.model, found)
         bench.begin(who, self.model, take_up_prints(bench, self.model))
+
+    def take_over(self) -> None:
+        """Sit down at an instrument that stands ready: base and pictures set, its counters as `*RST` leaves them."""
+        who = self.bench.crew.everybody
+        self.bench.seat.counters(who)
+        self.bench.begin(who, self.model, take_up_prints(self.bench, self.model))
 
     def begin(self, form: str) -> None:
         """Begin a form of the book."""
@@ -105,9 +123,9 @@ class _Button:
         if entry.struck:
             if entry.number in self._numbers:
                 self._client.send(f"REC:STR {self._numbers[entry.number]},{quoted(entry.struck[:60])}")
-        elif entry.point and not entry.item.startswith(("set ", "Y", "Z", "parallax seen")):
+        elif entry.point and (entry.item in {REGISTERED_ALREADY, *ELEMENTS} or entry.item.startswith(_REGISTERED)):
             if entry.item != REGISTERED_ALREADY:
-                words = [] if entry.item.startswith("X ") else [recorded_as(entry.item)]
+                words = [recorded_as(entry.item)] if entry.item in ELEMENTS else []
                 self._client.send(",".join([f"REC {quoted(entry.point)}", *words]))
             self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
 
@@ -119,21 +137,22 @@ def interior_orientation(seated: Seated) -> None:
 
 
 @procedure("measure parallaxes")
-def measure_parallaxes(seated: Seated, points: list[str] | None = None, readings: int = 3) -> None:
-    """Clear the y-parallax at standard points with by', then with by\", so many times each."""
-    seated.set_up()
-    labels = points or seated.model.points_of_case(seated.bench.job.plan.case)
+def measure_parallaxes(seated: Seated, readings: int = 2) -> None:
+    """Clear the y-parallax at the standard points with by', then with by\", coming back to each so many times."""
+    seated.take_over()
     seated.begin("y-parallaxes")
-    who = seated.bench.crew.everybody
-    seated.bench.parallaxes(who, [seated.model.standard_points[label] for label in labels], readings)
+    for _ in range(readings):
+        seated.bench.parallaxes(seated.bench.crew.everybody, seated.points(), 1)
 
 
 @procedure("relative orientation")
 def relative_orientation(seated: Seated) -> None:
-    """Relative orientation as the scenario's plan has it."""
-    seated.set_up()
+    """Relative orientation as the scenario's plan has it, of pictures that lie ready; then a look at every point."""
+    seated.take_over()
     seated.begin("relative orientation")
     oriented(seated.bench, seated.model)
+    seated.begin("last look")
+    seated.bench.parallaxes_seen(seated.bench.crew.everybody, seated.points())
 
 
 @procedure("day's work")
