@@ -10,18 +10,20 @@ from a7sim.operator.bridging import carry_on, carry_scale_on, set_as_its_neighbo
 from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import relative_orientation
 from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
+from a7sim.training.account import ANSWER
 from a7sim.training.procedures.base import Seated, procedure
 
 
-@procedure("oriented model")
-def oriented_model(seated: Seated, model: str = "") -> None:
-    """Set a model up and orient it relatively, as somebody does who leaves it to the next operator.
+@procedure("prepared model")
+def prepared_model(seated: Seated, model: str = "", orient: bool = True) -> None:
+    """Set a model up and `orient` it relatively, as somebody does who leaves it to the next operator.
 
     The Z counter is left so that it reads from the base line.
     """
     bench, chosen = seated.bench, model_named(seated, model)
     Seated(seated.person, bench, chosen).set_up()
-    oriented(bench, chosen)
+    if orient:
+        oriented(bench, chosen)
     who = bench.crew.everybody
     heights = bench.seat.from_zero(who, [f"bz{chosen.left_projector}"])[f"bz{chosen.left_projector}"]
     bench.seat.shift_counter(who, "Z", bench.seat.units_per_mm * heights - bench.seat.centre(who, 1)[2])
@@ -56,12 +58,59 @@ def absolute_orientation(
     model = seated.model if points is None else replace(seated.model, other_points=tuple(points))
     take_over(seated, model)
     seated.begin("absolute orientation")
-    control = dict(bench.job.control)
-    for name, (dx, dy, dz) in (misread or {}).items():
-        x, y, z = control[name]
-        control[name] = (x + dx, y + dy, z + dz)
-    absolute_orientation_at(bench, model, control)
+    absolute_orientation_at(bench, model, changed_by(bench.job.control, misread or {}))
     knock(seated, knocked or {})
+
+
+@procedure("A8 model")
+def a8_model(
+    seated: Seated,
+    level: bool = True,
+    doubled: bool = True,
+    place: str = "3",
+    misread: Mapping[str, Sequence[float]] | None = None,
+    points: Sequence[str] | None = None,
+    knocked: Mapping[str, float] | None = None,
+) -> None:
+    """Orient a model empirically, level it by common Phi and both omegas, read it, and answer the place of a point.
+
+    By mistake it is not made `level`, scale units are taken for mm instead of `doubled`, control is `misread`, only
+    `points` are read, elements are `knocked` in the end.
+    """
+    bench, crew = seated.bench, seated.bench.crew
+    name = seated.model.standard_points[place]
+    others = seated.model.other_points if points is None else tuple(points)
+    model = replace(seated.model, other_points=(*others, name))
+    take_over(seated, model)
+    seated.begin("relative orientation")
+    oriented(bench, model)
+    seated.begin("absolute orientation")
+    if level:
+        control = changed_by(bench.job.control, misread or {})
+        on_ground = absolute_orientation_at(bench, model, control)[0]
+        reading, bx = np.array(on_ground.points[name]), on_ground.elements["bx"]
+    else:
+        wanted = dict.fromkeys([*bench.job.control, *model.other_points])
+        shown = [each for each in wanted if bench.pricked(crew.everybody, each).all()]
+        reading = bench.measure(crew.everybody, shown)[:, shown.index(name), 0]
+        bx = float(bench.seat.bx(crew.everybody)[0])
+    scales = [bench.seat.manual.scales[axis] for axis in "XY"]
+    x, y = (each - scale.at_origin for each, scale in zip(reading[:2].tolist(), scales, strict=True))
+    mm = 1.0 / scales[0].units_per_mm if doubled else 1.0
+    left = bench.seat.manual.centres_on_base[0] * bx
+    seated.person.note(f"{ANSWER}x{place}={mm * x - left:.2f} y{place}={mm * y:.2f}")
+    knock(seated, knocked or {})
+
+
+def changed_by(
+    control: Mapping[str, tuple[float, float, float]], misread: Mapping[str, Sequence[float]]
+) -> dict[str, tuple[float, float, float]]:
+    """Return control with some of it misread by so many m in X, Y, Z."""
+    changed = dict(control)
+    for name, (dx, dy, dz) in misread.items():
+        x, y, z = control[name]
+        changed[name] = (x + dx, y + dy, z + dz)
+    return changed
 
 
 def knock(seated: Seated, elements: Mapping[str, float]) -> None:
