@@ -302,3 +302,30 @@ class PlaceByScales(Measure, frozen=True, kw_only=True):
     def floor(self, scenario: Scenario) -> float:
         """Return half a count of both scales, which count in two millimetres."""
         return 2.0 * math.sqrt(2.0) * HALF_A_COUNT
+
+
+@measure("answers-off")
+class AnswersOff(Measure, frozen=True, kw_only=True):
+    """The largest difference of several answered numbers from what the maker of the papers kept back."""
+
+    truth = True
+    keys: list[str]
+    least: float = 0.0
+    """What can be read of them: no tolerance is below."""
+
+    def of(self, account: Account) -> Found:
+        """Return it."""
+        off: dict[str, float] = {}
+        for key in self.keys:
+            try:
+                off[key] = abs(float(account.answers.get(key, "")) - float(account.hidden[key]))
+            except (ValueError, KeyError):
+                return Found(None, f"{key}: expected a number, got {account.answers.get(key, 'no answer')!r}")
+        worst = max(off, key=lambda key: off[key])
+        if not math.isfinite(off[worst]):
+            return Found(None, f"{worst}: expected a number, got {account.answers[worst]!r}")
+        return Found(round(off[worst], 4), f"{worst} was answered {account.answers[worst]}, the furthest off")
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what can be read of them."""
+        return self.least
