@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from a7sim.files import csv_text
 from a7sim.geometry import Array, length_of
+from a7sim.mistakes import Mistake
 from a7sim.reduction import Ground, Model
 from a7sim.reduction.strips import formed_strip, is_centre
 from a7sim.scenario import Scenario
@@ -60,25 +62,32 @@ def model_sheets(scenario: Scenario, seed: int, wanted: list[str]) -> Handout:
     slip = misread(models, given, seed)
     strip = grounded([model.without(slip.point) if model.name == slip.model else model for model in models], given)
     places = dict(zip(strip.points.points, strip.points.coordinates.T.tolist(), strict=True))
-    hidden = {"bad": slip.point, "ties": len(shared(models[0], models[1])), "scale": 1e3 * float(strip.oriented.similarity.scale)}
+    hidden = {
+        "bad": slip.point,
+        "ties": len(shared(models[0], models[1])),
+        "scale": 1e3 * float(strip.oriented.similarity.scale),
+    }
     hidden |= {f"{axis}{name}": places[name][k] for name in wanted for k, axis in enumerate("xyz")}
     papers = {SHEETS: _sheets_csv(slip.on(models), scenario), CONTROL: control_csv(given)}
     return Handout(papers, hidden)
 
 
 def misread(models: Sequence[Model], given: Ground, seed: int) -> Misread:
-    """Return a slip that the joins show: with it the point has by far the largest closing difference."""
+    """Return a slip that the joins show: its point has by far the largest closing difference. Raises Mistake."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=HANDOUT_STREAM))
-    candidates = [
+    candidates: list[Misread] = [
         Misread(after.name, name, axis, float(sign * round(rng.uniform(*MISREAD_MM), 2)))
-        for before, after in zip(models, models[1:], strict=False)
+        for before, after in pairwise(models)
         for name in shared(before, after)
         if not is_centre(name) and name not in given.points
         for axis in range(3)
         for sign in (-1.0, 1.0)
     ]
-    order = rng.permutation(len(candidates))
-    return next(candidates[i] for i in order if _stands_out(candidates[i], models))
+    order: list[int] = rng.permutation(len(candidates)).tolist()
+    for i in order:
+        if _stands_out(candidates[i], models):
+            return candidates[i]
+    raise Mistake("expected models with ties enough for a misread one to stand out, got too few")
 
 
 def _stands_out(slip: Misread, models: Sequence[Model]) -> bool:

@@ -21,7 +21,6 @@ from a7sim.training.exercise import Played
 from a7sim.training.room import Room
 from a7sim.training.variation import scenario_for
 
-
 ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)
 
 _REGISTERED = ("X left at", "X right at", "parallax seen")
