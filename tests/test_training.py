@@ -5,8 +5,9 @@ import pytest
 from a7sim.session.lines import Chain, read_journal
 from a7sim.training.attempts import attempted, begun, gone_on, write_answers
 from a7sim.training.checking import checked
-from a7sim.training.exercise import Played
+from a7sim.training.exercise import Measured, Played
 from a7sim.training.grading import graded
+from a7sim.training.measures import Found, measure_of
 from a7sim.training.room import Unreliable
 from a7sim.training.shelf import ExerciseError, all_exercises, find_exercise, read_exercise
 from a7sim.training.variation import scenario_for, seed_of
@@ -109,6 +110,17 @@ def test_answers_written_down_count_before_those_noted(tmp_path):
     assert [each.id for each in graded(counters, 1, tmp_path).failed] == ["play"]
 
 
+def test_pictures_are_not_drawn_again_for_a_grade_and_all_else_is_compared(parallax, tmp_path):
+    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+        engine = room.desk.open("client2")
+        first = engine.feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 1.0)
+        engine.feed(b'REC "1011",BY1\n', 2.0)
+    assert len(set(first)) > 20, "expected a picture that is not black"
+    assert graded(parallax, 4, tmp_path).marks
+    with gone_on(parallax, 4, tmp_path) as room:
+        assert room.desk.open(time=3.0).feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 3.0) == first
+
+
 BAD = {
     'measure = "minutes"': ('measure = "minuets"', r"criterion\[6\]\.measure: expected one of"),
     'measure = "not-opposed"\ndone': ('measure = "parallax-left"\ndone', r"step\[3\]\.measure: .* the truth"),
@@ -125,3 +137,29 @@ def test_a_mistake_in_an_exercise_is_named_with_its_place(parallax, tmp_path, wa
     (tmp_path / "exercise.toml").write_text(text.replace(was, now))
     with pytest.raises(ExerciseError, match=expected):
         read_exercise(tmp_path)
+
+
+def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
+    """By lines that a person might say; what the instrument refuses and what is struck out did not happen."""
+    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+        engine = room.desk.open("client2", time=5.0)
+        lines = (
+            b'PROJ1:BY 0.30;:REC "1011",BY1\n',
+            b'PROJector1:BY:TURN -0.04;:RECord "1011",BY1\n',
+            b'PROJ1:BY 99;:REC "1021",BY2;:REC:STR 3,"wrong point"\n',
+            b'NOTE "answer play=0.07 Slip=none";:DRIV:X 3\n',
+        )
+        for line in lines:
+            engine.feed(line, 6.0)
+        account = room.account({"play": "0.08"})
+
+        def found(name, **options):
+            return measure_of(Measured(measure=name, options=options)).of(account)
+
+        assert found("spread", handles=["by1"]) == Found(0.04, "by' at point 1 read from 0.26 to 0.30")
+        assert found("missing-readings", points=["2"]) == Found(1.0, "1 of 1 registrations are missing: 2")
+        assert found("wrong-approach", handles=["by1"]).value == 1.0
+        assert found("handles-moved", handles=["by1", "by2"]) == Found(1.0, "by' moved")
+        assert found("run-by-motor", handles=["X"]).value == 0.0
+        assert found("not-opposed").value is None
+        assert account.answers == {"play": "0.08", "slip": "none"}

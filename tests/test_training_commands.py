@@ -16,6 +16,9 @@ import pytest
 
 from a7sim.link.client import Client
 from a7sim.mistakes import Mistake
+from a7sim.training.attempts import attempted
+from a7sim.training.exercise import Played
+from a7sim.training.handed_in import graded_folder, graded_folders
 from a7sim.training.progress import FILE, MIGRATIONS, Progress
 from a7sim.training.shelf import find_exercise
 from a7sim.training.variation import seed_of
@@ -53,7 +56,7 @@ def test_who_has_done_nothing_is_told_what_is_missing_and_ends_in_one(train, tmp
     assert next(m["reason"] for m in document["marks"] if m["id"] == "complete").startswith("24 of 24 registrations")
 
 
-def test_hints_come_in_their_order_cost_points_and_end(train):
+def test_hints_come_in_their_order_cost_points_and_end(train, tmp_path):
     assert train("hint", 4)[0] == 2
     at_the_references_seed(train)
     hints = find_exercise("4").exercise.hints
@@ -62,6 +65,8 @@ def test_hints_come_in_their_order_cost_points_and_end(train):
     code, _, err = train("hint", 4)
     assert code == 2 and "all 3 were given" in err
     assert "passed, 90 of 100 points" in train("verify", 4)[1]
+    (journal,) = (tmp_path / "home").rglob("session.jsonl")
+    assert "passed, 90 of 100 points" in train("verify", "--journal", journal.parent, "--seed", 4)[1]
 
 
 def test_a_damaged_journal_ends_in_three(train, tmp_path):
@@ -111,6 +116,31 @@ def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
     code, _, err = train("verify", "--journal", journal.parent)
     assert code == 3 and "expected an attempt with scenario_hash" in err
     assert train("verify", "--journal", journal.parent, "--seed", 4)[0] == 0
+    (tmp_path / "empty").mkdir()
+    folders = ["--journal", journal.parent, "--journal", tmp_path / "home", "--journal", tmp_path / "empty"]
+    code, out, err = train("verify", "--seed", 4, "--json", *folders)
+    handed_in = json.loads(out)["handed_in"]
+    assert code == 3 and "expected the journal of a session" in err
+    assert [bool(each["grade"]) for each in handed_in] == [True, True, False]
+    assert [each["student"] for each in handed_in] == ["ada", "ada", ""]
+
+
+def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path):
+    shelved = find_exercise("14")
+    folders = []
+    for i in range(10):
+        seed = seed_of(f"student {i}", shelved.name)
+        folders.append(tmp_path / str(i))
+        assert attempted(shelved, Played(script="faulty-kind.a7s"), folders[-1], seed, f"student {i}") == ""
+    together = graded_folders(folders, workers=2)
+    assert together == [graded_folder(folder) for folder in folders]
+    assert [each.student for each in together] == [f"student {i}" for i in range(10)]
+    assert not any(each.grade.passed for each in together)
+
+
+def test_an_exercise_is_shown_with_what_is_graded(train):
+    out = train("list", "4")[1]
+    assert "The drum reads to 0.01 mm" in out and "25  the other by stands at zero" in out
 
 
 def test_reports_of_student_and_class_in_every_form(train, tmp_path, monkeypatch):

@@ -1,5 +1,6 @@
 """An attempt from the opening to its end: by a script, by the virtual operator, or by whoever sits down."""
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +20,11 @@ from a7sim.training.variation import scenario_for
 
 ANSWERS = "answers.txt"
 """Answers that were written down beside the journal, a KEY=VALUE a line."""
+
+HINTS = "hints.txt"
+"""Hints that were given, their number and what they cost, a line each; the student's progress has them too."""
+
+_HINT = re.compile(r"\d+ \d+(\.\d+)?")
 
 STUDENT = "student"
 """The client as which a script or the virtual operator plays the student."""
@@ -116,6 +122,21 @@ def written_answers(folder: Path) -> dict[str, str]:
     for line in read_text(path).splitlines():
         answers |= answers_in([line])
     return answers
+
+
+def write_hint(folder: Path, number: int, cost: float) -> None:
+    """Note beside the journal that a hint was given, for whoever grades the folder alone."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / HINTS).open("a", encoding="utf-8") as hints:
+        hints.write(f"{number} {cost:g}\n")
+
+
+def written_hints(folder: Path) -> tuple[int, float]:
+    """Return how many hints are noted beside a journal, and what they cost."""
+    path = folder / HINTS
+    lines = read_text(path).splitlines() if path.is_file() else []
+    costs = [float(line.split()[1]) for line in lines if _HINT.fullmatch(line)]
+    return len(costs), sum(costs)
 
 
 def mode_of(folder: Path) -> tuple[str, str, str]:

@@ -11,12 +11,12 @@ from a7sim.cli.train.options import last_attempt, named, of_a_student, progress_
 from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
 from a7sim.session.folder import JOURNAL
-from a7sim.training.attempts import ANSWERS, mode_of
+from a7sim.training.attempts import ANSWERS
 from a7sim.training.grading import Grade, as_sentences, graded
+from a7sim.training.handed_in import HandedIn, attempts_in, graded_folders
 from a7sim.training.progress import EXAM, Attempt, Progress
 from a7sim.training.room import Unreliable
 from a7sim.training.shelf import find_exercise
-from a7sim.training.variation import seed_of
 
 EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
 
@@ -28,7 +28,7 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
     "folders",
     type=click.Path(path_type=Path, file_okay=False),
     multiple=True,
-    help="Grade the attempt in a folder that somebody handed in; nothing is recorded. May be given several times.",
+    help="Grade the attempts handed in as a folder, or in its folders; nothing is recorded. May be repeated.",
 )
 @click.option("--seed", type=click.IntRange(min=0), help="Of attempts handed in that were started with a --seed.")
 @click.option("--json", "as_document", is_flag=True, help="Print the grade as one JSON document.")
@@ -45,33 +45,41 @@ def verify_(
 
     Example: a7sim train verify 4
     """
-    try:
-        if folders:
-            grades = [_handed_in(folder, seed) for folder in folders]
-        else:
-            with progress_in(home) as progress:
-                attempt = last_attempt(progress, named(student), exercise)
-                grades = [_graded(progress, attempt)]
-                progress.give(attempt, grades[0])
-    except Unreliable as unreliable:
-        click.echo(f"a7sim: {unreliable}", err=True)
-        raise click.exceptions.Exit(EXIT_DIFFERS) from unreliable
+    if folders:
+        raise click.exceptions.Exit(_tell_of_many(graded_folders(attempts_in(folders), seed), as_document))
+    with progress_in(home) as progress:
+        attempt = last_attempt(progress, named(student), exercise)
+        try:
+            grade = _graded(progress, attempt)
+        except Unreliable as unreliable:
+            click.echo(f"a7sim: {unreliable}", err=True)
+            raise click.exceptions.Exit(EXIT_DIFFERS) from unreliable
+        progress.give(attempt, grade)
     if as_document:
-        documents = [msgspec.to_builtins(each) for each in grades]
-        click.echo(as_json(head("train verify") | ({"grades": documents} if folders else documents[0])), nl=False)
+        click.echo(as_json(head("train verify") | msgspec.to_builtins(grade)), nl=False)
     else:
-        for grade in grades:
-            click.echo("\n".join(as_sentences(grade)))
-    raise click.exceptions.Exit(EXIT_PASSED if all(each.passed for each in grades) else EXIT_NOT_PASSED)
+        click.echo("\n".join(as_sentences(grade)))
+    raise click.exceptions.Exit(EXIT_PASSED if grade.passed else EXIT_NOT_PASSED)
+
+
+def _tell_of_many(handed_in: list[HandedIn], as_document: bool) -> int:
+    """Print what came of attempts that were handed in; return the exit code."""
+    if as_document:
+        documents = [msgspec.to_builtins(each) for each in handed_in]
+        click.echo(as_json(head("train verify") | {"handed_in": documents}), nl=False)
+    for each in handed_in:
+        if each.grade is None:
+            click.echo(f"a7sim: {each.trouble}", err=True)
+        elif not as_document:
+            click.echo(f"{each.folder}: {each.student}")
+            click.echo("\n".join(as_sentences(each.grade)))
+    if any(each.grade is None for each in handed_in):
+        return EXIT_DIFFERS
+    return EXIT_PASSED if all(each.grade and each.grade.passed for each in handed_in) else EXIT_NOT_PASSED
 
 
 def _graded(progress: Progress, attempt: Attempt) -> Grade:
     return graded(find_exercise(attempt.exercise), attempt.seed, attempt.folder, progress.hints_taken(attempt))
-
-
-def _handed_in(folder: Path, seed: int | None) -> Grade:
-    exercise, student, mode = mode_of(folder)
-    return graded(find_exercise(exercise), seed_of(student, exercise, mode) if seed is None else seed, folder)
 
 
 @click.command("watch")

@@ -10,18 +10,23 @@ from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
 from a7sim.session.folder import write_whole
 from a7sim.sheets import sheet
+from a7sim.training.exercise import Shelved
 from a7sim.training.exports import HOME_PAGE, as_document, as_nbgrader, as_xapi
-from a7sim.training.shelf import all_exercises
+from a7sim.training.shelf import all_exercises, find_exercise
 
 
 @click.command("list")
+@click.argument("exercise", required=False)
 @click.option("--json", "as_json_", is_flag=True, help="Print the exercises as one JSON document.")
 @of_a_student
-def list_(as_json_: bool, home: Path | None, student: str | None) -> None:
-    """List the exercises and how far they are done.
+def list_(exercise: str | None, as_json_: bool, home: Path | None, student: str | None) -> None:
+    """List the exercises and how far they are done; or show what EXERCISE is about.
 
-    Example: a7sim train list
+    Example: a7sim train list 4
     """
+    if exercise is not None:
+        click.echo(_shown(find_exercise(exercise)))
+        return
     name = named(student)
     with progress_in(home) as progress:
         best = progress.best(name)
@@ -42,6 +47,14 @@ def list_(as_json_: bool, home: Path | None, student: str | None) -> None:
     for number, title, state, points, tries in rows:
         table.add_row(str(number), title, state, "" if points is None else f"{points:g}", str(tries or ""))
     Console().print(table)
+
+
+def _shown(shelved: Shelved) -> str:
+    exercise = shelved.exercise
+    steps = [f"  - {each.text}" for each in exercise.steps]
+    criteria = [f"  {each.weight:4g}  {each.title}" for each in exercise.criteria]
+    facts = f"{exercise.minutes:g} minutes, {exercise.pass_points:g} of 100 points pass, {len(exercise.hints)} hints"
+    return "\n".join([shelved.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
 
 
 @click.command("report")

@@ -7,7 +7,7 @@ import click
 from a7sim.cli.train.options import last_attempt, named, of_a_student, progress_in
 from a7sim.mistakes import Mistake
 from a7sim.training.account import answers_in
-from a7sim.training.attempts import write_answers
+from a7sim.training.attempts import write_answers, write_hint
 from a7sim.training.shelf import find_exercise
 
 
@@ -24,6 +24,7 @@ def hint_(exercise: str | None, home: Path | None, student: str | None) -> None:
         if attempt.closed:
             raise Mistake(f"{attempt.exercise}: expected an attempt that is open, got one that is closed")
         number, hint = progress.next_hint(attempt, find_exercise(attempt.exercise).exercise)
+        write_hint(attempt.folder, number, hint.cost)
         click.echo(f"hint {number} (-{hint.cost:g} points): {hint.text}")
 
 

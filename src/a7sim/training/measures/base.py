@@ -1,6 +1,6 @@
 """What a measure is: a small pure function of the account, with its options, its unit and its floor."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, TypeVar
 
@@ -96,6 +96,16 @@ def title(handle: str) -> str:
     if handle[-1:] in "12" and handle[:-1] in ("c", "kappa", "phi", "omega", "by", "bz"):
         return handle[:-1] + ("'" if handle.endswith("1") else '"')
     return handle
+
+
+def readings_with(account: Account, element: str, points: Sequence[str] = ()) -> list[Reading]:
+    """Return the registrations of an element, or any, at points given by position or name, or anywhere."""
+    names = [account.name_of(point) for point in points]
+    return [
+        each
+        for each in account.readings
+        if (not element or element in each.named) and (not names or each.point in names)
+    ]
 
 
 def where(readings: Iterable[Reading], account: Account) -> str:

@@ -240,8 +240,9 @@ class PrincipalDistanceOff(Measure, frozen=True, kw_only=True):
                 return Found(None, f"no photograph lies in projector {projector}")
             wanted = account.scenario.camera.c * (1.0 + _lie(account, projector)[2])
             shown = account.autograph.element(f"c{projector}")
+            side = "long" if shown > wanted else "short"
             told = (
-                f"{title(f'c{projector}')} stands at {shown:.2f}; with the film as it lies it belongs at {wanted:.2f}"
+                f"{title(f'c{projector}')} stands at {shown:.2f}: {abs(shown - wanted):.3f} mm too {side} for the film"
             )
             off.append((abs(shown - wanted), told))
         value, told = max(off)
@@ -251,70 +252,3 @@ class PrincipalDistanceOff(Measure, frozen=True, kw_only=True):
         """Return half a count, and what four fiducials say of a scale."""
         reach = max(abs(each.x) for each in scenario.camera.fiducials)
         return HALF_A_COUNT + 1e-3 * BEST_FIDUCIAL_UM / math.sqrt(8.0) * scenario.camera.c / reach
-
-
-@measure("answer-off")
-class AnswerOff(Measure, frozen=True, kw_only=True):
-    """How far a number that was answered is from the truth.
-
-    `true` is 'play X' (of a carriage or an element, mm), 'parallax 3' (the y-parallax at a point as the instrument
-    stands in the end, um), or a number that the maker of the papers kept back.
-    """
-
-    truth = True
-    key: str
-    true: str
-    least: float = 0.0
-    """What can be read of it: no tolerance is below."""
-
-    def of(self, account: Account) -> Found:
-        """Return it."""
-        answered = account.answers.get(self.key, "")
-        try:
-            number = float(answered)
-        except ValueError:
-            said = f"expected a number, got {answered!r}" if answered else "not answered"
-            return Found(None, f"{self.key}: {said}")
-        value = abs(number - self._truth(account))
-        return Found(round(value, 4) if math.isfinite(value) else None, f"{self.key} was answered {answered}")
-
-    def _truth(self, account: Account) -> float:
-        what, _, name = self.true.partition(" ")
-        if what == "play":
-            return account.autograph.play(name)
-        if what == "parallax":
-            return parallax_of(account, account.name_of(name)) or math.nan
-        return float(account.hidden.get(self.true, math.nan))
-
-    def floor(self, scenario: Scenario) -> float:
-        """Return what can be read of it."""
-        return self.least
-
-
-@measure("answer-wrong")
-class AnswerWrong(Measure, frozen=True, kw_only=True):
-    """How many answers are not the words that the maker of the papers kept back under the same keys."""
-
-    unit = "answers"
-    truth = True
-    keys: list[str]
-
-    def of(self, account: Account) -> Found:
-        """Return their number."""
-        missing = [key for key in self.keys if not account.answers.get(key)]
-        wrong = [key for key in self.keys if key not in missing and not self._right(account, key)]
-        told = [f"not answered: {listed(missing)}"] if missing else []
-        told += [f"{key} is not {account.answers[key]}" for key in wrong]
-        return Found(float(len(missing) + len(wrong)), "; ".join(told) or f"{listed(self.keys)}: right")
-
-    def _right(self, account: Account, key: str) -> bool:
-        right = account.hidden.get(key, ())
-        allowed = [right] if isinstance(right, str | int | float) else right
-        return _plain(account.answers[key]) in {_plain(str(each)) for each in allowed}
-
-
-def _plain(text: str) -> str:
-    try:
-        return f"{float(text):.6g}"
-    except ValueError:
-        return text.lower().replace("-", " ").replace("_", " ").strip().strip("\"'")
