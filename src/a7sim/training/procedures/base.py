@@ -1,7 +1,7 @@
 """What the virtual operator can do of an exercise, for references, openings and the skill study: by name."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from a7sim.link.client import Client
 from a7sim.link.headers import quoted, recorded_as
@@ -38,6 +38,8 @@ class Seated:
     person: Person
     bench: Bench
     model: ModelJob
+    papers: Mapping[str, str] = field(default_factory=dict)
+    """What was handed out, by file name."""
 
     @classmethod
     def at(cls, person: Person, job: Job, model: str) -> "Seated":
@@ -97,15 +99,18 @@ def procedure(name: str) -> Callable[[Procedure], Procedure]:
     return registered
 
 
-def play(room: Room, played: Played, client: str) -> str:
-    """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake."""
+def play(room: Room, played: Played, client: str, papers: Mapping[str, str] | None = None) -> str:
+    """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake.
+
+    `papers` are what was handed out, by file name.
+    """
     port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
     observer = scenario_for(room.shelved, room.seed, played.observer).observer
     person = Person(Client(port), room.clock, observer, room.seed)
     seated = Seated.at(person, job_of(room.scenario, room.scene), room.shelved.exercise.model)
     person.book.listener = _Button(person.client, seated.model).written
     try:
-        PROCEDURES[played.procedure](seated, **played.options)
+        PROCEDURES[played.procedure](replace(seated, papers=papers or {}), **played.options)
     except (DoesNotFit, Undetermined) as trouble:
         return str(trouble) or type(trouble).__name__
     except TypeError as error:
