@@ -1,14 +1,18 @@
 """The checklist of an attempt, which ticks itself by what is seen at the link."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
-from a7sim.training.attempts import written_answers
+from a7sim.training.attempts import ANSWERS, HINTS, written_answers
 from a7sim.training.exercise import Exercise
 from a7sim.training.measures import measure_of
 from a7sim.training.progress import EXAM, Attempt
 from a7sim.training.room import Room
 
 TICKED, OPEN = "[x]", "[ ]"
+
+PAPERS = (".csv", ".txt", ".md")
+"""Endings of papers that are handed out."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +38,20 @@ class Checklist:
 
     def lines(self) -> list[str]:
         """Return goal and checklist for people, a line each."""
+        told = [self.head(), *(f"your papers: {paper}" for paper in self.papers())]
         if self.attempt.mode == EXAM:
-            return [self.head(), *(f"  -  {each.text}" for each in self.exercise.steps)]
+            return [*told, *(f"  -  {each.text}" for each in self.exercise.steps)]
         ticked = zip(self.ticks(), self.exercise.steps, strict=True)
-        return [self.head(), *(f" {TICKED if done else OPEN} {step.text}" for done, step in ticked)]
+        return [*told, *(f" {TICKED if done else OPEN} {step.text}" for done, step in ticked)]
+
+    def papers(self) -> list[Path]:
+        """Return the papers that were handed out, in the attempt's folder."""
+        there = sorted(self.attempt.folder.iterdir())
+        return [path for path in there if path.suffix in PAPERS and path.name not in (ANSWERS, HINTS)]
 
     def head(self) -> str:
         """Return exercise and time for people."""
         exercise, minutes = self.exercise, self.room.account().seconds / 60.0
         exam = ", exam" if self.attempt.mode == EXAM else ""
-        return f"{exercise.number} {exercise.title}{exam}: {minutes:.0f} of {exercise.minutes:g} minutes"
+        over = ", the time is up" if minutes > exercise.minutes else ""
+        return f"{exercise.number} {exercise.title}{exam}: {minutes:.0f} of {exercise.minutes:g} minutes{over}"

@@ -91,6 +91,8 @@ class Exercise(_Data, frozen=True, kw_only=True):
     """Values of the scenario by path, instead of its own."""
     vary: dict[str, float] = {}
     """By path, within how much of its own value a number of the scenario is drawn anew by the seed."""
+    choose: list[Annotated[list[dict[str, Any]], Meta(min_length=1, description="one alternative or more")]] = []
+    """Groups of alternatives, each values by path that belong together; of every group the seed draws one."""
     opening: Played | None = None
     """What is done at the instrument before the student sits down."""
     handout: str = ""

@@ -229,6 +229,13 @@ class Progress:
             if attempt.mode == EXAM:
                 self._close_open(attempt.student, attempt.exercise)
 
+    def given(self, attempt: Attempt) -> Grade | None:
+        """Return the grade that an attempt was given first, None where it has none."""
+        row = self._database.execute(
+            "SELECT document FROM grade WHERE attempt = ? ORDER BY id", (attempt.id,)
+        ).fetchone()
+        return msgspec.json.decode(row[0], type=Grade) if row else None
+
     def grades(self, student: str | None = None) -> list[Graded]:
         """Return the grades of a student, or of all, in the order in which they were given."""
         attempts = {each.id: each for each in self.attempts(student)}

@@ -33,11 +33,14 @@ def scenario_for(shelved: Shelved, seed: int, observer: Mapping[str, Any] | None
     name = beside if beside.is_file() else exercise.scenario
     overrides = {path: as_toml(value) for path, value in exercise.settings.items()}
     overrides |= {f"observer.{key}": as_toml(value) for key, value in (observer or {}).items()}
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(TRAINING_STREAM,)))
     if exercise.vary:
         nominal = msgspec.to_builtins(load_scenario(name, overrides))
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(TRAINING_STREAM,)))
         for path, within in exercise.vary.items():
             overrides[path] = as_toml(_drawn(_at(nominal, path), within, rng))
+    for alternatives in exercise.choose:
+        chosen = alternatives[int(rng.integers(len(alternatives)))]
+        overrides |= {path: as_toml(value) for path, value in chosen.items()}
     return load_scenario(name, overrides)
 
 

@@ -41,7 +41,7 @@ def verify_(
     home: Path | None,
     student: str | None,
 ) -> None:
-    """Grade the last attempt: its journal is worked again. Points and reasons; an exam is over with it.
+    """Grade the last attempt: its journal is worked again. Points and reasons; an exam is over with its first.
 
     Example: a7sim train verify 4
     """
@@ -49,12 +49,14 @@ def verify_(
         raise click.exceptions.Exit(_tell_of_many(graded_folders(attempts_in(folders), seed), as_document))
     with progress_in(home) as progress:
         attempt = last_attempt(progress, named(student), exercise)
+        given = progress.given(attempt) if attempt.mode == EXAM else None
         try:
-            grade = _graded(progress, attempt)
+            grade = given or _graded(progress, attempt)
         except Unreliable as unreliable:
             click.echo(f"a7sim: {unreliable}", err=True)
             raise click.exceptions.Exit(EXIT_DIFFERS) from unreliable
-        progress.give(attempt, grade)
+        if given is None:
+            progress.give(attempt, grade)
     if as_document:
         click.echo(as_json(head("train verify") | msgspec.to_builtins(grade)), nl=False)
     else:

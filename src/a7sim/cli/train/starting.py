@@ -24,10 +24,17 @@ from a7sim.training.progress import EXAM, PRACTICE, Attempt, Progress
 from a7sim.training.room import Room
 from a7sim.training.shelf import find_exercise
 
+EXAMINATION = "exam"
+"""The exercise that an exam is about where none is named: a part of the name of its folder."""
+
 
 @click.command("start")
-@click.argument("exercise")
-@click.option("--exam", is_flag=True, help="No hints, nothing ticks, one grading; another seed than for practice.")
+@click.argument("exercise", required=False)
+@click.option(
+    "--exam",
+    is_flag=True,
+    help="No hints, nothing ticks, one grading; another seed than for practice. Without EXERCISE, the examination.",
+)
 @click.option("--anew", is_flag=True, help="Begin anew where an attempt is under way; that one is kept.")
 @click.option("--seed", type=click.IntRange(min=0), help="Draw other photographs than the student's own.")
 @click.option("--script", type=click.Path(path_type=Path, dir_okay=False), help="Do it by a script (.a7s).")
@@ -36,7 +43,7 @@ from a7sim.training.shelf import find_exercise
 @click.option("--plain", is_flag=True, help="The console in words, for screen readers.")
 @of_a_student
 def start_(
-    exercise: str,
+    exercise: str | None,
     exam: bool,
     anew: bool,
     seed: int | None,
@@ -51,11 +58,13 @@ def start_(
 
     Example: a7sim train start 4
     """
+    if exercise is None and not exam:
+        raise Mistake("start: expected an EXERCISE such as 4 (a7sim train list), or --exam for the examination")
     if sum((script is not None, link is not None, serves)) > 1:
         raise Mistake("start: expected one of --script, --link and --serve, got several")
     address = _address(link) if link is not None else USUAL if serves else None
     played = read_script(script) if script is not None else None
-    shelved = find_exercise(exercise)
+    shelved = find_exercise(exercise or EXAMINATION)
     with progress_in(home) as progress:
         attempt = _attempt(progress, shelved, named(student), EXAM if exam else PRACTICE, anew, seed)
     with _entered(shelved, attempt) as room:
@@ -106,9 +115,6 @@ def _address(text: str) -> Address:
 
 def _tell_of_papers(checklist: Checklist) -> None:
     click.echo("\n".join([*checklist.lines(), "", checklist.room.shelved.text.strip(), ""]))
-    papers = sorted(path for path in checklist.attempt.folder.iterdir() if path.suffix in (".csv", ".txt", ".md"))
-    for paper in papers:
-        click.echo(f"your papers: {paper}")
     for key, about in checklist.exercise.answers.items():
         click.echo(f"a7sim train answer {key}=...   {about}")
 

@@ -1,8 +1,10 @@
 """Measures of what was done, by what is seen at the link: order, levers, what was left alone, time."""
 
+import msgspec
 from msgspec import field
 
 from a7sim.manual import RIGHT_FITTINGS
+from a7sim.operator import ModelJob
 from a7sim.scenario import Scenario
 from a7sim.training.account import Account
 from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, listed, measure, readings_with, title, where
@@ -171,9 +173,13 @@ class WrongFittings(Measure, frozen=True, kw_only=True):
     polarity: str = ""
     pictures: list[str] = field(default_factory=list)
     """What must lie in the left and the right projector; what else lies there is counted too."""
+    by_job: bool = False
+    """Whether base and pictures must be those of the exercise's model on the job sheet."""
 
     def of(self, account: Account) -> Found:
         """Return their number, the base counted where it is not as it should be."""
+        if self.by_job:
+            return self._as_ordered(account.model).of(account)
         autograph = account.autograph
         fittings, base = autograph.fittings.as_words(), autograph.base_mode
         lying = autograph.loaded(1), autograph.loaded(2)
@@ -194,3 +200,8 @@ class WrongFittings(Measure, frozen=True, kw_only=True):
         ]
         picture = f"{'at ' + self.point + ' ' if self.point else ''}for a {polarity} with base {self.base or base}"
         return Found(float(len(wrong)), f"{picture}: {listed(wrong) if wrong else 'all is as it belongs'}")
+
+    def _as_ordered(self, model: ModelJob) -> "WrongFittings":
+        """Return the measure with what the job sheet orders of a model."""
+        pictures = [model.left, model.right] if model.left_projector == 1 else [model.right, model.left]
+        return msgspec.structs.replace(self, base=model.base, polarity=model.polarity, pictures=pictures, by_job=False)

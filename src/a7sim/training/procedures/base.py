@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from a7sim.link.client import Client
 from a7sim.link.headers import quoted, recorded_as
 from a7sim.link.inprocess import InProcessSerial
@@ -80,6 +82,19 @@ class Seated:
         """Begin a form of the book."""
         self.bench.crew.begin(self.bench.crew.everybody, self.model.name, form)
         self.person.note(f"{self.model.name}: {form}")
+
+
+def knock(seated: Seated, elements: Mapping[str, float]) -> None:
+    """Turn elements by so much, by mistake."""
+    who = seated.bench.crew.everybody
+    standing = seated.bench.seat.elements(who, list(elements))
+    seated.bench.seat.turn_elements(who, {name: standing[name] + amount for name, amount in elements.items()})
+
+
+def put_over(seated: Seated, fittings: Mapping[str, str]) -> None:
+    """Put fittings into positions, by mistake."""
+    for name, position in fittings.items():
+        seated.bench.hands.set_fitting(np.asarray(seated.bench.crew.everybody), name, position)
 
 
 Procedure = Callable[..., None]

@@ -11,7 +11,7 @@ from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import relative_orientation
 from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
 from a7sim.training.account import ANSWER
-from a7sim.training.procedures.base import Seated, procedure
+from a7sim.training.procedures.base import Seated, knock, procedure, put_over
 
 
 @procedure("prepared model")
@@ -113,13 +113,6 @@ def changed_by(
     return changed
 
 
-def knock(seated: Seated, elements: Mapping[str, float]) -> None:
-    """Turn elements by so much, by mistake."""
-    who = seated.bench.crew.everybody
-    standing = seated.bench.seat.elements(who, list(elements))
-    seated.bench.seat.turn_elements(who, {name: standing[name] + amount for name, amount in elements.items()})
-
-
 @procedure("base change")
 def base_change(
     seated: Seated,
@@ -163,5 +156,4 @@ def base_change(
     if read_again:
         bench.measure(crew.everybody, common)
     knock(seated, knocked or {})
-    for name, position in (wrong_fittings or {}).items():
-        bench.hands.set_fitting(np.asarray(crew.everybody), name, position)
+    put_over(seated, wrong_fittings or {})

@@ -1,6 +1,6 @@
 """What the virtual operator can do of the exercises in orienting a model: clearing, computing, perspective centres."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -11,9 +11,10 @@ from a7sim.operator.centres import centre_of, observe_centre
 from a7sim.operator.empirical import empirical_orientation
 from a7sim.operator.relative import corrections_of, unknowns_of
 from a7sim.operator.seat import side
+from a7sim.operator.work import oriented
 from a7sim.standard_points import CASES
 from a7sim.training.account import ANSWER
-from a7sim.training.procedures.base import Seated, procedure
+from a7sim.training.procedures.base import Seated, knock, procedure, put_over
 
 INDEPENDENT = "independent"
 
@@ -110,6 +111,32 @@ def perspective_centres(
     (`swapped`), or the height above the lower level in mm instead of counter units.
     """
     seated.take_over()
+    find_centres(seated, hands, swapped, height_in_mm)
+
+
+@procedure("model with its centres")
+def model_with_its_centres(
+    seated: Seated,
+    hands: Sequence[int] = (1, 2),
+    swapped: bool = False,
+    height_in_mm: bool = False,
+    knocked: Mapping[str, float] | None = None,
+    wrong_fittings: Mapping[str, str] | None = None,
+) -> None:
+    """From empty carriers to both centres answered: fittings, pictures, relative orientation, pointings, sums.
+
+    By mistake as in `perspective_centres`, or in the end elements are `knocked` or fittings left in `wrong_fittings`.
+    """
+    seated.set_up()
+    seated.begin("relative orientation")
+    oriented(seated.bench, seated.model)
+    find_centres(seated, hands, swapped, height_in_mm)
+    knock(seated, knocked or {})
+    put_over(seated, wrong_fittings or {})
+
+
+def find_centres(seated: Seated, hands: Sequence[int], swapped: bool, height_in_mm: bool) -> None:
+    """Preset the counters at point 1, point at both levels and answer the centres."""
     bench, model, plan = seated.bench, seated.model, seated.bench.job.plan
     seated.begin("model coordinates")
     bench.parallaxes_seen(bench.crew.everybody, [model.standard_points["1"]])

@@ -1,0 +1,48 @@
+"""The job sheet of a model: what whoever sets it up is told, and nothing of the truth."""
+
+from a7sim.operator import Job, ModelJob
+from a7sim.scenario import Scenario
+from a7sim.scene import build_scene
+from a7sim.session.running import job_of
+from a7sim.training.handouts.base import Handout, handout
+
+JOB = "job.txt"
+
+
+@handout("job sheet")
+def job_sheet(scenario: Scenario, seed: int, model: str = "1") -> Handout:
+    """Make the job sheet of a model."""
+    job = job_of(scenario, build_scene(scenario, seed))
+    ordered = next(each for each in job.models if each.name == model)
+    return Handout({JOB: "\n".join([*_of_model(job, ordered), *_of_camera(scenario), *_of_plan(job), ""])})
+
+
+def _of_model(job: Job, model: ModelJob) -> list[str]:
+    labels = model.points_of_case(job.plan.case)
+    return [
+        f"Model {model.name}: {model.left} on the left of the model, {model.right} on its right; {model.polarity}s",
+        f"  base {model.base}: {model.left} lies in projector {model.left_projector}, {model.right} in projector "
+        f"{model.right_projector}",
+        "  points " + ", ".join(f"{label} = {model.standard_points[label]}" for label in labels),
+    ]
+
+
+def _of_camera(scenario: Scenario) -> list[str]:
+    camera = scenario.camera
+    x0, y0 = camera.principal_point
+    return [
+        f"Camera {camera.name}: c = {camera.c:g} mm, principal point x = {x0:+.3f} mm, y = {y0:+.3f} mm",
+        "  fiducials " + ", ".join(f"{each.name} ({each.x:+g}, {each.y:+g})" for each in camera.fiducials),
+    ]
+
+
+def _of_plan(job: Job) -> list[str]:
+    plan = job.plan
+    x, y, z = plan.preset
+    low, high = plan.centre_levels[0], plan.centre_levels[-1]
+    return [
+        f"Plotter: bx = {plan.bx:g} mm, centres {plan.projection_height:g} mm above the model, height gear "
+        f"{plan.height_gear}",
+        f"  preset at point 1 on the ground: X = {x:.2f}, Y = {y:.2f}, Z = {z:.2f}",
+        f"  perspective centres from Z = {low:.2f} and Z = {high:.2f}",
+    ]
