@@ -21,7 +21,12 @@ from a7sim.training.measures.base import (
     measure,
     title,
 )
-from a7sim.training.witness import AXES, Deed, Reading
+from a7sim.training.witness import AXES, PLAIN, Deed, Reading
+
+PLAN_AXES = ("X", "Y")
+
+ARRIVAL = 2.0
+"""Units of its counter by which a carriage moves when the mark is brought to a point, and not when it is set on it."""
 
 LAST = 2
 """So many registrations of a point are its reading: a point is pointed at twice."""
@@ -39,8 +44,20 @@ def last_readings(account: Account, points: Iterable[str], base: str = "") -> di
 
 
 def pointings(account: Account, name: str, base: str = "") -> list[Reading]:
-    """Return the registrations of a point's coordinates: those with no element named."""
-    return [each for each in account.readings if each.point == name and not each.named and base in ("", each.base)]
+    """Return the registrations of a point's coordinates: those that are no readings of an element just turned there."""
+    deeds = [each for each in account.deeds if each.what in PLAIN]
+    there = [each for each in account.readings if each.point == name and base in ("", each.base)]
+    return [each for each in there if not _turned_there(deeds, each)]
+
+
+def _turned_there(deeds: Sequence[Deed], reading: Reading) -> bool:
+    """Whether an element that was registered had been turned after the mark came to the point.
+
+    At the console whatever is in hand is registered, so that it is named says nothing.
+    """
+    before = [each for each in deeds if each.place < reading.place]
+    came = [each.place for each in before if each.name in PLAN_AXES and abs(each.after - each.before) >= ARRIVAL]
+    return any(each.name in reading.named and each.place > max(came, default=-1) for each in before)
 
 
 def mean_shown(readings: Sequence[Reading]) -> Array:

@@ -1,0 +1,130 @@
+"""Make the pictures of docs/student-guide.md: exercise 4 at the console, by its own keys: `python -m docs.make_guide_pictures`.
+
+Run it from the top of the repository. Somebody who sees exactly turns the wheels; the console draws what it shows.
+"""
+
+import asyncio
+import re
+import tempfile
+from pathlib import Path
+
+from a7sim.console.app import Console
+from a7sim.console.eyepiece import Drawing
+from a7sim.console.seat import Seat
+from a7sim.console.sheet import JobSheet
+from a7sim.link.client import Client
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.training.attempts import begun, done
+from a7sim.training.checklist import Checklist
+from a7sim.training.exercise import Played
+from a7sim.training.progress import Progress
+from a7sim.training.shelf import find_exercise
+from tests.sitting_down import Person
+
+FIGURES = Path(__file__).parent / "figures"
+SIZE = (104, 34)
+LOOKS = 4
+POINT = "1011"
+
+
+class Student:
+    """Somebody at the console who sees exactly, and has it photographed."""
+
+    def __init__(self, person, room):
+        self.person, self.room = person, room
+        self.looker = Client(InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0))
+        plan, camera = room.scenario.plan, room.scenario.camera
+        self.scale = 1e-3 * plan.projection_height / camera.c
+
+    def seen(self):
+        return self.looker.numbers(f'EYEP1? "{POINT}";:EYEP2? "{POINT}"')
+
+    async def set_down(self):
+        """Bring the mark onto the point and the ground."""
+        for _ in range(LOOKS):
+            lx, _, rx, _ = self.seen()
+            z, bx = self.looker.numbers("COUN:Z?;:BASE:BX?")
+            await self.person.turn((lx - rx) * self.scale * -z / bx, "pageup", "pagedown")
+            lx, ly, rx, ry = self.seen()
+            await self.person.turn((lx + rx) / 2 * self.scale, "right", "left")
+            await self.person.turn((ly + ry) / 2 * self.scale, "up", "down")
+
+    async def clear(self, sense):
+        """Turn the by in hand until the images stand level."""
+        for _ in range(LOOKS):
+            _, ly, _, ry = self.seen()
+            await self.person.turn(-(ly - ry) * self.scale / sense, "+", "-")
+            await self.set_down()
+
+    async def register(self):
+        await self.person.press("enter")
+
+    async def twice(self):
+        """Register, turn away and back, and register again."""
+        await self.register()
+        await self.person.turn(0.05, "+", "-")
+        await self.person.turn(-0.05, "+", "-")
+        await self.register()
+
+    async def photograph(self, name):
+        await self.person.look_on()
+        await self.person.pilot.pause(1.2)
+        FIGURES.joinpath(f"guide-{name}.svg").write_text(bare(self.person.console.export_screenshot()), encoding="utf-8")
+
+
+def bare(svg):
+    """Return a picture that fetches nothing, in the reader's own letters of fixed width, and a third of it left out."""
+    svg = re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"font-family: ?[^;]*;", "font-family: monospace;", svg)
+    svg = re.sub(r'<clipPath id="[^"]*-line-\d+">.*?</clipPath>\s*', "", svg, flags=re.DOTALL)
+    svg = re.sub(r' clip-path="url\(#[^)]*-line-\d+\)"| shape-rendering="crispEdges"', "", svg)
+    svg = re.sub(r"terminal-\d+-", "", svg).replace("<style>", "<style>rect { shape-rendering: crispEdges }", 1)
+    return re.sub(r"(?<=[0-9])\.0(?=\")|\s+(?=\n)", "", svg)
+
+
+async def work(console, room):
+    async with console.run_test(size=SIZE) as pilot:
+        student = Student(Person(pilot), room)
+        person = student.person
+        await person.settle()
+        await person.press("g")
+        await person.choose(POINT)
+        await person.step_of(1.0)
+        await student.photograph("1-sat-down")
+        await student.set_down()
+        await student.photograph("2-on-the-ground")
+        await person.press("y")
+        await student.clear(-1.0)
+        await student.photograph("3-cleared")
+        await student.twice()
+        await student.photograph("4-registered")
+        await person.press("s")
+        await person.type_in("0")
+        await person.press('"')
+        await student.clear(1.0)
+        await student.twice()
+        await student.photograph("5-other-eye")
+        done(room, Played(procedure="measure parallaxes", observer={"skill": "first-order"}))
+        await person.press("up", "down")
+        await student.photograph("6-done")
+
+
+def main():
+    with tempfile.TemporaryDirectory() as place, Progress(Path(place)) as progress:
+        shelved = find_exercise("4")
+        attempt = progress.begin("ada", shelved)
+        with begun(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
+            port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
+            seat = Seat(
+                lambda: Client(port),
+                lambda: room.clock.now,
+                where="exercise 4",
+                sheet=JobSheet("exercise 4", room.scenario.camera),
+                drawing=Drawing.HALVES,
+                tasks=Checklist(room, attempt).lines,
+            )
+            asyncio.run(work(Console(seat), room))
+
+
+if __name__ == "__main__":
+    main()
