@@ -1,12 +1,14 @@
-"""Make the pictures of docs/student-guide.md: exercise 4 at the console, by its own keys: `python -m docs.make_guide_pictures`.
+"""Make the pictures of docs/student-guide.md: exercise 4 at the console, by its own keys.
 
-Run it from the top of the repository. Somebody who sees exactly turns the wheels; the console draws what it shows.
+`python -m docs.make_guide_pictures`, from the top of the repository. Somebody who sees exactly turns the wheels; the console draws what it shows.
 """
 
 import asyncio
 import re
 import tempfile
 from pathlib import Path
+
+from tests.sitting_down import Person
 
 from a7sim.console.app import Console
 from a7sim.console.eyepiece import Drawing
@@ -19,7 +21,6 @@ from a7sim.training.checklist import Checklist
 from a7sim.training.exercise import Played
 from a7sim.training.progress import Progress
 from a7sim.training.shelf import find_exercise
-from tests.sitting_down import Person
 
 FIGURES = Path(__file__).parent / "figures"
 SIZE = (104, 34)
@@ -69,7 +70,9 @@ class Student:
     async def photograph(self, name):
         await self.person.look_on()
         await self.person.pilot.pause(1.2)
-        FIGURES.joinpath(f"guide-{name}.svg").write_text(bare(self.person.console.export_screenshot()), encoding="utf-8")
+        FIGURES.joinpath(f"guide-{name}.svg").write_text(
+            bare(self.person.console.export_screenshot()), encoding="utf-8"
+        )
 
 
 def bare(svg):

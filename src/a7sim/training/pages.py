@@ -2,12 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from statistics import median
+from typing import TYPE_CHECKING
 
-from a7sim.report.drawing import FAINT, INK, LEFT, RIGHT, drawing
+from a7sim.report.drawing import INK, LEFT, RIGHT, drawing
 from a7sim.report.page import Chapter, Paragraph, Part, Picture, Sheet, page
 from a7sim.training.exercise import FULL_MARKS, Shelved
 from a7sim.training.grading import EXCELLENT, Grade
 from a7sim.training.progress import Attempt, Graded
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Best = Mapping[tuple[str, str], Graded]
 
@@ -32,13 +36,11 @@ def _overview(shelf: Sequence[Shelved], mine: Mapping[str, Graded], graded: Sequ
         tried = sum(other.attempt.exercise == shelved.name for other in graded)
         name = f"{shelved.exercise.number} {shelved.exercise.title}"
         if each is None:
-            rows.append([name, "not graded yet", "", "", ""])
+            rows.append([name, "open", "", "", ""])
         else:
             grade = each.grade
             rows.append([name, _verdict(grade), f"{grade.points:g}", str(grade.hints), str(tried)])
-    return Sheet(
-        "Best grade of each exercise", ["exercise", "", "points", "hints", "gradings"], rows, frozenset({0, 1})
-    )
+    return Sheet("Best grade of each exercise", ["exercise", "", "points", "hints", "graded"], rows, frozenset({0, 1}))
 
 
 def _verdict(grade: Grade) -> str:
@@ -47,10 +49,11 @@ def _verdict(grade: Grade) -> str:
 
 def _of_exercise(each: Graded) -> Sequence[Part]:
     grade, attempt = each.grade, each.attempt
-    after = f", {grade.hints} hints (-{grade.hint_points:g})" if grade.hints else ""
+    hints = "a hint" if grade.hints == 1 else f"{grade.hints} hints"
+    after = f", {hints} (-{grade.hint_points:g})" if grade.hints else ""
     first = Paragraph(
-        f"{_verdict(grade)} with {grade.points:g} of {FULL_MARKS:g} points{after}; attempt {attempt.number}, "
-        f"{attempt.mode}, {grade.minutes:g} minutes at the instrument's clock."
+        f"{_verdict(grade).capitalize()} with {grade.points:g} of {FULL_MARKS:g} points{after}; "
+        f"attempt {attempt.number}, {attempt.mode}, {grade.minutes:g} minutes at the instrument's clock."
     )
     rows = [[mark.title, mark.band, f"{mark.points:g} of {mark.weight:g}", mark.reason] for mark in grade.marks]
     table = Sheet("What was graded", ["criterion", "", "points", "why"], rows, frozenset({0, 1, 3}))
@@ -67,24 +70,44 @@ def _points(shelf: Sequence[Shelved], mine: Mapping[str, Graded]) -> Picture:
     with drawing("points", "Points of each exercise", said, size=(8.0, 3.2), wide=True) as drawn:
         axes = drawn.axes[0]
         axes.bar(numbers, points, color=colours, edgecolor=INK, width=0.65)
+        _what_passes(axes, shelf)
         axes.set(xlabel="exercise", ylabel="points", ylim=(0.0, FULL_MARKS))
         axes.grid(axis="y")
         axes.set_axisbelow(True)
+        drawn.legend = "Blue passed, red not passed; dotted, the points that pass unless a required criterion failed"
     return drawn.picture
+
+
+def _what_passes(axes: "Axes", shelf: Sequence[Shelved]) -> None:
+    """Draw the points with which each exercise is passed."""
+    for place, shelved in enumerate(shelf):
+        limit = shelved.exercise.pass_points
+        axes.plot([place - 0.45, place + 0.45], [limit] * 2, ":", color=INK, linewidth=1.6)
 
 
 def class_sheet(shelf: Sequence[Shelved], best: Best, attempts: Sequence[Attempt]) -> str:
     """Return the sheet of a class: who stands where, and which mistakes are everybody's."""
     students = sorted({each.student for each in attempts})
     lead: list[Part] = [Paragraph(f"{len(students)} students, {len(attempts)} attempts.")]
-    rows = [[student, *(_cell(best.get((student, each.name))) for each in shelf)] for student in students]
-    columns = ["student", *(str(each.exercise.number) for each in shelf)]
-    table = Sheet("Best points by exercise; those in brackets are not passed", columns, rows)
+    rows = [
+        [student, str(_passed(best, [student], shelf)), *(_cell(best.get((student, each.name))) for each in shelf)]
+        for student in students
+    ]
+    totals = [_passed(best, students, [each]) for each in shelf]
+    rows.append(["how many passed", str(sum(totals)), *map(str, totals)])
+    columns = ["student", "passed", *(str(each.exercise.number) for each in shelf)]
+    table = Sheet("Best points by exercise; in brackets: not passed", columns, rows)
     chapters = [
         Chapter("The class", [_spread(shelf, best), table]),
         Chapter("What went wrong", [_mistakes(shelf, best)]),
     ]
     return page("Exercises at the plotter: the class", lead, chapters)
+
+
+def _passed(best: Best, students: Sequence[str], shelf: Sequence[Shelved]) -> int:
+    """Return how many exercises of these were passed by these students, all together."""
+    grades = [best.get((student, shelved.name)) for student in students for shelved in shelf]
+    return sum(each is not None and each.grade.passed for each in grades)
 
 
 def _cell(each: Graded | None) -> str:
@@ -105,14 +128,12 @@ def _spread(shelf: Sequence[Shelved], best: Best) -> Picture:
         for place, some in enumerate(by_exercise):
             axes.plot([place] * len(some), some, "o", color=LEFT, alpha=0.5, markersize=6)
             if some:
-                axes.plot([place - 0.25, place + 0.25], [median(some)] * 2, color=RIGHT)
-        for shelved_place, shelved in enumerate(shelf):
-            limit = shelved.exercise.pass_points
-            axes.plot([shelved_place - 0.4, shelved_place + 0.4], [limit] * 2, color=FAINT, linewidth=1.0)
+                axes.plot([place - 0.3, place + 0.3], [median(some)] * 2, color=RIGHT)
+        _what_passes(axes, shelf)
         axes.set_xticks(range(len(numbers)), numbers)
-        axes.set(xlabel="exercise", ylabel="points", ylim=(0.0, FULL_MARKS))
+        axes.set(xlabel="exercise", ylabel="points", ylim=(0.0, 1.04 * FULL_MARKS))
         axes.grid(axis="y")
-    drawn.legend = "each dot a student; long line the median, faint line what passes"
+        drawn.legend = "Each dot a student, line the median; dotted, the points that pass"
     return drawn.picture
 
 
