@@ -153,30 +153,30 @@ def drawn(rows, path):
 
     plt.rcParams.update({"font.size": 10, "svg.hashsalt": "a7sim", "svg.fonttype": "none", "font.family": "sans-serif"})
     names = list(dict.fromkeys(each.exercise for each in rows))
-    figure, axes = plt.subplots(figsize=(9.0, 1.6 + 0.52 * len(names)), layout="constrained")
+    figure, axes = plt.subplots(figsize=(9.5, 1.6 + 0.5 * len(names)), layout="constrained")
     titles = {each.exercise: each.title.partition(":")[0] for each in rows}
     for profile, (sense, limit) in ASKED.items():
         offset = 0.24 * (1 - list(ASKED).index(profile))
         mine = [each for each in rows if each.profile == profile]
         places = [len(names) - 1 - names.index(each.exercise) + offset for each in mine]
         axes.hlines(places, 0, [100 * each.share for each in mine], color=COLOURS[profile], lw=1.4, alpha=0.55)
-        label = f"{profile} (asked of 5 to 11: {sense} {100 * limit:.0f} %)"
+        label = f"{profile} ({'≥' if sense == 'at least' else '<'} {100 * limit:.0f} % asked of 5 to 11)"
         axes.plot(
             [100 * each.share for each in mine], places, MARKS[profile], color=COLOURS[profile], ms=6, label=label
         )
         axes.axvline(100 * limit, color=COLOURS[profile], lw=1.0, ls=":")
         for each, place in zip(mine, places, strict=True):
             number = f"{each.passed} of {each.seeds}"
-            axes.text(103, place, number, color=COLOURS[profile], va="center", fontsize=8)
+            axes.text(105, place, number, color=COLOURS[profile], va="center", fontsize=8)
     for between in range(len(names) - 1):
         axes.axhline(between + 0.5, color=FAINT, lw=0.8)
     axes.set_yticks(range(len(names)), [f"{int(each[:2])} {titles[each]}" for each in reversed(names)])
-    axes.set(xlim=(-2, 116), ylim=(-0.5, len(names) - 0.5), xlabel="attempts that passed, %")
+    axes.set(xlim=(-2, 118), ylim=(-0.5, len(names) - 0.5), xlabel="attempts that passed, %")
     axes.set_xticks(range(0, 101, 20))
     axes.tick_params(axis="y", length=0)
     axes.spines[["top", "right", "left"]].set_visible(False)
-    axes.set_title("Who passes: three virtual operators, each with as many different photographs", loc="left", pad=34)
-    axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncols=3, fontsize=8, columnspacing=1.2)
+    figure.suptitle("Who passes: three virtual operators, each with other photographs every time", x=0.01, ha="left")
+    figure.legend(frameon=False, loc="outside lower left", ncols=3, fontsize=9, columnspacing=1.2)
     figure.savefig(path, metadata={"Date": None}, facecolor="white")
 
 

@@ -1,6 +1,6 @@
 """Make the pictures of docs/student-guide.md: exercise 4 at the console, by its own keys.
 
-`python -m docs.make_guide_pictures`, from the top of the repository. Somebody who sees exactly turns the wheels; the console draws what it shows.
+Run `python -m docs.make_guide_pictures` at the top of the repository. Somebody who sees exactly turns the wheels.
 """
 
 import asyncio
