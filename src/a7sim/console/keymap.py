@@ -72,6 +72,7 @@ DEEDS = (
     Deed("merge", ("a",), "side by side, anaglyph, flicker", "eyes"),
     Deed("drawing", ("v",), "half-blocks, shades, braille, words", "eyes"),
     Deed("record", ("enter",), "record a reading", "book"),
+    Deed("record_as", ("r",), "record under another name", "book"),
     Deed("strike", ("x", "backspace"), "strike the last reading out", "book"),
     Deed("note", ("n",), "a remark into the journal", "book"),
     Deed("panel", ("tab",), "the next panel at the right", "screen"),

@@ -17,7 +17,11 @@ class RecordingDeeds(Sitting):
         if console.point is not None:
             self._record(console.point)
         else:
-            console.push_screen(Ask("record: name of the point"), self._record)
+            self.do_record_as()
+
+    def do_record_as(self) -> None:
+        """Record a reading of a point that is named."""
+        self._console.push_screen(Ask("record: name of the point"), self._record)
 
     def _record(self, point: str | None) -> None:
         console = self._console
