@@ -23,7 +23,7 @@ from a7sim.training.progress import Progress
 from a7sim.training.shelf import find_exercise
 
 FIGURES = Path(__file__).parent / "figures"
-SIZE = (104, 34)
+SIZE = (104, 35)
 LOOKS = 4
 POINT = "1011"
 

@@ -42,7 +42,7 @@ def at_the_references_seed(train):
 def test_a_script_that_passes_ends_in_zero_and_ticks_the_checklist(train):
     code, out, err = at_the_references_seed(train)
     assert (code, err) == (0, "")
-    assert out.count("[x]") == 4 and "[ ]" not in out
+    assert out.count("[x]") == 5 and "[ ]" not in out
     code, out, _ = train("verify", 4)
     assert code == 0 and "passed, 100 of 100 points" in out
 
