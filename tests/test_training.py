@@ -123,7 +123,7 @@ def test_pictures_are_not_drawn_again_for_a_grade_and_all_else_is_compared(paral
 
 BAD = {
     'measure = "minutes"': ('measure = "minuets"', r"criterion\[6\]\.measure: expected one of"),
-    'measure = "not-opposed"\ndone': ('measure = "parallax-left"\ndone', r"step\[3\]\.measure: .* the truth"),
+    'measure = "not-opposed"\ndone': ('measure = "parallax-left"\ndone', r"step\[4\]\.measure: .* the truth"),
     'fails = "cleared"': ('fails = "clear"', r"faulty\[1\]\.fails: expected one of complete"),
     "away = 0.02": ('away = "far"', r"criterion\[4\]\.options\.away: expected a number, got \"far\""),
 }
@@ -163,3 +163,20 @@ def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
         assert found("run-by-motor", handles=["X"]).value == 0.0
         assert found("not-opposed").value is None
         assert account.answers == {"play": "0.08", "slip": "none"}
+
+
+def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parallax, tmp_path):
+    """At the console whatever is in hand is registered, so that an element is named says nothing."""
+    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+        engine = room.desk.open("client2", time=5.0)
+
+        def missing_after(*lines):
+            for line in lines:
+                engine.feed(line + b"\n", 6.0)
+            options = {"points": ["1"], "each": 4}
+            return measure_of(Measured(measure="missing-pointings", options=options)).of(room.account()).value
+
+        assert missing_after(b"DRIV:X 50", b"PROJ1:BY 0.3", b"DRIV:X 1", b'REC "1011",BY1') == 3.0
+        assert missing_after(b"PROJ1:BY 0.4;:WHE:Y 0.4", b'REC "1011",BY1') == 3.0
+        assert missing_after(b'REC "1011",BY2') == 2.0
+        assert missing_after(b'REC "1011"') == 1.0

@@ -30,12 +30,16 @@ def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: 
             await person.press("enter")
             await person.until(lambda: "[x] Register two readings of by' at point 1" in shown(console))
             assert "[ ] Do the same at points 2 to 6" in shown(console)
+            await person.press("r")
+            await person.type_in("A")
+            assert person.message() == "recorded 3: A"
 
     with begun(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
         port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
         tasks = Checklist(room, attempt).lines
         asyncio.run(sit_down(Console(Seat(lambda: Client(port), lambda: 0.0, drawing=Drawing.HALVES, tasks=tasks))))
-        assert [each.named for each in room.account().readings] == [("by1",), ("by1",)]
+        readings = room.account().readings
+        assert [(each.point, each.named) for each in readings] == [("1011", ("by1",))] * 2 + [("A", ("by1",))]
 
 
 def shown(console: Console) -> str:
