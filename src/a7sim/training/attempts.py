@@ -1,7 +1,7 @@
 """An attempt from the opening to its end: by a script, by the virtual operator, or by whoever sits down."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -51,11 +51,16 @@ def gone_on(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
 
 def hand_out(shelved: Shelved, seed: int, folder: Path) -> None:
     """Put the papers of an exercise into a folder."""
+    for name, text in papers_of(shelved, seed).items():
+        write_whole(folder / name, text)
+
+
+def papers_of(shelved: Shelved, seed: int) -> Mapping[str, str]:
+    """Return the papers of an exercise by file name, none where it has none."""
     exercise = shelved.exercise
-    if exercise.handout:
-        made = handed_out(exercise.handout, scenario_for(shelved, seed), seed, exercise.handout_options)
-        for name, text in made.papers.items():
-            write_whole(folder / name, text)
+    if not exercise.handout:
+        return {}
+    return handed_out(exercise.handout, scenario_for(shelved, seed), seed, exercise.handout_options).papers
 
 
 def open_(room: Room) -> None:
@@ -70,7 +75,7 @@ def open_(room: Room) -> None:
 def done(room: Room, played: Played, client: str = STUDENT) -> str:
     """Let a script or a procedure be played; return what kept it from its end, empty where nothing did."""
     if played.procedure:
-        return play(room, played, client)
+        return play(room, played, client, papers_of(room.shelved, room.seed))
     return played_script(room, read_script(room.shelved.folder / played.script), client)
 
 

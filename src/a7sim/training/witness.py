@@ -11,6 +11,7 @@ from a7sim.instrument.language import LinkEvent
 from a7sim.instrument.language.commands import recorded_element
 from a7sim.instrument.language.program import Fault, Step, program_of
 from a7sim.instrument.recorder import Recorder, Registration
+from a7sim.scenario import Condition
 from a7sim.training.exercise import OPENING
 
 AXES = ("X", "Y", "Z")
@@ -166,6 +167,16 @@ class WitnessedAutograph(Autograph):
     def _counted(self, axis: str) -> float:
         counter = self._counters[axis]
         return counter.offset + counter.units_per_mm * self._carriages[axis].at
+
+    @property
+    def z_units_per_mm(self) -> float:
+        """Return the units of the Z counter a mm, as it is geared."""
+        return self._counters["Z"].units_per_mm
+
+    @property
+    def condition(self) -> Condition:
+        """Return the faults of the instrument: part of the truth."""
+        return self._condition
 
     def play(self, handle: str) -> float:
         """Return the play of a carriage or an element: part of the truth."""

@@ -34,7 +34,7 @@ def half_a_count_um(scenario: Scenario) -> float:
     return 1e3 * HALF_A_COUNT * scenario.camera.c / plan.projection_height
 
 
-class _AtReadings(Measure, frozen=True, kw_only=True):
+class AtReadings(Measure, frozen=True, kw_only=True):
     """The largest of something at the registrations, in um at photo scale."""
 
     unit = "um"
@@ -69,7 +69,7 @@ class _AtReadings(Measure, frozen=True, kw_only=True):
 
 
 @measure("parallax-left")
-class ParallaxLeft(_AtReadings, frozen=True, kw_only=True):
+class ParallaxLeft(AtReadings, frozen=True, kw_only=True):
     """The largest y-parallax that was left where a reading was registered, um at photo scale."""
 
     def _um(self, reading: Reading) -> float | None:
@@ -84,7 +84,7 @@ class ParallaxLeft(_AtReadings, frozen=True, kw_only=True):
 
 
 @measure("off-the-ground")
-class OffTheGround(_AtReadings, frozen=True, kw_only=True):
+class OffTheGround(AtReadings, frozen=True, kw_only=True):
     """The largest x-parallax where a reading was registered: the mark was above or below the ground, um."""
 
     def _um(self, reading: Reading) -> float | None:
@@ -99,7 +99,7 @@ class OffTheGround(_AtReadings, frozen=True, kw_only=True):
 
 
 @measure("beside-the-point")
-class BesideThePoint(_AtReadings, frozen=True, kw_only=True):
+class BesideThePoint(AtReadings, frozen=True, kw_only=True):
     """The largest distance of the mark from the point in plan where a reading was registered, um at photo scale."""
 
     eye: int = 0

@@ -1,7 +1,7 @@
 """What the virtual operator can do of an exercise, for references, openings and the skill study: by name."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 from a7sim.link.client import Client
 from a7sim.link.headers import quoted, recorded_as
@@ -17,13 +17,18 @@ from a7sim.operator.line_hands import LineHands
 from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
 from a7sim.reduction import Undetermined
 from a7sim.session.running import job_of
+from a7sim.training.account import ANSWER
 from a7sim.training.exercise import Played
 from a7sim.training.room import Room
+from a7sim.training.variation import scenario_for
 
 ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)
 
-_REGISTERED = ("X left at", "X right at", "parallax seen")
-"""Items at which counters are registered; at model points the operator does that."""
+_POINTED = {1: "X left at", 2: "X right at"}
+"""How items of pointings with one eye begin, by the hand of the photograph."""
+
+_REGISTERED = (*_POINTED.values(), "parallax seen")
+"""Items at which counters are registered beside those of elements."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,8 @@ class Seated:
     person: Person
     bench: Bench
     model: ModelJob
+    papers: Mapping[str, str] = field(default_factory=dict)
+    """What was handed out, by file name."""
 
     @classmethod
     def at(cls, person: Person, job: Job, model: str) -> "Seated":
@@ -60,8 +67,14 @@ class Seated:
     def take_over(self) -> None:
         """Sit down at an instrument that stands ready: base and pictures set, its counters as `*RST` leaves them."""
         who = self.bench.crew.everybody
+        self.bench.seat.take_over(who)
         self.bench.seat.counters(who)
         self.bench.begin(who, self.model, take_up_prints(self.bench, self.model))
+
+    def answer(self, answers: Mapping[str, float], decimals: int = 2) -> None:
+        """Note answers down at the instrument."""
+        for key, value in answers.items():
+            self.person.note(f"{ANSWER}{key}={value:.{decimals}f}")
 
     def begin(self, form: str) -> None:
         """Begin a form of the book."""
@@ -86,14 +99,18 @@ def procedure(name: str) -> Callable[[Procedure], Procedure]:
     return registered
 
 
-def play(room: Room, played: Played, client: str) -> str:
-    """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake."""
+def play(room: Room, played: Played, client: str, papers: Mapping[str, str] | None = None) -> str:
+    """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake.
+
+    `papers` are what was handed out, by file name.
+    """
     port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
-    person = Person(Client(port), room.clock, room.scenario.observer, room.seed)
+    observer = scenario_for(room.shelved, room.seed, played.observer).observer
+    person = Person(Client(port), room.clock, observer, room.seed)
     seated = Seated.at(person, job_of(room.scenario, room.scene), room.shelved.exercise.model)
-    person.book.listener = _Button(person.client).written
+    person.book.listener = _Button(person.client, seated.model).written
     try:
-        PROCEDURES[played.procedure](seated, **played.options)
+        PROCEDURES[played.procedure](replace(seated, papers=papers or {}), **played.options)
     except (DoesNotFit, Undetermined) as trouble:
         return str(trouble) or type(trouble).__name__
     except TypeError as error:
@@ -105,21 +122,38 @@ def play(room: Room, played: Played, client: str) -> str:
     return ""
 
 
-class _Button:
-    """The button of the recording device: what is written into the book is registered as well."""
+REGISTERED_ALREADY = "X"
+"""Of a point measured with both eyes the operator has registered all three coordinates before they are entered."""
 
-    def __init__(self, client: Client) -> None:
+
+class _Button:
+    """The button of the recording device: what is written into the book is registered as well.
+
+    With the element that is read; a pointing with one eye with by of its projector, which says whose it is.
+    """
+
+    def __init__(self, client: Client, model: ModelJob) -> None:
         self._client = client
         self._numbers: dict[int, int] = {}
+        self._named = {
+            _POINTED[1]: f"by{model.left_projector}",
+            _POINTED[2]: f"by{model.right_projector}",
+        }
 
     def written(self, entry: Entry) -> None:
         if entry.struck:
             if entry.number in self._numbers:
                 self._client.send(f"REC:STR {self._numbers[entry.number]},{quoted(entry.struck[:60])}")
-        elif entry.point and (entry.item in ELEMENTS or entry.item.startswith(_REGISTERED)):
-            words = [recorded_as(entry.item)] if entry.item in ELEMENTS else []
-            self._client.send(",".join([f"REC {quoted(entry.point)}", *words]))
+        elif entry.point and (entry.item in {REGISTERED_ALREADY, *ELEMENTS} or entry.item.startswith(_REGISTERED)):
+            if entry.item != REGISTERED_ALREADY:
+                self._client.send(",".join([f"REC {quoted(entry.point)}", *self._words(entry.item)]))
             self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
+
+    def _words(self, item: str) -> list[str]:
+        """Return the elements that are registered with an item of the book."""
+        if item in ELEMENTS:
+            return [recorded_as(item)]
+        return [recorded_as(by) for pointed, by in self._named.items() if item.startswith(pointed)]
 
 
 @procedure("interior orientation")
