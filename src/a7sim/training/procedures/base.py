@@ -129,12 +129,14 @@ REGISTERED_ALREADY = "X"
 class _Button:
     """The button of the recording device: what is written into the book is registered as well.
 
-    With the element that is read; a pointing with one eye with by of its projector, which says whose it is.
+    With the element that is read; a pointing with one eye at a model point with by of its projector, which says whose
+    it is (a cross of a plate lies under one projector alone).
     """
 
     def __init__(self, client: Client, model: ModelJob) -> None:
         self._client = client
         self._numbers: dict[int, int] = {}
+        self._points = frozenset(model.standard_points.values())
         self._named = {
             _POINTED[1]: f"by{model.left_projector}",
             _POINTED[2]: f"by{model.right_projector}",
@@ -146,14 +148,15 @@ class _Button:
                 self._client.send(f"REC:STR {self._numbers[entry.number]},{quoted(entry.struck[:60])}")
         elif entry.point and (entry.item in {REGISTERED_ALREADY, *ELEMENTS} or entry.item.startswith(_REGISTERED)):
             if entry.item != REGISTERED_ALREADY:
-                self._client.send(",".join([f"REC {quoted(entry.point)}", *self._words(entry.item)]))
+                self._client.send(",".join([f"REC {quoted(entry.point)}", *self._words(entry)]))
             self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
 
-    def _words(self, item: str) -> list[str]:
-        """Return the elements that are registered with an item of the book."""
-        if item in ELEMENTS:
-            return [recorded_as(item)]
-        return [recorded_as(by) for pointed, by in self._named.items() if item.startswith(pointed)]
+    def _words(self, entry: Entry) -> list[str]:
+        """Return the elements that are registered with an entry of the book."""
+        if entry.item in ELEMENTS:
+            return [recorded_as(entry.item)]
+        named = self._named.items() if entry.point in self._points else ()
+        return [recorded_as(by) for pointed, by in named if entry.item.startswith(pointed)]
 
 
 @procedure("interior orientation")
