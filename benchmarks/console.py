@@ -57,6 +57,7 @@ class Terminal:
         self.began = time.perf_counter()
         self.pid, self.fd = pty.fork()
         if self.pid == 0:
+            os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
             os.environ.update(TERM="xterm-256color", COLORTERM="truecolor", LC_ALL="C.UTF-8")
             os.execv(command[0], command)
         ioctl(self.fd, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
@@ -162,12 +163,27 @@ def floor_app(columns: int, rows: int) -> None:
     Floor().run()
 
 
+def first_paint(command: list[str], columns: int, rows: int, there: bytes, times: int = 5) -> tuple[float, float]:
+    """Return the shortest time of some starts to the first paint, and the least CPU time spent on one, s.
+
+    The start before them compiles what has not been compiled yet, as the first start of an installed console does.
+    """
+    taken = []
+    for _ in range(times + 1):
+        terminal = Terminal(command, columns, rows)
+        taken.append((terminal.until(there), terminal.cpu()))
+        terminal.end()
+    wall, cpu = zip(*taken[1:], strict=True)
+    return min(wall), min(cpu)
+
+
 def measured(
     command: list[str], columns: int, rows: int, there: bytes, load: bool
-) -> tuple[float, float, float, float, int]:
-    """Return first paint s, key to frame ms, CPU share at 20 keys a second, kB/s, and bytes drawn in 3 idle s."""
+) -> tuple[float, float, float, float, float, int]:
+    """Return first paint s, its CPU s, key to frame ms, CPU share at 20 keys/s, kB/s, and bytes drawn in 3 idle s."""
+    paint, spent = first_paint(command, columns, rows, there)
     terminal = Terminal(command, columns, rows)
-    paint = terminal.until(there)
+    terminal.until(there)
     terminal.drained(1.5)
     if load:
         for line in ('PHOT1:LOAD "101";:PHOT2:LOAD "102"', "BASE:BX 194.99;:DRIV:X 97;Z -320"):
@@ -180,7 +196,7 @@ def measured(
     terminal.drained(1.0)
     idle = terminal.drained(3.0)
     terminal.end()
-    return paint, frame, share, kilobytes, idle
+    return paint, spent, frame, share, kilobytes, idle
 
 
 def main() -> None:
@@ -195,13 +211,14 @@ def main() -> None:
         print(f"  {across:>3} x {down:<3} rendered {rendered:6.2f} ms   drawn {drawn:5.2f} ms")
     console = [sys.executable, "-m", "a7sim", "console", "akwanga", "--seed", "7", "--theme", "enamel"]
     floor = [sys.executable, __file__, FLOOR, str(2 * 29), "13"]
-    print(f"{'':<22}first paint   key to frame   CPU at 20/s     drawn    idle 3 s")
+    print(f"{'':<22}first paint   its CPU   key to frame   CPU at 20/s     drawn    idle 3 s")
     for name, command, there, load in (
         ("console", console, b"elements", True),
         ("bare Textual widget", floor, "▀".encode(), False),
     ):
-        paint, frame, share, kilobytes, idle = measured(command, columns, rows, there, load)
-        print(f"  {name:<20}{paint:9.2f} s {frame:11.0f} ms {share:11.0%} {kilobytes:7.0f} kB/s {idle:7d} B")
+        paint, spent, frame, share, kilobytes, idle = measured(command, columns, rows, there, load)
+        seen = f"{paint:9.2f} s {spent:7.2f} s {frame:11.0f} ms {share:11.0%} {kilobytes:7.0f} kB/s {idle:7d} B"
+        print(f"  {name:<20}{seen}")
 
 
 if __name__ == "__main__":

@@ -92,12 +92,18 @@ GIVEN = {
     "EYEPiece<n>:PICTure?": "64,48,2",
     "EYEPiece:STEReo?": '"1011"',
     "RECord": '"1011",PHI1,BX',
+    "RECord?": "1",
     "RECord:STRike": '1,"wrong point"',
     "NOTE": '"coffee"',
 }
 """What follows the header in its example."""
 
-BEFORE = {"RECord:LAST?": 'REC "1011"', "RECord:STRike": 'REC "1011"', "SYSTem:ERRor[:NEXT]?": "FOO"}
+BEFORE = {
+    "RECord?": 'REC "1011"',
+    "RECord:LAST?": 'REC "1011"',
+    "RECord:STRike": 'REC "1011"',
+    "SYSTem:ERRor[:NEXT]?": "FOO",
+}
 """What is done before an example, beside mounting."""
 
 SHOWN_BY = {
@@ -137,6 +143,7 @@ ALSO = {
     "PHOTo<n>:SKETch?": (-221,),
     "GEAR:HEIGht": (-224,),
     "RECord": (-221, -222, -224),
+    "RECord?": (-222,),
     "RECord:LAST?": (-200,),
     "RECord:STRike": (-221, -222),
     "NOTE": (-222,),

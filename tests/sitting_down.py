@@ -10,10 +10,11 @@ from textual.pilot import Pilot
 from textual.widgets import Input, OptionList
 
 from a7sim.console.app import Console
-from a7sim.console.eyepiece import Drawing
+from a7sim.console.eyepiece import Drawing, picture_size
 from a7sim.console.hands import LADDER
 from a7sim.console.seat import Seat
 from a7sim.console.sheet import JobSheet
+from a7sim.console.window import Eyepiece
 from a7sim.instrument.language import Listener
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
@@ -58,6 +59,18 @@ class Person:
         for _ in range(5):
             await asyncio.sleep(0.0)
         await self.until(self._quiet)
+
+    async def look_on(self) -> None:
+        """Wait until what the eyes see fills their windows."""
+        await self.settle()
+        await self.until(self._fills_the_windows)
+        await self.settle()
+
+    def _fills_the_windows(self) -> bool:
+        console = self.console
+        sizes = {picture_size(console.view.drawing, *eyepiece.cells) for eyepiece in console.main.query(Eyepiece)}
+        sight = console.sight
+        return sight is not None and sizes == {(sight.look.columns, sight.look.rows)}
 
     def _quiet(self) -> bool:
         """Whether no message waits to be dealt with."""

@@ -1,18 +1,14 @@
 """The console at its door: keys in, the screen out, and nothing said but the command language."""
 
 import asyncio
-import os
-import shutil
-import subprocess
-import sys
-import time
+import threading
 from collections.abc import Coroutine
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from a7sim.console.app import Console
+from a7sim.console.drum_panels import Elements
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.panels import Book
 from a7sim.console.seat import Seat
@@ -120,6 +116,33 @@ def test_a_key_is_a_step_and_holding_it_is_many() -> None:
             assert console.dials.elements["omega2"] == "100.01"
             await person.press("[", "+")
             assert console.dials.elements["omega2"] == "100.01", "a drum stands between two counts"
+
+    played(sit_down())
+
+
+def test_keys_pressed_before_anything_answers_are_done_when_it_does() -> None:
+    door = with_photographs()
+    answers = threading.Event()
+
+    def connected() -> Client:
+        assert answers.wait(20.0)
+        return Client(InProcessSerial(desk=door.desk, clock=door.clock, timeout=5.0))
+
+    console = Console(Seat(connected, lambda: 0.0, drawing=Drawing.HALVES))
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            person.strike("right", "right", "y", "s", *"12.5", "enter", "up", "]", "right")
+            await pilot.pause()
+            assert console.dials is None
+            answers.set()
+            await person.until(lambda: console.dials is not None and console.dials.counters["X"] == "12.00")
+            await person.settle()
+            assert console.dials.counters == {"X": "12.00", "Y": "1.00", "Z": "-300.00"}
+            assert console.dials.elements["by1"] == "12.50"
+            await person.press("left")
+            assert console.dials.counters["X"] == "2.00"
 
     played(sit_down())
 
@@ -314,41 +337,23 @@ def test_a_dead_link_is_a_banner_and_a_new_one_is_taken_up() -> None:
     played(sit_down())
 
 
-@pytest.mark.skipif(shutil.which("tmux") is None, reason="there is no tmux")
-def test_real_keys_in_a_real_terminal(tmp_path: Path) -> None:
-    def tmux(*words: str) -> str:
-        done = subprocess.run(["tmux", "-L", name, *words], capture_output=True, text=True, check=True)
-        return done.stdout
+def test_another_theme_repaints_drums_and_mark() -> None:
+    console = at(with_model())
 
-    def shows(words: str) -> str:
-        end = time.monotonic() + 20.0
-        while words not in (screen := tmux("capture-pane", "-p", "-t", "seat")):
-            assert time.monotonic() < end, f"expected {words!r} on the screen, got\n{screen}"
-            time.sleep(0.05)
-        return screen
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.look_on()
+            elements, eye = console.query_one(Elements), console.query(Eyepiece).first()
 
-    name = f"a7sim-{os.getpid()}"
-    options = "akwanga --seed 7"
-    command = (
-        f"env -u COLUMNS -u LINES XDG_DATA_HOME={tmp_path} LC_ALL=C.UTF-8 {sys.executable} -m a7sim console {options}"
-    )
-    size = ("-x", "100", "-y", "30")
-    tmux("-f", "/dev/null", "new-session", "-d", "-s", "seat", *size, f"{command}; echo left $?; cat")
-    try:
-        assert "Two eyes, one ground" in shows("l lays pictures; ? is help")
-        tmux("send-keys", "-t", "seat", "l")
-        shows("left projector: lay")
-        tmux("send-keys", "-t", "seat", "Enter")
-        shows("lay in the left projector")
-        tmux("send-keys", "-t", "seat", "Enter")
-        screen = shows("sketch 101")
-        assert "Two eyes" not in screen, "the welcome goes with the first key"
-        assert "▀" in screen
-        tmux("send-keys", "-t", "seat", "Right", "Right", "NPage")
-        shows("- 3 0 1 . 0 0")
-        shows("  2 . 0 0")
-        tmux("resize-window", "-t", "seat", "-x", "80", "-y", "24")
-        tmux("send-keys", "-t", "seat", "q")
-        assert "Traceback" not in shows("left 0")
-    finally:
-        tmux("kill-server")
+            def colours() -> tuple[str, str]:
+                strip = eye.render_line(eye.cells[1] // 2)
+                mark = next(segment.style for segment in strip if segment.text == "•")
+                return elements.like("drum").bgcolor.name, mark.color.name
+
+            assert colours() == ("#16181a", "#ffd23f")
+            console.theme = "contrast"
+            await pilot.pause()
+            assert colours() == ("#000000", "#ffff00")
+
+    played(sit_down())

@@ -13,9 +13,9 @@ from a7sim.console import eyepiece
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
 from a7sim.console.eyepiece import Drawing, Run
 from a7sim.console.hands import LADDER, Hands
-from a7sim.console.keymap import DEEDS, default_keymap, load_keymap, pressed, sample
+from a7sim.console.keymap import deeds_of, default_keymap, load_keymap, pressed, sample
 from a7sim.console.seat import best_drawing, speaks_utf8
-from a7sim.console.sketches import sketched
+from a7sim.console.sketches import marked, pricked
 from a7sim.console.words import image_in_words, parallax_in_words
 from a7sim.manual import VARIANTS
 from a7sim.mistakes import Mistake
@@ -90,7 +90,7 @@ def test_a_bar_shows_where_an_element_stands() -> None:
 
 
 def test_a_sketch_shows_points_names_and_the_mark() -> None:
-    drawn = sketched({"1011": (-80.0, 0.0), "C1": (80.0, 80.0)}, (0.0, -80.0), 25, 7)
+    drawn = marked(pricked({"1011": (-80.0, 0.0), "C1": (80.0, 80.0)}, 25, 7), (0.0, -80.0), 25, 7)
     assert drawn.rows == [
         "                         ",
         "                    ·C1  ",
@@ -101,7 +101,7 @@ def test_a_sketch_shows_points_names_and_the_mark() -> None:
         "                         ",
     ]
     assert drawn.nearest(5, 4) == "1011" and drawn.mark == (12, 5)
-    assert sketched({}, (500.0, 0.0), 9, 3).mark is None
+    assert marked(pricked({}, 9, 3), (500.0, 0.0), 9, 3).mark is None
 
 
 @pytest.mark.parametrize(
@@ -157,8 +157,9 @@ def test_the_sample_keymap_is_the_default_one(tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.write_text(sample(), encoding="utf-8")
     assert load_keymap(file) == default_keymap()
-    keys = [key for deed in DEEDS for key in deed.keys]
-    assert len(keys) == len(set(keys))
+    for watching in (False, True):
+        keys = [key for deed in deeds_of(watching) for key in deed.keys]
+        assert len(keys) == len(set(keys))
 
 
 def test_a_deed_that_a_keymap_leaves_out_keeps_its_keys(tmp_path: Path) -> None:
@@ -194,8 +195,9 @@ def test_a_bad_keymap_is_one_sentence(content: str, words: str, tmp_path: Path) 
         (["--keymap", "{folder}/none.toml"], "expected a keymap in TOML"),
         (["nowhere"], "nowhere"),
         ([], "expected a terminal to sit at"),
+        (["--drawing", "halves", "--theme", "dark"], "expected a terminal to sit at"),
         (["--connect", "tcp://127.0.0.1:1"], "expected an instrument to answer there"),
-        (["--connect", "tcp://127.0.0.1:1", "--seed", "7"], "expected neither --seed nor --variant"),
+        (["--connect", "tcp://127.0.0.1:1", "--seed", "7"], "expected no --seed beside it"),
     ],
 )
 def test_what_cannot_be_sat_down_at_is_one_sentence_and_exit_2(
@@ -224,3 +226,31 @@ def test_the_keymap_is_written_once(
         assert left.value.code == code
     assert load_keymap(file) == default_keymap()
     assert "expected to write a new file" in capsys.readouterr().err
+
+
+SLOPE = (np.add.outer(np.arange(8), np.arange(8)) * 18).astype(np.uint8)
+"""Light from the top left, 0, to the bottom right, 252."""
+
+
+@pytest.mark.parametrize(
+    ("drawing", "golden"),
+    [
+        (Drawing.SHADES, ["   ░░▒░▒", "░░▒░▒▒▓▓", "░▒░▒▒▓▓▓", "▒▒▓▓▓▓██"]),
+        (Drawing.ASCII, [" ..::==+", "::--=+**", "-==++**#", "++**##%%"]),
+        (Drawing.BRAILLE, ["⠀⢄⢕⢵", "⢕⢵⢽⣽"]),
+    ],
+)
+def test_a_slope_in_every_drawing_without_colours(drawing: Drawing, golden: list[str]) -> None:
+    assert text(eyepiece.drawn(drawing, SLOPE)) == golden
+
+
+def test_a_slope_in_an_eyepiece_at_32_greys() -> None:
+    """Levels of ink and paper by cell; the corners are darkened."""
+    shown = eyepiece.half_blocks(eyepiece.vignetted(SLOPE))
+    cells = [[(run.ink, run.paper) for run in row for _ in run.text] for row in shown]
+    assert cells == [
+        [(0, 1), (1, 3), (3, 6), (5, 8), (7, 10), (9, 12), (10, 13), (8, 13)],
+        [(3, 5), (6, 8), (8, 11), (11, 13), (13, 15), (15, 17), (17, 19), (17, 19)],
+        [(7, 9), (10, 12), (13, 15), (15, 17), (17, 20), (20, 22), (21, 23), (21, 22)],
+        [(10, 8), (13, 13), (17, 17), (19, 19), (21, 21), (23, 22), (23, 21), (21, 17)],
+    ]

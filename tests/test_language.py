@@ -107,9 +107,11 @@ EXAMPLES = {
     "EYEPiece<n>:PICTure?": "4,3,1",
     "EYEPiece:STEReo?": '"1011"',
     "RECord": '"1011",BY1,BX',
+    "RECord?": "1",
     "RECord:LAST?": "",
     "RECord:COUNt?": "",
     "RECord:STRike": '1,"wrong point"',
+    "RECord:STRike:COUNt?": "",
     "NOTE": '"coffee"',
 }
 """Every header of protocol.md, and what came to it, with parameters that a mounted model takes."""
@@ -527,6 +529,7 @@ REFUSED = {
         "EYEP1:PICT? 4,4,0",
         "REC ''",
         "REC:STR 1,'why'",
+        "REC? 1",
         "NOTE ''",
         f"NOTE '{'x' * 1001}'",
     ],
@@ -978,6 +981,9 @@ def test_struck_entries_stay_marked():
     door = Door()
     door.say("REC 'P1';:REC 'P2';:REC:STR 2,'wrong, point'")
     assert door.say("REC:LAST?;COUN?") == '2,"P2",0.00,0.00,-300.00,"struck: wrong, point";2'
+    assert door.say("REC? 1;REC? 2;REC:STR:COUN?") == (
+        '1,"P1",0.00,0.00,-300.00;2,"P2",0.00,0.00,-300.00,"struck: wrong, point";1'
+    )
     door.say("REC:STR 0,'x';STR 3,'x'")
     assert door.errors() == [-222, -222]
 

@@ -1,27 +1,18 @@
 """`a7sim console`: sit down at the instrument."""
 
 import sys
-import time
-from collections.abc import Callable
-from functools import cache
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
-from msgspec import structs
 
-from a7sim.cli.links import token_from
+from a7sim.cli.browser import drawn_by_a_browser, in_a_browser, served_instead
 from a7sim.cli.prompt import data_folder
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.words import ACUITY_UM
-from a7sim.link.client import Client
-from a7sim.link.clock import Clock
-from a7sim.link.opening import TIMEOUT_S
 from a7sim.mistakes import Mistake
-from a7sim.scenario import Scenario, load_scenario
-
-if TYPE_CHECKING:
-    from a7sim.instrument.language import Desk
+from a7sim.scenario import load_scenario
 
 USUAL = "akwanga"
 """The scenario when nothing is named."""
@@ -37,7 +28,9 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 @click.option("--variant", type=click.Choice(["A7", "A8"], case_sensitive=False), help="Another plotter.")
 @click.option("--theme", type=click.Choice(THEMES), help="Colours  [default: enamel]")
 @click.option(
-    "--drawing", type=click.Choice(list(Drawing)), help="How pictures are drawn  [default: the best there is]"
+    "--drawing",
+    type=click.Choice([each.value for each in Drawing]),
+    help="How pictures are drawn  [default: the best there is]",
 )
 @click.option("--plain", is_flag=True, help="Say in words what the eyes see; nothing rolls. For screen readers.")
 @click.option(
@@ -50,8 +43,24 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 )
 @click.option("--keymap", type=click.Path(path_type=Path, dir_okay=False), help="File with keys of your own.")
 @click.option("--write-keymap", is_flag=True, help="Write all keys to --keymap, or to the usual file, and end.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of the session  [default: one among your data]")
+@click.option(
+    "--go-on/--anew",
+    "go_on",
+    default=None,
+    help="Go on with the last session, or begin another and keep it  [default: ask]",
+)
+@click.option(
+    "--watch",
+    metavar="SESSION|URL",
+    help="Watch a session (folder, .jsonl, .a7s), or a served instrument that somebody works.",
+)
 @click.option("--token-file", type=click.Path(path_type=Path, dir_okay=False), help="File with a server's token.")
+@in_a_browser
+@click.pass_context
 def command(
+    context: click.Context,
+    /,
     scenario: str | None,
     connect: str | None,
     seed: int | None,
@@ -62,58 +71,70 @@ def command(
     acuity: float,
     keymap: Path | None,
     write_keymap: bool,
+    out: Path | None,
+    go_on: bool | None,
+    watch: str | None,
     token_file: Path | None,
+    **_browser: Any,
 ) -> None:
     """Sit down at the instrument of SCENARIO, or at a served one: the plotter on a terminal, for a person.
+
+    All that is done is journalled, and the next console at the same scenario, seed and variant offers to go on.
 
     Example: a7sim console akwanga
     """
     _see_that_textual_is_there()
-    from a7sim.console.app import Console  # noqa: PLC0415 # only who sits down loads the screen
+    from a7sim.cli.seats import InProcess, at_a_line, before_a_film, is_url  # noqa: PLC0415 # only who sits down
+    from a7sim.console.app import Console  # noqa: PLC0415
     from a7sim.console.keymap import default_keymap, load_keymap, sample  # noqa: PLC0415
-    from a7sim.console.seat import Seat  # noqa: PLC0415
     from a7sim.console.sheet import JobSheet  # noqa: PLC0415
 
-    if connect and (seed is not None or variant is not None):
-        raise Mistake("--connect: expected neither --seed nor --variant, which are the served instrument's own")
+    _refuse_beside("--watch", watch, connect=connect, seed=seed, variant=variant, out=out, go_on=go_on)
+    _refuse_beside("--connect", connect, seed=seed, variant=variant, out=out, go_on=go_on)
     usual = data_folder() / KEYMAP
     if write_keymap:
         _write(keymap or usual, sample())
         return
     keys = load_keymap(keymap or usual) if keymap or usual.exists() else default_keymap()
-    loaded = _scenario(scenario or USUAL, variant) if scenario or not connect else None
-    began, clock = time.monotonic(), Clock()
-
-    def at_the_instrument() -> float:
-        clock.pass_to(time.monotonic() - began)
-        return clock.now
-
-    opened = _at_a_line(connect, token_file) if connect else _in_process(loaded, seed, clock)
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+    here: InProcess | None = None
+    if watch is not None and not is_url(watch):
+        _refuse_beside("--watch", watch, scenario=scenario)
+        seat = before_a_film(watch)
+    elif url := watch or connect:
+        loaded = load_scenario(scenario) if scenario else None
+        sheet = JobSheet(loaded.title, loaded.camera) if loaded else JobSheet()
+        seat = at_a_line(url, sheet, token_file, watching=watch is not None)
+    else:
+        name = scenario or USUAL
+        overrides = {"instrument.variant": f'"{variant.upper()}"'} if variant else {}
+        here = InProcess(name, load_scenario(name, overrides), seed, out, go_on)
+        seat = here.seat
+    if served_instead(context):
+        return
+    if not (drawn_by_a_browser() or (sys.stdin.isatty() and sys.stderr.isatty())):
         raise Mistake("console: expected a terminal to sit at, got a file or a pipe (a7sim send takes lines from one)")
-    sheet = JobSheet(loaded.title, loaded.camera) if loaded else JobSheet()
     Console(
-        Seat(
-            opened,
-            at_the_instrument,
-            alone=connect is None,
-            where=connect or scenario or USUAL,
-            sheet=sheet,
+        replace(
+            seat,
             keymap=keys,
             drawing=Drawing.WORDS if plain else Drawing(drawing) if drawing else None,
             acuity_um=acuity,
             theme=theme or ("contrast" if plain else "enamel"),
-            welcome=_first_visit(),
+            welcome=watch is None and _first_visit(),
         )
     ).run()
+    kept = here.stand_up() if here else None
+    if kept is not None:
+        click.echo(f"the session is kept in {kept}")
 
 
-def _scenario(name: str, variant: str | None) -> Scenario:
-    """Return a scenario at the plotter that is asked for; nobody works its plan here, so any will do."""
-    loaded = load_scenario(name)
-    if variant is None:
-        return loaded
-    return structs.replace(loaded, instrument=structs.replace(loaded.instrument, variant=variant.upper()))
+def _refuse_beside(option: str, given: str | None, **others: object) -> None:
+    """See that an option comes without what is for an instrument in this process. Raises Mistake."""
+    if given is not None:
+        words = {"scenario": "SCENARIO", "go_on": "--go-on" if others.get("go_on") else "--anew"}
+        beside = [words.get(name, f"--{name}") for name, value in others.items() if value is not None]
+        if beside:
+            raise Mistake(f"{option} {given}: expected no {' and no '.join(beside)} beside it")
 
 
 def _see_that_textual_is_there() -> None:
@@ -121,33 +142,6 @@ def _see_that_textual_is_there() -> None:
         import textual  # noqa: F401, PLC0415
     except ImportError as error:
         raise Mistake("console: expected textual to be installed: pip install 'a7sim[console]'") from error
-
-
-def _at_a_line(url: str, token_file: Path | None) -> Callable[[], Client]:
-    token = token_from(token_file)
-    Client.open(url, token=token).close()
-    return lambda: Client.open(url, token=token)
-
-
-def _in_process(scenario: Scenario | None, seed: int | None, clock: Clock) -> Callable[[], Client]:
-    """Return what builds the instrument when it is first spoken to, while the screen is already there."""
-    assert scenario is not None
-    drawn_by = scenario.seed if seed is None else seed
-
-    @cache
-    def desk() -> "Desk":
-        from a7sim.instrument import build_autograph  # noqa: PLC0415 # beside the first paint of the screen
-        from a7sim.instrument.language import Desk  # noqa: PLC0415
-        from a7sim.scene import build_scene  # noqa: PLC0415
-
-        return Desk(build_autograph(scenario.instrument, build_scene(scenario, drawn_by).drawer, drawn_by))
-
-    def opened() -> Client:
-        from a7sim.link.inprocess import InProcessSerial  # noqa: PLC0415
-
-        return Client(InProcessSerial(desk=desk(), clock=clock, timeout=TIMEOUT_S))
-
-    return opened
 
 
 def _first_visit() -> bool:

@@ -1,8 +1,6 @@
 """`a7sim replay`: a session worked again on a fresh instrument."""
 
-import re
 import time
-from bisect import bisect_left
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -21,10 +19,9 @@ from a7sim.session.lines import Journalled, read_journal
 from a7sim.session.playing import Player
 from a7sim.session.replaying import Difference, Replay, names_scenario, replayed
 from a7sim.session.scripts import SUFFIX, find_script, read_script
+from a7sim.session.seeking import line_sought
 
 _MOST_PARTS = 20
-
-_TIME = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:\.\d*)?)")
 
 
 @click.command("replay")
@@ -107,24 +104,10 @@ def _is_script(session: str) -> bool:
 
 def _line(journalled: Journalled, begin: str) -> int:
     """Return the first line that is to be told. Raises Mistake where there is none."""
-    numbers = range(2, len(journalled) + 1)
-    found: int | None = None
-    if begin.startswith("@") and begin[1:].isdecimal():
-        found = int(begin[1:])
-    elif time_there := _TIME.fullmatch(begin):
-        hours, minutes, seconds = (float(each or 0) for each in time_there.groups())
-        at = 3600.0 * hours + 60.0 * minutes + seconds
-        found = 2 + bisect_left(numbers, at, key=lambda number: journalled.event(number).t)
-    else:
-        notes = (n for n in numbers if _notes(journalled.event(n).text, begin))
-        found = next(notes, None)
-    if found is None or found not in numbers:
+    found = line_sought(journalled, begin)
+    if found is None:
         raise Mistake(f"--from {begin}: expected a time, @LINE or the text of a note within {journalled.path}")
     return found
-
-
-def _notes(text: str, wanted: str) -> bool:
-    return text.upper().startswith("NOTE") and wanted.lower() in text.lower()
 
 
 def _told(journalled: Journalled, first: int, pace: Pace, silent: bool, as_document: bool) -> None:

@@ -135,7 +135,7 @@ def _served_again(begun: Begun, token: str | None, keeping: Keeping) -> _Served:
             f"{begun.journalled.where(1)}: expected {asked} token, as the session was begun with, got {given}"
         )
     journal = Journal(keeping)
-    desk, now = served_again(begun, journal)
+    desk, now, _ = served_again(begun, journal)
     desk.token = token
     return _Served(_head(begun.scenario, begun.seed), desk, _clock(begun.setting("realtime"), now), journal)
 

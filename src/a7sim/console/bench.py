@@ -123,8 +123,7 @@ class BenchDeeds(Sitting):
         console = self._console
         variant, dials = self._at()
         for axis, reading in readings:
-            if variant.scales[axis].preset:
-                console.presets.preset(variant, dials, axis, float(reading))
+            console.presets.preset(variant, dials, axis, float(reading))
             console.station.say(f"COUN:{axis}:PRES {reading}")
 
     def _reset(self) -> None:

@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from a7sim.console.dials import values
 from a7sim.console.hands import title
 from a7sim.link.client import Client
 from a7sim.link.headers import quoted, recorded_as
+from a7sim.link.replies import as_text
 from a7sim.manual import VARIANTS
 
 ELEMENTS = tuple(dict.fromkeys(name for variant in VARIANTS.values() for name in variant.elements))
@@ -42,6 +44,20 @@ class Entry:
     def struck_out(self) -> "Entry":
         """Return the entry struck out; it stays."""
         return replace(self, struck=True)
+
+
+AT_ONCE = 40
+"""Registrations that are asked for in a line."""
+
+
+def read_book(client: Client, records: int) -> tuple[Entry, ...]:
+    """Return so many registrations of the recorder, from the first, as they stand now."""
+    entries: list[Entry] = []
+    for first in range(1, records + 1, AT_ONCE):
+        numbers = range(first, min(first + AT_ONCE, records + 1))
+        client.send(";".join(f"REC? {number}" for number in numbers))
+        entries += [Entry.read(values(as_text(part))) for part in client.reply() or ()]
+    return tuple(entries)
 
 
 def _title(word: str) -> str:

@@ -11,7 +11,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from a7sim.console.keymap import DEEDS, Keymap, shown
+from a7sim.console.keymap import Keymap, deeds_of, shown
 
 _LEAVING: list[BindingType] = [("escape", "leave", "back")]
 
@@ -46,14 +46,16 @@ class Choose(ModalScreen[str | None]):
 
     BINDINGS: ClassVar[list[BindingType]] = _LEAVING
 
-    def __init__(self, question: str, choices: Sequence[tuple[str, str]]) -> None:
+    def __init__(self, question: str, choices: Sequence[tuple[str, str]], note: str = "") -> None:
         super().__init__()
-        self._question, self._choices = question, choices
+        self._question, self._choices, self._note = question, choices, note
 
     def compose(self) -> ComposeResult:
         """Lay out the choices: pairs of what is returned and how it reads."""
         with Vertical(id="dialog") as dialog:
             dialog.border_title = self._question
+            if self._note:
+                yield Static(self._note, classes="note", markup=False)
             yield OptionList(*(Option(Text(words), id=name) for name, words in self._choices))
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
@@ -70,15 +72,15 @@ class HelpPage(ModalScreen[None]):
 
     BINDINGS: ClassVar[list[BindingType]] = [*_LEAVING, ("q", "leave", "back"), ("question_mark", "leave", "back")]
 
-    def __init__(self, keymap: Keymap, plain: bool) -> None:
+    def __init__(self, keymap: Keymap, plain: bool, watching: bool, film: bool) -> None:
         super().__init__()
-        self._keymap, self._plain = keymap, plain
+        self._text = help_text(keymap, plain, watching, film)
 
     def compose(self) -> ComposeResult:
         """Lay out the page."""
         with VerticalScroll(id="dialog") as dialog:
             dialog.border_title = "help"
-            yield Static(help_text(self._keymap, self._plain), markup=False)
+            yield Static(self._text, markup=False)
 
     def action_leave(self) -> None:
         """Go back."""
@@ -106,12 +108,19 @@ drum. Ctrl+P lists everything by name, themes too; Ctrl+Q leaves.
 """
 
 
-def help_text(keymap: Keymap, plain: bool) -> str:
+_HOW_TO_WATCH = """\
+You watch somebody at work: what they see in both eyepieces, their
+counters, elements and book. Your hands are off; your eyes are your own.
+"""
+
+
+def help_text(keymap: Keymap, plain: bool, watching: bool = False, film: bool = True) -> str:
     """Return the page of help."""
-    lines = [_HOW_TO]
-    for group in dict.fromkeys(deed.group for deed in DEEDS):
+    lines = [_HOW_TO_WATCH if watching else _HOW_TO]
+    deeds = deeds_of(watching, film)
+    for group in dict.fromkeys(deed.group for deed in deeds):
         lines.append(group.upper())
-        for deed in DEEDS:
+        for deed in deeds:
             if deed.group == group:
                 keys = " ".join(shown(key, plain) for key in keymap[deed.name])
                 lines.append(f"  {keys:<10} {deed.about}")

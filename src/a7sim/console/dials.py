@@ -22,6 +22,9 @@ class Dials:
     pictures: tuple[str, str]
     """Names of what lies in the left and the right projector, empty where nothing does."""
     records: int
+    """Registrations in the recorder."""
+    struck: int
+    """Those of them that are struck out."""
     errors: int
     """Errors that the instrument has to tell."""
 
@@ -41,7 +44,7 @@ def question(variant: Variant) -> str:
             "COUN?",
             *(f"{header(name)}?" for name in variant.elements),
             *(f"FITT:{FITTING_NODES[name]}?" for name in variant.fittings),
-            "BASE:MODE?;:GEAR:HEIG?;:GEAR:PLAN?;:PHOT1?;:PHOT2?;:REC:COUN?;:SYST:ERR:COUN?",
+            "BASE:MODE?;:GEAR:HEIG?;:GEAR:PLAN?;:PHOT1?;:PHOT2?;:REC:COUN?;:REC:STR:COUN?;:SYST:ERR:COUN?",
         ]
     )
 
@@ -52,7 +55,7 @@ def read_dials(variant: Variant, reply: Sequence[Part]) -> Dials:
     counters, *rest = texts
     elements, rest = rest[: len(variant.elements)], rest[len(variant.elements) :]
     fittings, rest = rest[: len(variant.fittings)], rest[len(variant.fittings) :]
-    mode, height, plan, left, right, records, errors = rest
+    mode, height, plan, left, right, records, struck, errors = rest
     return Dials(
         dict(zip("XYZ", counters.split(","), strict=True)),
         dict(zip(variant.elements, elements, strict=True)),
@@ -62,6 +65,7 @@ def read_dials(variant: Variant, reply: Sequence[Part]) -> Dials:
         unquoted(plan),
         (unquoted(left), unquoted(right)),
         int(records),
+        int(struck),
         int(errors),
     )
 

@@ -136,22 +136,13 @@ def with_mark(rows: list[list[Run]], mark: str) -> list[list[Run]]:
     """Return the rows with the floating mark in the middle cell, on the paper that lies about it."""
     middle = len(rows) // 2
     row = rows[middle]
-    at = sum(len(run.text) for run in row) // 2
-    before, after = _cut(row, at)
-    _, after = _cut(after, 1)
-    around = before[-1] if before else Run("")
-    return [*rows[:middle], [*before, Run(mark, MARK, around.paper), *after], *rows[middle + 1 :]]
-
-
-def _cut(row: list[Run], at: int) -> tuple[list[Run], list[Run]]:
-    before: list[Run] = []
-    after: list[Run] = []
-    begin = 0
-    for run in row:
-        head = max(0, min(len(run.text), at - begin))
-        if head:
-            before.append(Run(run.text[:head], run.ink, run.paper))
-        if head < len(run.text):
-            after.append(Run(run.text[head:], run.ink, run.paper))
-        begin += len(run.text)
-    return before, after
+    left = sum(len(run.text) for run in row) // 2
+    for at, run in enumerate(row):
+        if left < len(run.text):
+            before, after = run.text[:left], run.text[left + 1 :]
+            under = row[at - 1] if at and not before else run
+            marked = [run._replace(text=before), Run(mark, MARK, under.paper), run._replace(text=after)]
+            marked = [each for each in marked if each.text]
+            return [*rows[:middle], [*row[:at], *marked, *row[at + 1 :]], *rows[middle + 1 :]]
+        left -= len(run.text)
+    return rows

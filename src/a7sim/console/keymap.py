@@ -25,6 +25,12 @@ class Deed:
     group: str
 
 
+WATCHING = "watching"
+"""The group of what is done only while one watches."""
+
+LOOKING = ("eyes", "screen")
+"""The groups of what is done at the instrument and while one watches."""
+
 DEEDS = (
     Deed("x_up", ("right",), "X handwheel, forward", "hands"),
     Deed("x_down", ("left",), "X handwheel, back", "hands"),
@@ -51,6 +57,15 @@ DEEDS = (
     Deed("drive", ("d",), "run X, Y or Z to a reading", "bench"),
     Deed("go_to", ("g",), "drive near a point of the sketch", "bench"),
     Deed("bench", ("l",), "pictures, base, fittings, gears", "bench"),
+    Deed("say", (":",), "say a line of the command language", "bench"),
+    Deed("play", ("space",), "play and pause", WATCHING),
+    Deed("step_on", (".",), "on by a line that is said", WATCHING),
+    Deed("step_back", (",",), "back by a line that is said", WATCHING),
+    Deed("next_record", (">",), "on to the next registration", WATCHING),
+    Deed("last_record", ("<",), "back to the registration before", WATCHING),
+    Deed("faster", ("]",), "play faster", WATCHING),
+    Deed("slower", ("[",), "play slower", WATCHING),
+    Deed("jump", ("g",), "to a step, a time, or a note", WATCHING),
     Deed("magnify", ("m",), "magnify more", "eyes"),
     Deed("reduce", ("M",), "magnify less", "eyes"),
     Deed("eyes", ("e",), "both eyes, left, right", "eyes"),
@@ -60,11 +75,20 @@ DEEDS = (
     Deed("strike", ("x", "backspace"), "strike the last reading out", "book"),
     Deed("note", ("n",), "a remark into the journal", "book"),
     Deed("panel", ("tab",), "the next panel at the right", "screen"),
-    Deed("say", (":",), "say a line of the command language", "screen"),
     Deed("help", ("?",), "help", "screen"),
     Deed("quit", ("q",), "leave", "screen"),
 )
 """All that keys do. Same keys on every plotter that has the part."""
+
+
+def deeds_of(watching: bool, film: bool = True) -> tuple[Deed, ...]:
+    """Return what keys do at the instrument, or while one watches, be it a film or what is done now."""
+    played = {WATCHING} if film else set()
+    return tuple(
+        deed
+        for deed in DEEDS
+        if deed.group in LOOKING or (deed.group in played if watching else deed.group != WATCHING)
+    )
 
 
 def default_keymap() -> Keymap:
@@ -117,17 +141,21 @@ def _is_key(key: str) -> bool:
 
 
 def _refuse_shared(path: Path, keymap: Keymap) -> None:
-    deeds: dict[str, str] = {}
-    for name, keys in keymap.items():
-        for key in keys:
-            other = deeds.setdefault(key, name)
-            if other != name:
-                raise Mistake(f"{path}: expected every key once, got {key!r} for both {other} and {name}")
+    for watching in (False, True):
+        deeds: dict[str, str] = {}
+        for deed in deeds_of(watching):
+            for key in keymap[deed.name]:
+                other = deeds.setdefault(key, deed.name)
+                if other != deed.name:
+                    raise Mistake(f"{path}: expected every key once, got {key!r} for both {other} and {deed.name}")
 
 
-def deeds_by_key(keymap: Keymap) -> dict[str, str]:
-    """Return the name of the deed that every key does."""
-    return {key: name for name, keys in keymap.items() for key in keys}
+def deeds_by_key(keymap: Keymap, watching: bool = False) -> dict[str, str]:
+    """Return the name of the deed that every key does; who watches has those of the hands too where they are free."""
+    at_the_instrument, watched = (
+        {key: deed.name for deed in deeds_of(each) for key in keymap[deed.name]} for each in (False, True)
+    )
+    return at_the_instrument | watched if watching else at_the_instrument
 
 
 def pressed(key: str, character: str | None) -> str:

@@ -1,32 +1,15 @@
 """The panels of the console: each shows what it is given and draws only when that changes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 from rich.style import Style
 from rich.text import Text
-from textual import events
-from textual.geometry import Size
-from textual.message import Message
 from textual.widget import Widget
 
 from a7sim.console.book import Entry
 from a7sim.console.dials import Dials
-from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
-from a7sim.console.hands import BARE, Hands
 from a7sim.manual import POSITIONS_OF, Variant
-
-ROLLING_S = 0.04
-"""Between two frames of a drum that rolls."""
-
-
-class Wheeled(Message):
-    """The mouse wheel was turned over a drum: of an element or of X, Y, Z; forward or back."""
-
-    def __init__(self, drum: str, way: int) -> None:
-        super().__init__()
-        self.drum = drum
-        self.way = way
 
 
 class Panel(Widget):
@@ -45,148 +28,18 @@ class Panel(Widget):
 
     def __init__(self, *, id: str | None = None, classes: str = "") -> None:
         super().__init__(id=id, classes=f"panel {classes}".strip())
+        self._likes: dict[str, Style] = {}
 
     def like(self, part: str) -> Style:
         """Return the style of a part."""
-        return self.get_component_rich_style(f"panel--{part}", partial=True)
+        if part not in self._likes:
+            self._likes[part] = self.get_component_rich_style(f"panel--{part}", partial=True)
+        return self._likes[part]
 
-
-class Counter(Panel):
-    """X, Y or Z as drum digits that roll."""
-
-    def __init__(self, axis: str) -> None:
-        super().__init__(id=f"counter{axis}")
-        self.axis = axis
-        self.border_title = axis
-        self.tooltip = f"The {axis} counter. Turn it with the mouse wheel, or with its keys."
-        self.rolling = True
-        self._from, self._to, self._frame = "", "", ROLLING_FRAMES
-
-    def turn_to(self, reading: str) -> None:
-        """Show another reading; a drum that is still rolling goes straight on to it."""
-        if reading != self._to:
-            still = self._frame >= ROLLING_FRAMES
-            self._from, self._to = self._to, reading
-            self._frame = 0 if self.rolling and still and self._from else ROLLING_FRAMES
-            self._roll()
-
-    def _roll(self) -> None:
-        self.refresh()
-        if self._frame < ROLLING_FRAMES:
-            self._frame += 1
-            self.set_timer(ROLLING_S, self._roll)
-
-    def render(self) -> Text:
-        """Return the digits in their windows."""
-        shown = rolled(self._from, self._to, self._frame)
-        width = self.content_size.width
-        apart = " " if width >= 2 * len(shown) + 1 else ""
-        whole, point, decimals = shown.partition(".")
-        drum = apart + apart.join(whole + point) + apart
-        text = Text(drum, self.like("drum"), no_wrap=True)
-        text.append(apart.join(decimals) + apart, self.like("decimals"))
-        padding = max(0, width - text.cell_len)
-        left = Text(" " * padding, self.like("drum"))
-        return left + text
-
-    def on_mouse_scroll_up(self) -> None:
-        """Turn forward."""
-        self.post_message(Wheeled(self.axis, 1))
-
-    def on_mouse_scroll_down(self) -> None:
-        """Turn back."""
-        self.post_message(Wheeled(self.axis, -1))
-
-
-ROWS = ("kappa", "phi", "omega", "by", "bz", "c", "bx", "common_phi")
-
-
-class Elements(Panel):
-    """The elements of both projectors as drums; the one in hand is lit."""
-
-    def __init__(self) -> None:
-        super().__init__(id="elements", classes="-chosen")
-        self.border_title = "elements"
-        self.tooltip = "Orientation elements. Take one up by its key, turn it with + and - or with the mouse wheel."
-        self.plain = False
-        self._variant: Variant | None = None
-        self._readings: Mapping[str, str] = {}
-        self._hands = Hands()
-
-    def show(self, variant: Variant, readings: Mapping[str, str], hands: Hands) -> None:
-        """Show readings, and what is in hand."""
-        if (variant, readings, hands) != (self._variant, self._readings, self._hands):
-            anew = self._variant is not variant
-            self._variant, self._readings, self._hands = variant, readings, hands
-            self.border_subtitle = f"step {hands.step:g}" + (" free hand" if hands.free else "")
-            self.refresh(layout=anew)
-
-    @property
-    def _names(self) -> list[str]:
-        elements = self._variant.elements if self._variant else {}
-        return [name for name in ROWS if name in elements or f"{name}1" in elements]
-
-    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        """Return a row for the heads and one for each element."""
-        return 1 + len(self._names)
-
-    def render(self) -> Text:
-        """Return the table."""
-        width = self.content_size.width
-        name_width = 6
-        room = (width - name_width) // 2
-        bar_width = room - 9 if room >= 13 else 0
-        lines = [
-            Text(
-                " " * name_width + f"{chr(39):>7} {' ' * bar_width} {chr(34):>7}"[: width - name_width],
-                self.like("faint"),
-            )
-        ]
-        lines += [self._row(name, name_width, bar_width) for name in self._names]
-        return Text("\n", no_wrap=True).join(lines)
-
-    def _row(self, name: str, name_width: int, bar_width: int) -> Text:
-        shown = "Phi" if name == "common_phi" else name
-        row = Text(f"{shown:<{name_width}}", self.like("word"))
-        for element in [name] if name in BARE else [f"{name}1", f"{name}2"]:
-            lit = element == self._hands.element
-            reading = self._readings.get(element, "")
-            row.append(f">{reading:>6} " if lit else f"{reading:>7} ", self.like("hand" if lit else "drum"))
-            row.append(f"{self._bar(element, bar_width)} ", self.like("faint"))
-        return row
-
-    def _bar(self, element: str, width: int) -> str:
-        reading = self._readings.get(element)
-        if not width or not reading or self._variant is None:
-            return ""
-        data = self._variant.elements[element]
-        line, here = ("-", "|") if self.plain else ("─", "┃")
-        return bar(float(reading), data.low, data.high, width, line, here)
-
-    def _under(self, event: events.MouseEvent) -> str | None:
-        offset = event.get_content_offset(self)
-        if offset is None or not 1 <= offset.y <= len(self._names):
-            return None
-        name = self._names[offset.y - 1]
-        room = (self.content_size.width - 6) // 2
-        return name if name in BARE else f"{name}{1 if offset.x < 6 + room else 2}"
-
-    def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
-        """Turn the drum under the mouse forward."""
-        self._wheeled(event, 1)
-
-    def on_mouse_scroll_down(self, event: events.MouseScrollDown) -> None:
-        """Turn the drum under the mouse back."""
-        self._wheeled(event, -1)
-
-    def on_click(self, event: events.Click) -> None:
-        """Take up the element under the mouse."""
-        self._wheeled(event, 0)
-
-    def _wheeled(self, event: events.MouseEvent, way: int) -> None:
-        element = self._under(event)
-        if element is not None:
-            self.post_message(Wheeled(element, way))
+    def notify_style_update(self) -> None:
+        """Forget the colours of another theme."""
+        super().notify_style_update()
+        self._likes.clear()
 
 
 LEVERS = {

@@ -7,7 +7,7 @@ from textual import events
 from textual.message import Message
 
 from a7sim.console.panels import Panel
-from a7sim.console.sketches import Place, Sketch, sketched
+from a7sim.console.sketches import Place, Sketch, marked, pricked
 
 
 class Pointed(Message):
@@ -32,6 +32,7 @@ class SketchPanel(Panel):
         self._going_to: str | None = None
         self._title = ""
         self._sketch = Sketch([], None, {})
+        self._pricked: tuple[object, Sketch] = (None, self._sketch)
 
     def show(self, picture: str, points: Mapping[str, Place], mark: Place | None, going_to: str | None) -> None:
         """Show a print's points, where the mark stands, and which point is worked at."""
@@ -49,7 +50,10 @@ class SketchPanel(Panel):
         width, height = self.content_size
         if not self.display or not width or not height:
             return
-        sketch = sketched(*self._given, width, height, self.dot)
+        points, mark = self._given
+        if self._pricked[0] != (points, width, height):
+            self._pricked = (points, width, height), pricked(points, width, height, self.dot)
+        sketch = marked(self._pricked[1], mark, width, height)
         if (sketch, going_to) != (self._sketch, self._going_to):
             self._sketch, self._going_to = sketch, going_to
             self.refresh()

@@ -45,7 +45,9 @@ class Presets:
         return self.units.get(axis, variant.scales[axis].units_per_mm)
 
     def preset(self, variant: Variant, dials: Dials, axis: str, reading: float) -> None:
-        """Take note that a counter is made to show a reading where it stands."""
+        """Take note that a counter is made to show a reading where it stands, if it is one that can be."""
+        if not variant.scales[axis].preset:
+            return
         self.origins[axis] = self.origin(variant, axis) + reading - dials.counter(axis)
 
     def regeared(self, variant: Variant, dials: Dials, units: float) -> None:
@@ -140,3 +142,12 @@ def _outward() -> list[Place]:
     span = range(-SEARCH_RINGS, SEARCH_RINGS + 1)
     places = [(SEARCH_STEP_MM * i, SEARCH_STEP_MM * j) for i in span for j in span]
     return sorted(places, key=lambda place: place[0] ** 2 + place[1] ** 2)
+
+
+def sketch_of(projector: int, picture: str, client: Client) -> dict[str, Place]:
+    """Ask for the points that are pricked on the print in a projector."""
+    if not picture:
+        return {}
+    fields = client.fields(f"PHOT{projector}:SKET?")
+    places = zip(map(float, fields[1::3]), map(float, fields[2::3]), strict=True)
+    return dict(zip(fields[0::3], places, strict=True))

@@ -1,14 +1,27 @@
 """What the console is given when somebody sits down: the instrument, the sheet, the keys, and the terminal's limits."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.keymap import Keymap, default_keymap
+from a7sim.console.recalling import Said
 from a7sim.console.sheet import JobSheet
 from a7sim.console.words import ACUITY_UM
 from a7sim.link.client import Client
+
+if TYPE_CHECKING:
+    from a7sim.session.film import Film
+
+
+@dataclass(frozen=True)
+class Resumable:
+    """A session that was left or cut off: what it is, and what is called with whether to go on with it."""
+
+    about: str
+    decide: Callable[[bool], None]
 
 
 @dataclass(frozen=True)
@@ -30,6 +43,16 @@ class Seat:
     theme: str = "enamel"
     welcome: bool = False
     """Whether to tell a first-time visitor what there is."""
+    resumable: Callable[[], Resumable | None] = lambda: None
+    """Looks for a session to go on with, once the screen is there."""
+    greeting: Callable[[], str] = lambda: ""
+    """What is to be said when the instrument first answers."""
+    past: Callable[[], Iterable[Said]] = tuple
+    """What was said in the session that is gone on with."""
+    watching: bool = False
+    """Whether somebody else turns and this console only shows it."""
+    film: "Film | None" = None
+    """The session that is watched, where it is over."""
 
 
 def speaks_utf8(environment: Mapping[str, str] = os.environ) -> bool:

@@ -30,18 +30,29 @@ class Sketch:
         )
 
 
-def sketched(points: Mapping[str, Place], mark: Place | None, width: int, height: int, dot: str = "·") -> Sketch:
-    """Return the sketch of named places in so many columns and rows; names are written where there is room."""
+def pricked(points: Mapping[str, Place], width: int, height: int, dot: str = "·") -> Sketch:
+    """Return the sketch of named places in so many columns and rows, without the mark.
+
+    Names are written where there is room.
+    """
     rows = [[" "] * width for _ in range(height)]
     cells = {name: cell for name, place in points.items() if (cell := _cell(place, width, height)) is not None}
     for column, row in cells.values():
         rows[row][column] = dot
     for name, (column, row) in cells.items():
         _write(rows[row], column, name)
+    return Sketch(["".join(row) for row in rows], None, cells)
+
+
+def marked(sketch: Sketch, mark: Place | None, width: int, height: int) -> Sketch:
+    """Return a sketch of so many columns and rows with the mark on it."""
     at = _cell(mark, width, height) if mark is not None else None
-    if at is not None:
-        rows[at[1]][at[0]] = "+"
-    return Sketch(["".join(row) for row in rows], at, cells)
+    if at is None:
+        return sketch
+    column, row = at
+    rows = list(sketch.rows)
+    rows[row] = f"{rows[row][:column]}+{rows[row][column + 1 :]}"
+    return Sketch(rows, at, sketch.points)
 
 
 def _cell(place: Place, width: int, height: int) -> Cell | None:

@@ -7,14 +7,14 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 from serial import SerialException
 
 from a7sim.console.dials import Dials, question, read_dials
 from a7sim.console.eyepiece import Greys
-from a7sim.link.client import Client, Identity, InstrumentRefused
+from a7sim.console.news import Look, Met, News, Refused, Sight, Silent
+from a7sim.link.client import Client, InstrumentRefused
 from a7sim.manual import VARIANTS, Variant
 from a7sim.mistakes import Mistake
 
@@ -33,55 +33,6 @@ Order = Callable[[Client], None]
 
 class Lost(Exception):
     """The instrument does not answer."""
-
-
-@dataclass(frozen=True)
-class Look:
-    """What the eyepieces are to show: pictures of so many columns and rows; none of 0 columns."""
-
-    columns: int = 0
-    rows: int = 0
-    magnification: float = 8.0
-    eyes: tuple[int, ...] = (1, 2)
-    point: str | None = None
-    """The point of which the eye is to say where it stands."""
-
-
-@dataclass(frozen=True)
-class Sight:
-    """What the eyepieces show."""
-
-    look: Look
-    pictures: dict[int, Greys] = field(default_factory=dict)
-    """Greys ``(rows, columns)`` by eye."""
-    seen: dict[int, tuple[float, float] | None] = field(default_factory=dict)
-    """dx, dy in um of the point, by eye; None where it is not in the field of view."""
-
-
-@dataclass(frozen=True)
-class Met:
-    """An instrument answers."""
-
-    identity: Identity
-    variant: Variant
-
-
-@dataclass(frozen=True)
-class Refused:
-    """The instrument has refused something: what it said."""
-
-    errors: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Silent:
-    """The instrument does not answer any more, and why."""
-
-    why: str
-
-
-News = Met | Dials | Sight | Refused | Silent
-"""What the station tells the screen."""
 
 
 class Station:
@@ -109,7 +60,8 @@ class Station:
         """End the conversation once what was ordered is said."""
         self._leaving.set()
         self._orders.put(None)
-        self._thread.join(timeout=2.0)
+        if self._thread.is_alive():
+            self._thread.join(timeout=2.0)
 
     def order(self, order: Order) -> None:
         """Have something said; the dials are read afterwards."""
@@ -245,15 +197,3 @@ def seen_point(client: Client, eye: int, point: str) -> tuple[float, float] | No
     doubled = point.replace('"', '""')
     dx, dy = client.numbers(f'EYEP{eye}? "{doubled}"')
     return (dx, dy) if max(abs(dx), abs(dy)) < 1e9 else None
-
-
-def elapsed(seconds: float) -> str:
-    """Return a time as hours, minutes and seconds."""
-    whole = int(seconds)
-    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
-
-
-def wall_time() -> Callable[[], float]:
-    """Return a clock that counts the seconds from now on, as the wall does."""
-    began = time.monotonic()
-    return lambda: time.monotonic() - began

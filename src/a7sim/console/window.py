@@ -1,6 +1,5 @@
 """The window of an eyepiece on the screen: runs of grey as a widget."""
 
-from collections.abc import Callable
 from functools import lru_cache
 from textwrap import wrap
 from typing import ClassVar
@@ -38,20 +37,22 @@ def _of_both(level: int | None) -> Color | None:
     return Color.from_rgb(left, right, right)
 
 
-def _strip_of(
-    row: list[Run], width: int, look: Callable[[int | None, int | None], Style], dark: Style, mark: Style
-) -> Strip:
-    segments = []
-    room = width
-    for text, ink, paper in row:
-        if ink == MARK:
-            segments.append(Segment(text, dark + look(None, paper) + mark))
-        else:
-            segments.append(Segment(text, dark if ink is None else look(ink, paper)))
-        room -= len(text)
-    if room > 0:
-        segments.append(Segment(" " * room, dark))
-    return Strip(segments, max(width, width - room))
+@lru_cache(maxsize=16384)
+def _segment(run: Run, in_colours: bool) -> Segment:
+    look = _red_and_cyan if in_colours else _grey
+    return Segment(run.text, look(run.ink, run.paper))
+
+
+def _strip_of(row: list[Run], width: int, in_colours: bool, dark: Style, mark: Style) -> Strip:
+    segments = [_segment(run, in_colours) if run.ink is not None else Segment(run.text, dark) for run in row]
+    for at, run in enumerate(row):
+        if run.ink == MARK:
+            look = _red_and_cyan if in_colours else _grey
+            segments[at] = Segment(run.text, dark + look(None, run.paper) + mark)
+    drawn = sum(len(run.text) for run in row)
+    if drawn < width:
+        segments.append(Segment(" " * (width - drawn), dark))
+    return Strip(segments, max(width, drawn))
 
 
 class Eyepiece(Widget):
@@ -80,6 +81,13 @@ class Eyepiece(Widget):
         self._strips: list[Strip] = []
         self._rows: list[list[Run]] = []
         self._in_colours = False
+        self._styles_now: tuple[Style, Style] | None = None
+
+    def notify_style_update(self) -> None:
+        """Forget what is drawn in the colours of another theme."""
+        super().notify_style_update()
+        self._styles_now = None
+        self._strips = []
 
     @property
     def cells(self) -> tuple[int, int]:
@@ -90,23 +98,24 @@ class Eyepiece(Widget):
         """Draw rows of runs, if they are not those that are shown."""
         if rows == self._rows and in_colours == self._in_colours and self._strips:
             return
-        self._rows, self._in_colours = rows, in_colours
-        self._lay()
+        self._rows, self._in_colours, self._strips = rows, in_colours, []
+        self.refresh()
 
     def say(self, words: str) -> None:
         """Show words instead of a picture, wrapped to the room."""
         lines = wrap(words, max(8, self.content_size.width))
         self.show([[Run(line)] for line in lines])
 
-    def _lay(self) -> None:
-        width, dark = self.content_size.width, self.rich_style
-        look = _red_and_cyan if self._in_colours else _grey
-        mark = self.get_component_rich_style("eyepiece--mark", partial=True)
-        self._strips = [_strip_of(row, width, look, dark, mark) for row in self._rows]
-        self.refresh()
+    def _drawn(self) -> list[Strip]:
+        if self._styles_now is None:
+            self._styles_now = self.rich_style, self.get_component_rich_style("eyepiece--mark", partial=True)
+        width = self.content_size.width
+        return [_strip_of(row, width, self._in_colours, *self._styles_now) for row in self._rows]
 
     def render_line(self, y: int) -> Strip:
         """Return a line of the picture on the dark of the eyepiece."""
+        if len(self._strips) != len(self._rows):
+            self._strips = self._drawn()
         if y < len(self._strips):
             return self._strips[y]
         return Strip.blank(self.content_size.width, self.rich_style)

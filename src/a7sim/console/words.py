@@ -1,4 +1,6 @@
-"""What an eye would say of an image beside the mark, for screen readers and for `--plain`."""
+"""What an eye would say of an image beside the mark, for screen readers and for `--plain`; refusals in words."""
+
+import re
 
 ACUITY_UM = 10.0
 """What the eye tells apart, um at photo scale, unless somebody says otherwise."""
@@ -35,3 +37,10 @@ def parallax_in_words(parallax: tuple[float, float] | None, acuity: float = ACUI
 def length(um: float) -> str:
     """Return a length for people, in um or mm."""
     return f"{um / 1e3:.2g} mm" if abs(um) >= 1000.0 else f"{um:.0f} um"
+
+
+def error_in_words(error: str) -> str:
+    """Return an entry of the instrument's error queue as people read it, without number and header."""
+    _, _, text = error.partition(",")
+    message, _, detail = text.strip().strip('"').partition(";")
+    return re.sub(r"^[A-Z]+[A-Z0-9:?]*( \S+)?: ", "", detail) or message

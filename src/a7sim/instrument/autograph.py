@@ -250,6 +250,11 @@ class Autograph:
         """Return the reading of a counter with the decimals that it shows."""
         return self._counters[axis].text(self._carriages[axis].at)
 
+    @property
+    def counter_scales(self) -> dict[str, tuple[float, float]]:
+        """What each counter shows in the origin of the frame, and its units a mm, by axis; what it missed included."""
+        return {axis: (each.offset, each.units_per_mm) for axis, each in self._counters.items()}
+
     def counter_limits(self, axis: str) -> tuple[float, float]:
         """Return the counter readings at the two ends of a carriage."""
         low, high = self.variant.carriages[axis]

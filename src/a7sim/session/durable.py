@@ -100,6 +100,21 @@ class DurableFile:
         return self._trouble
 
 
+def being_written(path: Path) -> bool:
+    """Return whether somebody writes a file of lines now."""
+    try:
+        file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(file)
+    return False
+
+
 def stopped(path: Path, error: OSError) -> JournalStopped:
     """Return what is said where a file of a journal can no longer be written."""
     return JournalStopped(f"{path}: it can no longer be written, so the session stops here: {error.strerror}")

@@ -24,6 +24,11 @@ _REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
 _LONGEST_SHOWN = 300
 
 
+def registers(line: str) -> bool:
+    """Return whether a line registers something or strikes it out."""
+    return _REGISTERS.search(line) is not None
+
+
 def software() -> str:
     """Return the name and version under which journals are written."""
     return f"a7sim {a7sim.__version__}"
@@ -138,13 +143,13 @@ class Journal:
             if self._desk is None:
                 self._unwritten.append(event)
             return
-        registers, self._time = False, event.time
+        at_once, self._time = False, event.time
         if event.direction == ">":
             if self._since_checkpoint >= EVERY and self._desk is not None and self._desk.quiet:
                 self._checkpoint(event.time, self._desk)
-            registers = _REGISTERS.search(event.text) is not None
+            at_once = registers(event.text)
         self._since_checkpoint += 1
-        self._write(Event(event.time, event.client, event.direction, event.text), registers)
+        self._write(Event(event.time, event.client, event.direction, event.text), at_once)
 
     def written(self, entry: Entry, time: float) -> None:
         """Write an entry of the observation book, or that it was struck out. Raises Mistake where that fails."""

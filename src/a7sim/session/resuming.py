@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from a7sim.instrument.language import Desk
 from a7sim.mistakes import Mistake
@@ -42,22 +42,30 @@ def begun_in(folder: Path, command: str) -> Begun:
     return Begun(journalled, *scenario_of_journal(journalled))
 
 
-def served_again(begun: Begun, journal: Journal) -> tuple[Desk, float]:
-    """Return the desk of a served instrument as its journal leaves it, its clients gone, and the time there in s.
+class Again(NamedTuple):
+    """An instrument as a journal leaves it, its clients gone: the desk, the time there in s, and who held the lock."""
 
-    The journal goes on.
+    desk: Desk
+    time: float
+    held_by: str | None
 
-    Raises Mistake where what the journal holds does not happen again.
+
+def served_again(begun: Begun, journal: Journal, from_checkpoint: bool = False) -> Again:
+    """Return an instrument as its journal leaves it; the journal goes on.
+
+    All that it holds happens again, or what stands behind its last checkpoint. Raises Mistake where it does not.
     """
     replay = Replay(begun.journalled)
-    for number, _, difference in replayed(replay):
+    first = replay.seek(len(begun.journalled) + 1) if from_checkpoint else 2
+    for number, _, difference in replayed(replay, first):
         if difference is not None:
             raise Mistake(f"{begun.journalled.where(number)}: {_not_again(difference)}")
     desk = replay.desk
     desk.listener = journal.continued(begun.journalled, desk, replay.checkpoints).heard
+    held_by = desk.lock_holder
     for client in [*desk.clients]:
         desk.close(client, replay.time)
-    return desk, replay.time
+    return Again(desk, replay.time, held_by)
 
 
 def _not_again(difference: Difference) -> str:

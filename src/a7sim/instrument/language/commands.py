@@ -21,6 +21,7 @@ from a7sim.instrument.language.table import (
     QuotedOrNumber,
     short_form,
 )
+from a7sim.instrument.recorder import Registration
 from a7sim.manual import NOT_VISIBLE, SCPI_VERSION
 
 if TYPE_CHECKING:
@@ -509,11 +510,22 @@ def _last_record(engine: "Engine", call: Call) -> str:
     registrations = _autograph(engine).recorder.registrations
     if not registrations:
         raise LanguageError(ErrorNumber.EXECUTION_ERROR, "nothing is registered yet")
-    last = registrations[-1]
-    counters = [reading for _, reading in last.readings[:3]]
-    elements = [f"{name},{reading}" for name, reading in last.readings[3:]]
-    struck = [quoted(f"struck: {last.struck}")] if last.struck is not None else []
-    return ",".join([str(last.number), quoted(last.point), *counters, *elements, *struck])
+    return _shown(registrations[-1])
+
+
+def _numbered_record(engine: "Engine", call: Call) -> str:
+    return _shown(_autograph(engine).recorder.numbered(int(call.arguments[0])))
+
+
+def _shown(registration: Registration) -> str:
+    counters = [reading for _, reading in registration.readings[:3]]
+    elements = [f"{name},{reading}" for name, reading in registration.readings[3:]]
+    struck = [quoted(f"struck: {registration.struck}")] if registration.struck is not None else []
+    return ",".join([str(registration.number), quoted(registration.point), *counters, *elements, *struck])
+
+
+def _struck_records(engine: "Engine", call: Call) -> str:
+    return str(sum(each.struck is not None for each in _autograph(engine).recorder.registrations))
 
 
 def _strike(engine: "Engine", call: Call) -> None:
@@ -533,6 +545,12 @@ _RECORDING = [
         repeats=AnyWord("element"),
         about="register X, Y, Z and the named elements (BY1, KAPP2, BX, CPHI ...) under the point",
     ),
+    Command(
+        "RECord?",
+        _numbered_record,
+        (Quantity(whole=True, name="number"),),
+        about="a registration as it stands: number, point, X, Y, Z and element,reading ...",
+    ),
     Command("RECord:LAST?", _last_record, about="number, point, X, Y, Z and element,reading ..."),
     Command("RECord:COUNt?", lambda e, c: str(len(_autograph(e).recorder.registrations)), about="registrations"),
     Command(
@@ -541,6 +559,7 @@ _RECORDING = [
         (Quantity(whole=True, name="number"), Quoted("why")),
         about="strike a registration out; it stays, marked",
     ),
+    Command("RECord:STRike:COUNt?", _struck_records, about="registrations that are struck out"),
     Command("NOTE", _note, (Quoted("text"),), about="a remark into the journal"),
 ]
 

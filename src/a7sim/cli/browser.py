@@ -1,0 +1,90 @@
+"""`a7sim console --browser`: the console that was asked for, served to browsers of this machine."""
+
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+from a7sim.mistakes import Mistake
+
+PORT, IDLE_MIN = 8515, 30.0
+
+_OPTIONS = (
+    click.option("--browser", is_flag=True, help="Serve it to browsers of this machine instead."),
+    click.option(
+        "--port", type=click.IntRange(0, 65535), default=PORT, show_default=True, help="Where; 0 for any that is free."
+    ),
+    click.option(
+        "--idle-exit",
+        type=click.FloatRange(min=0.0, min_open=True, max=1e5),
+        default=IDLE_MIN,
+        show_default=True,
+        metavar="MIN",
+        help="End when no browser has been connected for so long.",
+    ),
+)
+_OWN = ("browser", "port", "idle_exit")
+
+
+def in_a_browser(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a console that is served to browsers."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def drawn_by_a_browser() -> bool:
+    """Whether this process draws what a browser shows, as its server says."""
+    return "TEXTUAL_DRIVER" in os.environ
+
+
+def served_instead(context: click.Context) -> bool:
+    """Serve the command of a context without its browser, until it is ended or left alone, if that was asked for."""
+    if not context.params["browser"]:
+        _refuse_without_browser(context)
+        return False
+    try:
+        from a7sim.console.browser import serve  # noqa: PLC0415 # only a browser's console needs the server
+    except ImportError as error:
+        raise Mistake("--browser: expected textual-serve to be installed: pip install 'a7sim[browser]'") from error
+    minutes = f"{context.params['idle_exit']:g} min"
+
+    def told(url: str) -> None:
+        click.echo(f"{url}  (Ctrl+C ends it, and so do {minutes} without a browser)")
+        sys.stdout.flush()
+
+    os.environ["LC_ALL"] = "C.UTF-8"
+    if serve(_said_again(context), context.params["port"], 60.0 * context.params["idle_exit"], told):
+        click.echo(f"no browser for {minutes}: ended")
+    return True
+
+
+def _refuse_without_browser(context: click.Context) -> None:
+    given = [name for name in _OWN if _was_said(context, name)]
+    if given:
+        raise Mistake(f"--{given[0].replace('_', '-')}: expected --browser beside it")
+
+
+def _was_said(context: click.Context, name: str) -> bool:
+    return context.get_parameter_source(name) is not ParameterSource.DEFAULT
+
+
+def _said_again(context: click.Context) -> list[str]:
+    """Return the words that start the same command without its browser."""
+    words = [sys.executable, "-m", "a7sim", "console"]
+    for parameter in context.command.params:
+        name, value = str(parameter.name), context.params.get(str(parameter.name))
+        if name not in _OWN and value is not None and _was_said(context, name):
+            words += _words(parameter, value)
+    return words
+
+
+def _words(parameter: click.Parameter, value: Any) -> list[str]:
+    if isinstance(parameter, click.Argument):
+        return [str(value)]
+    if isinstance(parameter, click.Option) and parameter.is_flag:
+        return parameter.opts[:1] if value else parameter.secondary_opts[:1]
+    return [parameter.opts[0], str(value)]

@@ -1,0 +1,162 @@
+"""Where somebody sits down: at an instrument in this process, at a line, or before what others do."""
+
+from collections.abc import Callable, Iterable
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from a7sim.cli.links import token_from
+from a7sim.cli.prompt import data_folder
+from a7sim.console.margins import elapsed
+from a7sim.console.recalling import Said
+from a7sim.console.seat import Resumable, Seat
+from a7sim.console.sheet import JobSheet
+from a7sim.link.client import Client
+from a7sim.link.clock import Clock, WallClock
+from a7sim.mistakes import Mistake
+from a7sim.scenario import Scenario, bare_name
+
+if TYPE_CHECKING:
+    from a7sim.session.chair import Chair
+    from a7sim.session.shelf import Left
+
+SHELF = "sessions"
+
+
+class InProcess:
+    """A seat at the instrument of a scenario in this process. What imports the instrument waits for the screen."""
+
+    def __init__(self, name: str, scenario: Scenario, seed: int | None, out: Path | None, go_on: bool | None) -> None:
+        self._name, self._scenario = name, scenario
+        self._seed = scenario.seed if seed is None else seed
+        self._folder = out or data_folder() / SHELF / bare_name(name)
+        self._go_on = go_on
+        self._clock, self._wall = Clock(), WallClock()
+        self._left: Left | None = None
+        self._chair: Chair | None = None
+        self._greeting = ""
+        if go_on is not None or (out is not None and out.exists()):
+            self._answered_beforehand(out)
+
+    def _answered_beforehand(self, out: Path | None) -> None:
+        last = self._last()
+        if self._go_on:
+            if last is None or last.begun is None:
+                found = last.trouble if last else "found none"
+                raise Mistake(
+                    f"--go-on: expected a session of {self._name} at seed {self._seed} in {self._folder}: {found}"
+                )
+            self._decide(last, True)
+        elif last is None and out is not None and out.exists():
+            raise Mistake(
+                f"{out}: expected a folder that does not exist yet, or that of a session of {self._name} at seed "
+                f"{self._seed}, got another"
+            )
+
+    @property
+    def seat(self) -> Seat:
+        """The seat, as it is before anybody has sat down."""
+        return Seat(
+            self._opened,
+            self._time,
+            where=self._name,
+            sheet=JobSheet(self._scenario.title, self._scenario.camera),
+            resumable=self._resumable,
+            greeting=lambda: self._greeting,
+            past=self._past,
+        )
+
+    def _last(self) -> "Left | None":
+        if not self._folder.exists():
+            return None
+        from a7sim.session.shelf import last_session  # noqa: PLC0415 # only where there may be one
+
+        return last_session(self._folder, self._scenario, self._seed)
+
+    def _resumable(self) -> Resumable | None:
+        if self._go_on is not None:
+            return None
+        last = self._last()
+        if last is None:
+            return None
+        if last.begun is None:
+            self._greeting = f"begun anew, since the last session cannot be gone on with: {last.trouble}"
+            return None
+        if not last.worked:
+            self._decide(last, True)
+            self._greeting = ""
+            return None
+        when = datetime.fromtimestamp(last.when).strftime("%Y-%m-%d %H:%M")  # as the person's clock shows it
+        about = f"{elapsed(last.lasted)} at the instrument, left {when}, kept in {last.folder}"
+        return Resumable(about, lambda goes_on: self._decide(last, goes_on))
+
+    def _decide(self, last: "Left", goes_on: bool) -> None:
+        if goes_on:
+            self._left = last
+            self._wall = WallClock(now=last.lasted)
+            self._greeting = f"where it stood, {elapsed(last.lasted)} at the instrument; ? is help"
+
+    def _opened(self) -> Client:
+        """Sit down in the chair, which is built when the instrument is first spoken to."""
+        if self._chair is None:
+            from a7sim.session.chair import Chair  # noqa: PLC0415 # beside the first paint of the screen
+
+            begun = self._left.begun if self._left else None
+            self._chair = Chair(self._scenario, self._seed, self._folder, self._clock, begun)
+        return self._chair.sit_down()
+
+    def _past(self) -> Iterable[Said]:
+        return (Said(each.text, each.dir == "<") for each in self._chair.past()) if self._chair else ()
+
+    def _time(self) -> float:
+        self._clock.pass_to(self._wall.now)
+        return self._clock.now
+
+    def stand_up(self) -> Path | None:
+        """End the journal; return the folder where it is, None where nothing was begun."""
+        if self._chair is None:
+            return None
+        self._chair.stand_up()
+        return self._chair.folder
+
+
+def at_a_line(url: str, sheet: JobSheet, token_file: Path | None, watching: bool = False) -> Seat:
+    """Return a seat at a served instrument. Raises Mistake where nobody answers there."""
+    token = token_from(token_file)
+    Client.open(url, token=token).close()
+    wall = WallClock()
+    return Seat(
+        lambda: Client.open(url, token=token),
+        lambda: wall.now,
+        alone=False,
+        where=url,
+        sheet=sheet,
+        watching=watching,
+        greeting=_watching_now(url) if watching else lambda: "",
+    )
+
+
+def _watching_now(url: str) -> Callable[[], str]:
+    return lambda: f"watching {url}; ? is help"
+
+
+def before_a_film(session: str) -> Seat:
+    """Return a seat from which a session that is over is watched. Raises Mistake where there is none."""
+    from a7sim.session.film import film_of  # noqa: PLC0415 # only for who watches one
+
+    film = film_of(session)
+    title = str(film.journalled.header.get("title", ""))
+    return Seat(
+        film.opened,
+        lambda: film.frame.time,
+        where=session,
+        sheet=JobSheet(title),
+        watching=True,
+        film=film,
+        greeting=lambda: "hands off: space plays, . steps, g jumps; ? is help",
+    )
+
+
+def is_url(watched: str) -> bool:
+    """Whether what is to be watched is an instrument at work rather than a session that is over."""
+    return "://" in watched or Path(watched).is_char_device()

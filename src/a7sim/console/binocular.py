@@ -1,0 +1,104 @@
+"""The binocular: both eyepieces, how they show what they see, and what is drawn in them."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from textual.app import ComposeResult
+from textual.containers import Horizontal
+from textual.timer import Timer
+
+from a7sim.console.eyepiece import Drawing, anaglyph, drawn, picture_size, vignetted, with_mark
+from a7sim.console.news import Look, Sight
+from a7sim.console.window import Eyepiece
+
+FLICKER_S = 0.25
+
+NAMES = {1: "left eye", 2: "right eye"}
+
+
+@dataclass(frozen=True)
+class View:
+    """How the eyepieces show what they see."""
+
+    drawing: Drawing
+    magnification: float = 8.0
+    eyes: tuple[int, ...] = (1, 2)
+    merged: str = "side by side"
+
+    @property
+    def in_one(self) -> bool:
+        """Whether both pictures are shown in one eyepiece."""
+        return self.merged != "side by side" and self.drawing is Drawing.HALVES
+
+
+class Binocular(Horizontal):
+    """Both eyepieces."""
+
+    def __init__(self, view: View, mark: str) -> None:
+        super().__init__(id="eyes")
+        self.view = view
+        self._mark = mark
+        self._eyes = {eye: Eyepiece(eye, name) for eye, name in NAMES.items()}
+        self._sight: Sight | None = None
+        self._flicker: Timer | None = None
+        self._flicker_eye = 1
+
+    def compose(self) -> ComposeResult:
+        """Lay the eyepieces side by side."""
+        yield from self._eyes.values()
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the eyepieces are there, and not yet gone."""
+        return all(each.is_attached for each in self._eyes.values())
+
+    def set_view(self, **changes: Any) -> None:
+        """Change how the eyepieces show what they see."""
+        self.view = replace(self.view, **changes)
+        if self._flicker is not None:
+            self._flicker.stop()
+            self._flicker = None
+        if self.view.merged == "flicker":
+            self._flicker = self.set_interval(FLICKER_S, self._other_eye)
+
+    def lay(self) -> None:
+        """Open and close the eyepieces as the view has them."""
+        view = self.view
+        for eye, eyepiece in self._eyes.items():
+            closed = eye == 2 if view.in_one else eye not in view.eyes
+            eyepiece.set_class(closed, "-closed")
+            eyepiece.border_title = view.merged if view.in_one else NAMES[eye]
+            eyepiece.border_subtitle = f"x{view.magnification:g}"
+
+    def look(self, point: str | None) -> Look:
+        """Return what the open eyepieces have room for; of a point where the view is in words."""
+        view = self.view
+        open_ones = [each for each in self._eyes.values() if not each.has_class("-closed")]
+        cells = min((each.cells for each in open_ones), default=(0, 0))
+        columns, rows = picture_size(view.drawing, *cells)
+        eyes = (1, 2) if view.in_one else view.eyes
+        return Look(columns, rows, view.magnification, eyes, point if view.drawing is Drawing.WORDS else None)
+
+    def draw(self, sight: Sight) -> None:
+        """Draw the pictures that the eyes see."""
+        self._sight = sight
+        view = self.view
+        pictures = {eye: vignetted(greys) for eye, greys in sight.pictures.items()}
+        both = view.in_one and len(pictures) == 2
+        if both and view.merged == "anaglyph":
+            self._eyes[1].show(with_mark(anaglyph(pictures[1], pictures[2]), self._mark), in_colours=True)
+            return
+        if both:
+            pictures = {1: pictures[self._flicker_eye]}
+        for eye, greys in pictures.items():
+            self._eyes[eye].show(with_mark(drawn(view.drawing, greys), self._mark))
+
+    def say(self, words: dict[int, str]) -> None:
+        """Say to each eye in words what it sees."""
+        for eye, said in words.items():
+            self._eyes[eye].say(said)
+
+    def _other_eye(self) -> None:
+        self._flicker_eye = 3 - self._flicker_eye
+        if self._sight is not None and self.view.drawing is not Drawing.WORDS:
+            self.draw(self._sight)

@@ -1,0 +1,147 @@
+"""The console in a browser: served to this machine alone, with nothing fetched from anywhere else.
+
+Every page that is opened has a console of its own, in a process of its own, which ends with the page.
+"""
+
+import asyncio
+import os
+import shlex
+import signal
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import aiohttp_jinja2
+from aiohttp import web
+from textual_serve.app_service import AppService
+from textual_serve.server import Server, to_int
+
+from a7sim.mistakes import Mistake
+
+LOOPBACK = "127.0.0.1"
+OWN_NAMES = (LOOPBACK, "localhost")
+PAGE = Path(__file__).parent / "page"
+TITLE = "a7sim console"
+FONT_SIZES = (6, 60)
+CLOSING_S = 2.0
+
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; font-src 'self'; img-src 'self' data:; "
+    "connect-src ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""What a page may fetch: its own parts, and the conversation with its console. xterm.js writes styles of its own."""
+
+
+@dataclass
+class Visitors:
+    """Who looks on: pages that are open, and a call when there has been none for some seconds."""
+
+    idle_s: float
+    left_alone: Callable[[], None]
+    pages: set[web.WebSocketResponse] = field(default_factory=set)
+    _alarm: asyncio.TimerHandle | None = None
+
+    def watch(self) -> None:
+        """Count from now how long nobody has been there."""
+        self._alarm = asyncio.get_running_loop().call_later(self.idle_s, self.left_alone)
+
+    @contextmanager
+    def looking_on(self, page: web.WebSocketResponse) -> Iterator[None]:
+        """Take a page for open."""
+        if self._alarm is not None:
+            self._alarm.cancel()
+        self.pages.add(page)
+        try:
+            yield
+        finally:
+            self.pages.remove(page)
+            if not self.pages:
+                self.watch()
+
+
+class BrowserServer(Server):
+    """Serves a command that draws a console to browsers of this machine."""
+
+    def __init__(self, command: Sequence[str], port: int, visitors: Visitors) -> None:
+        super().__init__(shlex.join(command), LOOPBACK, port, TITLE, templates_path=PAGE)
+        self._visitors = visitors
+
+    async def application(self) -> web.Application:
+        """Return the pages, each only for who asks for it by a name of this machine."""
+        application = await self._make_app()
+        application.middlewares.append(_this_machine_alone)
+        return application
+
+    async def on_startup(self, app: web.Application) -> None:
+        """Say nothing: who called says where the console is."""
+
+    async def on_shutdown(self, app: web.Application) -> None:
+        """Close the pages that are open; their consoles end with them."""
+        for page in list(self._visitors.pages):
+            await page.close()
+
+    @aiohttp_jinja2.template("app_index.html")
+    async def handle_index(self, request: web.Request) -> dict[str, Any]:
+        """Return what the page is made of."""
+        smallest, largest = FONT_SIZES
+        size = min(max(to_int(request.query.get("fontsize", ""), 16), smallest), largest)
+        return {"title": TITLE, "websocket": f"ws://{request.host}/ws", "font_size": size}
+
+    async def _process_messages(self, websocket: web.WebSocketResponse, app_service: AppService) -> None:
+        with self._visitors.looking_on(websocket):
+            await super()._process_messages(websocket, app_service)
+
+
+@web.middleware
+async def _this_machine_alone(request: web.Request, handler: Callable[[web.Request], Any]) -> web.StreamResponse:
+    """Refuse pages of other sites, which a browser lets speak to this machine too."""
+    origin = request.headers.get("Origin")
+    if request.url.host not in OWN_NAMES or origin not in (None, f"http://{request.host}"):
+        raise web.HTTPForbidden(text="expected to be asked from this machine, by a page of this server")
+    response: web.StreamResponse = await handler(request)
+    if not response.prepared:
+        response.headers["Content-Security-Policy"] = _POLICY.format(host=request.host)
+    return response
+
+
+def serve(command: Sequence[str], port: int, idle_s: float, told: Callable[[str], None]) -> bool:
+    """Serve a command at a port, 0 for any that is free, until a signal ends it; return whether it was left alone.
+
+    `told` gets the address once it is open. It also ends when no page has been open for `idle_s` seconds.
+    """
+    try:
+        door = socket.create_server((LOOPBACK, port))
+    except OSError as error:
+        raise Mistake(f"--port {port}: expected a port that is free: {os.strerror(error.errno or 0)}") from error
+    with door:
+        return asyncio.run(_serving(command, door, idle_s, told))
+
+
+async def _serving(command: Sequence[str], door: socket.socket, idle_s: float, told: Callable[[str], None]) -> bool:
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    alone = False
+
+    def left_alone() -> None:
+        nonlocal alone
+        alone = True
+        ended.set()
+
+    port = door.getsockname()[1]
+    visitors = Visitors(idle_s, left_alone)
+    runner = web.AppRunner(
+        await BrowserServer(command, port, visitors).application(), access_log=None, shutdown_timeout=CLOSING_S
+    )
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    await runner.setup()
+    try:
+        await web.SockSite(runner, door).start()
+        visitors.watch()
+        told(f"http://{LOOPBACK}:{port}/")
+        await ended.wait()
+    finally:
+        await runner.cleanup()
+    return alone

@@ -1,0 +1,143 @@
+"""What the station tells, and what becomes of it: what the console knows, the banner, the book, the first keys."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from textual.message import Message
+
+from a7sim.console.book import Entry, read_book
+from a7sim.console.dials import Dials
+from a7sim.console.news import Met, News, Refused, Sight, Silent
+from a7sim.console.playback import TICK_S
+from a7sim.console.reaching import Presets, sketch_of
+from a7sim.console.recalling import recalled
+from a7sim.console.sitting import Sitting
+from a7sim.console.sketches import Place
+from a7sim.console.words import error_in_words
+from a7sim.link.client import Client
+
+
+class Told(Message):
+    """The station tells something."""
+
+    def __init__(self, news: News) -> None:
+        super().__init__()
+        self.news = news
+
+
+class Done(Message):
+    """Something that was asked has been answered: what is to be done with it."""
+
+    def __init__(self, then: Callable[[], None]) -> None:
+        super().__init__()
+        self.then = then
+
+
+class Hearing(Sitting):
+    """What is asked of the station, and told by it."""
+
+    def ask(self, work: Callable[[Client], Any], then: Callable[[Any], None]) -> None:
+        """Have something asked in the station's thread, and go on with the answer in the screen's."""
+        console = self._console
+
+        def order(client: Client) -> None:
+            answer = work(client)
+            console.post_message(Done(partial(then, answer)))
+
+        console.station.order(order)
+
+    def afterwards(self, then: Callable[[], None]) -> None:
+        """Go on when all that was ordered so far is said, and what came of it is known."""
+        self.ask(lambda _: None, lambda _: then())
+
+    def _tell(self, news: News) -> None:
+        self._console.post_message(Told(news))
+
+    def on_done(self, done: Done) -> None:
+        """Go on with an answer, unless the screen is gone."""
+        if self._console.main.is_there:
+            done.then()
+
+    def on_told(self, told: Told) -> None:
+        """Show what the station tells, unless the screen is gone."""
+        console = self._console
+        if not console.main.is_there:
+            return
+        match told.news:
+            case Met():
+                self._meet(told.news)
+            case Dials():
+                self._read(told.news)
+            case Sight():
+                console.sight = told.news
+                console.draw()
+            case Refused():
+                console.say(" · ".join(error_in_words(error) for error in told.news.errors), refused=True)
+            case Silent():
+                self._lose(told.news)
+
+    def _meet(self, met: Met) -> None:
+        console = self._console
+        first = console.met is None
+        console.met = met
+        console.hands = console.hands.on(met.variant)
+        if console.silent is not None:
+            console.silent = None
+            console.say("the instrument answers again")
+        else:
+            console.say(console.seat.greeting() or "l lays pictures; ? is help")
+        if first:
+            self._begin(met)
+        console.main.warn(None)
+        console.call_after_refresh(console.look)
+
+    def _begin(self, met: Met) -> None:
+        """Take up what was there before anybody sat down here."""
+        console = self._console
+        past = console.seat.past
+        self.ask(lambda _: recalled(met.variant, past()), self._recall)
+        if console.playback is not None:
+            console.playback.go_to(0)
+            console.set_interval(TICK_S, console.playback.tick)
+
+    def _recall(self, presets: Presets) -> None:
+        if presets != Presets():
+            self._console.presets = presets
+
+    def _lose(self, silent: Silent) -> None:
+        console = self._console
+        if silent != console.silent:
+            console.silent = silent
+            console.forget_early_keys()
+            if console.playback is not None:
+                console.playback.interrupted()
+            console.main.warn(f"The instrument does not answer: {silent.why}. Trying again every second; q leaves.")
+
+    def _read(self, dials: Dials) -> None:
+        console = self._console
+        before, console.dials = console.dials, dials
+        for projector, picture in enumerate(dials.pictures, start=1):
+            if before is None or before.pictures[projector - 1] != picture:
+                self.ask(partial(sketch_of, projector, picture), partial(self._sketch, projector))
+        if console.seat.watching or (before is None and console.seat.alone):
+            self._keep_book(dials)
+        console.refresh_panels()
+        if before is None:
+            console.press_early_keys()
+
+    def _keep_book(self, dials: Dials) -> None:
+        """Have the book as the recorder has it."""
+        console = self._console
+        if (dials.records, dials.struck) != (len(console.entries), sum(entry.struck for entry in console.entries)):
+            self.ask(partial(read_book, records=dials.records), self._open_book)
+
+    def _open_book(self, entries: tuple[Entry, ...]) -> None:
+        console = self._console
+        console.entries = entries
+        console.refresh_panels()
+
+    def _sketch(self, projector: int, points: dict[str, Place]) -> None:
+        console = self._console
+        console.sketches[projector] = points
+        console.refresh_panels()

@@ -1,0 +1,278 @@
+"""Watching at the console: a session that is over, on and back, or an instrument that somebody works; hands are off."""
+
+import asyncio
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from textual.widgets import Static
+
+from a7sim.cli.seats import at_a_line, before_a_film, is_url
+from a7sim.console.app import Console
+from a7sim.console.dials import question, read_dials
+from a7sim.console.drum_panels import Wheeled
+from a7sim.console.eyepiece import Drawing
+from a7sim.console.sheet import JobSheet
+from a7sim.console.window import Eyepiece
+from a7sim.instrument import build_autograph
+from a7sim.instrument.language import Desk
+from a7sim.link.client import Client
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.manual import VARIANTS
+from a7sim.mistakes import Mistake
+from a7sim.scenario import load_scenario
+from a7sim.scene import build_scene
+from a7sim.session import film as film_module
+from a7sim.session import journal as journal_module
+from a7sim.session.film import Film, film_of
+from a7sim.session.journal import Journal, header_of
+from a7sim.session.lines import read_journal
+from tests.door import with_model
+from tests.served import Served
+from tests.sitting_down import Person
+
+WORK = [
+    'PHOT1:LOAD "101";:PHOT2:LOAD "102"',
+    "PROJ1:PDIS 152.68;:PROJ2:PDIS 152.68;:BASE:BX 194.99;:DRIV:Z -325.71",
+    "COUN:X:PRES 5000;:COUN:Z:PRES 4967",
+    *(f'WHE:X 1;:EYEP1? "1011";:REC "P{number}",BY1' for number in range(1, 9)),
+    'REC:STR 3,"a slip"',
+    'NOTE "after the slip"',
+    *(f'PROJ1:BY:TURN 0.5;:REC "Q{number}"' for number in range(1, 5)),
+]
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session of 17 lines, ten seconds apart, with a checkpoint every ten events."""
+    folder = tmp_path_factory.mktemp("session")
+    scenario = load_scenario("akwanga")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr(journal_module, "EVERY", 10)
+        journal = Journal()
+        desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, 7).drawer, 7), journal.heard)
+        with journal.opened(folder, header_of("serve", scenario, 7), desk):
+            port = InProcessSerial(desk=desk, timeout=1.0)
+            for line in WORK:
+                port.clock.spend(10.0)
+                port.write(line.encode() + b"\n")
+            port.close()
+    return folder
+
+
+def film(session: Path) -> Film:
+    return film_of(str(session))
+
+
+def dials_of(a_film: Film) -> Any:
+    with a_film.opened() as client:
+        client.send(question(VARIANTS["A7"]))
+        return read_dials(VARIANTS["A7"], client.reply())
+
+
+def watched(session: str, sitting: Any, size: tuple[int, int] = (100, 30), **others: Any) -> None:
+    console = Console(replace(before_a_film(session), **{"drawing": Drawing.HALVES, **others}))
+
+    async def sit_down() -> None:
+        async with console.run_test(size=size) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            await sitting(person)
+
+    asyncio.run(sit_down())
+
+
+def progress(person: Person) -> str:
+    return str(person.console.main.query_one("#progress", Static).content)
+
+
+def message_of_eye(person: Person) -> str:
+    return " ".join(run.text for row in person.console.query_one("#eye1", Eyepiece)._rows for run in row)
+
+
+# --- the film -----------------------------------------------------------------------------------------
+
+
+def test_a_film_stands_the_same_whichever_way_it_came_there(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    straight = film(session)
+    assert straight.steps == len(WORK)
+    there = []
+    for step in range(straight.steps + 1):
+        frame = straight.run_to(step)
+        there.append((frame, dials_of(straight)))
+    assert straight.journalled.header["command"] == "serve" and frame.trouble == ""
+    jumping = film(session)
+    monkeypatch.setattr(film_module, "LEAP", 5)
+    for step in (17, 3, 9, 8, 0, 15, 1, 17):
+        assert (jumping.run_to(step), dials_of(jumping)) == there[step]
+    assert there[11][1].struck == 0 and there[12][1].struck == 1
+    assert [each.records for _, each in there] == [0] * 4 + [*range(1, 9), 8, 8, *range(9, 13)]
+
+
+def test_checkpoints_make_a_jump_say_few_lines_again(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(film_module, "LEAP", 5)
+    jumping = film(session)
+    said: list[int] = []
+    say = jumping._replay.__class__.say
+    monkeypatch.setattr(
+        jumping._replay.__class__,
+        "say",
+        lambda replay, number, event: said.append(number) or say(replay, number, event),
+    )
+    jumping.run_to(jumping.steps)
+    jumping.run_to(jumping.steps - 1)
+    assert len(said) <= 2 * 14 < len(jumping.journalled)
+
+
+def test_a_film_knows_what_was_done_where(session: Path) -> None:
+    a_film = film(session)
+    assert [a_film.next_record(step, 1) for step in (0, 4, 11, 17)] == [4, 5, 12, None]
+    assert [a_film.next_record(step, -1) for step in (17, 5, 4)] == [16, 4, None]
+    assert a_film.run_to(6).point == "P3" and a_film.run_to(2).point is None
+    assert (a_film.frame.said, a_film.frame.time) == (f"client1: {WORK[1]}", 20.0)
+    assert a_film.run_to(4).origins["X"] == 5000.0
+    assert [a_film.sought(words) for words in ("7", "70s", "0:01:10", "after the slip", "@2")] == [7, 7, 7, 13, 1]
+    for words in ("18", "never noted", "@999", "1:00:00"):
+        with pytest.raises(Mistake, match=f"jump to {words}: expected a step up to 17, a time up to 170s"):
+            a_film.sought(words)
+
+
+def test_what_does_not_happen_again_is_said(session: Path) -> None:
+    there = read_journal(session / "session.jsonl")
+    answers = next(number for number in range(2, len(there)) if there.event(number).dir == "<")
+    there.lines[answers - 1] = there.lines[answers - 1].replace(b'"text":"', b'"text":"9')
+    a_film = Film(there)
+    assert a_film.run_to(3).trouble == ""
+    assert f"line {answers}: expected again client1 < 9" in a_film.run_to(4).trouble
+
+
+@pytest.mark.parametrize(
+    ("watched", "so"), [("tcp://127.0.0.1:5025", True), ("clearing", False), ("runs/akwanga", False)]
+)
+def test_an_address_is_known_from_a_session(watched: str, so: bool) -> None:
+    assert is_url(watched) is so
+
+
+def test_a_session_in_which_nothing_was_said_is_one_sentence(tmp_path: Path) -> None:
+    scenario = load_scenario("akwanga")
+    with Journal().opened(tmp_path, header_of("serve", scenario, 7), None):
+        pass
+    with pytest.raises(Mistake, match="expected a session in which something was said, got none"):
+        film_of(str(tmp_path))
+
+
+# --- at the console -----------------------------------------------------------------------------------
+
+
+def test_keys_step_through_a_session_and_the_book_follows(session: Path) -> None:
+    async def sitting(person: Person) -> None:
+        console = person.console
+        assert progress(person) == f"paused (1x)  step 0 of {len(WORK)}  0:00:00"
+        await person.press(".", ".", ".", ".")
+        assert progress(person) == f"paused (1x)  step 4 of {len(WORK)}  0:00:40  client1: {WORK[3]}"
+        assert [entry.point for entry in console.entries] == ["P1"] and console.point == "P1"
+        assert console.dials.counters["X"] == "5001.00"
+        await person.until(lambda: any(each.any() for each in console.sight.pictures.values()))
+        await person.press(">", ">", ",")
+        assert console.playback.frame.step == 5
+        await person.press("g")
+        await person.type_in("after the slip")
+        assert [entry.point for entry in console.entries if entry.struck] == ["P3"]
+        await person.press("<", "<")
+        assert console.playback.frame.step == 11 and not any(entry.struck for entry in console.entries)
+        await person.press("g")
+        await person.type_in("99")
+        assert person.message().startswith("jump to 99: expected a step up to 17")
+        frame = "\n".join(await person.frame())
+        assert "space play" in frame and "hands off" in frame and "P7" in frame
+
+    watched(str(session), sitting)
+
+
+def test_hands_are_off_in_one_sentence_and_nothing_turns(session: Path) -> None:
+    async def sitting(person: Person) -> None:
+        console = person.console
+        await person.press(".", ".")
+        before = console.dials
+        for key in ("right", "+", "enter", "x", "l", ":", "s", "h", "f", "pageup"):
+            console.say("")
+            await person.press(key)
+            assert person.message() == "hands are off: what you watch has been done; space plays and pauses", key
+        console.post_message(Wheeled("X", 1))
+        await person.settle()
+        await person.press("m", "tab")
+        assert console.dials == before and console.view.magnification == 12.0
+
+    watched(str(session), sitting)
+
+
+def test_a_session_plays_at_its_pace_to_its_end_and_again(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    wall = [100.0]
+    monkeypatch.setattr("a7sim.console.playback.monotonic", lambda: wall[0])
+
+    async def sitting(person: Person) -> None:
+        playback = person.console.playback
+
+        async def after(seconds: float) -> int:
+            wall[0] += seconds
+            playback.tick()
+            await person.settle()
+            return playback.frame.step
+
+        await person.press("space")
+        assert playback.playing and await after(0.0) == 0
+        assert [await after(9.0), await after(2.0), await after(10.0)] == [0, 1, 2]
+        await person.press("]")
+        assert playback.speed == 10.0 and await after(0.0) == 2
+        assert await after(3.1) == 5
+        assert "playing 10x" in progress(person)
+        await person.press("space")
+        assert await after(100.0) == 5
+        await person.press("]", "]", "]", "space")
+        assert math.isinf(playback.speed)
+        monkeypatch.setattr("a7sim.console.playback.RUN_S", -1.0)
+        before = playback.frame.step
+        await person.until(lambda: playback.frame.step > before)
+        await person.until(lambda: not playback.playing)
+        assert playback.frame.step == len(WORK) and person.message() == "the end of the session"
+        await person.press("[", "[", "[", "space")
+        assert playback.frame.step == 0 and playback.playing
+
+    watched(str(session), sitting)
+
+
+def test_a_script_is_watched_too_and_in_words(session: Path) -> None:
+    async def sitting(person: Person) -> None:
+        await person.press(">")
+        assert "REC" in progress(person)
+        await person.until(lambda: "1011: image is on the mark" in message_of_eye(person))
+        assert person.message() == "1011: no y-parallax, no x-parallax"
+
+    watched("clearing", sitting, size=(80, 24), drawing=Drawing.WORDS)
+
+
+def test_who_watches_a_served_instrument_sees_what_another_does_and_turns_nothing() -> None:
+    with Served(with_model().desk) as served:
+        url = f"tcp://127.0.0.1:{served.port}"
+        console = Console(replace(at_a_line(url, JobSheet("Akwanga"), None, watching=True), drawing=Drawing.HALVES))
+
+        async def sit_down() -> None:
+            async with console.run_test(size=(100, 30)) as pilot:
+                person = Person(pilot)
+                await person.settle()
+                with Client.open(url) as operator, operator.lock():
+                    operator.send('WHE:X 3;:REC "P1";:REC "P2";:REC:STR 1,"a slip"')
+                    await person.until(lambda: [entry.struck for entry in console.entries] == [True, False])
+                    assert console.dials.counters["X"] == "3.00"
+                    await person.press("right", "+", "enter", "x")
+                    assert person.message() == f"hands are off: you watch what somebody else does at {url} now"
+                    await person.press("space")
+                    assert (
+                        person.message() == f"there is nothing to play: you watch what somebody else does at {url} now"
+                    )
+                    assert operator.ask("COUN:X?;:REC:COUN?;:PROJ1:BY?") == "3.00;2;0.00"
+                assert "m x8" in "\n".join(await person.frame())
+
+        asyncio.run(sit_down())
