@@ -86,7 +86,8 @@ class Replay:
         scenario, seed = scenario_of_journal(journalled, known)
         header = journalled.header
         settings = header.get("settings", {})
-        autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
+        drawer = build_scene(scenario, seed, header.get("pictures", 1)).drawer
+        autograph = build_autograph(scenario.instrument, drawer, seed)
         self.journalled = journalled
         self.desk = Desk(
             autograph,
