@@ -112,3 +112,7 @@ def test_at_the_command_line_a_script_is_told_judged_and_kept(tmp_path):
     done = replay(tmp_path / "s.a7s", "--quiet")
     assert (done.returncode, done.stdout) == (3, "")
     assert done.stderr == f"a7sim: {tmp_path}/s.a7s, line 2: expected COUN:X? = 11, got 0.00\n"
+
+
+def test_a_script_that_says_nothing_is_played_to_its_end(tmp_path):
+    assert played(tmp_path, "")[:2] == (None, [])

@@ -28,6 +28,7 @@ _VERBS = {
     "export": "a7sim.cli.export",
     "compare": "a7sim.cli.compare",
     "console": "a7sim.cli.console",
+    "train": "a7sim.cli.train",
 }
 
 

@@ -105,11 +105,11 @@ def command(
             prepare_folder(out, force)
         served = _served_anew(loaded, seed, token, realtime, out, Keeping(durability))
     with served.journal:
-        run(_serve(served, doors, terms, _Told(served.head, as_document, quiet)))
+        run(serve(served, doors, terms, Told(served.head, as_document, quiet)))
 
 
 @dataclass(frozen=True)
-class _Served:
+class Served:
     """What is served: a desk, the time at it, and the journal of what is said there."""
 
     head: Document
@@ -120,15 +120,15 @@ class _Served:
 
 def _served_anew(
     scenario: Scenario, seed: int, token: str | None, realtime: bool, out: Path | None, keeping: Keeping
-) -> _Served:
+) -> Served:
     autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
     journal = Journal(keeping)
     desk = Desk(autograph, journal.heard if out else None, token, 0.0 if realtime else POLL_TAKES)
     header = header_of("serve", scenario, seed, realtime=realtime, login=token is not None)
-    return _Served(_head(scenario, seed), desk, _clock(realtime), journal.opened(out, header, desk))
+    return Served(_head(scenario, seed), desk, _clock(realtime), journal.opened(out, header, desk))
 
 
-def _served_again(begun: Begun, token: str | None, keeping: Keeping) -> _Served:
+def _served_again(begun: Begun, token: str | None, keeping: Keeping) -> Served:
     if begun.setting("login") != (token is not None):
         asked, given = ("a", "none") if token is None else ("no", "one")
         raise Mistake(
@@ -137,14 +137,15 @@ def _served_again(begun: Begun, token: str | None, keeping: Keeping) -> _Served:
     journal = Journal(keeping)
     desk, now, _ = served_again(begun, journal)
     desk.token = token
-    return _Served(_head(begun.scenario, begun.seed), desk, _clock(begun.setting("realtime"), now), journal)
+    return Served(_head(begun.scenario, begun.seed), desk, _clock(begun.setting("realtime"), now), journal)
 
 
 def _clock(realtime: bool, now: float = 0.0) -> Clock | WallClock:
     return WallClock(now=now) if realtime else Clock(now)
 
 
-async def _serve(served: _Served, doors: Doors, terms: Terms, told: "_Told") -> None:
+async def serve(served: Served, doors: Doors, terms: Terms, told: "Told") -> None:
+    """Serve an instrument until the process is told to stop. Raises JournalStopped where nothing can be written."""
     stopped = asyncio.Event()
     broken: list[JournalStopped] = []
     loop = asyncio.get_running_loop()
@@ -172,7 +173,7 @@ async def _serve(served: _Served, doors: Doors, terms: Terms, told: "_Told") -> 
 
 
 @dataclass(frozen=True)
-class _Told:
+class Told:
     """What is printed once every door is open."""
 
     head: Document
@@ -180,6 +181,7 @@ class _Told:
     quiet: bool
 
     def ready(self, opened: list[dict[str, Any]]) -> None:
+        """Print where every door leads."""
         if self.as_document:
             click.echo(as_json(self.head | {"listening": opened}), nl=False)
         elif not self.quiet:

@@ -65,7 +65,7 @@ class Console(Hearing, Deeds, App[None]):
         self.playback = Playback(seat.film, self.ask, self.show_frame) if seat.film else None
         self._by_key = deeds_by_key(seat.keymap, seat.watching)
         self._early: deque[events.Key] | None = deque()
-        self.main = Front(self.binocular, self.key_pressed, self.utf8, seat.welcome)
+        self.main = Front(self.binocular, self.key_pressed, self.utf8, seat.welcome, seat.tasks)
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = seat.theme

@@ -1,6 +1,6 @@
 """The front of the instrument: the main screen, its panels and where they stand."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from textual import events
 from textual.app import ComposeResult
@@ -36,12 +36,20 @@ class Front(Screen[None]):
     class Laid(Message):
         """All panels are there."""
 
-    def __init__(self, binocular: Binocular, pressed: Callable[[events.Key], bool], utf8: bool, welcome: bool) -> None:
+    def __init__(
+        self,
+        binocular: Binocular,
+        pressed: Callable[[events.Key], bool],
+        utf8: bool,
+        welcome: bool,
+        tasks: Callable[[], Sequence[str]] | None = None,
+    ) -> None:
         super().__init__(id="bench", classes="" if utf8 else "-ascii")
         self._binocular = binocular
         self._pressed = pressed
         self._utf8 = utf8
         self._welcome = welcome
+        self._tasks = tasks
         self._counters = [Counter(axis) for axis in "XYZ"]
         self._sketches = [SketchPanel(n, f"{where}{n}") for where in ("side", "sketch") for n in (1, 2)]
         self._hinted: Hints = ()
@@ -61,6 +69,8 @@ class Front(Screen[None]):
         with Horizontal(id="lower"):
             yield from self._sketches[2:]
             yield Book()
+        if self._tasks is not None:
+            yield Static(id="tasks", markup=False)
         yield Static(id="progress", markup=False)
         yield Static(id="message", markup=False)
         yield Static(id="hints", markup=False)
@@ -75,7 +85,13 @@ class Front(Screen[None]):
         self.query_one(Elements).plain = not self._utf8
         for sketch in self._sketches:
             sketch.dot = "·" if self._utf8 else "."
+        if self._tasks is not None:
+            self.set_interval(1.0, self._show_tasks)
         self.post_message(self.Laid())
+
+    def _show_tasks(self) -> None:
+        if self._tasks is not None:
+            self.query_one("#tasks", Static).update("\n".join(self._tasks()))
 
     def on_key(self, event: events.Key) -> None:
         """Do what the keymap says."""

@@ -1,7 +1,7 @@
 """What the console is given when somebody sits down: the instrument, the sheet, the keys, and the terminal's limits."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -41,6 +41,8 @@ class Seat:
     """How pictures are drawn; None for the best that the terminal can."""
     acuity_um: float = ACUITY_UM
     theme: str = "enamel"
+    tasks: Callable[[], Sequence[str]] | None = None
+    """What there is to do, a line each, asked again every second; None where nobody has set any tasks."""
     welcome: bool = False
     """Whether to tell a first-time visitor what there is."""
     resumable: Callable[[], Resumable | None] = lambda: None

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -80,6 +80,18 @@ class Autograph:
         self._principal_points = {n: 1e-3 * np.array(each.principal_point_um) for n, each in projectors.items()}
         self._local = {n: local_coefficients(each) for n, each in projectors.items()}
         self._rods = {n: 1e-3 * np.array(each.rod_um) if any(each.rod_um) else None for n, each in projectors.items()}
+
+    @classmethod
+    def of(cls, instrument: Instrument, photographs: Mapping[str, Photograph], seed: int) -> Self:
+        """Return the instrument of a scenario with its photographs in the drawer."""
+        return cls(
+            VARIANTS[instrument.variant],
+            condition_of(instrument, seed),
+            photographs,
+            instrument.serial,
+            (instrument.laying_sigma_mm, instrument.laying_sigma_gon),
+            np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM,))),
+        )
 
     def _element_spindle(self, name: str, element: Element) -> Spindle:
         condition = self._condition
@@ -456,8 +468,15 @@ class Autograph:
 
     def mark_on_carrier(self, projector: int) -> Array:
         """Return the place ``(2,)`` in mm on a carrier where the space rod brings the floating mark."""
+        return self.on_carrier(projector, self.mark_in_model())
+
+    def on_carrier(self, projector: int, place: Array) -> Array:
+        """Return the place ``(2,)`` in mm on a carrier where the space rod brings a place ``(3,)`` of the frame.
+
+        Part of the truth, but where the mark stands.
+        """
         return place_on_carrier(
-            self.mark_in_model(),
+            place,
             *self.pose(projector),
             self._spindles[f"c{projector}"].position,
             self._principal_points[projector],
@@ -544,11 +563,4 @@ def guides_of(condition: Condition) -> Array:
 
 def build_autograph(instrument: Instrument, photographs: Mapping[str, Photograph], seed: int) -> Autograph:
     """Return the instrument of a scenario with its photographs in the drawer."""
-    return Autograph(
-        VARIANTS[instrument.variant],
-        condition_of(instrument, seed),
-        photographs,
-        instrument.serial,
-        (instrument.laying_sigma_mm, instrument.laying_sigma_gon),
-        np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM,))),
-    )
+    return Autograph.of(instrument, photographs, seed)

@@ -15,7 +15,8 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
 
     Whatever is written is obeyed before `write` returns; its replies wait to be read. What waits for movement lets
     simulated time pass on the clock, and nothing blocks. Line settings
-    (baud rate, parity ...) are taken and change nothing. Several ports may share one desk.
+    (baud rate, parity ...) are taken and change nothing. Several ports may share one desk, each the
+    `client` of its name.
     """
 
     is_open: bool
@@ -26,10 +27,12 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         *args: Any,
         desk: Desk | None = None,
         clock: Clock | None = None,
+        client: str | None = None,
         **kwargs: Any,
     ) -> None:
         self.clock = clock or Clock()
         self._desk = desk
+        self._client = client
         self._engine: Engine | None = None
         self._unread, self._read_up_to = b"", 0
         self._alone = threading.RLock()
@@ -48,7 +51,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
             raise SerialException("expected a port to open, got none")
         if self.is_open:
             raise SerialException(f"expected a closed port, got {self.port}, which is open")
-        self._engine = self._connect().open(time=self.clock.now)
+        self._engine = self._connect().open(self._client, time=self.clock.now)
         self._unread, self._read_up_to = b"", 0
         self._cancelled = False
         self.is_open = True

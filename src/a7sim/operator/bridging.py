@@ -99,7 +99,7 @@ def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedMod
         begin_form(bench, model, "interior orientation", begins)
         if last is not None:
             _see_that_it_follows(bench, last, model)
-            _carry_on(bench, model)
+            carry_on(bench, model)
         set_base_and_fittings(bench, model.base, model.polarity)
         mount(bench, model, interior)
         prints = take_up_prints(bench, model)
@@ -108,16 +108,16 @@ def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedMod
         if last is None:
             preset_counters(bench, model)
         else:
-            _set_as_its_neighbour(bench, model)
+            set_as_its_neighbour(bench, model)
         begin_form(bench, model, "relative orientation", begins)
         orientation = _oriented(bench, model)
         scale = np.ones(crew.sessions)
         if last is not None:
             begin_form(bench, model, "scale", begins)
-            scale = _scaled(bench, crew.everybody, model, before)
+            scale = carry_scale_on(bench, crew.everybody, model, before)
         orientation = _refined(bench, model, orientation)
         if last is not None:
-            scale *= _scaled(bench, crew.everybody, model, before)
+            scale *= carry_scale_on(bench, crew.everybody, model, before)
         begin_form(bench, model, "model coordinates", begins)
         points = model_coordinates(bench, model)
         see_that_somebody_goes_on(bench)
@@ -139,7 +139,7 @@ def _see_that_it_follows(bench: Bench, last: ModelJob, model: ModelJob) -> None:
 # --- from one model to the next ---------------------------------------------------------------------------------------
 
 
-def _carry_on(bench: Bench, model: ModelJob) -> None:
+def carry_on(bench: Bench, model: ModelJob) -> None:
     """Preset X for the oriented photograph's new place on the left, and Y and Z where its by and bz run out.
 
     With the base changed over, its centre comes from X = bx to X = 0: what stands in X = 0 has to read bx more.
@@ -155,7 +155,7 @@ def _carry_on(bench: Bench, model: ModelJob) -> None:
             seat.set_elements(who[far], {name: np.full(int(far.sum()), element.zero)})
 
 
-def _set_as_its_neighbour(bench: Bench, model: ModelJob) -> None:
+def set_as_its_neighbour(bench: Bench, model: ModelJob) -> None:
     """Start the new photograph from the tilts and the by and bz of the oriented one, and bx from the plan."""
     seat, who = bench.seat, bench.crew.everybody
     left, right = model.left_projector, model.right_projector
@@ -176,7 +176,7 @@ def _oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
 # --- scale ------------------------------------------------------------------------------------------------------------
 
 
-def _scaled(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]) -> Array:
+def carry_scale_on(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]) -> Array:
     """Change the base until common points read the heights that they had; return the factor ``(sessions,)``.
 
     by and bz of the new photograph follow, so that the base keeps its direction and the parallaxes stay cleared.

@@ -48,23 +48,37 @@ class Seat:
     def prepare(self, who: Who) -> None:
         """Bring the instruments to their zeros, engage the gears, set base and projection height."""
         plan, hands = self.job.plan, self.hands
-        self.manual = VARIANTS[hands.variant()]
-        gear = plan.height_gear
-        self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
+        gear = self._learn_manual()
         hands.engage(who, 1.0, plan.plan_gear)
         hands.reset(who)
         self.spend_setting(who, 6)
         self._left_at.clear()
         self.run_element(who, "bx", np.full(who.size, plan.bx))
         hands.drive(who, {"Z": np.full(who.size, -plan.projection_height)})
-        self._plane = np.array([self.manual.scales[axis].units_per_mm for axis in "XY"])
-        for row, axis in enumerate("XY"):
-            self._offset[row, who] = self.manual.scales[axis].at_origin
+        self._count_from_origin(who, "XY")
         hands.drive(who, dict(zip("XY", self._offset[:2, who], strict=True)))
         height = hands.counter(who, "Z")
         hands.engage(who, gear, plan.plan_gear)
         self.see_that_it_obeyed(who, "preparing the instrument")
         self._offset[2, who] = hands.counter(who, "Z") - self.units_per_mm * height
+
+    def take_over(self, who: Who) -> None:
+        """Sit down at instruments that somebody else has prepared by the job sheet, their counters not yet preset."""
+        self._learn_manual()
+        self._left_at.clear()
+        self._count_from_origin(who, "XYZ")
+
+    def _learn_manual(self) -> str | float:
+        """Read up on the plotter; return the height gear that the job sheet asks for."""
+        gear = self.job.plan.height_gear
+        self.manual = VARIANTS[self.hands.variant()]
+        self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
+        self._plane = np.array([self.manual.scales[axis].units_per_mm for axis in "XY"])
+        return gear
+
+    def _count_from_origin(self, who: Who, axes: str) -> None:
+        for axis in axes:
+            self._offset["XYZ".index(axis), who] = self.manual.scales[axis].at_origin
 
     def begin(self, who: Who, model: ModelJob) -> None:
         """Take up a model whose pictures are mounted."""

@@ -50,6 +50,11 @@ class Model:
         place = {name: i for i, name in enumerate(self.points)}
         return self.coordinates[:, [place[name] for name in names]]
 
+    def without(self, point: str) -> "Model":
+        """Return the model without a point."""
+        keep = [i for i, name in enumerate(self.points) if name != point]
+        return Model(self.name, tuple(self.points[i] for i in keep), self.coordinates[:, keep])
+
 
 @dataclass(frozen=True)
 class Join:

@@ -23,7 +23,7 @@ def mistakes_of_form(raw: Raw, expected: inspect.Type, path: str = "") -> Iterat
         yield from _mistakes_in_list(raw, constraint, described, path)
     elif isinstance(constraint, inspect.DictType):
         yield from _mistakes_in_dictionary(raw, constraint, path)
-    elif not _fits(raw, constraint):
+    elif not isinstance(constraint, inspect.AnyType) and not _fits(raw, constraint):
         yield f"{path}: expected {described or _in_words(constraint)}, got {_shown(raw)}"
 
 

@@ -10,7 +10,7 @@ from a7sim.scene.coverage import within_band
 from a7sim.scene.lines import GroundLine
 from a7sim.scene.terrain import Ground
 
-HOUSES_STREAM = 7
+HOUSES_STREAM = 8
 """Spawn key of the houses' random numbers, under the terrain's own seed."""
 
 HAMLET_EVERY_M, HAMLET_M = 220.0, 45.0

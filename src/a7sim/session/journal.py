@@ -71,6 +71,8 @@ class Keeping:
 
     durability: Durability = "records"
     resumes: bool = False
+    states: bool = True
+    """Whether states are kept beside the journal, for seeking in it; they are part of the truth."""
 
 
 class Journal:
@@ -129,9 +131,10 @@ class Journal:
         return self
 
     def _begin(self, folder: Path, size: int, states: bytes) -> None:
-        self._states = folder / STATES
         self._file = DurableFile(folder / JOURNAL, self._keeping.durability, size)
-        self._states.write_bytes(states)
+        if self._keeping.states:
+            self._states = folder / STATES
+            self._states.write_bytes(states)
 
     def heard(self, event: LinkEvent) -> None:
         """Write what happened on the link. Raises JournalStopped where that fails, unless somebody just went."""

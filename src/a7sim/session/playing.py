@@ -25,18 +25,23 @@ class NotMet:
 
 
 class Player:
-    """A fresh instrument with the operator of a script at it."""
+    """The operator of a script, at a fresh instrument or at a desk that is there."""
 
-    def __init__(self, script: Script, listener: Listener | None = None) -> None:
-        scene = build_scene(script.scenario, script.seed)
+    def __init__(
+        self,
+        script: Script,
+        listener: Listener | None = None,
+        desk: Desk | None = None,
+        clock: Clock | None = None,
+    ) -> None:
         self._script = script
-        self._clock = Clock()
-        self.desk = Desk(build_autograph(script.scenario.instrument, scene.drawer, script.seed), listener)
+        self._clock = clock or Clock()
+        self.desk = desk or _fresh(script, listener)
 
-    def play(self) -> NotMet | None:
+    def play(self, client: str | None = None) -> NotMet | None:
         """Carry out the statements up to the first that fails, and return that; an error not expected is one."""
-        engine = self.desk.open()
-        for done, after in zip(self._script.statements, [*self._script.statements[1:], None], strict=True):
+        engine = self.desk.open(client, time=self._clock.now)
+        for done, after in zip(self._script.statements, [*self._script.statements[1:], None], strict=False):
             failed = self._carry_out(engine, done)
             if failed is None and not _asks_for_errors(after) and engine.errors:
                 failed = NotMet(done.place, f"{_said(done)} to be obeyed", engine.errors[0])
@@ -58,6 +63,11 @@ class Player:
             return None
         errors = f" ({engine.errors[0]})" if engine.errors else ""
         return NotMet(statement.place, str(statement), (", ".join(answer) or "no answer") + errors)
+
+
+def _fresh(script: Script, listener: Listener | None) -> Desk:
+    scene = build_scene(script.scenario, script.seed)
+    return Desk(build_autograph(script.scenario.instrument, scene.drawer, script.seed), listener)
 
 
 def _said(statement: Statement) -> str:

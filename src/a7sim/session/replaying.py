@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from a7sim.instrument import build_autograph
+from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import LONGEST_LINE, Desk, LinkEvent
 from a7sim.instrument.language.desk import POLL_TAKES
 from a7sim.instrument.language.logins import THE_TOKEN
@@ -80,14 +80,20 @@ class Difference:
 
 
 class Replay:
-    """A fresh instrument to which the lines of a journal are said again, from the first or from a checkpoint."""
+    """A fresh instrument to which the lines of a journal are said again, from the first or from a checkpoint.
 
-    def __init__(self, journalled: Journalled, known: Scenario | None = None) -> None:
-        scenario, seed = scenario_of_journal(journalled, known)
+    Where the journal is not asked what the instrument is, that is handed in.
+    """
+
+    def __init__(
+        self, journalled: Journalled, known: Scenario | None = None, autograph: Autograph | None = None
+    ) -> None:
         header = journalled.header
         settings = header.get("settings", {})
-        drawer = build_scene(scenario, seed, header.get("pictures", 1)).drawer
-        autograph = build_autograph(scenario.instrument, drawer, seed)
+        if autograph is None:
+            scenario, seed = scenario_of_journal(journalled, known)
+            drawer = build_scene(scenario, seed, header.get("pictures", 1)).drawer
+            autograph = build_autograph(scenario.instrument, drawer, seed)
         self.journalled = journalled
         self.desk = Desk(
             autograph,
@@ -157,6 +163,12 @@ class Replay:
     def ended(self) -> Difference | None:
         """Return what the instrument still says where the journal ends, if it does."""
         return self._left_over(len(self.journalled) + 1)
+
+    def unsaid(self) -> list[LinkEvent]:
+        """Return what the instrument still says where the journal ends: it broke off before that was written."""
+        left = list(self._said)
+        self._said.clear()
+        return left
 
     def _left_over(self, number: int) -> Difference | None:
         if not self._said:

@@ -62,6 +62,8 @@ def served_again(begun: Begun, journal: Journal, from_checkpoint: bool = False) 
             raise Mistake(f"{begun.journalled.where(number)}: {_not_again(difference)}")
     desk = replay.desk
     desk.listener = journal.continued(begun.journalled, desk, replay.checkpoints).heard
+    for event in replay.unsaid():
+        journal.heard(event)
     held_by = desk.lock_holder
     for client in [*desk.clients]:
         desk.close(client, replay.time)

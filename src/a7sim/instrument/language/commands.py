@@ -481,7 +481,8 @@ _RECORDED |= {node.upper(): name for node, name, _, _ in _ELEMENT_NODES}
 _COMMON_TO_BOTH = {"BX": "bx", "CPHI": "common_phi"}
 
 
-def _recorded_element(word: str) -> str:
+def recorded_element(word: str) -> str:
+    """Return the element that a word in a registration names. Raises LanguageError."""
     if word in _COMMON_TO_BOTH:
         return _COMMON_TO_BOTH[word]
     found = re.fullmatch(r"([A-Z]+)([12])", word)
@@ -501,7 +502,7 @@ def _text_within(text: str) -> str:
 def _record(engine: "Engine", call: Call) -> None:
     autograph = _autograph(engine)
     point, *words = call.arguments
-    elements = [(word, _fixed(autograph.element(_recorded_element(word)))) for word in words]
+    elements = [(word, _fixed(autograph.element(recorded_element(word)))) for word in words]
     counters = [(axis, autograph.counter_text(axis)) for axis in "XYZ"]
     autograph.recorder.register(_text_within(point), counters + elements)
 

@@ -1,0 +1,51 @@
+"""A class graded: two hundred students' journals on two cores, and one journal beside its bare replay.
+
+Prints the seconds of the class (to be below 60 on two cores), and how much longer grading takes than replaying.
+"""
+
+import tempfile
+import time
+from pathlib import Path
+
+from a7sim.session.lines import read_journal
+from a7sim.training.attempts import attempted
+from a7sim.training.exercise import Played
+from a7sim.training.grading import graded
+from a7sim.training.handed_in import graded_folders
+from a7sim.training.room import seen_again
+from a7sim.training.shelf import find_exercise
+from a7sim.training.variation import seed_of
+
+STUDENTS, CORES = 200, 2
+
+DONE = (("4", Played(procedure="measure parallaxes", observer={"skill": "trained"})), ("14", None), ("1", None))
+"""A long journal, one whose papers are to be made again, and a short one, by turns."""
+
+
+def timed(does):
+    begun = time.perf_counter()
+    does()
+    return time.perf_counter() - begun
+
+
+def main():
+    with tempfile.TemporaryDirectory() as place:
+        folders, lines = [], 0
+        for i in range(STUDENTS):
+            name, played = DONE[i % len(DONE)]
+            shelved, student = find_exercise(name), f"student {i}"
+            folder = Path(place) / str(i)
+            attempted(shelved, played or shelved.exercise.reference, folder, seed_of(student, shelved.name), student)
+            folders.append(folder)
+            lines += len(read_journal(folder / "session.jsonl"))
+        seconds = timed(lambda: graded_folders(folders, workers=CORES))
+        shelved, seed, folder = find_exercise("4"), seed_of("student 0", "04-parallax"), folders[0]
+        journal = folder / "session.jsonl"
+        replaying = min(timed(lambda: seen_again(shelved, seed, read_journal(journal))) for _ in range(3))
+        grading = min(timed(lambda: graded(shelved, seed, folder)) for _ in range(3))
+    print(f"{STUDENTS} journals, {lines} lines, {CORES} processes: {seconds:.1f} s")
+    print(f"grading takes {grading / replaying:.2f} times as long as replaying")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,449 @@
+"""Write the reference and the faulty scripts of the exercises that need eyes: `python docs/make_exercise_scripts.py`.
+
+The driver looks through the eyepieces at the exercise's own instrument and writes down where handles came to stand.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from a7sim.geometry import GON
+from a7sim.link.client import Client
+from a7sim.link.headers import header, recorded_as, short
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.manual import RIGHT_FITTINGS
+from a7sim.training.attempts import open_
+from a7sim.training.handouts import handed_out
+from a7sim.training.room import entered
+from a7sim.training.shelf import find_exercise
+
+LOOKS = 8
+
+
+class Driver:
+    """Somebody with perfect eyes who writes a script of what they do."""
+
+    def __init__(self, room, seed, intro):
+        port = InProcessSerial(desk=room.desk, clock=room.clock, client="student", timeout=1.0)
+        self.client, self.room = Client(port), room
+        self.model = room.account().model
+        self.lines = [f"scenario {room.shelved.exercise.scenario} seed {seed}", "", *(f"# {each}" for each in intro)]
+        self.readings = 0
+        self.skew = 0.0
+
+    def say(self, line, comment=""):
+        self.client.send(line)
+        self.lines.append(f"{line:<34}# {comment}" if comment else line)
+
+    def wait(self, seconds, comment=""):
+        self.room.clock.spend(seconds)
+        self.lines.append(f"{f'wait {seconds}':<34}# {comment}" if comment else f"wait {seconds}")
+
+    def remark(self, *texts):
+        self.lines += ["", *(f"# {each}" for each in texts)]
+
+    def expect(self, query, values, within, comment=""):
+        line = f"expect {query} = {values} +- {within}"
+        self.lines.append(f"{line:<44}  # {comment}" if comment else line)
+
+    def name(self, position):
+        return self.model.standard_points[position]
+
+    def seen(self, point):
+        return self.client.numbers(f'EYEP1? "{point}";:EYEP2? "{point}"')
+
+    def fuse(self, point, follow="XYZ", tell=True):
+        """Bring the mark onto a point, with Z onto the ground too; write down where it came to stand."""
+        scale = 1e-3 * self.room.scenario.plan.projection_height / self.room.scenario.camera.c
+        bx = self.client.numbers("BASE:BX?")[0]
+        for _ in range(LOOKS):
+            lx, ly, rx, ry = self.seen(point)
+            assert max(map(abs, (lx, ly, rx, ry))) < 1e9, f"{point} is not in view"
+            x, y, z = self.client.numbers("COUN?")
+            rise = (lx - rx) * scale * -z / bx if "Z" in follow else 0.0
+            ahead = -rise / -z
+            x += (lx + rx) / 2 * scale + ahead * (x - bx / 2)
+            y += (ly + ry) / 2 * scale + ahead * y
+            at = {"X": x, "Y": y, "Z": z + rise}
+            line = "DRIV:" + ";".join(f"{axis} {at[axis]:.2f}" for axis in follow)
+            self.client.send(line)
+        if tell:
+            self.lines.append(line)
+
+    def point_with_left_eye(self, point, side):
+        """Bring the mark onto a point by the wheels, X coming from one side; return the reading of X."""
+        scale = 1e-3 * self.room.scenario.plan.projection_height / self.room.scenario.camera.c
+        for _ in range(LOOKS):
+            dx, dy = self.client.numbers(f'EYEP1? "{point}"')
+            x, y = dx * scale, dy * scale
+            if abs(x) < 0.0051 and abs(y) < 0.0051:
+                break
+            if x * side < 0:
+                self.say(f"WHE:X {-0.50 * side:.2f}", "too far: back, and come again")
+                continue
+            self.say(f"WHE:X {x:.2f};Y {y:.2f}")
+        return self.client.numbers("COUN:X?")[0]
+
+    def come_to(self, position, rough):
+        self.client.send("DRIV:X {:.2f};Y {:.2f}".format(*rough))
+        self.fuse(self.name(position))
+
+    def clear(self, element, by):
+        """Turn by until the parallax is gone, to the least count; return what the drum shows."""
+        point, sense = self.name(by), -1.0 if element == "by1" else 1.0
+        scale = 1e-3 * self.room.scenario.plan.projection_height / self.room.scenario.camera.c
+        at = self.client.numbers(f"{header(element)}?")[0]
+        for _ in range(LOOKS):
+            self.fuse(point, "XYZ", tell=False)
+            _, ly, _, ry = self.seen(point)
+            if abs((ly - ry) * scale) < 0.0051:
+                break
+            at = round(at - (ly - ry) * scale / sense, 2)
+            self.client.send(f"{header(element)} {at:.2f}")
+        return at
+
+    def turn_to_clear(self, element, position):
+        """Turn a drum between its counts until a point is clear; return by how much."""
+        point, turned, probe = self.name(position), 0.0, 0.02
+        for _ in range(LOOKS):
+            before = self._parallax(point)
+            self.client.send(f"{header(element)}:TURN {probe:.4f}")
+            turned += probe
+            after = self._parallax(point)
+            if abs(after) < 0.3 or after == before:
+                break
+            probe = round(max(-1.0, min(1.0, -after * probe / (after - before))), 4)
+            if probe == 0.0:
+                break
+        return turned
+
+    def _parallax(self, point):
+        self.fuse(point, tell=False)
+        _, left, _, right = self.seen(point)
+        return left - right
+
+    def fiducials(self, projector):
+        """Look at the fiducials, and write down that it was done and what was seen."""
+        fields = self.client.fields(f"PHOT{projector}:FID?")
+        shown = ", ".join(f'"{each}"' if i % 3 == 0 else each for i, each in enumerate(fields))
+        self.lines.append(f"expect PHOT{projector}:FID? = {shown} +- 0.001")
+        return {fields[i]: (float(fields[i + 1]), float(fields[i + 2])) for i in range(0, len(fields), 3)}
+
+    def record(self, point, element=""):
+        self.say(f'REC "{point}"' + (f",{recorded_as(element)}" if element else ""))
+        self.readings += 1
+
+    def finish(self, path):
+        if self.readings:
+            self.lines += ["", f"expect REC:COUN? = {self.readings}"]
+        path.write_text("\n".join(self.lines) + "\n", encoding="utf-8")
+
+
+ROUGH = {"1": (0, 0), "2": (195, 0), "3": (0, 182), "4": (195, 182), "5": (0, -182), "6": (195, -182)}
+"""About where the standard points lie below the centres, mm."""
+
+
+def scripts_of(name, seed, play, variants):
+    """Write the reference and the faulty scripts of an exercise: file name, what is done otherwise, and the heading."""
+    shelved = find_exercise(name)
+    for file, otherwise, intro in variants:
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            entered(shelved, seed, Path(folder), "author", "practice") as room,
+        ):
+            open_(room)
+            driver = Driver(room, seed, intro)
+            play(driver, otherwise)
+            driver.finish(shelved.folder / file)
+            print(shelved.folder / file)
+
+
+def parallax(driver, otherwise):
+    signs = {"by1": "by'", "by2": 'by"'}
+    for position in "315624":
+        driver.remark(f"Point {position}")
+        driver.wait(240, "to look, to turn and to write takes its time")
+        name = driver.name(position)
+        if otherwise == "in the air" and position != "3":
+            driver.client.send("DRIV:X {:.2f};Y {:.2f}".format(*ROUGH[position]))
+            driver.fuse(name, "XY")
+        else:
+            driver.come_to(position, ROUGH[position])
+        for element in ("by1", "by2"):
+            if otherwise == "half" and element == "by2" and position in "456":
+                continue
+            other = "by2" if element == "by1" else "by1"
+            rest = driver.client.numbers(f"{header(element)}?")[0]
+            at = driver.clear(element, position)
+            if otherwise == "wrong way" and position == "5" and element == "by1":
+                at = -at
+            for again in range(2):
+                if again and otherwise != "no second":
+                    driver.say(f"{header(element)} {at - 0.08:.2f}", "away, to see it anew")
+                if not (again and otherwise == "no second"):
+                    driver.say(f"{header(element)} {at:.2f}", "" if again else f"cleared with {signs[element]}")
+                if not again:
+                    driver.fuse(name, "Y" if otherwise == "in the air" else "YZ")
+                driver.record(name, element)
+            left = otherwise == "left" and position == "3" and element == "by2"
+            if not left:
+                driver.say(f"{header(element)} {0 if otherwise != 'left' else rest:g}")
+            assert other
+
+
+def counters(driver, otherwise):
+    places = {"A": (40.0, 60.0), "B": (150.0, -80.0), "C": (97.5, 12.34)}
+    for name, (x, y) in places.items():
+        driver.remark(f"Place {name}: X {x:.2f}, Y {y:.2f}, twice, coming from smaller readings")
+        driver.wait(120, "to find the place and to read")
+        for again in range(2):
+            if again and otherwise == "no second":
+                driver.record(name)
+                continue
+            from_above = otherwise == "from above" and name in "BC"
+            step = -0.50 if from_above else 0.50
+            driver.say(f"DRIV:X {x - step:.2f};Y {y - step:.2f}", "near it" if not again else "away, and back again")
+            if otherwise == "by motor" and name == "C":
+                driver.say(f"DRIV:X {x:.2f};Y {y:.2f}", "run there")
+            elif otherwise == "off by a tenth" and name == "B":
+                driver.say(f"WHE:X {step - 0.10:.2f};Y {step:.2f}", "the drum misread")
+            else:
+                driver.say(f"WHE:X {step:.2f};Y {step:.2f}", "by hand, upwards" if step > 0 else "by hand, downwards")
+            driver.record(name)
+    driver.remark("Two drums to the hundredth")
+    driver.wait(60)
+    driver.say("PROJ1:BZ 1.25")
+    driver.say("PROJ2:BY -0.37")
+    driver.remark(
+        "The play of the X spindle: point 1 under the mark of the left eye, first coming from smaller readings, then",
+        "from larger ones. The picture stands alike both times; the counter does not.",
+    )
+    driver.wait(180)
+    point, read = driver.name("1"), {}
+    driver.client.send("PROJ1:BZ 1.25;:DRIV:X 0;Y 0;Z -330")
+    for side in (1,) if otherwise == "one side" else (1, -1):
+        driver.say("DRIV:Y -5.00;Z -330.00")
+        driver.say(f"DRIV:X {-3.0 * side:.2f}", "beyond it, on the " + ("left" if side > 0 else "right"))
+        read[side] = driver.point_with_left_eye(point, side)
+        driver.record(point)
+    play = round(read[1] - read[-1], 2) if len(read) > 1 else 0.00
+    driver.remark("The difference of the two readings is the play.")
+    driver.say(f'NOTE "answer play={play:.2f}"')
+
+
+CASES = {
+    "A": ("negative", "inside", "101n", "102n"),
+    "B": ("negative", "outside", "103n", "102n"),
+    "C": ("positive", "outside", "103", "102"),
+    "D": ("positive", "inside", "101", "102"),
+}
+
+
+def fittings(driver, otherwise):
+    nodes = {"dove": "DOVE", "triangulation": "TRI", "diapositive": "DIAP", "xcollar": "XCOL", "ycollar": "YCOL"}
+    forgotten = {"y collar": ("A", "ycollar"), "dove": ("B", "dove"), "diapositive": ("C", "diapositive")}
+    forgotten["triangulation"] = ("D", "triangulation")
+    lying = ["", ""]
+    for letter, (polarity, base, left, right) in CASES.items():
+        driver.remark(f"{letter}: {polarity}s, base {base[:-4]}, {left} on the left and {right} on the right")
+        for projector, name in ((1, left), (2, right)):
+            if lying[projector - 1] != name:
+                driver.say(f'PHOT{projector}:LOAD "{name}"')
+                lying[projector - 1] = name
+        driver.wait(200, "to lay pictures takes its time")
+        driver.say(f"BASE:MODE {short(base)}")
+        for fitting, position in RIGHT_FITTINGS[polarity, base].as_words().items():
+            if (letter, fitting) != forgotten.get(otherwise):
+                driver.say(f"FITT:{nodes[fitting]} {short(position)}")
+        if otherwise != "blind" or letter == "A":
+            driver.lines += ["# Look, turn a handwheel, and look again.", "expect EYEP1:PICT? 1,1,8 = *"]
+            driver.client.block("EYEP1:PICT? 1,1,8")
+            driver.say("WHE:X 1;Y 1")
+        driver.record(letter)
+
+
+def interior(driver, otherwise):
+    camera = driver.room.scenario.camera
+    places = {each.name: (each.x, each.y) for each in camera.fiducials}
+    pictures = {1: "101", 2: "102"} if otherwise != "exchanged" else {1: "102", 2: "101"}
+    for projector, picture in pictures.items():
+        driver.remark(f"{picture}: laid, its fiducials looked at, centred")
+        driver.say(f'PHOT{projector}:LOAD "{picture}"')
+        driver.wait(300, "laying it takes five minutes")
+        displaced = driver.fiducials(projector)
+        driver.lines.append("# The mean displacement is the shift, how they go round is the turn; both are taken away.")
+        xy, d = np.array([places[name] for name in displaced]).T, np.array(list(displaced.values())).T
+        turn = float((xy[0] * d[1] - xy[1] * d[0]).sum() / (xy**2).sum()) / GON
+        shift = -(d.mean(axis=1) + camera.principal_point)
+        if otherwise == "sign" and projector == 1:
+            shift = -shift
+        driver.say(f"PHOT{projector}:CENT {shift[0]:.3f},{shift[1]:.3f},{-turn:.3f}")
+        left = displaced if otherwise == "not checked" else driver.fiducials(projector)
+        scale = float((xy * np.array(list(left.values())).T).sum() / (xy**2).sum())
+        driver.wait(60, "to compute")
+        driver.lines.append(
+            f"# The film is smaller by {-1e6 * scale:.0f} parts in a million, and so is the principal distance."
+        )
+        c = camera.c if otherwise == "certificate" else camera.c * (1.0 + scale)
+        driver.say(f"PROJ{projector}:PDIS {c:.2f}")
+
+
+STEPS = (("2", "by2"), ("1", "kappa2"), ("4", "bz2"), ("3", "phi2"), ("6", "omega2"))
+
+
+def one_projector(driver, otherwise):
+    steps = [STEPS[4], *STEPS[:4]] if otherwise == "omega first" else STEPS
+    if otherwise == "left turned":
+        steps = [(at, "by1" if element == "by2" else element) for at, element in steps]
+    rounds = 1 if otherwise == "one round" else 4
+    for number in range(1, rounds + 1):
+        driver.remark(f"Round {number}")
+        driver.wait(600, "five points to go to, to look at and to turn at")
+        for position, element in steps:
+            driver.come_to(position, ROUGH[position])
+            amount = driver.turn_to_clear(element, position)
+            if element == "omega2" and otherwise not in ("one round", "omega first"):
+                _, y, z = driver.client.numbers("COUN?")
+                n = (1.0 + (z / y) ** 2) / 2.0
+                driver.client.send(f"{header(element)}:TURN {(n - 1.0) * amount:.4f}")
+                told = f"point 6 asks for {amount:.4f}; {n:.2f} times that"
+                amount *= n
+            else:
+                told = f"clears point {position}"
+            driver.lines.append(f"{f'{header(element)}:TURN {amount:.4f}':<34}# {told}")
+    if otherwise == "last point":
+        driver.remark("Knocked by the sleeve")
+        driver.say("PROJ2:PHI:TURN 0.06")
+    if otherwise != "not checked":
+        driver.remark("All six points once more, hands off the elements")
+        driver.wait(300)
+        for position in "123456":
+            driver.come_to(position, ROUGH[position])
+            driver.record(driver.name(position))
+
+
+def slip(driver, otherwise):
+    made = handed_out("book with a slip", driver.room.scenario, driver.room.seed, {})
+    kind, entry, right = made.hidden["kind"], made.hidden["entry"], made.hidden["right"][0]
+    wrong = made.papers["book.csv"].splitlines()[entry].split(",")
+    driver.lines += ["# What follows from the copy that the seed above makes.", ""]
+    if otherwise == "entry":
+        entry += 1
+    if otherwise == "kind":
+        kind = "gross" if kind != "gross" else "last digit"
+    if otherwise == "right":
+        right = wrong[3] if kind == "wrong point" else wrong[5]
+    driver.say(f'NOTE "answer kind={kind.replace(" ", "-")} entry={entry} right={right}"')
+
+
+INTRO = "The y-parallaxes of model 1 at its six standard points, with by' and with by\", twice each."
+
+FITTED = "The four cases of the table of fittings, one after the other."
+LAID = "Interior orientation of 101 and 102: fiducials to their marks, principal distances for the shrunken film."
+CLEARED = "Relative orientation of model 1 with the right projector alone, point by point."
+FOUND = "Answers to: find the slip."
+COUNTERS = "Counters, handwheels, drums, and the play of a spindle."
+
+ALL = {
+    "counters": (
+        "01-counters",
+        1,
+        counters,
+        [
+            ("reference.a7s", "", [COUNTERS]),
+            ("faulty-from-above.a7s", "from above", [COUNTERS, "By mistake B and C are come to from larger readings."]),
+            (
+                "faulty-no-second.a7s",
+                "no second",
+                [COUNTERS, "By mistake a place is registered twice without leaving it."],
+            ),
+            (
+                "faulty-misread.a7s",
+                "off by a tenth",
+                [COUNTERS, "By mistake the last drum is misread by a tenth at B."],
+            ),
+            (
+                "faulty-by-motor.a7s",
+                "by motor",
+                [COUNTERS, "By mistake the carriages are run to C instead of turned there."],
+            ),
+            ("faulty-one-side.a7s", "one side", [COUNTERS, "By mistake point 1 is come to from one side only."]),
+        ],
+    ),
+    "fittings": (
+        "02-fittings",
+        2,
+        fittings,
+        [
+            ("reference.a7s", "", [FITTED]),
+            ("faulty-y-collar.a7s", "y collar", [FITTED, "By mistake the Y collar stays out in A."]),
+            ("faulty-dove.a7s", "dove", [FITTED, "By mistake the Dove prisms stay as they are in B."]),
+            ("faulty-diapositive.a7s", "diapositive", [FITTED, "By mistake the diapositive lever stays in C."]),
+            ("faulty-triangulation.a7s", "triangulation", [FITTED, "By mistake the triangulation lever stays in D."]),
+            ("faulty-blind.a7s", "blind", [FITTED, "By mistake nobody looks into the eyepieces from B on."]),
+        ],
+    ),
+    "interior": (
+        "03-interior",
+        3,
+        interior,
+        [
+            ("reference.a7s", "", [LAID]),
+            ("faulty-sign.a7s", "sign", [LAID, "By mistake the shift of the left picture has the wrong sign."]),
+            ("faulty-certificate.a7s", "certificate", [LAID, "By mistake the film's shrinkage is forgotten."]),
+            ("faulty-exchanged.a7s", "exchanged", [LAID, "By mistake the photographs have changed places."]),
+            ("faulty-not-checked.a7s", "not checked", [LAID, "By mistake nobody looks again after centring."]),
+        ],
+    ),
+    "one-projector": (
+        "05-one-projector",
+        5,
+        one_projector,
+        [
+            ("reference.a7s", "", [CLEARED, 'by" at 2, kappa" at 1, bz" at 4, phi" at 3, omega" at 6.']),
+            (
+                "faulty-one-round.a7s",
+                "one round",
+                [CLEARED, "By mistake omega is not over-corrected, and all ends after a round."],
+            ),
+            ("faulty-left-turned.a7s", "left turned", [CLEARED, "By mistake by' is turned instead of by\"."]),
+            ("faulty-omega-first.a7s", "omega first", [CLEARED, 'By mistake omega" comes first.']),
+            ("faulty-not-checked.a7s", "not checked", [CLEARED, "By mistake no point is looked at again in the end."]),
+            ("faulty-last-point.a7s", "last point", [CLEARED, 'By mistake phi" is knocked in the end.']),
+        ],
+    ),
+    "slip": (
+        "14-slip",
+        14,
+        slip,
+        [
+            ("reference.a7s", "", [FOUND]),
+            ("faulty-entry.a7s", "entry", [FOUND, "By mistake the next entry is blamed."]),
+            ("faulty-kind.a7s", "kind", [FOUND, "By mistake it is taken for another slip."]),
+            ("faulty-right.a7s", "right", [FOUND, "By mistake the wrong entry is given as the right one."]),
+        ],
+    ),
+    "parallax": (
+        "04-parallax",
+        4,
+        parallax,
+        [
+            ("reference.a7s", "", [INTRO, "The way over the model is 3, 1, 5, 6, 2, 4."]),
+            ("faulty-by2-left.a7s", "left", [INTRO, 'By mistake by" stays where it cleared point 3.']),
+            ("faulty-not-cleared.a7s", "wrong way", [INTRO, "By mistake by' is turned the wrong way at point 5."]),
+            (
+                "faulty-no-second-reading.a7s",
+                "no second",
+                [INTRO, "By mistake nothing is turned between two readings."],
+            ),
+            ("faulty-in-the-air.a7s", "in the air", [INTRO, "By mistake Z stays where point 3 asked for it."]),
+            ("faulty-half.a7s", "half", [INTRO, 'By mistake by" is not read at points 4 to 6.']),
+        ],
+    ),
+}
+
+if __name__ == "__main__":
+    for chosen in sys.argv[1:] or ALL:
+        scripts_of(*ALL[chosen])

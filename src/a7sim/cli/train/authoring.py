@@ -1,0 +1,49 @@
+"""`a7sim train check` and `new`: for who writes exercises."""
+
+from pathlib import Path
+
+import click
+
+from a7sim.documents import as_json, head
+from a7sim.training.checking import checked
+from a7sim.training.shelf import all_exercises, find_exercise
+from a7sim.training.skeleton import begin_exercise
+
+EXIT_FAULTY = 1
+
+
+@click.command("check")
+@click.argument("exercises", nargs=-1)
+@click.option("--json", "as_document", is_flag=True, help="Print what was found as one JSON document.")
+def check_(exercises: tuple[str, ...], as_document: bool) -> None:
+    """See that exercises hold: the reference passes, each faulty one fails for its reason, no criterion is dead.
+
+    All that come with a7sim, or those named. Exit code 1 where one does not hold.
+
+    Example: a7sim train check 4 my-exercises/20-clouds
+    """
+    found = [checked(each) for each in (map(find_exercise, exercises) if exercises else all_exercises())]
+    if as_document:
+        told = [{"exercise": each.name, "faults": list(each.faults)} for each in found]
+        click.echo(as_json(head("train check") | {"exercises": told}), nl=False)
+    else:
+        for each in found:
+            points = "" if each.reference_points is None else f" (reference {each.reference_points:g} points)"
+            click.echo(f"{each.name}: {'holds' if not each.faults else f'{len(each.faults)} to mend'}{points}")
+            for fault in each.faults:
+                click.echo(f"  {fault}")
+    if any(each.faults for each in found):
+        raise click.exceptions.Exit(EXIT_FAULTY)
+
+
+@click.command("new")
+@click.argument("folder", type=click.Path(path_type=Path), metavar="NAME")
+def new_(folder: Path) -> None:
+    """Write the skeleton of an exercise into a new folder; check says what is still missing.
+
+    Example: a7sim train new 20-clouds
+    """
+    digits = folder.name.partition("-")[0]
+    taken = [each.exercise.number for each in all_exercises()]
+    number = int(digits) if digits.isdecimal() and 1 <= int(digits) <= 999 else max(taken, default=0) + 1
+    click.echo(str(begin_exercise(folder, number)))

@@ -1,0 +1,113 @@
+"""`a7sim train verify` and `watch`: grades."""
+
+import time
+from pathlib import Path
+
+import click
+import msgspec
+
+from a7sim.cli import EXIT_DIFFERS
+from a7sim.cli.train.options import last_attempt, named, of_a_student, progress_in
+from a7sim.documents import as_json, head
+from a7sim.mistakes import Mistake
+from a7sim.session.folder import JOURNAL
+from a7sim.training.attempts import ANSWERS
+from a7sim.training.grading import Grade, as_sentences, graded
+from a7sim.training.handed_in import HandedIn, attempts_in, graded_folders
+from a7sim.training.progress import EXAM, Attempt, Progress
+from a7sim.training.room import Unreliable
+from a7sim.training.shelf import find_exercise
+
+EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
+
+
+@click.command("verify")
+@click.argument("exercise", required=False)
+@click.option(
+    "--journal",
+    "folders",
+    type=click.Path(path_type=Path, file_okay=False),
+    multiple=True,
+    help="Grade the attempts handed in as a folder, or in its folders; nothing is recorded. May be repeated.",
+)
+@click.option("--seed", type=click.IntRange(min=0), help="Of attempts handed in that were started with a --seed.")
+@click.option("--json", "as_document", is_flag=True, help="Print the grade as one JSON document.")
+@of_a_student
+def verify_(
+    exercise: str | None,
+    folders: tuple[Path, ...],
+    seed: int | None,
+    as_document: bool,
+    home: Path | None,
+    student: str | None,
+) -> None:
+    """Grade the last attempt: its journal is worked again. Points and reasons; an exam is over with it.
+
+    Example: a7sim train verify 4
+    """
+    if folders:
+        raise click.exceptions.Exit(_tell_of_many(graded_folders(attempts_in(folders), seed), as_document))
+    with progress_in(home) as progress:
+        attempt = last_attempt(progress, named(student), exercise)
+        try:
+            grade = _graded(progress, attempt)
+        except Unreliable as unreliable:
+            click.echo(f"a7sim: {unreliable}", err=True)
+            raise click.exceptions.Exit(EXIT_DIFFERS) from unreliable
+        progress.give(attempt, grade)
+    if as_document:
+        click.echo(as_json(head("train verify") | msgspec.to_builtins(grade)), nl=False)
+    else:
+        click.echo("\n".join(as_sentences(grade)))
+    raise click.exceptions.Exit(EXIT_PASSED if grade.passed else EXIT_NOT_PASSED)
+
+
+def _tell_of_many(handed_in: list[HandedIn], as_document: bool) -> int:
+    """Print what came of attempts that were handed in; return the exit code."""
+    if as_document:
+        documents = [msgspec.to_builtins(each) for each in handed_in]
+        click.echo(as_json(head("train verify") | {"handed_in": documents}), nl=False)
+    for each in handed_in:
+        if each.grade is None:
+            click.echo(f"a7sim: {each.trouble}", err=True)
+        elif not as_document:
+            click.echo(f"{each.folder}: {each.student}")
+            click.echo("\n".join(as_sentences(each.grade)))
+    if any(each.grade is None for each in handed_in):
+        return EXIT_DIFFERS
+    return EXIT_PASSED if all(each.grade and each.grade.passed for each in handed_in) else EXIT_NOT_PASSED
+
+
+def _graded(progress: Progress, attempt: Attempt) -> Grade:
+    return graded(find_exercise(attempt.exercise), attempt.seed, attempt.folder, progress.hints_taken(attempt))
+
+
+@click.command("watch")
+@click.argument("exercise", required=False)
+@click.option("--every", type=click.FloatRange(min=0.1, max=3600.0), default=1.0, show_default=True, metavar="SECONDS")
+@of_a_student
+def watch_(exercise: str | None, every: float, home: Path | None, student: str | None) -> None:
+    """Grade the attempt under way again whenever its journal has grown, until it passes or Ctrl-C. Not in an exam.
+
+    Example: a7sim train watch 4
+    """
+    with progress_in(home) as progress:
+        attempt = last_attempt(progress, named(student), exercise)
+        if attempt.mode == EXAM:
+            raise Mistake(f"{attempt.exercise}: expected an attempt for practice, got an exam")
+        seen: tuple[int, ...] = ()
+        while True:
+            now = _sizes(attempt)
+            if now != seen:
+                seen = now
+                grade = _graded(progress, attempt)
+                click.clear()
+                click.echo("\n".join(as_sentences(grade)))
+                if grade.passed:
+                    return
+            time.sleep(every)
+
+
+def _sizes(attempt: Attempt) -> tuple[int, ...]:
+    paths = [attempt.folder / name for name in (JOURNAL, ANSWERS)]
+    return tuple(path.stat().st_mtime_ns if path.exists() else 0 for path in paths)

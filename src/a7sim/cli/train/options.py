@@ -1,0 +1,63 @@
+"""What the training verbs share: whose progress it is, and where it is kept."""
+
+import getpass
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from a7sim.cli.prompt import data_folder
+from a7sim.mistakes import Mistake
+from a7sim.training.progress import Attempt, Progress
+from a7sim.training.shelf import find_exercise
+
+HOME_VARIABLE, STUDENT_VARIABLE = "A7SIM_HOME", "A7SIM_STUDENT"
+
+LONGEST_NAME = 100
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+_HOME = click.option(
+    "--home",
+    type=click.Path(path_type=Path, file_okay=False),
+    envvar=HOME_VARIABLE,
+    help=f"Folder of progress and journals; also {HOME_VARIABLE}  [default: the platform's data folder]",
+)
+_STUDENT = click.option(
+    "--student", envvar=STUDENT_VARIABLE, help=f"Whose progress; also {STUDENT_VARIABLE}  [default: who is logged in]"
+)
+
+
+def of_a_home(command: Command) -> Command:
+    """Add --home."""
+    return _HOME(command)
+
+
+def of_a_student(command: Command) -> Command:
+    """Add --home and --student."""
+    return _HOME(_STUDENT(command))
+
+
+def progress_in(home: Path | None) -> Progress:
+    """Open the progress of a home. Raises Mistake."""
+    return Progress(home or data_folder() / "training")
+
+
+def named(student: str | None) -> str:
+    """Return the name of a student. Raises Mistake for one that is none."""
+    if student is None:
+        try:
+            student = getpass.getuser()
+        except (KeyError, OSError):
+            student = os.environ.get("USERNAME", "student")
+    name = " ".join(student.split())
+    if not 1 <= len(name) <= LONGEST_NAME or not name.isprintable():
+        raise Mistake(f"--student: expected a name of 1 to {LONGEST_NAME} characters, got {student!r}")
+    return name
+
+
+def last_attempt(progress: Progress, student: str, exercise: str | None) -> Attempt:
+    """Return a student's last attempt, at an exercise where one is named. Raises Mistake where there is none."""
+    return progress.last(student, find_exercise(exercise).name if exercise else None)

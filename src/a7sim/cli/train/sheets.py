@@ -1,0 +1,93 @@
+"""`a7sim train list` and `report`: where students stand."""
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from a7sim.cli.train.options import named, of_a_student, progress_in
+from a7sim.documents import as_json, head
+from a7sim.mistakes import Mistake
+from a7sim.session.folder import write_whole
+from a7sim.sheets import sheet
+from a7sim.training.exercise import Shelved
+from a7sim.training.exports import HOME_PAGE, as_document, as_nbgrader, as_xapi
+from a7sim.training.shelf import all_exercises, find_exercise
+
+
+@click.command("list")
+@click.argument("exercise", required=False)
+@click.option("--json", "as_json_", is_flag=True, help="Print the exercises as one JSON document.")
+@of_a_student
+def list_(exercise: str | None, as_json_: bool, home: Path | None, student: str | None) -> None:
+    """List the exercises and how far they are done; or show what EXERCISE is about.
+
+    Example: a7sim train list 4
+    """
+    if exercise is not None:
+        click.echo(_shown(find_exercise(exercise)))
+        return
+    name = named(student)
+    with progress_in(home) as progress:
+        best = progress.best(name)
+        attempts = progress.attempts(name)
+    rows = []
+    for shelved in all_exercises():
+        mine = [each for each in attempts if each.exercise == shelved.name]
+        grade = best.get((name, shelved.name))
+        state = "passed" if grade and grade.grade.passed else "under way" if mine and not mine[-1].closed else ""
+        points = grade.grade.points if grade else None
+        rows.append((shelved.exercise.number, shelved.exercise.title, state, points, len(mine)))
+    if as_json_:
+        keys = ("number", "title", "state", "points", "attempts")
+        exercises = [dict(zip(keys, row, strict=True)) for row in rows]
+        click.echo(as_json(head("train list") | {"student": name, "exercises": exercises}), nl=False)
+        return
+    table = sheet("", "exercise", "state", "points", "attempts", left=(1, 2), fold=(1,))
+    for number, title, state, points, tries in rows:
+        table.add_row(str(number), title, state, "" if points is None else f"{points:g}", str(tries or ""))
+    Console().print(table)
+
+
+def _shown(shelved: Shelved) -> str:
+    exercise = shelved.exercise
+    steps = [f"  - {each.text}" for each in exercise.steps]
+    criteria = [f"  {each.weight:4g}  {each.title}" for each in exercise.criteria]
+    facts = f"{exercise.minutes:g} minutes, {exercise.pass_points:g} of 100 points pass, {len(exercise.hints)} hints"
+    return "\n".join([shelved.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
+
+
+@click.command("report")
+@click.option("--class", "whole_class", is_flag=True, help="Of all students; otherwise of one.")
+@click.option("--to", type=click.Choice(["html", "csv", "json", "xapi"]), default="html", show_default=True)
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File  [default: standard output]")
+@click.option("--home-page", default=HOME_PAGE, show_default=True, help="Of the students' accounts, for xapi.")
+@of_a_student
+def report_(
+    whole_class: bool, to: str, out: Path | None, home_page: str, home: Path | None, student: str | None
+) -> None:
+    """Write the sheet of a student or of the class: HTML with figures, CSV as nbgrader's, JSON, or xAPI statements.
+
+    Example: a7sim train report --class --to html --out class.html
+    """
+    whose = None if whole_class else named(student)
+    with progress_in(home) as progress:
+        graded, best, attempts = progress.grades(whose), progress.best(whose), progress.attempts(whose)
+    if not attempts:
+        raise Mistake(f"{whose or 'the class'}: expected attempts to report on, found none")
+    if to == "csv":
+        text = as_nbgrader(best)
+    elif to == "json":
+        text = as_json(as_document(graded, best, attempts))
+    elif to == "xapi":
+        text = as_xapi(graded, home_page)
+    else:
+        from a7sim.training.pages import class_sheet, student_sheet  # noqa: PLC0415 # only pages need figures
+
+        shelf = all_exercises()
+        text = class_sheet(shelf, best, attempts) if whose is None else student_sheet(whose, shelf, best, graded)
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        write_whole(out, text)
+        click.echo(str(out))

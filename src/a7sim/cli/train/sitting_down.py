@@ -1,0 +1,51 @@
+"""The console at an exercise's instrument, its checklist on the screen."""
+
+import sys
+import time
+
+from a7sim.cli.console import KEYMAP
+from a7sim.cli.prompt import data_folder
+from a7sim.link.client import Client
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.link.opening import TIMEOUT_S
+from a7sim.mistakes import Mistake
+from a7sim.training.checklist import Checklist
+from a7sim.training.room import Room
+
+
+def sit_down(room: Room, checklist: Checklist, plain: bool) -> None:
+    """Open the console in the room of an attempt, until whoever sits there leaves. Raises Mistake without a terminal.
+
+    The simulated clock goes with the wall's while somebody sits there.
+    """
+    try:
+        from a7sim.console.app import Console  # noqa: PLC0415 # only who sits down loads the screen
+    except ImportError as error:
+        raise Mistake("start: expected textual to be installed: pip install 'a7sim[console]'") from error
+    from a7sim.console.eyepiece import Drawing  # noqa: PLC0415
+    from a7sim.console.keymap import default_keymap, load_keymap  # noqa: PLC0415
+    from a7sim.console.seat import Seat  # noqa: PLC0415
+    from a7sim.console.sheet import JobSheet  # noqa: PLC0415
+
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        raise Mistake("start: expected a terminal to sit at, got a file or a pipe (--script and --link need none)")
+    began, clock, so_far = time.monotonic(), room.clock, room.clock.now
+
+    def at_the_instrument() -> float:
+        clock.pass_to(so_far + time.monotonic() - began)
+        return clock.now
+
+    own_keys = data_folder() / KEYMAP
+    title = f"exercise {checklist.exercise.number}"
+    Console(
+        Seat(
+            lambda: Client(InProcessSerial(desk=room.desk, clock=clock, timeout=TIMEOUT_S)),
+            at_the_instrument,
+            where=title,
+            sheet=JobSheet(title, room.scenario.camera),
+            keymap=load_keymap(own_keys) if own_keys.exists() else default_keymap(),
+            drawing=Drawing.WORDS if plain else None,
+            theme="contrast" if plain else "enamel",
+            tasks=checklist.lines,
+        )
+    ).run()

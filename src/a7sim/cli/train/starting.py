@@ -1,0 +1,119 @@
+"""`a7sim train start`: sit down at an exercise, play a script of it, or serve it."""
+
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import click
+
+from a7sim.cli.serve import USUAL, Served, Told, serve
+from a7sim.cli.train.options import named, of_a_student, progress_in
+from a7sim.cli.train.sitting_down import sit_down
+from a7sim.documents import head
+from a7sim.link.addresses import Address, address_of
+from a7sim.link.conversation import Terms
+from a7sim.link.loops import run
+from a7sim.link.serving import Doors
+from a7sim.mistakes import Mistake
+from a7sim.session.folder import JOURNAL
+from a7sim.session.journal import Journal
+from a7sim.session.scripts import read_script
+from a7sim.training.attempts import begun, gone_on, played_script
+from a7sim.training.checklist import Checklist
+from a7sim.training.exercise import Shelved
+from a7sim.training.progress import EXAM, PRACTICE, Attempt, Progress
+from a7sim.training.room import Room
+from a7sim.training.shelf import find_exercise
+
+
+@click.command("start")
+@click.argument("exercise")
+@click.option("--exam", is_flag=True, help="No hints, nothing ticks, one grading; another seed than for practice.")
+@click.option("--anew", is_flag=True, help="Begin anew where an attempt is under way; that one is kept.")
+@click.option("--seed", type=click.IntRange(min=0), help="Draw other photographs than the student's own.")
+@click.option("--script", type=click.Path(path_type=Path, dir_okay=False), help="Do it by a script (.a7s).")
+@click.option("--link", metavar="tcp:HOST:PORT", help="Serve it there for any client instead of opening the console.")
+@click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp:{USUAL}.")
+@click.option("--plain", is_flag=True, help="The console in words, for screen readers.")
+@of_a_student
+def start_(
+    exercise: str,
+    exam: bool,
+    anew: bool,
+    seed: int | None,
+    script: Path | None,
+    link: str | None,
+    serves: bool,
+    plain: bool,
+    home: Path | None,
+    student: str | None,
+) -> None:
+    """Sit down at EXERCISE, or go on with the attempt under way: its goal, a checklist that ticks itself, the console.
+
+    Example: a7sim train start 4
+    """
+    if sum((script is not None, link is not None, serves)) > 1:
+        raise Mistake("start: expected one of --script, --link and --serve, got several")
+    address = _address(link) if link is not None else USUAL if serves else None
+    played = read_script(script) if script is not None else None
+    shelved = find_exercise(exercise)
+    with progress_in(home) as progress:
+        attempt = _attempt(progress, shelved, named(student), EXAM if exam else PRACTICE, anew, seed)
+    with _entered(shelved, attempt) as room:
+        checklist = Checklist(room, attempt)
+        if shelved.exercise.paper and played is None:
+            _tell_of_papers(checklist)
+        elif played is not None:
+            trouble = played_script(room, played)
+            click.echo("\n".join(checklist.lines()))
+            if trouble:
+                raise Mistake(trouble)
+        elif address is not None:
+            click.echo("\n".join(checklist.lines()))
+            _serve(room, address)
+        else:
+            sit_down(room, checklist, plain)
+    click.echo(f"a7sim train verify {shelved.exercise.number} grades it; a7sim train start goes on with it")
+
+
+def _attempt(progress: Progress, shelved: Shelved, student: str, mode: str, anew: bool, seed: int | None) -> Attempt:
+    there = progress.open_attempt(student, shelved.name)
+    if there is not None and not anew:
+        if there.mode == mode and seed in (None, there.seed):
+            return there
+        if there.mode == EXAM:
+            raise Mistake(
+                f"{shelved.name}: expected --exam, since an exam is under way (verify ends it, --anew drops it)"
+            )
+    return progress.begin(student, shelved, mode, seed)
+
+
+def _entered(shelved: Shelved, attempt: Attempt) -> AbstractContextManager[Room]:
+    journal = attempt.folder / JOURNAL
+    if journal.exists() and b"\n" in journal.read_bytes():
+        return gone_on(shelved, attempt.seed, attempt.folder)
+    return begun(shelved, attempt.seed, attempt.folder, attempt.student, attempt.mode)
+
+
+def _address(text: str) -> Address:
+    kind, colon, address = text.partition(":")
+    if kind != "tcp" or not colon:
+        raise Mistake(f"--link: expected tcp:HOST:PORT, got {text!r}")
+    found = address_of(address, "--link")
+    if not found.loopback:
+        raise Mistake(f"--link: expected an address of this machine alone, got {found}")
+    return found
+
+
+def _tell_of_papers(checklist: Checklist) -> None:
+    click.echo("\n".join([*checklist.lines(), "", checklist.room.shelved.text.strip(), ""]))
+    papers = sorted(path for path in checklist.attempt.folder.iterdir() if path.suffix in (".csv", ".txt", ".md"))
+    for paper in papers:
+        click.echo(f"your papers: {paper}")
+    for key, about in checklist.exercise.answers.items():
+        click.echo(f"a7sim train answer {key}=...   {about}")
+
+
+def _serve(room: Room, address: Address) -> None:
+    first = head("train start") | {"scenario": room.shelved.exercise.title, "variant": room.scenario.instrument.variant}
+    served = Served(first, room.desk, room.clock, Journal())
+    run(serve(served, Doors([address]), Terms(), Told(first, as_document=False, quiet=False)))

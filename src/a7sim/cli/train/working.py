@@ -1,0 +1,69 @@
+"""`a7sim train hint`, `answer` and `reset`: what a student does beside the instrument."""
+
+from pathlib import Path
+
+import click
+
+from a7sim.cli.train.options import last_attempt, named, of_a_student, progress_in
+from a7sim.mistakes import Mistake
+from a7sim.training.account import answers_in
+from a7sim.training.attempts import write_answers, write_hint
+from a7sim.training.shelf import find_exercise
+
+
+@click.command("hint")
+@click.argument("exercise", required=False)
+@of_a_student
+def hint_(exercise: str | None, home: Path | None, student: str | None) -> None:
+    """Give the next hint of the attempt under way; it costs points and is recorded.
+
+    Example: a7sim train hint 4
+    """
+    with progress_in(home) as progress:
+        attempt = last_attempt(progress, named(student), exercise)
+        if attempt.closed:
+            raise Mistake(f"{attempt.exercise}: expected an attempt that is open, got one that is closed")
+        number, hint = progress.next_hint(attempt, find_exercise(attempt.exercise).exercise)
+        write_hint(attempt.folder, number, hint.cost)
+        click.echo(f"hint {number} (-{hint.cost:g} points): {hint.text}")
+
+
+@click.command("answer")
+@click.argument("answers", nargs=-1, required=True, metavar="KEY=VALUE...")
+@click.option("--exercise", help="Of which exercise  [default: the last one started]")
+@of_a_student
+def answer_(answers: tuple[str, ...], exercise: str | None, home: Path | None, student: str | None) -> None:
+    """Write answers down beside the journal of the attempt under way; a later one takes the place of an earlier.
+
+    Example: a7sim train answer play=0.05
+    """
+    with progress_in(home) as progress:
+        attempt = last_attempt(progress, named(student), exercise)
+    if attempt.closed:
+        raise Mistake(f"{attempt.exercise}: expected an attempt that is open, got one that is closed")
+    asked = find_exercise(attempt.exercise).exercise.answers
+    for word in answers:
+        given = answers_in([word])
+        if not given or next(iter(given)) not in asked:
+            known = ", ".join(f"{key}=... ({about})" for key, about in asked.items()) or "no answers at all"
+            raise Mistake(f"{attempt.exercise}: expected {known}, got {word!r}")
+    written = write_answers(attempt.folder, answers_in(answers))
+    click.echo(", ".join(f"{key}={value}" for key, value in written.items()))
+
+
+@click.command("reset")
+@click.argument("exercise")
+@of_a_student
+def reset_(exercise: str, home: Path | None, student: str | None) -> None:
+    """Close the attempt under way at EXERCISE; it is kept, and the next start begins anew.
+
+    Example: a7sim train reset 4
+    """
+    with progress_in(home) as progress:
+        shelved = find_exercise(exercise)
+        attempt = progress.open_attempt(named(student), shelved.name)
+        if attempt is None:
+            click.echo(f"{shelved.name}: no attempt is open")
+            return
+        progress.end(attempt)
+        click.echo(f"{shelved.name}: attempt {attempt.number} is closed and kept in {attempt.folder}")

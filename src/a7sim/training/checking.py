@@ -1,0 +1,174 @@
+"""Checking exercises: the reference passes, every faulty one fails for its reason, no criterion is dead."""
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from msgspec.structs import replace as changed
+
+from a7sim.mistakes import Mistake
+from a7sim.scenario import Scenario
+from a7sim.session.scripts import Say, read_script
+from a7sim.training.account import Account
+from a7sim.training.attempts import attempted, hand_out, open_, played_script, seed_played
+from a7sim.training.exercise import FULL_MARKS, Criterion, Exercise, Played, Shelved
+from a7sim.training.grading import Grade, account_in, grade_of, graded
+from a7sim.training.measures import measure_of
+from a7sim.training.room import entered
+from a7sim.training.variation import scenario_for
+
+LEAST_HINTS, LEAST_FAULTY = 2, 2
+
+NEVER = 1e12
+"""A limit that everything, or nothing, reaches."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found of an exercise: sentences on what is missing or wrong, none where all is well."""
+
+    name: str
+    faults: tuple[str, ...]
+    reference_points: float | None = None
+
+
+def checked(shelved: Shelved) -> Checked:
+    """Check an exercise whole."""
+    exercise = shelved.exercise
+    faults = list(_of_form(shelved))
+    if not _all_there(shelved):
+        return Checked(shelved.name, tuple(faults))
+    with tempfile.TemporaryDirectory() as place:
+        try:
+            faults += _of_tolerances(exercise, scenario_for(shelved, seed_played(shelved, exercise.reference)))
+            accounts = _accounts(shelved, Path(place))
+        except Mistake as mistake:
+            return Checked(shelved.name, (*faults, str(mistake)))
+        reference = grade_of(accounts["reference"])
+        faults += _of_runs(exercise, accounts)
+        faults += dead_criteria(exercise, accounts)
+    return Checked(shelved.name, tuple(faults), reference.points)
+
+
+def _of_form(shelved: Shelved) -> Iterator[str]:
+    exercise = shelved.exercise
+    if not shelved.text.strip():
+        yield "text.md: expected the exercise in plain words, found none"
+    if len(exercise.hints) < LEAST_HINTS:
+        yield f"hint: expected {LEAST_HINTS} hints or more, got {len(exercise.hints)}"
+    if len(exercise.faulty) < LEAST_FAULTY:
+        yield f"faulty: expected {LEAST_FAULTY} faulty ones or more, got {len(exercise.faulty)}"
+    if not exercise.steps:
+        yield "step: expected a checklist, got no step"
+    total = sum(each.weight for each in exercise.criteria)
+    if abs(total - FULL_MARKS) > 1e-6:
+        yield f"criterion: expected weights that add up to {FULL_MARKS:g}, got {total:g}"
+    for played in (exercise.reference, *exercise.faulty, exercise.opening):
+        if played is not None and played.script and not (shelved.folder / played.script).is_file():
+            yield f"{played.script}: expected a script beside the exercise, found none"
+
+
+def _all_there(shelved: Shelved) -> bool:
+    exercise = shelved.exercise
+    played = [each for each in (exercise.reference, *exercise.faulty, exercise.opening) if each is not None]
+    return all(not each.script or (shelved.folder / each.script).is_file() for each in played)
+
+
+def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
+    for each in exercise.criteria:
+        measure = measure_of(each)
+        if not measure.more_is_better:
+            floor = round(measure.floor(scenario), 4)
+            for band, limit in (("excellent", each.excellent), ("pass", each.passing)):
+                if limit < floor:
+                    yield f"{each.id}: expected {band} no better than eye and least count, {floor:g}, got {limit:g}"
+        if not measure.reached(each.excellent, each.passing):
+            yield f"{each.id}: expected excellent no worse than pass, got {each.excellent:g} and {each.passing:g}"
+
+
+def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
+    """Return the accounts of the reference, the faulty ones, who does nothing, who is slow, who stops early."""
+    exercise = shelved.exercise
+    accounts: dict[str, Account] = {}
+    for i, played in enumerate((exercise.reference, *exercise.faulty)):
+        name = "reference" if i == 0 else f"faulty {i}"
+        seed = seed_played(shelved, played)
+        trouble = attempted(shelved, played, place / name, seed)
+        if trouble and i == 0:
+            raise Mistake(f"reference: expected it to come to its end: {trouble}")
+        if trouble and played.script:
+            raise Mistake(f"{played.script}: {trouble}")
+        accounts[name] = account_in(shelved, seed, place / name)
+    seed = seed_played(shelved, exercise.reference)
+    for name, minutes in (("nothing", 0.0), ("slow", 10.0 * exercise.minutes), ("half", 0.0)):
+        folder = place / name
+        folder.mkdir()
+        hand_out(shelved, seed, folder)
+        with entered(shelved, seed, folder, "somebody", "practice") as room:
+            open_(room)
+            if name != "nothing" and exercise.reference.script:
+                script = read_script(shelved.folder / exercise.reference.script)
+                lines = [each for each in script.statements if isinstance(each, Say)]
+                kept = script.statements if name == "slow" else tuple(lines[: len(lines) // 2])
+                played_script(room, replace(script, statements=tuple(kept)))
+            room.clock.spend(60.0 * minutes)
+            room.desk.close(room.desk.open("late", time=room.clock.now).client, room.clock.now)
+        accounts[name] = account_in(shelved, seed, folder)
+    return accounts
+
+
+def _of_runs(exercise: Exercise, accounts: dict[str, Account]) -> Iterator[str]:
+    reference = grade_of(accounts["reference"])
+    if not reference.passed:
+        told = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or f"{reference.points:g} points"
+        yield f"reference: expected it to pass, got {told}"
+    for i, faulty in enumerate(exercise.faulty, start=1):
+        grade = grade_of(accounts[f"faulty {i}"])
+        called = faulty.script or f"faulty {i} ({faulty.procedure})"
+        if grade.passed:
+            yield f"{called}: expected it to fail, got {grade.points:g} points"
+        if faulty.fails not in [each.id for each in grade.failed]:
+            got = ", ".join(each.id for each in grade.failed) or "nothing"
+            yield f"{called}: expected {faulty.fails} to fail, got {got}"
+    if grade_of(accounts["nothing"]).passed:
+        yield "expected who does nothing not to pass, got a pass"
+    for step in exercise.steps:
+        measure = measure_of(step)
+        found = measure.of(accounts["reference"])
+        if not measure.reached(found.value, step.done):
+            yield f"step {step.text!r}: expected the reference to tick it, got {found.reason}"
+        if exercise.opening is not None and measure.reached(measure.of(accounts["nothing"]).value, step.done):
+            yield f"step {step.text!r}: expected it to be still to do after the opening, got it ticked"
+
+
+def dead_criteria(exercise: Exercise, accounts: dict[str, Account]) -> Iterator[str]:
+    """Yield what of the criteria decides nothing: limits and weights that may be anything, and no verdict changes.
+
+    Who does nothing at all is left out: they fail everything.
+    """
+    runs = {name: account for name, account in accounts.items() if name != "nothing"}
+    for criterion in exercise.criteria:
+        sense = -1.0 if measure_of(criterion).more_is_better else 1.0
+        mutations = {
+            "its tolerances are without limit": changed(criterion, excellent=sense * NEVER, passing=sense * NEVER),
+            "its tolerances are impossible": changed(criterion, excellent=-sense * NEVER, passing=-sense * NEVER),
+            "its weight is next to nothing": changed(criterion, weight=1e-6),
+            "its weight is all": changed(criterion, weight=1e3),
+        }
+        for mutation, mutant in mutations.items():
+            if not any(_verdict(exercise, account) != _verdict(exercise, account, mutant) for account in runs.values()):
+                yield f"{criterion.id}: expected it to decide something, but nothing changes where {mutation}"
+
+
+def _verdict(exercise: Exercise, account: Account, mutant: Criterion | None = None) -> tuple[bool, float]:
+    criteria = [mutant if mutant is not None and mutant.id == each.id else each for each in exercise.criteria]
+    grade = grade_of(replace(account, exercise=changed(exercise, criteria=criteria)))
+    return grade.passed, grade.points
+
+
+def results_of(shelved: Shelved, played: Played, place: Path, seed: int | None = None) -> Grade:
+    """Return the grade of something played, for a seed of its own where one is given. For checks and studies."""
+    seed = seed_played(shelved, played) if seed is None else seed
+    attempted(shelved, played, place, seed)
+    return graded(shelved, seed, place)

@@ -1,0 +1,46 @@
+"""The checklist of an attempt, which ticks itself by what is seen at the link."""
+
+from dataclasses import dataclass
+
+from a7sim.training.attempts import written_answers
+from a7sim.training.exercise import Exercise
+from a7sim.training.measures import measure_of
+from a7sim.training.progress import EXAM, Attempt
+from a7sim.training.room import Room
+
+TICKED, OPEN = "[x]", "[ ]"
+
+
+@dataclass(frozen=True)
+class Checklist:
+    """The checklist of an attempt in its room; in an exam it only says what is to be done."""
+
+    room: Room
+    attempt: Attempt
+
+    @property
+    def exercise(self) -> Exercise:
+        """The exercise."""
+        return self.room.shelved.exercise
+
+    def ticks(self) -> list[bool]:
+        """Return which steps are done."""
+        account = self.room.account(written_answers(self.attempt.folder))
+        measures = [measure_of(each) for each in self.exercise.steps]
+        return [
+            measure.reached(measure.of(account).value, step.done)
+            for measure, step in zip(measures, self.exercise.steps, strict=True)
+        ]
+
+    def lines(self) -> list[str]:
+        """Return goal and checklist for people, a line each."""
+        if self.attempt.mode == EXAM:
+            return [self.head(), *(f"  -  {each.text}" for each in self.exercise.steps)]
+        ticked = zip(self.ticks(), self.exercise.steps, strict=True)
+        return [self.head(), *(f" {TICKED if done else OPEN} {step.text}" for done, step in ticked)]
+
+    def head(self) -> str:
+        """Return exercise and time for people."""
+        exercise, minutes = self.exercise, self.room.account().seconds / 60.0
+        exam = ", exam" if self.attempt.mode == EXAM else ""
+        return f"{exercise.number} {exercise.title}{exam}: {minutes:.0f} of {exercise.minutes:g} minutes"

@@ -1,0 +1,162 @@
+"""Grading an attempt: its journal is worked again, and every criterion gets a band, points and a reason."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from a7sim.mistakes import Mistake
+from a7sim.session.folder import JOURNAL
+from a7sim.session.lines import read_journal
+from a7sim.training.account import Account
+from a7sim.training.attempts import written_answers
+from a7sim.training.exercise import FULL_MARKS, Criterion, Shelved
+from a7sim.training.handouts import handed_out
+from a7sim.training.measures import Found, measure_of
+from a7sim.training.room import Room, Unreliable, seen_again
+
+JUST_PASSED = 0.6
+"""Share of its weight that a criterion earns at the limit of its pass band; from there it rises to all of it."""
+
+EXCELLENT, PASSED, FAILED = "excellent", "pass", "fail"
+
+
+class Marked(msgspec.Struct, frozen=True):
+    """A criterion as it was graded."""
+
+    id: str
+    title: str
+    band: str
+    points: float
+    weight: float
+    value: float | None
+    unit: str
+    excellent: float
+    passing: float = msgspec.field(name="pass")
+    reason: str = ""
+    feedback: str = ""
+    required: bool = True
+
+    @property
+    def lost(self) -> float:
+        """Return the points that it cost."""
+        return round(self.weight - self.points, 1)
+
+    @property
+    def sentence(self) -> str:
+        """Return the reason, what it cost, and what to do about it."""
+        if self.band == EXCELLENT:
+            return f"{self.reason}: {self.points:+g}"
+        return f"{self.reason}: -{self.lost:g}. {self.feedback}"
+
+
+class Grade(msgspec.Struct, frozen=True):
+    """An attempt as it was graded."""
+
+    exercise: str
+    title: str
+    passed: bool
+    points: float
+    """What is left of 100 after hints."""
+    pass_points: float
+    hints: int
+    hint_points: float
+    minutes: float
+    marks: list[Marked]
+
+    @property
+    def failed(self) -> list[Marked]:
+        """Return the criteria that were failed."""
+        return [each for each in self.marks if each.band == FAILED]
+
+
+@dataclass(frozen=True)
+class HintsTaken:
+    """How many hints were asked for, and what they cost."""
+
+    number: int = 0
+    cost: float = 0.0
+
+
+def grade_of(account: Account, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
+    """Grade an account."""
+    hints = hints or HintsTaken()
+    exercise = account.exercise
+    marks = [marked(each, measure_of(each).of(account)) for each in exercise.criteria]
+    earned = round(max(0.0, sum(each.points for each in marks) - hints.cost), 1)
+    missed = any(each.band == FAILED and each.required for each in marks)
+    return Grade(
+        shelved_name,
+        exercise.title,
+        not missed and earned >= exercise.pass_points,
+        earned,
+        exercise.pass_points,
+        hints.number,
+        hints.cost,
+        round(account.seconds / 60.0, 1),
+        marks,
+    )
+
+
+def marked(criterion: Criterion, found: Found) -> Marked:
+    """Return a criterion with its band and points by what its measure came to."""
+    measure = measure_of(criterion)
+    value = found.value
+    if measure.reached(value, criterion.excellent):
+        band, share = EXCELLENT, 1.0
+    elif measure.reached(value, criterion.passing) and value is not None:
+        width = criterion.passing - criterion.excellent
+        left = (criterion.passing - value) / width if width else 1.0
+        band, share = PASSED, JUST_PASSED + (1.0 - JUST_PASSED) * left
+    else:
+        band, share = FAILED, 0.0
+    return Marked(
+        criterion.id,
+        criterion.title,
+        band,
+        round(share * criterion.weight, 1),
+        criterion.weight,
+        value,
+        measure.unit,
+        criterion.excellent,
+        criterion.passing,
+        found.reason,
+        criterion.feedback,
+        criterion.required,
+    )
+
+
+def graded(shelved: Shelved, seed: int, folder: Path, hints: HintsTaken | None = None) -> Grade:
+    """Grade the attempt in a folder. Raises Unreliable for a journal that cannot be relied on."""
+    return grade_of(account_in(shelved, seed, folder), hints, shelved.name)
+
+
+def account_in(shelved: Shelved, seed: int, folder: Path) -> Account:
+    """Return the account of the attempt in a folder, by working it again. Raises Unreliable."""
+    try:
+        room = seen_again(shelved, seed, read_journal(folder / JOURNAL))
+    except Unreliable:
+        raise
+    except Mistake as mistake:
+        raise Unreliable(str(mistake)) from mistake
+    return account_of(room, folder)
+
+
+def account_of(room: Room, folder: Path) -> Account:
+    """Return the account of an attempt with what was answered on paper, and what its maker of papers knows."""
+    exercise = room.shelved.exercise
+    hidden = handed_out(exercise.handout, room.scenario, room.seed, exercise.handout_options).hidden
+    return room.account(written_answers(folder), dict(hidden))
+
+
+def as_sentences(grade: Grade) -> Sequence[str]:
+    """Return a grade for people, a line each: the verdict, then every criterion."""
+    verdict = "passed" if grade.passed else "not passed"
+    lines = [f"{grade.title}: {verdict}, {grade.points:g} of {FULL_MARKS:g} points"]
+    if grade.hints:
+        lines.append(f"  hints: {grade.hints}, -{grade.hint_points:g}")
+    lines += [
+        f"  {each.band:<9} {each.points:4g}/{each.weight:<4g} {each.title}: {each.sentence}" for each in grade.marks
+    ]
+    return lines

@@ -1,0 +1,29 @@
+"""The list of ground control that an operator is given."""
+
+import math
+
+from a7sim.files import csv_text
+from a7sim.reduction import Ground
+from a7sim.scenario import Scenario
+from a7sim.scene import build_scene
+from a7sim.session.strips import given_control
+from a7sim.training.handouts.base import Handout, handout
+
+COLUMNS = ("point", "X", "Y", "Z", "role")
+
+
+@handout("control")
+def control(scenario: Scenario, seed: int, points: list[str] | None = None) -> Handout:
+    """Make the list of ground control, of the points named or of all."""
+    return Handout({"control.csv": control_csv(given_control(scenario, build_scene(scenario, seed)), points)})
+
+
+def control_csv(given: Ground, points: list[str] | None = None) -> str:
+    """Return ground control as CSV, m; empty where something is not given."""
+    places = zip(given.points, given.coordinates.T.tolist(), given.roles, strict=True)
+    rows = [
+        (name, *("" if math.isnan(each) else f"{each:.2f}" for each in place), role)
+        for name, place, role in places
+        if points is None or name in points
+    ]
+    return csv_text(COLUMNS, rows)

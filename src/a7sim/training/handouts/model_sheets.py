@@ -1,0 +1,128 @@
+"""Sheets of independent models: what stood on the counters at points and centres, one figure of them misread."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from a7sim.files import csv_text
+from a7sim.geometry import Array, length_of
+from a7sim.mistakes import Mistake
+from a7sim.reduction import Ground, Model
+from a7sim.reduction.strips import formed_strip, is_centre
+from a7sim.scenario import Scenario
+from a7sim.scene import build_scene
+from a7sim.session.analytical import strip_by_comparator
+from a7sim.session.strips import given_control, grounded
+from a7sim.training.handouts.base import Handout, handout
+from a7sim.training.handouts.control import control_csv
+
+SHEETS, CONTROL = "models.csv", "control.csv"
+
+COLUMNS = ("model", "point", "X", "Y", "Z")
+
+HANDOUT_STREAM = (7, 1)
+"""Spawn key of what is misread, after those of what exercises vary."""
+
+MISREAD_MM = (0.8, 1.6)
+"""By how much, in the model: a wrong digit of a drum."""
+
+
+@dataclass(frozen=True)
+class Misread:
+    """A figure on the sheets that is not what the counter showed."""
+
+    model: str
+    point: str
+    axis: int
+    by: float
+    """mm in the model."""
+
+    def on(self, models: Sequence[Model]) -> list[Model]:
+        """Return the models with it."""
+        return [self._on(model) if model.name == self.model else model for model in models]
+
+    def _on(self, model: Model) -> Model:
+        coordinates = model.coordinates.copy()
+        coordinates[self.axis, model.points.index(self.point)] += self.by
+        return Model(model.name, model.points, coordinates)
+
+
+@handout("model sheets")
+def model_sheets(scenario: Scenario, seed: int, wanted: list[str]) -> Handout:
+    """Make sheets of a strip's models in counter readings, and keep back what the strip comes to without the slip.
+
+    The models are those of a comparator with the scenario's observer, brought to the scale and the presets of the
+    plan. Kept back are `bad`, `ties`, `scale`, and x, y and z of the `wanted` points in m.
+    """
+    scene = build_scene(scenario, seed)
+    models = [_in_instrument(each, scenario) for each in strip_by_comparator(scenario, scene, seed).models]
+    given = given_control(scenario, scene)
+    slip = misread(models, given, seed)
+    strip = grounded([model.without(slip.point) if model.name == slip.model else model for model in models], given)
+    places = dict(zip(strip.points.points, strip.points.coordinates.T.tolist(), strict=True))
+    hidden = {
+        "bad": slip.point,
+        "ties": len(shared(models[0], models[1])),
+        "scale": 1e3 * float(strip.oriented.similarity.scale),
+    }
+    hidden |= {f"{axis}{name}": places[name][k] for name in wanted for k, axis in enumerate("xyz")}
+    papers = {SHEETS: _sheets_csv(slip.on(models), scenario), CONTROL: control_csv(given)}
+    return Handout(papers, hidden)
+
+
+def misread(models: Sequence[Model], given: Ground, seed: int) -> Misread:
+    """Return a slip that the joins show: its point has by far the largest closing difference. Raises Mistake."""
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=HANDOUT_STREAM))
+    candidates: list[Misread] = [
+        Misread(after.name, name, axis, float(sign * round(rng.uniform(*MISREAD_MM), 2)))
+        for before, after in pairwise(models)
+        for name in shared(before, after)
+        if not is_centre(name) and name not in given.points
+        for axis in range(3)
+        for sign in (-1.0, 1.0)
+    ]
+    order: list[int] = rng.permutation(len(candidates)).tolist()
+    for i in order:
+        if _stands_out(candidates[i], models):
+            return candidates[i]
+    raise Mistake("expected models with ties enough for a misread one to stand out, got too few")
+
+
+def _stands_out(slip: Misread, models: Sequence[Model]) -> bool:
+    if sum(slip.point in model.points for model in models) > 2:
+        return False
+    join = next(each for each in formed_strip(slip.on(models)).joins if each.after == slip.model)
+    off = np.abs(join.differences).max(axis=0)
+    worst = int(off.argmax())
+    return join.points[worst] == slip.point and bool(np.sort(off)[-2] < 0.6 * off[worst])
+
+
+def shared(before: Model, after: Model) -> list[str]:
+    """Return the names of what two models have in common, their centre among them."""
+    return [name for name in before.points if name in after.points]
+
+
+def _in_instrument(model: Model, scenario: Scenario) -> Model:
+    """Return a model at the scale of the plan, with what the plan presets at its first standard point, mm."""
+    left, right = (model.at([name])[:, 0] for name in model.centres)
+    larger = scenario.plan.bx / float(length_of(right - left))
+    first = model.at([f"{model.centres[0].partition(':')[0]}1"])
+    preset = np.array(scenario.plan.preset)[:, None] / _units(scenario)
+    return Model(model.name, model.points, larger * (model.coordinates - first) + preset)
+
+
+def _units(scenario: Scenario) -> Array:
+    gear = scenario.plan.height_gear
+    assert not isinstance(gear, str)
+    return np.array([[1.0], [1.0], [gear]])
+
+
+def _sheets_csv(models: Sequence[Model], scenario: Scenario) -> str:
+    rows = [
+        (model.name, name, *(f"{each:.2f}" for each in place))
+        for model in models
+        for name, place in zip(model.points, (model.coordinates * _units(scenario)).T.tolist(), strict=True)
+    ]
+    return csv_text(COLUMNS, rows)

@@ -1,0 +1,216 @@
+"""Somebody else's book of a relative orientation, with one of seven slips in it, for who is to find it."""
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from statistics import fmean
+from typing import get_args
+
+import numpy as np
+
+from a7sim.manual import POSITIONS_OF
+from a7sim.mistakes import Mistake
+from a7sim.operator.book import Entry
+from a7sim.operator.levers import right_fittings
+from a7sim.operator.relative import GROSS_MM, corrections_of, unknowns_of
+from a7sim.operator.slips import neighbours, transpositions
+from a7sim.scenario import Scenario
+from a7sim.scenario.schema import SlipKind
+from a7sim.session.running import open_session
+from a7sim.training.handouts.base import Handout, handout
+from a7sim.training.procedures import Seated
+from a7sim.training.variation import TRAINING_STREAM
+
+BOOK = "book.csv"
+
+COLUMNS = ("entry", "form", "round", "point", "item", "reading")
+
+ROUNDS = 2
+
+MEASURING = ("by1", "by2")
+
+PLAINLY_MM = 0.05
+"""Readings that slips of sign and digits befall are larger: smaller ones tell little."""
+
+_SLIPS = 1
+"""Spawn key of the slip, beside what the scenario varies."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of the fair copy."""
+
+    entry: int
+    form: str
+    round: int
+    point: str
+    item: str
+    reading: str
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether it is what a drum showed where a parallax was cleared."""
+        return self.item in MEASURING
+
+
+@dataclass(frozen=True)
+class Slipped:
+    """A copy of a line with a slip in it, and what belongs there."""
+
+    line: Line
+    right: Sequence[str]
+
+
+@handout("book with a slip")
+def book_with_a_slip(scenario: Scenario, seed: int, kind: str = "") -> Handout:
+    """Return the fair copy of an operator's book in which one slip was made, of a kind that the seed draws."""
+    kinds: tuple[str, ...] = get_args(SlipKind)
+    if kind and kind not in kinds:
+        raise Mistake(f"handout_options.kind: expected one of {', '.join(kinds)}, got {kind!r}")
+    seated, rounds = _worked(scenario, seed)
+    lines = _copied(seated, rounds)
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(TRAINING_STREAM, _SLIPS)))
+    drawn = str(rng.choice(kinds))
+    kind = kind or drawn
+    ways = [way for line in lines for way in _WAYS[kind](line, lines, seated)]
+    way = ways[int(rng.integers(len(ways)))]
+    slipped = [way.line if each.entry == way.line.entry else each for each in lines]
+    hidden = {"kind": kind, "entry": way.line.entry, "right": list(way.right)}
+    return Handout({BOOK: _as_csv(slipped)}, hidden)
+
+
+@dataclass(frozen=True)
+class _Round:
+    """A round as it was worked: elements before and after, and the book's entries at its points."""
+
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    entries: Sequence[Entry]
+
+
+def _worked(scenario: Scenario, seed: int) -> tuple[Seated, list[_Round]]:
+    session = open_session(scenario, seed)
+    seated = Seated.at(session.person, session.job, session.job.models[0].name)
+    seated.set_up()
+    bench, model, plan = seated.bench, seated.model, session.job.plan
+    who, elements = bench.crew.everybody, unknowns_of(plan.method, model)
+    labels = model.points_of_case(plan.case)
+    rounds = []
+    for _ in range(ROUNDS):
+        begun = len(session.person.book.entries)
+        before = bench.seat.elements(who, elements)
+        seen = bench.parallaxes(who, [model.standard_points[label] for label in labels], plan.parallax_readings)
+        entries = [each for each in session.person.book.entries[begun:] if each.item in MEASURING and not each.struck]
+        mean = seen.p.mean(axis=0) if float(np.sqrt(np.mean(seen.p**2))) < GROSS_MM else 0.0
+        base = np.full(who.size, plan.bx)
+        found, _ = corrections_of(bench, who, model, seen.places, seen.p - mean, elements, base, labels)
+        bench.seat.set_elements(who, {name: before[name] + found[name][who] for name in elements})
+        after = bench.seat.elements(who, elements)
+        counts = [{name: float(each[name][0]) for name in elements} for each in (before, after)]
+        rounds.append(_Round(counts[0], counts[1], entries))
+    return seated, rounds
+
+
+def _copied(seated: Seated, rounds: Sequence[_Round]) -> list[Line]:
+    """Return the fair copy without any slip: fittings, and the rounds with their sums."""
+    model, lines = seated.model, list[Line]()
+
+    def write(form: str, round_: int, point: str, item: str, reading: str) -> None:
+        lines.append(Line(len(lines) + 1, form, round_, point, item, reading))
+
+    for name, position in right_fittings(seated.bench.seat.manual, model.polarity, model.base).items():
+        write("fittings", 0, "", name, position)
+    form = "relative orientation"
+    for number, worked in enumerate(rounds, start=1):
+        for name, value in worked.before.items():
+            write(form, number, "", f"{name} before", f"{value:.2f}")
+        for point in dict.fromkeys(each.point for each in worked.entries):
+            read = [each for each in worked.entries if each.point == point]
+            for each in read:
+                write(form, number, point, each.item, each.reading)
+            by1, by2 = (fmean(float(each.reading) for each in read if each.item == by) for by in MEASURING)
+            write(form, number, point, "mean p", f"{(by1 - by2) / 2.0:+.4f}")
+        for name, value in worked.after.items():
+            correction = (value - worked.before[name] + 200.0) % 400.0 - 200.0
+            write(form, number, "", f"{name} correction", f"{correction:+.2f}")
+        for name, value in worked.after.items():
+            write(form, number, "", f"{name} after", f"{value:.2f}")
+    return lines
+
+
+Way = Callable[[Line, Sequence[Line], Seated], list[Slipped]]
+
+
+def _misread(line: Line, wrong: float) -> list[Slipped]:
+    return [Slipped(replace(line, reading=f"{wrong:.2f}"), [line.reading])]
+
+
+def _last_digit(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+    return _misread(line, float(line.reading) + 0.01) if line.is_reading else []
+
+
+def _gross(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+    return _misread(line, float(line.reading) + 1.0) if line.is_reading else []
+
+
+def _wrong_sign(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+    plain = line.is_reading and abs(float(line.reading)) > PLAINLY_MM
+    return _misread(line, -float(line.reading)) if plain else []
+
+
+def _transposed(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+    if not line.is_reading:
+        return []
+    shown = float(line.reading)
+    return [
+        each
+        for wrong in transpositions(shown)
+        if abs(wrong - shown) > PLAINLY_MM and abs(abs(wrong - shown) - 1.0) > PLAINLY_MM
+        for each in _misread(line, wrong)
+    ]
+
+
+def _wrong_point(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+    if not line.is_reading:
+        return []
+    read = {each.point for each in lines if each.is_reading}
+    measured = {position: name for position, name in seated.model.standard_points.items() if name in read}
+    position = next(each for each, name in measured.items() if name == line.point)
+    return [Slipped(replace(line, point=name), [line.point, position]) for name in neighbours(measured, line.point)]
+
+
+def _forgotten_lever(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+    if line.form != "fittings":
+        return []
+    return [Slipped(replace(line, reading=other), [line.reading]) for other in _others(line.item, line.reading)]
+
+
+def _others(fitting: str, position: str) -> list[str]:
+    return [each for each in POSITIONS_OF[fitting] if each != position]
+
+
+def _not_reread(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+    if line.round < 2 or not line.item.endswith(" before"):
+        return []
+    old = next(each.reading for each in lines if each.round == line.round - 1 and each.item == line.item)
+    return [Slipped(replace(line, reading=old), [line.reading])] if old != line.reading else []
+
+
+_WAYS: Mapping[str, Way] = {
+    "last digit": _last_digit,
+    "gross": _gross,
+    "wrong point": _wrong_point,
+    "wrong sign": _wrong_sign,
+    "transposed digits": _transposed,
+    "forgotten lever": _forgotten_lever,
+    "element not re-read": _not_reread,
+}
+
+
+def _as_csv(lines: Sequence[Line]) -> str:
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows((each.entry, each.form, each.round or "", each.point, each.item, each.reading) for each in lines)
+    return out.getvalue()

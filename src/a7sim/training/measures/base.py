@@ -1,0 +1,115 @@
+"""What a measure is: a small pure function of the account, with its options, its unit and its floor."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, TypeVar
+
+import msgspec
+
+from a7sim.scenario import Scenario
+from a7sim.training.account import Account
+from a7sim.training.exercise import Measured
+from a7sim.training.witness import Reading
+
+BEST_PARALLAX_UM = 2.2
+"""Of one setting on vanishing y-parallax, at photo scale: the best of the organisations of 1960 (geometry.md)."""
+
+BEST_POINTING_UM = 2.8
+"""Of one monocular pointing: what the thesis's twenty centres ask for (decision 4)."""
+
+BEST_HEIGHT_UM = 2.0
+"""Of one setting of the mark on the ground, as x-parallax (decision 8)."""
+
+BEST_FIDUCIAL_UM = 7.0
+"""Of a fiducial against its collimating mark (decision 8)."""
+
+LARGEST_OF_SOME = 2.5
+"""The largest of some tens of settings, in standard deviations."""
+
+HALF_A_COUNT = 0.005
+"""mm and gon: nearer than this a counter shows no difference."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a measure came to: its value, None where there was nothing to measure, and why, in words with numbers."""
+
+    value: float | None
+    reason: str
+
+
+class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A measure with its options. A smaller value is a better one, unless `more_is_better`."""
+
+    unit: ClassVar[str] = ""
+    truth: ClassVar[bool] = False
+    """Whether it looks at what cannot be seen at the link."""
+    more_is_better: ClassVar[bool] = False
+
+    def of(self, account: Account) -> Found:
+        """Return what it comes to."""
+        raise NotImplementedError
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what nobody can be asked to stay below: what an eye and a least count allow."""
+        return 0.0
+
+    def reached(self, value: float | None, limit: float) -> bool:
+        """Whether a value is as good as a limit."""
+        if value is None:
+            return False
+        return value >= limit - 1e-9 if self.more_is_better else value <= limit + 1e-9
+
+
+MEASURES: dict[str, type[Measure]] = {}
+"""All measures by the names that exercises use."""
+
+Kind = TypeVar("Kind", bound=type[Measure])
+
+
+def measure(name: str) -> Callable[[Kind], Kind]:
+    """Register a measure under a name."""
+
+    def registered(kind: Kind) -> Kind:
+        MEASURES[name] = kind
+        return kind
+
+    return registered
+
+
+def measure_of(measured: Measured) -> Measure:
+    """Return the measure of a step or a criterion. Raises msgspec.ValidationError for options that are none."""
+    return msgspec.convert(measured.options, MEASURES[measured.measure])
+
+
+def listed(words: Iterable[object], most: int = 6) -> str:
+    """Return words as people list them, the first few."""
+    all_words = [str(each) for each in words]
+    shown = all_words[:most]
+    if len(all_words) > most:
+        shown.append(f"{len(all_words) - most} more")
+    return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}" if shown else "none"
+
+
+def title(handle: str) -> str:
+    """Return a handle as the field writes it: by', kappa\", X."""
+    if handle[-1:] in "12" and handle[:-1] in ("c", "kappa", "phi", "omega", "by", "bz"):
+        return handle[:-1] + ("'" if handle.endswith("1") else '"')
+    return handle
+
+
+def readings_with(account: Account, element: str, points: Sequence[str] = ()) -> list[Reading]:
+    """Return the registrations of an element, or any, at points given by position or name, or anywhere."""
+    names = [account.name_of(point) for point in points]
+    return [
+        each
+        for each in account.readings
+        if (not element or element in each.named) and (not names or each.point in names)
+    ]
+
+
+def where(readings: Iterable[Reading], account: Account) -> str:
+    """Return at which points readings were made, as positions of the model where they have one."""
+    positions = {name: position for position, name in account.model.standard_points.items()}
+    names = list(dict.fromkeys(positions.get(each.point, each.point) for each in readings))
+    return f"{'points' if len(names) > 1 else 'point'} {listed(names)}"

@@ -1,0 +1,265 @@
+"""Measures of models beside the ground and beside each other: heights, distances, scale carried on, what was kept."""
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import combinations
+
+import numpy as np
+from msgspec import field
+
+from a7sim.geometry import Array, length_of
+from a7sim.scenario import ModelPlan, Scenario
+from a7sim.training.account import Account
+from a7sim.training.measures.base import (
+    BEST_HEIGHT_UM,
+    BEST_PARALLAX_UM,
+    BEST_POINTING_UM,
+    HALF_A_COUNT,
+    Found,
+    Measure,
+    listed,
+    measure,
+    title,
+)
+from a7sim.training.witness import AXES, Deed, Reading
+
+LAST = 2
+"""So many registrations of a point are its reading: a point is pointed at twice."""
+
+
+def last_readings(account: Account, points: Iterable[str], base: str = "") -> dict[str, list[Reading]]:
+    """Return the last two pointings at points, with a base where it is named; points without any are left out."""
+    found = {}
+    for point in points:
+        name = account.name_of(point)
+        readings = pointings(account, name, base)
+        if readings:
+            found[name] = readings[-LAST:]
+    return found
+
+
+def pointings(account: Account, name: str, base: str = "") -> list[Reading]:
+    """Return the registrations of a point's coordinates: those with no element named."""
+    return [each for each in account.readings if each.point == name and not each.named and base in ("", each.base)]
+
+
+def mean_shown(readings: Sequence[Reading]) -> Array:
+    """Return what the X, Y and Z counters showed in the mean ``(3,)``."""
+    return np.asarray(np.mean([[each.shown[axis] for axis in AXES] for each in readings], axis=0))
+
+
+def height_floor_um(scenario: Scenario) -> float:
+    """Return what the best eye leaves in an x-parallax, the film's irregular deformation in both pictures with it."""
+    film = math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
+    return math.hypot(BEST_HEIGHT_UM, math.sqrt(2.0) * film)
+
+
+def metres_per_um(scenario: Scenario, scale_number: float) -> float:
+    """Return by how much a height changes with a micrometre of x-parallax at photo scale, m on the ground."""
+    plan, c = scenario.plan, scenario.camera.c
+    return 1e-6 * scale_number * plan.projection_height / c * plan.projection_height / plan.bx
+
+
+@measure("missing-pointings")
+class MissingPointings(Measure, frozen=True, kw_only=True):
+    """How many pointings are missing: at every point so many, with each of some bases."""
+
+    unit = "registrations"
+    points: list[str]
+    each: int = 1
+    bases: list[str] = field(default_factory=lambda: [""])
+
+    def of(self, account: Account) -> Found:
+        """Return their number."""
+        lacking = {
+            f"{point}{f' with base {base}' if base else ''}": self.each
+            - len(pointings(account, account.name_of(point), base))
+            for base in self.bases
+            for point in self.points
+        }
+        lacking = {where: lacks for where, lacks in lacking.items() if lacks > 0}
+        missing, wanted = sum(lacking.values()), len(self.points) * self.each * len(self.bases)
+        if not missing:
+            return Found(0.0, f"all {wanted} registrations are there")
+        return Found(float(missing), f"{missing} of {wanted} registrations are missing: {listed(lacking)}")
+
+
+@measure("heights-off")
+class HeightsOff(Measure, frozen=True, kw_only=True):
+    """By how much heights that the Z counter showed differ from the ground: rms or the largest, m."""
+
+    unit = "m"
+    truth = True
+    points: list[str]
+    scale_number: float
+    """Of the model, by which the counter reads metres."""
+    largest: bool = False
+
+    def of(self, account: Account) -> Found:
+        """Return it, by the last two registrations of each point."""
+        readings = last_readings(account, self.points)
+        missing = [point for point in self.points if account.name_of(point) not in readings]
+        if missing:
+            return Found(None, f"nothing was registered at {listed(missing)}")
+        truth = account.scene.ground_points
+        off = {name: float(mean_shown(some)[2] - truth[name][2]) for name, some in readings.items()}
+        worst = max(off, key=lambda name: abs(off[name]))
+        rms = math.sqrt(sum(each**2 for each in off.values()) / len(off))
+        told = f"heights are off by {rms:.2f} m (rms), the largest {off[worst]:+.2f} m at {worst}"
+        return Found(round(abs(off[worst]) if self.largest else rms, 4), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what the best eye and the film allow, and half a count."""
+        return height_floor_um(scenario) * metres_per_um(scenario, self.scale_number)
+
+
+@measure("distances-off")
+class DistancesOff(Measure, frozen=True, kw_only=True):
+    """The largest share by which distances in plan that the counters showed differ from the ground, in a thousand."""
+
+    unit = "per mille"
+    truth = True
+    points: list[str]
+    scale_number: float
+    shortest_m: float = 500.0
+    """Distances shorter than that tell little of the scale."""
+
+    def of(self, account: Account) -> Found:
+        """Return the share in the mean of all pairs, by the last two registrations of each point."""
+        readings = last_readings(account, self.points)
+        truth = account.scene.ground_points
+        metres = 1e-3 * self.scale_number / account.autograph.variant.scales["X"].units_per_mm
+        shares = []
+        for one, other in combinations(readings, 2):
+            true = float(length_of((truth[other] - truth[one])[:2]))
+            if true >= self.shortest_m:
+                shown = mean_shown(readings[other]) - mean_shown(readings[one])
+                shares.append(metres * float(length_of(shown[:2])) / true - 1.0)
+        if not shares:
+            return Found(None, f"no two of {listed(self.points)} were registered")
+        share = 1e3 * sum(shares) / len(shares)
+        told = f"the model is {abs(share):.2f} per mille too {'large' if share > 0 else 'small'}"
+        return Found(round(abs(share), 4), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what two pointings allow over the width of the model."""
+        film = math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
+        um = math.sqrt(2.0) * math.hypot(BEST_POINTING_UM, film)
+        return um / (1.5 * scenario.plan.half_width)
+
+
+def element_at(account: Account, name: str, place: int) -> float:
+    """Return where an element stood before a deed."""
+    moved = [each for each in account.witness.deeds if each.what in ("set", "turn") and each.name == name]
+    before = [each.after for each in moved if each.place < place]
+    later = [each.before for each in moved if each.place >= place]
+    return before[-1] if before else later[0] if later else account.autograph.element(name)
+
+
+def change_of_base(account: Account, mode: str) -> Deed | None:
+    """Return the student's deed by which the base was last changed over to a mode, None where it never was."""
+    changes = [each for each in account.deeds if each.what == "base" and each.text == mode]
+    return changes[-1] if changes else None
+
+
+@measure("moved-since")
+class MovedSince(Measure, frozen=True, kw_only=True):
+    """The largest difference of elements from how they stood when the base was changed over, mm or gon."""
+
+    unit = "mm or gon"
+    elements: list[str]
+    base: str = "outside"
+    """To which it was changed."""
+
+    def of(self, account: Account) -> Found:
+        """Return it."""
+        change = change_of_base(account, self.base)
+        if change is None:
+            return Found(None, f"the base was never set {self.base}")
+        moved = {}
+        for name in self.elements:
+            off = account.autograph.element(name) - element_at(account, name, change.place)
+            moved[name] = abs((off + 200.0) % 400.0 - 200.0) if name.startswith("kappa") else abs(off)
+        worst = max(moved, key=lambda name: moved[name])
+        told = [f"{title(name)} by {amount:.2f}" for name, amount in moved.items() if amount > HALF_A_COUNT]
+        return Found(round(moved[worst], 4), f"moved since: {listed(told)}")
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return half a count."""
+        return HALF_A_COUNT
+
+
+@measure("ties-apart")
+class TiesApart(Measure, frozen=True, kw_only=True):
+    """The largest difference of a counter between the readings of common points in two models, mm.
+
+    The two are the one with base in and the one with base out.
+    """
+
+    unit = "mm"
+    points: list[str]
+    axes: list[str] = field(default_factory=lambda: list(AXES))
+
+    def of(self, account: Account) -> Found:
+        """Return it, by the last two registrations of each point in either model."""
+        inside, outside = (last_readings(account, self.points, base) for base in ("inside", "outside"))
+        missing = [point for point in self.points if account.name_of(point) not in inside.keys() & outside.keys()]
+        if missing:
+            return Found(None, f"not registered both with base in and with base out: {listed(missing)}")
+        units = {"Z": account.autograph.z_units_per_mm}
+        apart = []
+        for name, some in inside.items():
+            difference = mean_shown(outside[name]) - mean_shown(some)
+            for axis, by in zip(AXES, difference.tolist(), strict=True):
+                if axis in self.axes:
+                    mm = by / units.get(axis, 1.0)
+                    apart.append((abs(mm), f"{axis} at {name} reads {mm:+.3f} mm more than in the model before"))
+        worst, told = max(apart)
+        return Found(round(worst, 4), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what the best eye allows of heights in two models."""
+        plan = scenario.plan
+        um = math.sqrt(2.0) * height_floor_um(scenario)
+        return 1e-3 * um * plan.projection_height / scenario.camera.c * plan.projection_height / plan.bx
+
+
+@measure("scale-not-carried")
+class ScaleNotCarried(Measure, frozen=True, kw_only=True):
+    """By how much the second model's scale differs from the first's, per mille: by the bases, beside the flight."""
+
+    unit = "per mille"
+    truth = True
+    first: str = "1"
+    base: str = "outside"
+
+    def of(self, account: Account) -> Found:
+        """Return it."""
+        change = change_of_base(account, self.base)
+        if change is None:
+            return Found(None, f"the base was never set {self.base}")
+        models = {each.name: each for each in account.scenario.models}
+        before = self._scale(account, models[self.first], change.place)
+        after = self._scale(account, models[account.model.name], account.witness.deeds[-1].place + 1)
+        share = 1e3 * (after / before - 1.0)
+        told = f"the second model is {abs(share):.2f} per mille {'larger' if share > 0 else 'smaller'} than the first"
+        return Found(round(abs(share), 4), told)
+
+    def _scale(self, account: Account, model: ModelPlan, place: int) -> float:
+        at = {
+            name: element_at(account, name, place)
+            for name in ("bx", "by1", "by2", "bz1", "bz2")
+            if name in account.autograph.variant.elements
+        }
+        base = np.array([at["bx"], at.get("by1", 0.0) - at.get("by2", 0.0), at.get("bz1", 0.0) - at.get("bz2", 0.0)])
+        stations = account.scene.stations
+        return float(length_of(base) / length_of(stations[model.right].centre - stations[model.left].centre))
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what y-parallaxes in the outer rows allow of phi of both photographs in both models (T 2.32)."""
+        plan, c = scenario.plan, scenario.camera.c
+        film = math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
+        parallax = math.hypot(BEST_PARALLAX_UM, math.sqrt(2.0) * film)
+        base = plan.bx * c / plan.projection_height
+        tilt = parallax / (base * plan.half_width / c) / math.sqrt(2.0)
+        return 2.0 * c * tilt / base

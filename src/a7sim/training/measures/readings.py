@@ -1,0 +1,251 @@
+"""Measures of readings, by what is seen at the link: that they are there, how they were come to, how they agree."""
+
+from itertools import groupby, pairwise
+from statistics import fmean
+
+from msgspec import field
+
+from a7sim.scenario import Scenario
+from a7sim.training.account import Account
+from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, listed, measure, readings_with, title, where
+from a7sim.training.witness import AXES, PLAIN, Reading
+
+
+@measure("missing-readings")
+class MissingReadings(Measure, frozen=True, kw_only=True):
+    """How many registrations are missing: of every point, and of each element there, so many."""
+
+    unit = "registrations"
+    points: list[str]
+    elements: list[str] = field(default_factory=list)
+    each: int = 1
+    after: list[str] = field(default_factory=list)
+    """Only those count that were made after the last movement of these handles."""
+
+    def of(self, account: Account) -> Found:
+        """Return their number."""
+        short: dict[str, list[str]] = {}
+        missing = 0
+        moved = [each.place for each in account.deeds if each.name in self.after and each.what in PLAIN]
+        last = max(moved, default=-1)
+        for point in self.points:
+            for element in self.elements or [""]:
+                readings = [each for each in readings_with(account, element, [point]) if each.place > last]
+                lacks = self.each - len(readings)
+                if lacks > 0:
+                    missing += lacks
+                    short.setdefault(f"{title(element) + ' at ' if element else ''}{point}", []).append(str(lacks))
+        wanted = len(self.points) * max(1, len(self.elements)) * self.each
+        if not missing:
+            return Found(0.0, f"all {wanted} registrations are there")
+        late = f" after the last turn of {listed(map(title, self.after))}" if self.after else ""
+        return Found(float(missing), f"{missing} of {wanted} registrations are missing{late}: {listed(short)}")
+
+
+@measure("wrong-approach")
+class WrongApproach(Measure, frozen=True, kw_only=True):
+    """How many registrations were made with a handle whose last movement came from the other side."""
+
+    unit = "registrations"
+    handles: list[str]
+    side: int = 1
+    """+1 from smaller readings, -1 from larger ones."""
+    points: list[str] = field(default_factory=list)
+    besides: list[str] = field(default_factory=list)
+    """Points at which it does not matter."""
+
+    def of(self, account: Account) -> Found:
+        """Return their number."""
+        spared = {account.name_of(point) for point in self.besides}
+        readings = [each for each in readings_with(account, "", self.points) if each.point not in spared]
+        if not readings:
+            return Found(None, "nothing was registered")
+        wrong = {
+            handle: [each for each in readings if each.sides.get(handle, self.side) != self.side]
+            for handle in self.handles
+        }
+        bad = {each.number for some in wrong.values() for each in some}
+        if not bad:
+            return Found(0.0, f"{listed(map(title, self.handles))} always came from the same side")
+        from_where = "larger" if self.side > 0 else "smaller"
+        told = [f"{title(handle)} at {where(some, account)}" for handle, some in wrong.items() if some]
+        return Found(
+            float(len(bad)),
+            f"{len(bad)} of {len(readings)} registrations came from {from_where} readings: {listed(told)}",
+        )
+
+
+@measure("one-side-only")
+class OneSideOnly(Measure, frozen=True, kw_only=True):
+    """How many handles were not registered at a point both coming from smaller readings and from larger ones."""
+
+    unit = "handles"
+    point: str
+    handles: list[str]
+
+    def of(self, account: Account) -> Found:
+        """Return their number."""
+        readings = readings_with(account, "", [self.point])
+        if not readings:
+            return Found(None, f"nothing was registered at {self.point}")
+        lacking = {handle: {each.sides.get(handle, 0) for each in readings} for handle in self.handles}
+        told = [
+            f"{title(handle)} never came from {'smaller' if 1 not in sides else 'larger'} readings"
+            for handle, sides in lacking.items()
+            if not {1, -1} <= sides
+        ]
+        return Found(float(len(told)), f"at {self.point}: {listed(told) if told else 'both sides were registered'}")
+
+
+@measure("not-left-between")
+class NotLeftBetween(Measure, frozen=True, kw_only=True):
+    """How many points have no second registration for which a handle had gone away and come back."""
+
+    unit = "points"
+    points: list[str]
+    handles: list[str]
+    away: float = 0.1
+    """By how much it must have gone away, in units of its counter."""
+
+    def of(self, account: Account) -> Found:
+        """Return their number."""
+        lazy = {
+            point: [handle for handle in self.handles if not self._came_back(account, point, handle)]
+            for point in self.points
+        }
+        lazy = {point: handles for point, handles in lazy.items() if handles}
+        if not lazy:
+            return Found(0.0, f"at {listed(self.points)} the second reading is one of its own")
+        handles = [title(each) for each in self.handles if any(each in some for some in lazy.values())]
+        return Found(
+            float(len(lazy)),
+            f"at {listed(lazy)} there are no two readings of {listed(handles)} between which it went away "
+            f"by {self.away:g} and came back",
+        )
+
+    def _came_back(self, account: Account, point: str, handle: str) -> bool:
+        readings = readings_with(account, "" if handle in AXES else handle, [point])
+        return any(self._left(account, handle, *pair) for pair in pairwise(readings))
+
+    def _left(self, account: Account, handle: str, first: Reading, then: Reading) -> bool:
+        stood = [each.after for each in account.deeds if each.name == handle and first.place < each.place < then.place]
+        return any(abs(at - first.shown[handle]) >= self.away - 1e-9 for at in stood)
+
+
+@measure("off-target")
+class OffTarget(Measure, frozen=True, kw_only=True):
+    """The largest difference of a counter from what it should show where a point was registered."""
+
+    unit = "mm"
+    targets: dict[str, dict[str, float]]
+    """By point, by counter or element."""
+
+    def of(self, account: Account) -> Found:
+        """Return it, by the last registration of each point."""
+        off: list[tuple[float, str]] = []
+        missing = []
+        for point, wanted in self.targets.items():
+            readings = readings_with(account, "", [point])
+            if not readings:
+                missing.append(point)
+                continue
+            for handle, reading in wanted.items():
+                for each in readings:
+                    shown = each.shown[handle]
+                    off.append((abs(shown - reading), f"{title(handle)} at {point} read {shown:.2f} for {reading:.2f}"))
+        if missing:
+            return Found(None, f"nothing was registered at {listed(missing)}")
+        worst, told = max(off)
+        return Found(round(worst, 4), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return half a count."""
+        return HALF_A_COUNT
+
+
+@measure("other-not-at-rest")
+class OtherNotAtRest(Measure, frozen=True, kw_only=True):
+    """How many readings of an element were made while another did not stand where it rests."""
+
+    unit = "readings"
+    pairs: dict[str, str]
+    """By the element that is read, the one that must rest."""
+    at: float = 0.0
+    within: float = 0.005
+
+    def of(self, account: Account) -> Found:
+        """Return their number."""
+        told, count, all_read = [], 0, 0
+        for read, other in self.pairs.items():
+            readings = [each for each in readings_with(account, read) if other not in each.named]
+            all_read += len(readings)
+            wrong = [each for each in readings if abs(each.shown[other] - self.at) > self.within]
+            count += len(wrong)
+            if wrong:
+                told.append(
+                    f"{title(other)} was never returned to {self.at:g} before reading {title(read)} "
+                    f"at {where(wrong, account)}"
+                )
+        if not all_read:
+            return Found(None, f"no reading of {listed(map(title, self.pairs))} was registered")
+        return Found(float(count), listed(told) if told else f"at all {all_read} readings the other one stood at rest")
+
+
+@measure("spread")
+class Spread(Measure, frozen=True, kw_only=True):
+    """The largest difference between readings of the same element, or counter, at the same point."""
+
+    unit = "mm"
+    handles: list[str]
+    points: list[str] = field(default_factory=list)
+
+    def of(self, account: Account) -> Found:
+        """Return it."""
+        spreads: list[tuple[float, str]] = []
+        for handle in self.handles:
+            readings = sorted(
+                readings_with(account, "" if handle in AXES else handle, self.points), key=lambda each: each.point
+            )
+            for _, some in groupby(readings, key=lambda each: each.point):
+                group = list(some)
+                read = [each.shown[handle] for each in group]
+                if len(read) > 1:
+                    spread = max(read) - min(read)
+                    told = f"{title(handle)} at {where(group, account)} read from {min(read):.2f} to {max(read):.2f}"
+                    spreads.append((round(spread, 4), told))
+        if not spreads:
+            return Found(None, "nothing was read twice")
+        return Found(*max(spreads))
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return a count: two readings of the same setting may fall on either side of a half."""
+        return 2.0 * HALF_A_COUNT
+
+
+@measure("not-opposed")
+class NotOpposed(Measure, frozen=True, kw_only=True):
+    """By how much the mean readings of two elements at a point differ from being opposite: by' reads +p, by\" -p."""
+
+    unit = "mm"
+    one: str = "by1"
+    other: str = "by2"
+    points: list[str] = field(default_factory=list)
+
+    def of(self, account: Account) -> Found:
+        """Return the largest sum at a point."""
+        sums: list[tuple[float, str]] = []
+        for point in dict.fromkeys(each.point for each in readings_with(account, self.one, self.points)):
+            ones, others = readings_with(account, self.one, [point]), readings_with(account, self.other, [point])
+            if others:
+                left = fmean(each.shown[self.one] for each in ones)
+                right = fmean(each.shown[self.other] for each in others)
+                read = f"{title(self.one)} reads {left:+.3f} and {title(self.other)} {right:+.3f}"
+                told = f"at {where(ones, account)} {read}"
+                sums.append((round(abs(left + right), 4), told))
+        if not sums:
+            return Found(None, f"no point was read with both {title(self.one)} and {title(self.other)}")
+        return Found(*max(sums))
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return a count."""
+        return 2.0 * HALF_A_COUNT

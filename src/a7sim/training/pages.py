@@ -1,0 +1,129 @@
+"""The student's sheet and the class sheet, each one page of HTML that needs nothing beside it."""
+
+from collections.abc import Mapping, Sequence
+from statistics import median
+
+from a7sim.report.drawing import FAINT, INK, LEFT, RIGHT, drawing
+from a7sim.report.page import Chapter, Paragraph, Part, Picture, Sheet, page
+from a7sim.training.exercise import FULL_MARKS, Shelved
+from a7sim.training.grading import EXCELLENT, Grade
+from a7sim.training.progress import Attempt, Graded
+
+Best = Mapping[tuple[str, str], Graded]
+
+
+def student_sheet(student: str, shelf: Sequence[Shelved], best: Best, graded: Sequence[Graded]) -> str:
+    """Return the sheet of a student: where they stand, and for every exercise what to do better."""
+    mine = {exercise: each for (name, exercise), each in best.items() if name == student}
+    passed = sum(each.grade.passed for each in mine.values())
+    lead: list[Part] = [Paragraph(f"{passed} of {len(shelf)} exercises passed, {len(mine)} tried.")]
+    chapters = [Chapter("Where you stand", [_points(shelf, mine), _overview(shelf, mine, graded)])]
+    for shelved in shelf:
+        each = mine.get(shelved.name)
+        if each is not None:
+            chapters.append(Chapter(f"{shelved.exercise.number} {shelved.exercise.title}", list(_of_exercise(each))))
+    return page(f"{student}: exercises at the plotter", lead, chapters)
+
+
+def _overview(shelf: Sequence[Shelved], mine: Mapping[str, Graded], graded: Sequence[Graded]) -> Sheet:
+    rows = []
+    for shelved in shelf:
+        each = mine.get(shelved.name)
+        tried = sum(other.attempt.exercise == shelved.name for other in graded)
+        name = f"{shelved.exercise.number} {shelved.exercise.title}"
+        if each is None:
+            rows.append([name, "not graded yet", "", "", ""])
+        else:
+            grade = each.grade
+            rows.append([name, _verdict(grade), f"{grade.points:g}", str(grade.hints), str(tried)])
+    return Sheet(
+        "Best grade of each exercise", ["exercise", "", "points", "hints", "gradings"], rows, frozenset({0, 1})
+    )
+
+
+def _verdict(grade: Grade) -> str:
+    return "passed" if grade.passed else "not passed"
+
+
+def _of_exercise(each: Graded) -> Sequence[Part]:
+    grade, attempt = each.grade, each.attempt
+    after = f", {grade.hints} hints (-{grade.hint_points:g})" if grade.hints else ""
+    first = Paragraph(
+        f"{_verdict(grade)} with {grade.points:g} of {FULL_MARKS:g} points{after}; attempt {attempt.number}, "
+        f"{attempt.mode}, {grade.minutes:g} minutes at the instrument's clock."
+    )
+    rows = [[mark.title, mark.band, f"{mark.points:g} of {mark.weight:g}", mark.reason] for mark in grade.marks]
+    table = Sheet("What was graded", ["criterion", "", "points", "why"], rows, frozenset({0, 1, 3}))
+    advice = [mark for mark in grade.marks if mark.band != EXCELLENT]
+    better = [Paragraph(f"{mark.title} (-{mark.lost:g}): {mark.feedback}") for mark in advice]
+    return [first, table, *better]
+
+
+def _points(shelf: Sequence[Shelved], mine: Mapping[str, Graded]) -> Picture:
+    numbers = [str(each.exercise.number) for each in shelf]
+    points = [mine[each.name].grade.points if each.name in mine else 0.0 for each in shelf]
+    colours = [LEFT if each.name in mine and mine[each.name].grade.passed else RIGHT for each in shelf]
+    said = "; ".join(f"exercise {n}: {p:g}" for n, p in zip(numbers, points, strict=True))
+    with drawing("points", "Points of each exercise", said, size=(8.0, 3.2), wide=True) as drawn:
+        axes = drawn.axes[0]
+        axes.bar(numbers, points, color=colours, edgecolor=INK, width=0.65)
+        axes.set(xlabel="exercise", ylabel="points", ylim=(0.0, FULL_MARKS))
+        axes.grid(axis="y")
+        axes.set_axisbelow(True)
+    return drawn.picture
+
+
+def class_sheet(shelf: Sequence[Shelved], best: Best, attempts: Sequence[Attempt]) -> str:
+    """Return the sheet of a class: who stands where, and which mistakes are everybody's."""
+    students = sorted({each.student for each in attempts})
+    lead: list[Part] = [Paragraph(f"{len(students)} students, {len(attempts)} attempts.")]
+    rows = [[student, *(_cell(best.get((student, each.name))) for each in shelf)] for student in students]
+    columns = ["student", *(str(each.exercise.number) for each in shelf)]
+    table = Sheet("Best points by exercise; those in brackets are not passed", columns, rows)
+    chapters = [
+        Chapter("The class", [_spread(shelf, best), table]),
+        Chapter("What went wrong", [_mistakes(shelf, best)]),
+    ]
+    return page("Exercises at the plotter: the class", lead, chapters)
+
+
+def _cell(each: Graded | None) -> str:
+    if each is None:
+        return ""
+    return f"{each.grade.points:g}" if each.grade.passed else f"({each.grade.points:g})"
+
+
+def _spread(shelf: Sequence[Shelved], best: Best) -> Picture:
+    by_exercise = [[each.grade.points for (_, name), each in best.items() if name == s.name] for s in shelf]
+    numbers = [str(each.exercise.number) for each in shelf]
+    said = "; ".join(
+        f"exercise {n}: median {median(some):g} of {len(some)} students" if some else f"exercise {n}: nobody"
+        for n, some in zip(numbers, by_exercise, strict=True)
+    )
+    with drawing("spread", "Points of the class by exercise", said, size=(8.0, 3.6), wide=True) as drawn:
+        axes = drawn.axes[0]
+        for place, some in enumerate(by_exercise):
+            axes.plot([place] * len(some), some, "o", color=LEFT, alpha=0.5, markersize=6)
+            if some:
+                axes.plot([place - 0.25, place + 0.25], [median(some)] * 2, color=RIGHT)
+        for shelved_place, shelved in enumerate(shelf):
+            limit = shelved.exercise.pass_points
+            axes.plot([shelved_place - 0.4, shelved_place + 0.4], [limit] * 2, color=FAINT, linewidth=1.0)
+        axes.set_xticks(range(len(numbers)), numbers)
+        axes.set(xlabel="exercise", ylabel="points", ylim=(0.0, FULL_MARKS))
+        axes.grid(axis="y")
+    drawn.legend = "each dot a student; long line the median, faint line what passes"
+    return drawn.picture
+
+
+def _mistakes(shelf: Sequence[Shelved], best: Best) -> Sheet:
+    rows = []
+    for shelved in shelf:
+        marked = [each.grade.marks for (_, name), each in best.items() if name == shelved.name]
+        for criterion in shelved.exercise.criteria:
+            bands = [mark.band for marks in marked for mark in marks if mark.id == criterion.id]
+            failed = sum(band == "fail" for band in bands)
+            if failed:
+                rows.append([f"{shelved.exercise.number}: {criterion.title}", f"{failed} of {len(bands)}"])
+    rows.sort(key=lambda row: -int(row[1].split()[0]))
+    return Sheet("Criteria that were failed, those of most students first", ["criterion", "failed"], rows)

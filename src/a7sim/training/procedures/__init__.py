@@ -1,0 +1,6 @@
+"""The procedures of the virtual operator that exercises name."""
+
+from a7sim.training.procedures import cards, models, orienting, testing
+from a7sim.training.procedures.base import PROCEDURES, Seated, play, procedure
+
+__all__ = ["PROCEDURES", "Seated", "cards", "models", "orienting", "play", "procedure", "testing"]

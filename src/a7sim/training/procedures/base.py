@@ -1,0 +1,191 @@
+"""What the virtual operator can do of an exercise, for references, openings and the skill study: by name."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from a7sim.link.client import Client
+from a7sim.link.headers import quoted, recorded_as
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.manual import VARIANTS
+from a7sim.mistakes import Mistake
+from a7sim.operator import DoesNotFit, Job, ModelJob, Person, work
+from a7sim.operator.bench import Bench
+from a7sim.operator.book import Entry
+from a7sim.operator.crew import Crew
+from a7sim.operator.interior import InteriorOrientations
+from a7sim.operator.line_hands import LineHands
+from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
+from a7sim.reduction import Undetermined
+from a7sim.session.running import job_of
+from a7sim.training.account import ANSWER
+from a7sim.training.exercise import Played
+from a7sim.training.room import Room
+from a7sim.training.variation import scenario_for
+
+ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)
+
+_POINTED = {1: "X left at", 2: "X right at"}
+"""How items of pointings with one eye begin, by the hand of the photograph."""
+
+_REGISTERED = (*_POINTED.values(), "parallax seen")
+"""Items at which counters are registered beside those of elements."""
+
+
+@dataclass(frozen=True)
+class Seated:
+    """The virtual operator at the instrument of an exercise."""
+
+    person: Person
+    bench: Bench
+    model: ModelJob
+    papers: Mapping[str, str] = field(default_factory=dict)
+    """What was handed out, by file name."""
+
+    @classmethod
+    def at(cls, person: Person, job: Job, model: str) -> "Seated":
+        """Return an operator who is to work on a model of a job."""
+        bench = Bench(Crew.of_one(person), LineHands(person), job)
+        return cls(person, bench, next(each for each in job.models if each.name == model))
+
+    def points(self) -> list[str]:
+        """Return the names of the standard points that the job sheet asks for."""
+        labels = self.model.points_of_case(self.bench.job.plan.case)
+        return [self.model.standard_points[label] for label in labels]
+
+    def set_up(self) -> None:
+        """Bring the instrument to the settings of the job sheet, mount and centre pictures, take up the prints."""
+        bench = self.bench
+        who = bench.crew.everybody
+        self.begin("preparation")
+        bench.seat.prepare(who)
+        self.begin("interior orientation")
+        set_base_and_fittings(bench, self.model.base, self.model.polarity)
+        found: dict[str, InteriorOrientations] = {}
+        mount(bench, self.model, found)
+        bench.begin(who, self.model, take_up_prints(bench, self.model))
+
+    def take_over(self) -> None:
+        """Sit down at an instrument that stands ready: base and pictures set, its counters as `*RST` leaves them."""
+        who = self.bench.crew.everybody
+        self.bench.seat.take_over(who)
+        self.bench.seat.counters(who)
+        self.bench.begin(who, self.model, take_up_prints(self.bench, self.model))
+
+    def answer(self, answers: Mapping[str, float], decimals: int = 2) -> None:
+        """Note answers down at the instrument."""
+        for key, value in answers.items():
+            self.person.note(f"{ANSWER}{key}={value:.{decimals}f}")
+
+    def begin(self, form: str) -> None:
+        """Begin a form of the book."""
+        self.bench.crew.begin(self.bench.crew.everybody, self.model.name, form)
+        self.person.note(f"{self.model.name}: {form}")
+
+
+Procedure = Callable[..., None]
+"""What takes `Seated` and the options of an exercise."""
+
+PROCEDURES: dict[str, Procedure] = {}
+"""All procedures by the names that exercises use."""
+
+
+def procedure(name: str) -> Callable[[Procedure], Procedure]:
+    """Register a procedure under a name."""
+
+    def registered(does: Procedure) -> Procedure:
+        PROCEDURES[name] = does
+        return does
+
+    return registered
+
+
+def play(room: Room, played: Played, client: str, papers: Mapping[str, str] | None = None) -> str:
+    """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake.
+
+    `papers` are what was handed out, by file name.
+    """
+    port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
+    observer = scenario_for(room.shelved, room.seed, played.observer).observer
+    person = Person(Client(port), room.clock, observer, room.seed)
+    seated = Seated.at(person, job_of(room.scenario, room.scene), room.shelved.exercise.model)
+    person.book.listener = _Button(person.client, seated.model).written
+    try:
+        PROCEDURES[played.procedure](replace(seated, papers=papers or {}), **played.options)
+    except (DoesNotFit, Undetermined) as trouble:
+        return str(trouble) or type(trouble).__name__
+    except TypeError as error:
+        if "argument" not in str(error):
+            raise
+        raise Mistake(f"{played.procedure}: expected the options of this procedure: {error}") from error
+    finally:
+        port.close()
+    return ""
+
+
+REGISTERED_ALREADY = "X"
+"""Of a point measured with both eyes the operator has registered all three coordinates before they are entered."""
+
+
+class _Button:
+    """The button of the recording device: what is written into the book is registered as well.
+
+    With the element that is read; a pointing with one eye at a model point with by of its projector, which says whose
+    it is (a cross of a plate lies under one projector alone).
+    """
+
+    def __init__(self, client: Client, model: ModelJob) -> None:
+        self._client = client
+        self._numbers: dict[int, int] = {}
+        self._points = frozenset(model.standard_points.values())
+        self._named = {
+            _POINTED[1]: f"by{model.left_projector}",
+            _POINTED[2]: f"by{model.right_projector}",
+        }
+
+    def written(self, entry: Entry) -> None:
+        if entry.struck:
+            if entry.number in self._numbers:
+                self._client.send(f"REC:STR {self._numbers[entry.number]},{quoted(entry.struck[:60])}")
+        elif entry.point and (entry.item in {REGISTERED_ALREADY, *ELEMENTS} or entry.item.startswith(_REGISTERED)):
+            if entry.item != REGISTERED_ALREADY:
+                self._client.send(",".join([f"REC {quoted(entry.point)}", *self._words(entry)]))
+            self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
+
+    def _words(self, entry: Entry) -> list[str]:
+        """Return the elements that are registered with an entry of the book."""
+        if entry.item in ELEMENTS:
+            return [recorded_as(entry.item)]
+        named = self._named.items() if entry.point in self._points else ()
+        return [recorded_as(by) for pointed, by in named if entry.item.startswith(pointed)]
+
+
+@procedure("interior orientation")
+def interior_orientation(seated: Seated) -> None:
+    """Fittings, both pictures mounted and centred, principal distances."""
+    seated.set_up()
+
+
+@procedure("measure parallaxes")
+def measure_parallaxes(seated: Seated, readings: int = 2) -> None:
+    """Clear the y-parallax at the standard points with by', then with by\", coming back to each so many times."""
+    seated.take_over()
+    seated.begin("y-parallaxes")
+    for _ in range(readings):
+        seated.bench.parallaxes(seated.bench.crew.everybody, seated.points(), 1)
+
+
+@procedure("relative orientation")
+def relative_orientation(seated: Seated) -> None:
+    """Relative orientation as the scenario's plan has it, of pictures that lie ready; then a look at every point."""
+    seated.take_over()
+    seated.begin("relative orientation")
+    oriented(seated.bench, seated.model)
+    seated.begin("last look")
+    seated.bench.parallaxes_seen(seated.bench.crew.everybody, seated.points())
+
+
+@procedure("day's work")
+def days_work(seated: Seated) -> None:
+    """All models of the scenario from the first picture to the last centre."""
+    for _ in work(seated.person, seated.bench.job):
+        pass

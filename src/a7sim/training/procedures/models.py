@@ -1,0 +1,167 @@
+"""What the virtual operator can do of the exercises after relative orientation: absolute orientation, base change."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from a7sim.operator.absolute import absolute_orientation_at
+from a7sim.operator.bridging import carry_on, carry_scale_on, set_as_its_neighbour
+from a7sim.operator.job import ModelJob
+from a7sim.operator.relative import relative_orientation
+from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
+from a7sim.training.account import ANSWER
+from a7sim.training.procedures.base import Seated, procedure
+
+
+@procedure("prepared model")
+def prepared_model(seated: Seated, model: str = "", orient: bool = True) -> None:
+    """Set a model up and `orient` it relatively, as somebody does who leaves it to the next operator.
+
+    The Z counter is left so that it reads from the base line.
+    """
+    bench, chosen = seated.bench, model_named(seated, model)
+    Seated(seated.person, bench, chosen).set_up()
+    if orient:
+        oriented(bench, chosen)
+    who = bench.crew.everybody
+    heights = bench.seat.from_zero(who, [f"bz{chosen.left_projector}"])[f"bz{chosen.left_projector}"]
+    bench.seat.shift_counter(who, "Z", bench.seat.units_per_mm * heights - bench.seat.centre(who, 1)[2])
+
+
+def take_over(seated: Seated, model: ModelJob) -> None:
+    """Go on at an instrument that somebody else left, a model mounted in it and its counters not preset."""
+    bench = seated.bench
+    who = bench.crew.everybody
+    bench.seat.take_over(who)
+    bench.seat.counters(who)
+    bench.begin(who, model, take_up_prints(bench, model))
+
+
+def model_named(seated: Seated, name: str) -> ModelJob:
+    """Return a model of the job sheet, that of the exercise where none is named."""
+    return next((each for each in seated.bench.job.models if each.name == name), seated.model)
+
+
+@procedure("absolute orientation")
+def absolute_orientation(
+    seated: Seated,
+    misread: Mapping[str, Sequence[float]] | None = None,
+    points: Sequence[str] | None = None,
+    knocked: Mapping[str, float] | None = None,
+) -> None:
+    """Level and scale the model that stands there on its control, index its heights, and read control and new points.
+
+    By mistake control is `misread` by so many m in X, Y, Z; only `points` are read; elements are `knocked` in the end.
+    """
+    bench = seated.bench
+    model = seated.model if points is None else replace(seated.model, other_points=tuple(points))
+    take_over(seated, model)
+    seated.begin("absolute orientation")
+    absolute_orientation_at(bench, model, changed_by(bench.job.control, misread or {}))
+    knock(seated, knocked or {})
+
+
+@procedure("A8 model")
+def a8_model(
+    seated: Seated,
+    level: bool = True,
+    doubled: bool = True,
+    place: str = "3",
+    misread: Mapping[str, Sequence[float]] | None = None,
+    points: Sequence[str] | None = None,
+    knocked: Mapping[str, float] | None = None,
+) -> None:
+    """Orient a model empirically, level it by common Phi and both omegas, read it, and answer the place of a point.
+
+    By mistake it is not made `level`, scale units are taken for mm instead of `doubled`, control is `misread`, only
+    `points` are read, elements are `knocked` in the end.
+    """
+    bench, crew = seated.bench, seated.bench.crew
+    name = seated.model.standard_points[place]
+    others = seated.model.other_points if points is None else tuple(points)
+    model = replace(seated.model, other_points=(*others, name))
+    take_over(seated, model)
+    seated.begin("relative orientation")
+    oriented(bench, model)
+    seated.begin("absolute orientation")
+    if level:
+        control = changed_by(bench.job.control, misread or {})
+        on_ground = absolute_orientation_at(bench, model, control)[0]
+        reading, bx = np.array(on_ground.points[name]), on_ground.elements["bx"]
+    else:
+        wanted = dict.fromkeys([*bench.job.control, *model.other_points])
+        shown = [each for each in wanted if bench.pricked(crew.everybody, each).all()]
+        reading = bench.measure(crew.everybody, shown)[:, shown.index(name), 0]
+        bx = float(bench.seat.bx(crew.everybody)[0])
+    scales = [bench.seat.manual.scales[axis] for axis in "XY"]
+    x, y = (each - scale.at_origin for each, scale in zip(reading[:2].tolist(), scales, strict=True))
+    mm = 1.0 / scales[0].units_per_mm if doubled else 1.0
+    left = bench.seat.manual.centres_on_base[0] * bx
+    seated.person.note(f"{ANSWER}x{place}={mm * x - left:.2f} y{place}={mm * y:.2f}")
+    knock(seated, knocked or {})
+
+
+def changed_by(
+    control: Mapping[str, tuple[float, float, float]], misread: Mapping[str, Sequence[float]]
+) -> dict[str, tuple[float, float, float]]:
+    """Return control with some of it misread by so many m in X, Y, Z."""
+    changed = dict(control)
+    for name, (dx, dy, dz) in misread.items():
+        x, y, z = control[name]
+        changed[name] = (x + dx, y + dy, z + dz)
+    return changed
+
+
+def knock(seated: Seated, elements: Mapping[str, float]) -> None:
+    """Turn elements by so much, by mistake."""
+    who = seated.bench.crew.everybody
+    standing = seated.bench.seat.elements(who, list(elements))
+    seated.bench.seat.turn_elements(who, {name: standing[name] + amount for name, amount in elements.items()})
+
+
+@procedure("base change")
+def base_change(
+    seated: Seated,
+    kept: bool = True,
+    counters: bool = True,
+    scale: bool = True,
+    read_again: bool = True,
+    wrong_fittings: Mapping[str, str] | None = None,
+    knocked: Mapping[str, float] | None = None,
+) -> None:
+    """Read the common points, change the base, orient the next photograph to the one that stays, carry the scale on.
+
+    By mistake the one that should be `kept` is turned as well, the `counters` are not preset, the `scale` is not
+    carried on, common points are not `read_again`, fittings are left in `wrong_fittings` or elements `knocked`.
+    """
+    bench, model = seated.bench, seated.model
+    crew, plan = bench.crew, bench.job.plan
+    who = crew.everybody
+    models = bench.job.models
+    first = models[models.index(model) - 1]
+    take_over(seated, first)
+    seated.begin("common points")
+    common = [name for name in map(model.standard_points.get, "135") if name]
+    readings = bench.measure(who, common)
+    before = {name: readings[:, i] for i, name in enumerate(common)}
+    seated.begin("interior orientation")
+    if counters:
+        carry_on(bench, model)
+    set_base_and_fittings(bench, model.base, model.polarity)
+    mount(bench, model, {})
+    bench.begin(crew.everybody, model, take_up_prints(bench, model))
+    set_as_its_neighbour(bench, model)
+    seated.begin("relative orientation")
+    method = "dependent" if kept else "independent"
+    tolerated = bench.job.tolerated_parallax_mm
+    relative_orientation(bench, crew.everybody, model, method, plan.case, plan.parallax_readings, plan.bx, tolerated)
+    seated.begin("scale")
+    if scale:
+        carry_scale_on(bench, crew.everybody, model, before)
+    seated.begin("model coordinates")
+    if read_again:
+        bench.measure(crew.everybody, common)
+    knock(seated, knocked or {})
+    for name, position in (wrong_fittings or {}).items():
+        bench.hands.set_fitting(np.asarray(crew.everybody), name, position)

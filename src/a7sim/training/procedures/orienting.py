@@ -1,0 +1,124 @@
+"""What the virtual operator can do of the exercises in orienting a model: clearing, computing, perspective centres."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from a7sim.geometry import Array
+from a7sim.operator.bench import Parallaxes
+from a7sim.operator.centres import centre_of, observe_centre
+from a7sim.operator.empirical import empirical_orientation
+from a7sim.operator.relative import corrections_of, unknowns_of
+from a7sim.operator.seat import side
+from a7sim.standard_points import CASES
+from a7sim.training.account import ANSWER
+from a7sim.training.procedures.base import Seated, procedure
+
+INDEPENDENT = "independent"
+
+
+@procedure("clear the model")
+def clear_the_model(
+    seated: Seated,
+    method: str = INDEPENDENT,
+    over_correction: float | str = "computed",
+    case: str = "A",
+    names_missing: bool = False,
+    missing: str = "",
+) -> None:
+    """Clear the y-parallaxes point by point, registering each element at the point that it cleared.
+
+    With `names_missing` the operator answers which of the points 1 to 6 are not there, or by mistake `missing`.
+    """
+    seated.take_over()
+    seated.begin("relative orientation")
+    bench = seated.bench
+    if names_missing:
+        gone = sorted(set(CASES["A"]) - set(seated.model.points_of_case("A")))
+        seated.person.note(f"{ANSWER}missing={missing or ','.join(gone)}")
+    empirical_orientation(
+        bench,
+        bench.crew.everybody,
+        seated.model,
+        method,
+        case,
+        over_correction,
+        1,
+        bench.job.tolerated_parallax_mm,
+    )
+
+
+@procedure("numerical orientation")
+def numerical_orientation(
+    seated: Seated,
+    cases: str = "AE",
+    readings: int = 3,
+    sense: float = 1.0,
+    slip_gon: float = 0.0,
+    mean_on_by: Literal["in the end", "at once", "never"] = "in the end",
+) -> None:
+    """Measure, compute, answer and set in one case after the other; then the mean of what is left goes on by'.
+
+    `sense` is that in which the corrections are set, `slip_gon` by how much the sum for phi' is out.
+    """
+    seated.take_over()
+    bench, model = seated.bench, seated.model
+    who, unknowns = bench.crew.everybody, unknowns_of(INDEPENDENT, model)
+    for number, case in enumerate(cases, start=1):
+        seated.begin(f"relative orientation, case {case}")
+        bench.begin_round(who, number)
+        settings = bench.seat.elements(who, unknowns)
+        labels = model.points_of_case(case)
+        seen = _parallaxes(seated, case, readings)
+        mean = seen.p.mean(axis=0)
+        base = np.full(who.size, bench.job.plan.bx)
+        found, _ = corrections_of(bench, who, model, seen.places, seen.p - mean, unknowns, base, labels)
+        found["phi1"] = found["phi1"] + slip_gon
+        seated.answer({f"{case.lower()}-{name}": float(found[name][0]) for name in unknowns})
+        noted = bench.crew.notes(who, settings, {})
+        bench.seat.set_elements(who, {name: noted[name] + sense * found[name] for name in unknowns})
+        if mean_on_by == "at once":
+            _put_on_by(seated, mean)
+    if mean_on_by == "in the end":
+        bench.begin_round(who, len(cases) + 1)
+        _put_on_by(seated, _parallaxes(seated, "A", readings).p.mean(axis=0))
+
+
+def _parallaxes(seated: Seated, case: str, readings: int) -> Parallaxes:
+    bench, model = seated.bench, seated.model
+    points = [model.standard_points[label] for label in model.points_of_case(case)]
+    seen = bench.parallaxes(bench.crew.everybody, points, readings)
+    bench.crew.give_up(seen.parted(bench.crew.everybody), f"{model.name}: images too far apart to be fused")
+    return seen
+
+
+def _put_on_by(seated: Seated, mean: Array) -> None:
+    """Set by of the left-hand photograph's projector on by a mean parallax."""
+    bench, by = seated.bench, f"by{seated.model.left_projector}"
+    who = bench.crew.everybody
+    bench.seat.set_elements(who, {by: bench.seat.elements(who, [by])[by] + mean})
+
+
+@procedure("perspective centres")
+def perspective_centres(
+    seated: Seated, hands: Sequence[int] = (1, 2), swapped: bool = False, height_in_mm: bool = False
+) -> None:
+    """Preset the counters on the ground at point 1, point at two levels with each eye, and answer both centres.
+
+    By mistake only with some eyes (`hands`, 1 for the left-hand photograph), each centre under the other's name
+    (`swapped`), or the height above the lower level in mm instead of counter units.
+    """
+    seated.take_over()
+    bench, model, plan = seated.bench, seated.model, seated.bench.job.plan
+    seated.begin("model coordinates")
+    bench.parallaxes_seen(bench.crew.everybody, [model.standard_points["1"]])
+    bench.seat.preset(bench.crew.everybody, plan.preset)
+    for hand in hands:
+        seated.begin(f"{side(hand)} perspective centre")
+        centre = centre_of(observe_centre(bench, bench.crew.everybody, model, hand), 0)
+        X, Y, Z = (float(each) for each in (centre.X0, centre.Y0, centre.Z0))
+        if height_in_mm:
+            Z = plan.centre_levels[0] + (Z - plan.centre_levels[0]) / bench.seat.units_per_mm
+        projector = bench.seat.projector(3 - hand if swapped else hand)
+        seated.answer({f"x{projector}": X, f"y{projector}": Y, f"z{projector}": Z})

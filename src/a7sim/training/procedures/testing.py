@@ -1,0 +1,35 @@
+"""The grid test of a projector by few crosses."""
+
+from a7sim.geometry import GON
+from a7sim.operator.bench import Bench
+from a7sim.operator.grid_test import GridTestOrder, calibrated
+from a7sim.training.account import ANSWER
+from a7sim.training.procedures.base import Seated, procedure
+
+ANSWERED = ("c", "phi", "omega")
+
+
+@procedure("grid test")
+def grid_test(
+    seated: Seated,
+    crosses: int = 9,
+    levels: int = 2,
+    pointings: int = 2,
+    sense: float = 1.0,
+    in_gon: bool = True,
+    projectors: int = 2,
+) -> None:
+    """Test both projectors with the grid plate and answer by how much c, phi and omega stand beside their counters.
+
+    By mistake errors are answered in the other `sense`, tilts in radians, or fewer `projectors` are tested.
+    """
+    job = seated.bench.job
+    order = GridTestOrder(job.certificate, job.grid_plate, crosses, levels, pointings, seated.model.polarity)
+    bench = Bench(seated.bench.crew, seated.bench.hands, order.job)
+    for sheet in calibrated(bench, order):
+        for name in ANSWERED:
+            error = sense * float(sheet.test.errors[name][0])
+            shown = error / GON if name != "c" and in_gon else error
+            seated.person.note(f"{ANSWER}{name}{sheet.projector}={shown:+.4f}")
+        if sheet.projector == projectors:
+            return

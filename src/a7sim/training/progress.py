@@ -1,0 +1,250 @@
+"""Progress of students: attempts, hints and grades in one SQLite file, safe with several consoles open."""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from urllib.parse import quote
+
+import msgspec
+
+from a7sim.mistakes import Mistake
+from a7sim.training.exercise import Exercise, Hint, Shelved
+from a7sim.training.grading import Grade, HintsTaken
+from a7sim.training.variation import seed_of
+
+FILE = "progress.sqlite"
+
+BUSY_S = 15.0
+"""How long a console waits while another one writes."""
+
+PRACTICE, EXAM = "practice", "exam"
+
+MIGRATIONS = (
+    """
+    CREATE TABLE attempt (
+        id INTEGER PRIMARY KEY,
+        student TEXT NOT NULL,
+        exercise TEXT NOT NULL,
+        mode TEXT NOT NULL CHECK (mode IN ('practice', 'exam')),
+        number INTEGER NOT NULL,
+        seed INTEGER NOT NULL,
+        folder TEXT NOT NULL,
+        begun TEXT NOT NULL,
+        closed TEXT,
+        UNIQUE (student, exercise, number)
+    ) STRICT;
+    CREATE TABLE hint (
+        attempt INTEGER NOT NULL REFERENCES attempt (id),
+        number INTEGER NOT NULL,
+        cost REAL NOT NULL,
+        at TEXT NOT NULL,
+        PRIMARY KEY (attempt, number)
+    ) STRICT;
+    CREATE TABLE grade (
+        id INTEGER PRIMARY KEY,
+        attempt INTEGER NOT NULL REFERENCES attempt (id),
+        at TEXT NOT NULL,
+        points REAL NOT NULL,
+        passed INTEGER NOT NULL,
+        document TEXT NOT NULL
+    ) STRICT;
+    CREATE INDEX grade_of_attempt ON grade (attempt);
+    """,
+)
+"""Each brings the file from one schema version to the next; the first, from an empty file to version 1."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """An attempt at an exercise."""
+
+    id: int
+    student: str
+    exercise: str
+    mode: str
+    number: int
+    seed: int
+    folder: Path
+    begun: str
+    closed: str | None
+    """When it was closed, as ISO 8601 in UTC; None while it is open."""
+
+
+@dataclass(frozen=True)
+class Graded:
+    """A grade that was given, when, and for what."""
+
+    attempt: Attempt
+    at: str
+    grade: Grade
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+class Progress:
+    """The progress kept in a folder, with the attempts' own folders beside it."""
+
+    def __init__(self, home: Path) -> None:
+        self.home = home
+        try:
+            home.mkdir(parents=True, exist_ok=True)
+            self._database = sqlite3.connect(home / FILE, timeout=BUSY_S, isolation_level=None)
+            self._database.execute("PRAGMA journal_mode = WAL")
+            self._database.execute("PRAGMA foreign_keys = ON")
+            self._migrate()
+        except (OSError, sqlite3.Error) as error:
+            raise Mistake(f"{home / FILE}: expected a file of progress that can be used: {error}") from error
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._database.close()
+
+    def __enter__(self) -> "Progress":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _version(self) -> int:
+        return int(self._database.execute("PRAGMA user_version").fetchone()[0])
+
+    def _migrate(self) -> None:
+        if self._version() < len(MIGRATIONS):
+            with self._writing():
+                for version in range(self._version(), len(MIGRATIONS)):
+                    for statement in MIGRATIONS[version].split(";"):
+                        self._database.execute(statement)
+                    self._database.execute(f"PRAGMA user_version = {version + 1}")
+        if self._version() > len(MIGRATIONS):
+            raise Mistake(
+                f"{self.home / FILE}: expected progress of schema version {len(MIGRATIONS)} or older, "
+                f"got {self._version()}: a newer a7sim wrote it"
+            )
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        self._database.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._database.execute("ROLLBACK")
+            raise
+        self._database.execute("COMMIT")
+
+    # --- attempts -------------------------------------------------------------------------------------
+
+    def begin(self, student: str, shelved: Shelved, mode: str = PRACTICE, seed: int | None = None) -> Attempt:
+        """Begin a new attempt; one that is open is closed. Its folder is still to be made."""
+        name = shelved.name
+        with self._writing():
+            self._close_open(student, name)
+            number = 1 + self._one("SELECT count(*) FROM attempt WHERE student = ? AND exercise = ?", student, name)
+            drawn = seed_of(student, name, mode) if seed is None else seed
+            folder = Path("attempts") / quote(student, safe="") / name / str(number)
+            self._database.execute(
+                "INSERT INTO attempt (student, exercise, mode, number, seed, folder, begun) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (student, name, mode, number, drawn, str(folder), _now()),
+            )
+        return self.last(student, name)
+
+    def _one(self, query: str, *values: object) -> int:
+        return int(self._database.execute(query, values).fetchone()[0])
+
+    def open_attempt(self, student: str, exercise: str) -> Attempt | None:
+        """Return the attempt that a student left open."""
+        found = self._attempts("student = ? AND exercise = ? AND closed IS NULL", student, exercise)
+        return found[-1] if found else None
+
+    def last(self, student: str, exercise: str | None = None) -> Attempt:
+        """Return a student's last attempt, at an exercise or at all. Raises Mistake where there is none."""
+        found = (
+            self._attempts("student = ? AND exercise = ?", student, exercise)
+            if exercise
+            else self._attempts("student = ?", student)
+        )
+        if not found:
+            at = f" at {exercise}" if exercise else ""
+            raise Mistake(f"{student}: expected an attempt{at}, found none: a7sim train start {exercise or 'EXERCISE'}")
+        return found[-1]
+
+    def attempts(self, student: str | None = None) -> list[Attempt]:
+        """Return the attempts of a student, or of all, in the order in which they were begun."""
+        return self._attempts("student = ?", student) if student else self._attempts("1 = 1")
+
+    def _attempts(self, condition: str, *values: object) -> list[Attempt]:
+        columns = "id, student, exercise, mode, number, seed, folder, begun, closed"
+        rows = self._database.execute(f"SELECT {columns} FROM attempt WHERE {condition} ORDER BY id", values)
+        return [
+            Attempt(id, student, name, mode, number, seed, self.home / folder, begun, closed)
+            for id, student, name, mode, number, seed, folder, begun, closed in rows
+        ]
+
+    def end(self, attempt: Attempt) -> None:
+        """Close an attempt: it is kept, and the next one begins anew."""
+        with self._writing():
+            self._close_open(attempt.student, attempt.exercise)
+
+    def _close_open(self, student: str, exercise: str) -> None:
+        self._database.execute(
+            "UPDATE attempt SET closed = ? WHERE student = ? AND exercise = ? AND closed IS NULL",
+            (_now(), student, exercise),
+        )
+
+    # --- hints and grades -----------------------------------------------------------------------------
+
+    def next_hint(self, attempt: Attempt, exercise: Exercise) -> tuple[int, Hint]:
+        """Return the next hint and its number, counted from 1, and record that it was given.
+
+        Raises Mistake in an exam, and where all were given.
+        """
+        if attempt.mode == EXAM:
+            raise Mistake(f"{attempt.exercise}: expected an attempt for practice, got an exam: there are no hints")
+        with self._writing():
+            given = self._one("SELECT count(*) FROM hint WHERE attempt = ?", attempt.id)
+            if given >= len(exercise.hints):
+                raise Mistake(f"{attempt.exercise}: expected another hint, but all {given} were given")
+            hint = exercise.hints[given]
+            self._database.execute("INSERT INTO hint VALUES (?, ?, ?, ?)", (attempt.id, given + 1, hint.cost, _now()))
+        return given + 1, hint
+
+    def hints_taken(self, attempt: Attempt) -> HintsTaken:
+        """Return how many hints were given in an attempt, and what they cost."""
+        query = "SELECT count(*), coalesce(sum(cost), 0) FROM hint WHERE attempt = ?"
+        number, cost = self._database.execute(query, (attempt.id,)).fetchone()
+        return HintsTaken(int(number), float(cost))
+
+    def give(self, attempt: Attempt, grade: Grade) -> None:
+        """Record a grade; an exam is over with it."""
+        with self._writing():
+            self._database.execute(
+                "INSERT INTO grade (attempt, at, points, passed, document) VALUES (?, ?, ?, ?, ?)",
+                (attempt.id, _now(), grade.points, int(grade.passed), msgspec.json.encode(grade).decode()),
+            )
+            if attempt.mode == EXAM:
+                self._close_open(attempt.student, attempt.exercise)
+
+    def grades(self, student: str | None = None) -> list[Graded]:
+        """Return the grades of a student, or of all, in the order in which they were given."""
+        attempts = {each.id: each for each in self.attempts(student)}
+        rows = self._database.execute("SELECT attempt, at, document FROM grade ORDER BY id")
+        return [
+            Graded(attempts[attempt], at, msgspec.json.decode(document, type=Grade))
+            for attempt, at, document in rows
+            if attempt in attempts
+        ]
+
+    def best(self, student: str | None = None) -> dict[tuple[str, str], Graded]:
+        """Return the best grade by student and exercise; one that passed before any that did not."""
+        best: dict[tuple[str, str], Graded] = {}
+        for each in self.grades(student):
+            key = each.attempt.student, each.attempt.exercise
+            rank = (each.grade.passed, each.grade.points)
+            if key not in best or rank > (best[key].grade.passed, best[key].grade.points):
+                best[key] = each
+        return best

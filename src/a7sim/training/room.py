@@ -1,0 +1,144 @@
+"""The room of an attempt: the instrument of an exercise with a witness beside it, its clock, and its journal."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from a7sim.instrument.language import Desk, LinkEvent, Listener
+from a7sim.link.clock import Clock
+from a7sim.mistakes import Mistake
+from a7sim.scenario import Scenario, hash_of
+from a7sim.scene import Scene, build_scene
+from a7sim.session.folder import JOURNAL
+from a7sim.session.journal import Header, Journal, Keeping, header_of_unknown, software
+from a7sim.session.lines import Journalled, read_journal
+from a7sim.session.replaying import Difference, Replay, replayed
+from a7sim.training.account import Account
+from a7sim.training.exercise import Shelved
+from a7sim.training.variation import scenario_for
+from a7sim.training.witness import Witness, WitnessedAutograph
+
+_CHECKSUM = re.compile(r"(?<=bytes, )crc32 [0-9a-f]{8}")
+
+TRAIN = "train"
+"""The command in the header of an attempt's journal."""
+
+
+class Unreliable(Mistake):
+    """A journal that is damaged, or in which stands what the instrument does not do again."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """An exercise's instrument."""
+
+    shelved: Shelved
+    scenario: Scenario
+    seed: int
+    scene: Scene
+    desk: Desk
+    clock: Clock
+    autograph: WitnessedAutograph
+
+    @property
+    def witness(self) -> Witness:
+        """Who saw all that happened."""
+        return self.autograph.witness
+
+    def account(self, written: dict[str, str] | None = None, hidden: dict[str, Any] | None = None) -> Account:
+        """Return the account of what has happened so far."""
+        exercise = self.shelved.exercise
+        return Account(exercise, self.scenario, self.scene, self.autograph, self.witness, written or {}, hidden or {})
+
+
+def header_for(shelved: Shelved, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
+    """Return what the journal of an attempt says first. It names the scenario by its hash alone: it holds the truth."""
+    first = header_of_unknown(TRAIN, exercise=shelved.name, student=student, mode=mode).line
+    return Header(first | {"title": shelved.exercise.title, "scenario_hash": hash_of(scenario), "seed": seed})
+
+
+def _built(shelved: Shelved, seed: int, observer: dict[str, Any]) -> tuple[Scenario, Scene, WitnessedAutograph]:
+    scenario = scenario_for(shelved, seed, observer)
+    scene = build_scene(scenario, seed)
+    return scenario, scene, WitnessedAutograph.of(scenario.instrument, scene.drawer, seed)
+
+
+@contextmanager
+def entered(
+    shelved: Shelved, seed: int, folder: Path, student: str, mode: str, observer: dict[str, Any] | None = None
+) -> Iterator[Room]:
+    """Enter the room of a new attempt, journalled in a folder; the opening is still to be done.
+
+    Raises Mistake where it cannot be written.
+    """
+    scenario, scene, autograph = _built(shelved, seed, observer or {})
+    journal = Journal(Keeping(states=False))
+    desk = Desk(autograph, both(journal.heard, autograph.witness.heard))
+    nominal = scenario_for(shelved, seed)
+    with journal.opened(folder, header_for(shelved, nominal, seed, student, mode), desk):
+        yield Room(shelved, scenario, seed, scene, desk, Clock(), autograph)
+
+
+@contextmanager
+def entered_again(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
+    """Enter the room of an attempt that was left, as its journal leaves it. Raises Unreliable, Mistake."""
+    there = read_journal(folder / JOURNAL)
+    if there.header.get("software") != software():
+        raise Mistake(
+            f"{there.where(1)}: expected an attempt of {software()} to go on with, got one of "
+            f"{there.header.get('software')} (a7sim train reset begins anew)"
+        )
+    room, replay = _replayed(shelved, seed, there)
+    journal = Journal(Keeping(resumes=True, states=False)).continued(there, room.desk, replay.checkpoints)
+    room.desk.listener = both(journal.heard, room.witness.heard)
+    with journal:
+        for event in replay.unsaid():
+            journal.heard(event)
+        for client in [*room.desk.clients]:
+            room.desk.close(client, room.clock.now)
+        yield room
+
+
+def seen_again(shelved: Shelved, seed: int, there: Journalled) -> Room:
+    """Return the room of an attempt as its journal leaves it. Raises Unreliable."""
+    return _replayed(shelved, seed, there)[0]
+
+
+def _replayed(shelved: Shelved, seed: int, there: Journalled) -> tuple[Room, Replay]:
+    scenario, scene, autograph = _built(shelved, seed, {})
+    expected = header_for(shelved, scenario, seed, "", "").line
+    for name in ("command", "scenario_hash", "seed"):
+        got = there.header.get(name)
+        if got != expected[name]:
+            raise Unreliable(f"{there.where(1)}: expected an attempt with {name} {expected[name]}, got {got}")
+    replay = Replay(there, autograph=autograph)
+    autograph.blind = True
+    assert replay.desk.listener is not None
+    replay.desk.listener = both(replay.desk.listener, autograph.witness.heard)
+    for number, _, difference in replayed(replay):
+        if difference is not None and not _same_but_for_pictures(difference):
+            expected_, got = difference.replayed or "nothing", difference.journalled or "nothing"
+            raise Unreliable(
+                f"{there.where(number)}: expected what the instrument does again, {expected_[:200]}, got {got[:200]}"
+            )
+    autograph.blind = False
+    return Room(shelved, scenario, seed, scene, replay.desk, Clock(replay.time), autograph), replay
+
+
+def _same_but_for_pictures(difference: Difference) -> bool:
+    """Whether two replies differ in nothing but the checksums of pictures, which are not drawn again."""
+    journalled, again = (_CHECKSUM.sub("", each) for each in (difference.journalled, difference.replayed))
+    return journalled == again != difference.replayed
+
+
+def both(first: Listener, then: Listener) -> Listener:
+    """Return a listener that lets two hear."""
+
+    def heard(event: LinkEvent) -> None:
+        first(event)
+        then(event)
+
+    return heard

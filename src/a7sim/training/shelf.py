@@ -1,0 +1,114 @@
+"""Finding and reading exercises: those that come with a7sim, and folders of one's own."""
+
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from a7sim.mistakes import Mistake
+from a7sim.scenario.validation import mistakes_of_form
+from a7sim.training.exercise import Exercise, Measured, Shelved
+from a7sim.training.handouts import HANDOUTS
+from a7sim.training.measures import MEASURES, measure_of
+from a7sim.training.procedures import PROCEDURES
+
+SHELVES = (Path(__file__).parents[1] / "exercises", Path(__file__).parents[3] / "exercises")
+"""Where the exercises are that come with a7sim."""
+
+FILE = "exercise.toml"
+
+
+class ExerciseError(Mistake):
+    """An exercise that cannot be used; the text names each mistake with its path."""
+
+
+def all_exercises() -> list[Shelved]:
+    """Return the exercises that come with a7sim, by their numbers."""
+    shelf = next((each for each in SHELVES if each.is_dir()), None)
+    folders = sorted(path.parent for path in shelf.glob(f"*/{FILE}")) if shelf else []
+    return sorted(map(read_exercise, folders), key=lambda each: each.exercise.number)
+
+
+def find_exercise(name: str) -> Shelved:
+    """Return an exercise by its number, the name of its folder or a part of it, or a folder. Raises Mistake."""
+    if (Path(name) / FILE).is_file():
+        return read_exercise(Path(name))
+    there = all_exercises()
+    if name.isdecimal():
+        found = [each for each in there if each.exercise.number == int(name)]
+    else:
+        found = [each for each in there if each.name == name] or [each for each in there if name and name in each.name]
+    if len(found) != 1:
+        known = ", ".join(each.name for each in found or there)
+        raise Mistake(f"{name}: expected the number of an exercise, its folder, or one of {known}")
+    return found[0]
+
+
+def read_exercise(folder: Path) -> Shelved:
+    """Return the exercise in a folder. Raises ExerciseError, which names every mistake at once."""
+    path = folder / FILE
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ExerciseError(f"{path}: expected TOML, got a file that breaks its rules: {error}") from error
+    except OSError as error:
+        raise ExerciseError(f"{path}: expected the file of an exercise: {error.strerror}") from error
+    mistakes = list(mistakes_of_form(raw, _expected()))
+    if not mistakes:
+        exercise = msgspec.convert(raw, Exercise)
+        mistakes = _mistakes_of_reference(exercise)
+        if not mistakes:
+            return Shelved(exercise, folder)
+    raise ExerciseError("\n".join(f"{path}: {mistake}" for mistake in mistakes))
+
+
+@cache
+def _expected() -> msgspec.inspect.Type:
+    return msgspec.inspect.type_info(Exercise)
+
+
+def _mistakes_of_reference(exercise: Exercise) -> list[str]:
+    mistakes: list[str] = []
+    measured: list[tuple[str, Measured]] = [(f"step[{i}]", each) for i, each in enumerate(exercise.steps)]
+    measured += [(f"criterion[{i}]", each) for i, each in enumerate(exercise.criteria)]
+    for place, each in measured:
+        mistakes += _mistakes_of_measure(place, each)
+    for i, step in enumerate(exercise.steps):
+        known = MEASURES.get(step.measure)
+        if known is not None and known.truth:
+            mistakes.append(
+                f"step[{i}].measure: expected what can be seen at the link, got {step.measure!r}: the truth"
+            )
+    ids = exercise.criterion_ids
+    mistakes += [f"criterion: expected every id once, got {each!r} twice" for each in _twice(ids)]
+    for i, faulty in enumerate(exercise.faulty):
+        if faulty.fails not in ids:
+            mistakes.append(f"faulty[{i}].fails: expected one of {', '.join(ids)}, got {faulty.fails!r}")
+    played: list[tuple[str, Any]] = [("reference", exercise.reference), ("opening", exercise.opening)]
+    for place, run in played + [(f"faulty[{i}]", each) for i, each in enumerate(exercise.faulty)]:
+        if run is None:
+            continue
+        if bool(run.script) == bool(run.procedure):
+            mistakes.append(f"{place}: expected a script or a procedure, got {'both' if run.script else 'neither'}")
+        if run.procedure and run.procedure not in PROCEDURES:
+            known_ones = ", ".join(PROCEDURES)
+            mistakes.append(f"{place}.procedure: expected one of {known_ones}, got {run.procedure!r}")
+    if exercise.handout and exercise.handout not in HANDOUTS:
+        mistakes.append(f"handout: expected one of {', '.join(HANDOUTS)}, got {exercise.handout!r}")
+    return mistakes
+
+
+def _mistakes_of_measure(place: str, each: Measured) -> list[str]:
+    kind = MEASURES.get(each.measure)
+    if kind is None:
+        return [f"{place}.measure: expected one of {', '.join(MEASURES)}, got {each.measure!r}"]
+    mistakes = list(mistakes_of_form(each.options, msgspec.inspect.type_info(kind), f"{place}.options"))
+    if not mistakes:
+        measure_of(each)
+    return mistakes
+
+
+def _twice(names: list[str]) -> list[str]:
+    return [name for i, name in enumerate(names) if name in names[:i]]

@@ -1,0 +1,67 @@
+"""A scenario of each student's own: what of an exercise's scenario the seed draws anew."""
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from a7sim.mistakes import Mistake
+from a7sim.scenario import Scenario, load_scenario
+from a7sim.training.exercise import Shelved
+
+TRAINING_STREAM = 7
+"""Spawn key of what exercises vary, beside those of scene, instrument and operator."""
+
+_DECIMALS = 4
+
+
+def seed_of(student: str, exercise: str, mode: str = "practice") -> int:
+    """Return the seed of a student's exercise: neighbours have different ones, and an exam has another again."""
+    digest = hashlib.sha256("\0".join((student, exercise, mode)).encode("utf-8", "surrogatepass")).digest()
+    return int.from_bytes(digest[:4])
+
+
+def scenario_for(shelved: Shelved, seed: int, observer: Mapping[str, Any] | None = None) -> Scenario:
+    """Return the scenario of an exercise as a seed draws it. Raises Mistake for settings that do not fit.
+
+    `observer` says who the virtual operator is, where one plays.
+    """
+    exercise = shelved.exercise
+    beside = shelved.folder / exercise.scenario
+    name = beside if beside.is_file() else exercise.scenario
+    overrides = {path: as_toml(value) for path, value in exercise.settings.items()}
+    overrides |= {f"observer.{key}": as_toml(value) for key, value in (observer or {}).items()}
+    if exercise.vary:
+        nominal = msgspec.to_builtins(load_scenario(name, overrides))
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(TRAINING_STREAM,)))
+        for path, within in exercise.vary.items():
+            overrides[path] = as_toml(_drawn(_at(nominal, path), within, rng))
+    return load_scenario(name, overrides)
+
+
+def _drawn(value: float, within: float, rng: np.random.Generator) -> float:
+    if isinstance(value, int):
+        return value + int(rng.integers(0, int(within) + 1))
+    return round(value + float(rng.uniform(-within, within)), _DECIMALS)
+
+
+def _at(data: Any, path: str) -> float:
+    for key in path.split("."):
+        try:
+            data = data[int(key)] if isinstance(data, list | tuple) else data[key]
+        except (KeyError, IndexError, ValueError, TypeError):
+            raise Mistake(f"vary: expected the path of a number of the scenario, got {path!r}") from None
+    if not isinstance(data, int | float) or isinstance(data, bool):
+        raise Mistake(f"vary: expected the path of a number of the scenario, got {path!r}")
+    return data
+
+
+def as_toml(value: Any) -> str:
+    """Return a value as TOML writes it."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {as_toml(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(as_toml, value)) + "]"
+    return msgspec.json.encode(value).decode()

@@ -1,0 +1,270 @@
+"""An instrument with a witness beside it: every deed in its order, every registration with the truth at that moment."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from a7sim.instrument import Autograph
+from a7sim.instrument.language import LinkEvent
+from a7sim.instrument.language.commands import recorded_element
+from a7sim.instrument.language.program import Fault, Step, program_of
+from a7sim.instrument.recorder import Recorder, Registration
+from a7sim.scenario import Condition
+from a7sim.training.exercise import OPENING
+
+AXES = ("X", "Y", "Z")
+
+PLAIN = ("drive", "wheel", "set", "turn")
+"""Deeds that move a drum or a carriage."""
+
+
+@dataclass(frozen=True, slots=True)
+class Deed:
+    """Something done at the instrument, with where a handle stood before and after, as its counter counts.
+
+    `what` is 'set' or 'turn' of an element, 'drive' or 'wheel' of an axis, 'preset', 'fit', 'base', 'gear', 'load',
+    'unload', 'centre', 'fiducials' (asked for), 'reset', 'record', 'strike', 'look' (through an eyepiece or both),
+    'note'; `name` the element, axis, fitting, projector or point.
+    """
+
+    place: int
+    """Counted from 0 in the order of things."""
+    time: float
+    client: str
+    what: str
+    name: str = ""
+    before: float = 0.0
+    after: float = 0.0
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A registration with how everything stood at that moment."""
+
+    place: int
+    """Among the deeds."""
+    time: float
+    client: str
+    number: int
+    point: str
+    shown: Mapping[str, float]
+    """What all counters showed: X, Y, Z and the elements."""
+    named: tuple[str, ...]
+    """The elements that were registered."""
+    sides: Mapping[str, int]
+    """By handle, +1 where its last movement came from smaller readings, -1 from larger ones; none unmoved."""
+    fittings: Mapping[str, str]
+    base: str
+    stereo: tuple[float, float] | None
+    """px, py in um at photo scale of the point, exactly; None where it is not seen with both eyes."""
+    eyes: tuple[tuple[float, float] | None, tuple[float, float] | None]
+    """dx, dy in um of its image from the mark in either eyepiece, exactly."""
+    pictures: tuple[str | None, str | None]
+    """What lay in the projectors."""
+    mark: tuple[float, float, float]
+    """Where the mark truly stood in the frame, mm."""
+    struck: bool = False
+
+
+@dataclass
+class Witness:
+    """What was seen at an instrument, the truth beside it; everything but the truth can be had at the link."""
+
+    deeds: list[Deed] = field(default_factory=list)
+    readings: list[Reading] = field(default_factory=list)
+    sides: dict[str, int] = field(default_factory=dict)
+    began: float = 0.0
+    """Simulated time in s at which the opening was done."""
+    opened: bool = False
+    """Whether the opening was done to its end."""
+    now: float = 0.0
+    client: str = ""
+
+    def heard(self, event: LinkEvent) -> None:
+        """Take note of who speaks, when, and what is noted down."""
+        if event.direction == "<":
+            return
+        self.now, self.client = event.time, event.client
+        if event.direction == "-" and event.client == OPENING:
+            self.began, self.opened = event.time, True
+        if event.direction == ">" and any(word in event.text.lower() for word in ("note", "fid")):
+            for unit in program_of(event.text.encode("latin-1", "replace")):
+                self._take_note(unit)
+
+    def _take_note(self, unit: Step | Fault) -> None:
+        if isinstance(unit, Step) and unit.command.header == "NOTE" and unit.given:
+            self.did("note", text=str(getattr(unit.given[0], "value", "")))
+        if isinstance(unit, Step) and unit.command.header == "PHOTo<n>:FIDucial?":
+            self.did("fiducials", str(unit.suffix))
+
+    def did(self, what: str, name: str = "", before: float = 0.0, after: float = 0.0, text: str = "") -> None:
+        """Take note of a deed."""
+        if what in PLAIN and before != after:
+            self.sides[name] = 1 if after > before else -1
+        self.deeds.append(Deed(len(self.deeds), self.now, self.client, what, name, before, after, text))
+
+    def registered(self, autograph: Autograph, made: Registration) -> None:
+        """Take note of a registration and of how everything stands."""
+        self.did("record", made.point)
+        shown = {axis: autograph.counter(axis) for axis in AXES}
+        shown |= {name: autograph.element(name) for name in autograph.variant.elements}
+        x, y, z = autograph.mark_in_model().tolist()
+        left, right = (Autograph.eyepiece(autograph, eye, made.point) for eye in (1, 2))
+        stereo = None if left is None or right is None else (left[0] - right[0], left[1] - right[1])
+        self.readings.append(
+            Reading(
+                len(self.deeds) - 1,
+                self.now,
+                self.client,
+                made.number,
+                made.point,
+                shown,
+                tuple(recorded_element(word) for word, _ in made.readings[len(AXES) :]),
+                dict(self.sides),
+                autograph.fittings.as_words(),
+                autograph.base_mode,
+                stereo,
+                (left, right),
+                (autograph.loaded(1), autograph.loaded(2)),
+                (x, y, z),
+            )
+        )
+
+    def struck(self, number: int) -> None:
+        """Take note that a registration was struck out."""
+        self.did("strike", str(number))
+        self.readings = [replace(each, struck=True) if each.number == number else each for each in self.readings]
+
+
+class _WitnessedRecorder(Recorder):
+    def __init__(self, autograph: "WitnessedAutograph") -> None:
+        super().__init__()
+        self._autograph = autograph
+
+    def register(self, point: str, readings: list[tuple[str, str]]) -> Registration:
+        made = super().register(point, readings)
+        self._autograph.witness.registered(self._autograph, made)
+        return made
+
+    def strike(self, number: int, why: str) -> None:
+        super().strike(number, why)
+        self._autograph.witness.struck(number)
+
+
+class WitnessedAutograph(Autograph):
+    """An instrument that does all it is asked exactly as any other, and tells its witness. Refused deeds are none."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.witness = Witness()
+        self.recorder = _WitnessedRecorder(self)
+        self.blind = False
+        """Whether pictures are left black, for who only works a journal again: they take longer than all the rest."""
+
+    def _counted(self, axis: str) -> float:
+        counter = self._counters[axis]
+        return counter.offset + counter.units_per_mm * self._carriages[axis].at
+
+    @property
+    def z_units_per_mm(self) -> float:
+        """Return the units of the Z counter a mm, as it is geared."""
+        return self._counters["Z"].units_per_mm
+
+    @property
+    def condition(self) -> Condition:
+        """Return the faults of the instrument: part of the truth."""
+        return self._condition
+
+    def play(self, handle: str) -> float:
+        """Return the play of a carriage or an element: part of the truth."""
+        return self._carriages[handle].play if handle in self._carriages else self._spindle(handle).play
+
+    def set_element(self, name: str, value: float) -> None:
+        """Set an element through its counter."""
+        before = self._spindle(name).at
+        super().set_element(name, value)
+        self.witness.did("set", name, before, self._spindle(name).at)
+
+    def turn_element(self, name: str, amount: float) -> None:
+        """Turn the drum of an element."""
+        before = self._spindle(name).at
+        super().turn_element(name, amount)
+        self.witness.did("turn", name, before, self._spindle(name).at)
+
+    def drive(self, axis: str, reading: float) -> None:
+        """Run a carriage to a reading."""
+        before = self._counted(axis)
+        super().drive(axis, reading)
+        self.witness.did("drive", axis, before, self._counted(axis))
+
+    def wheel(self, axis: str, amount: float) -> None:
+        """Turn a handwheel."""
+        before = self._counted(axis)
+        super().wheel(axis, amount)
+        self.witness.did("wheel", axis, before, self._counted(axis))
+
+    def preset(self, axis: str, reading: float) -> None:
+        """Preset a counter."""
+        before = self._counted(axis)
+        super().preset(axis, reading)
+        self.witness.did("preset", axis, before, self._counted(axis))
+
+    def set_fitting(self, name: str, position: str) -> None:
+        """Put a fitting over."""
+        super().set_fitting(name, position)
+        self.witness.did("fit", name, text=position)
+
+    def set_base_mode(self, mode: str) -> None:
+        """Set base in or out."""
+        super().set_base_mode(mode)
+        self.witness.did("base", text=mode)
+
+    def set_height_gear(self, gear: str | float) -> None:
+        """Engage a height gear."""
+        super().set_height_gear(gear)
+        self.witness.did("gear", text=self.height_gear)
+
+    def load(self, projector: int, name: str) -> None:
+        """Lay a picture on a carrier."""
+        super().load(projector, name)
+        self.witness.did("load", str(projector), text=name)
+
+    def unload(self, projector: int) -> None:
+        """Take a picture off."""
+        super().unload(projector)
+        self.witness.did("unload", str(projector))
+
+    def centre_picture(self, projector: int, dx: float, dy: float, dkappa: float) -> None:
+        """Shift and turn a picture on its carrier."""
+        super().centre_picture(projector, dx, dy, dkappa)
+        self.witness.did("centre", str(projector))
+
+    def reset(self) -> None:
+        """Run everything to its zero."""
+        before = {name: spindle.at for name, spindle in self._spindles.items()}
+        super().reset()
+        self.witness.did("reset")
+        for name, spindle in self._spindles.items():
+            if spindle.at != before[name]:
+                self.witness.did("set", name, before[name], spindle.at)
+
+    def eyepiece(self, eyepiece: int, name: str) -> tuple[float, float] | None:
+        """Look at a point through an eyepiece."""
+        self.witness.did("look", name)
+        return super().eyepiece(eyepiece, name)
+
+    def stereo(self, name: str) -> tuple[float, float] | None:
+        """Look at a point with both eyes."""
+        self.witness.did("look", name)
+        left, right = Autograph.eyepiece(self, 1, name), Autograph.eyepiece(self, 2, name)
+        return None if left is None or right is None else (left[0] - right[0], left[1] - right[1])
+
+    def picture(self, eyepiece: int, columns: int, rows: int, magnification: float) -> Any:
+        """Look at the picture that an eyepiece shows."""
+        self.witness.did("look")
+        if self.blind:
+            return np.zeros((rows, columns))
+        return super().picture(eyepiece, columns, rows, magnification)

@@ -1,0 +1,165 @@
+"""Training (issue 8): exercises hold what they promise, grades say why, and a journal that was edited is found."""
+
+import pytest
+
+from a7sim.session.lines import Chain, read_journal
+from a7sim.training.attempts import attempted, begun, gone_on, write_answers
+from a7sim.training.checking import checked
+from a7sim.training.exercise import Measured, Played
+from a7sim.training.grading import graded
+from a7sim.training.measures import Found, measure_of
+from a7sim.training.room import Unreliable
+from a7sim.training.shelf import ExerciseError, all_exercises, find_exercise, read_exercise
+from a7sim.training.variation import scenario_for, seed_of
+
+EXERCISES = all_exercises()
+
+
+@pytest.mark.parametrize("shelved", EXERCISES, ids=lambda each: each.name)
+def test_every_exercise_holds_what_check_asks(shelved):
+    """The reference passes, every faulty one fails for its reason, nothing is dead or below the floor."""
+    found = checked(shelved)
+    assert found.faults == ()
+    assert found.reference_points is not None and found.reference_points >= shelved.exercise.pass_points
+
+
+def test_exercises_are_numbered_once():
+    numbers = [each.exercise.number for each in EXERCISES]
+    assert len(numbers) == len(set(numbers)) and numbers == sorted(numbers)
+    assert all(each.name.startswith(f"{each.exercise.number:02d}-") for each in EXERCISES)
+
+
+@pytest.fixture(scope="module")
+def parallax():
+    return find_exercise("4")
+
+
+@pytest.fixture(scope="module")
+def left_standing(parallax, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("attempt")
+    assert attempted(parallax, Played(script="faulty-by2-left.a7s"), folder, 4) == ""
+    return folder
+
+
+def test_the_sheet_names_the_mistake_with_its_points(parallax, left_standing):
+    grade = graded(parallax, 4, left_standing)
+    mark = next(each for each in grade.failed if each.id == "at-rest")
+    assert not grade.passed
+    assert mark.sentence.startswith("by\" was never returned to 0 before reading by' at points 1, 5, 6, 2 and 4: -25.")
+
+
+def test_an_edited_reply_is_found_by_working_the_journal_again(parallax, left_standing, tmp_path):
+    there = read_journal(left_standing / "session.jsonl")
+    number = next(
+        n for n in range(2, len(there) + 1) if there.event(n).dir == "<" and there.event(n).client == "student"
+    )
+    events = [there.header, *(there.event(n) for n in range(2, len(there) + 1))]
+    events[0].pop("crc")
+    forged = type(there.event(number))(**{**_fields(there.event(number)), "text": "23"})
+    events[number - 1] = forged
+    chain = Chain()
+    (tmp_path / "session.jsonl").write_bytes(b"".join(chain.line(each) + b"\n" for each in events))
+    with pytest.raises(Unreliable, match=f"line {number}: expected what the instrument does again"):
+        graded(parallax, 4, tmp_path)
+
+
+def test_a_journal_of_another_seed_is_another_students(parallax, left_standing):
+    with pytest.raises(Unreliable, match="expected an attempt with"):
+        graded(parallax, 5, left_standing)
+
+
+def _fields(event):
+    return {name: getattr(event, name) for name in event.__struct_fields__}
+
+
+def test_the_journal_of_an_attempt_holds_no_truth(left_standing):
+    header = read_journal(left_standing / "session.jsonl").header
+    assert "scenario" not in header
+    assert [each.name for each in left_standing.iterdir()] == ["session.jsonl"]
+
+
+def test_an_attempt_that_was_cut_off_goes_on_where_it_was(parallax, tmp_path):
+    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+        engine = room.desk.open("client2", time=1.0)
+        engine.feed(b'PROJ1:BY 0.30\nREC "1011",BY1\n', 2.0)
+        engine.feed(b"REC:COUN?\n", 3.0)
+    journal = tmp_path / "session.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    cut = next(n for n, line in enumerate(lines) if b"REC:COUN?" in line) + 1
+    journal.write_bytes(b"".join(lines[:cut]) + b'{"t":3.0,"cl')
+    with gone_on(parallax, 4, tmp_path) as room:
+        assert room.autograph.element("by1") == 0.3
+        assert [each.point for each in room.account().readings] == ["1011"]
+        room.desk.open(time=room.clock.now).feed(b'REC "1012",BY1\n', 9.0)
+    assert graded(parallax, 4, tmp_path).minutes == pytest.approx((9.0 - room.witness.began) / 60.0, abs=0.1)
+
+
+def test_neighbours_have_different_photographs_and_the_same_student_the_same(parallax):
+    ada, bob = (seed_of(name, parallax.name) for name in ("ada", "bob"))
+    assert ada != bob and ada == seed_of("ada", parallax.name)
+    assert ada != seed_of("ada", parallax.name, "exam")
+    first, again, other = (scenario_for(parallax, seed) for seed in (ada, ada, bob))
+    assert first == again and first.photos != other.photos
+
+
+def test_answers_written_down_count_before_those_noted(tmp_path):
+    counters = find_exercise("1")
+    assert attempted(counters, counters.exercise.reference, tmp_path, 1) == ""
+    assert graded(counters, 1, tmp_path).passed
+    write_answers(tmp_path, {"play": "0.5"})
+    assert [each.id for each in graded(counters, 1, tmp_path).failed] == ["play"]
+
+
+def test_pictures_are_not_drawn_again_for_a_grade_and_all_else_is_compared(parallax, tmp_path):
+    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+        engine = room.desk.open("client2")
+        first = engine.feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 1.0)
+        engine.feed(b'REC "1011",BY1\n', 2.0)
+    assert len(set(first)) > 20, "expected a picture that is not black"
+    assert graded(parallax, 4, tmp_path).marks
+    with gone_on(parallax, 4, tmp_path) as room:
+        assert room.desk.open(time=3.0).feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 3.0) == first
+
+
+BAD = {
+    'measure = "minutes"': ('measure = "minuets"', r"criterion\[6\]\.measure: expected one of"),
+    'measure = "not-opposed"\ndone': ('measure = "parallax-left"\ndone', r"step\[3\]\.measure: .* the truth"),
+    'fails = "cleared"': ('fails = "clear"', r"faulty\[1\]\.fails: expected one of complete"),
+    "away = 0.02": ('away = "far"', r"criterion\[4\]\.options\.away: expected a number, got \"far\""),
+}
+
+
+@pytest.mark.parametrize("was", BAD)
+def test_a_mistake_in_an_exercise_is_named_with_its_place(parallax, tmp_path, was):
+    now, expected = BAD[was]
+    text = (parallax.folder / "exercise.toml").read_text()
+    assert was in text
+    (tmp_path / "exercise.toml").write_text(text.replace(was, now))
+    with pytest.raises(ExerciseError, match=expected):
+        read_exercise(tmp_path)
+
+
+def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
+    """By lines that a person might say; what the instrument refuses and what is struck out did not happen."""
+    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+        engine = room.desk.open("client2", time=5.0)
+        lines = (
+            b'PROJ1:BY 0.30;:REC "1011",BY1\n',
+            b'PROJector1:BY:TURN -0.04;:RECord "1011",BY1\n',
+            b'PROJ1:BY 99;:REC "1021",BY2;:REC:STR 3,"wrong point"\n',
+            b'NOTE "answer play=0.07 Slip=none";:DRIV:X 3\n',
+        )
+        for line in lines:
+            engine.feed(line, 6.0)
+        account = room.account({"play": "0.08"})
+
+        def found(name, **options):
+            return measure_of(Measured(measure=name, options=options)).of(account)
+
+        assert found("spread", handles=["by1"]) == Found(0.04, "by' at point 1 read from 0.26 to 0.30")
+        assert found("missing-readings", points=["2"]) == Found(1.0, "1 of 1 registrations are missing: 2")
+        assert found("wrong-approach", handles=["by1"]).value == 1.0
+        assert found("handles-moved", handles=["by1", "by2"]) == Found(1.0, "by' moved")
+        assert found("run-by-motor", handles=["X"]).value == 0.0
+        assert found("not-opposed").value is None
+        assert account.answers == {"play": "0.08", "slip": "none"}

@@ -1,0 +1,263 @@
+"""`a7sim train` at the door: starting, hints, grades and their exit codes, reports, progress that nothing loses."""
+
+import csv
+import io
+import json
+import os
+import re
+import signal
+import sqlite3
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from a7sim.link.client import Client
+from a7sim.mistakes import Mistake
+from a7sim.training.attempts import attempted
+from a7sim.training.exercise import Played
+from a7sim.training.handed_in import graded_folder, graded_folders
+from a7sim.training.progress import FILE, MIGRATIONS, Progress
+from a7sim.training.shelf import find_exercise
+from a7sim.training.variation import seed_of
+
+EXERCISES = Path(__file__).parents[1] / "exercises"
+REFERENCE = EXERCISES / "04-parallax" / "reference.a7s"
+
+
+@pytest.fixture
+def train(typed, tmp_path, monkeypatch):
+    """Type `a7sim train ...` as ada, in a home of her own."""
+    monkeypatch.setenv("A7SIM_HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("A7SIM_STUDENT", "ada")
+    return lambda *words: typed("train", *words)
+
+
+def at_the_references_seed(train):
+    return train("start", 4, "--seed", 4, "--script", REFERENCE)
+
+
+def test_a_script_that_passes_ends_in_zero_and_ticks_the_checklist(train):
+    code, out, err = at_the_references_seed(train)
+    assert (code, err) == (0, "")
+    assert out.count("[x]") == 4 and "[ ]" not in out
+    code, out, _ = train("verify", 4)
+    assert code == 0 and "passed, 100 of 100 points" in out
+
+
+def test_who_has_done_nothing_is_told_what_is_missing_and_ends_in_one(train, tmp_path):
+    (tmp_path / "nothing.a7s").write_text('scenario akwanga\nNOTE "where do I begin?"\n')
+    assert train("start", 4, "--script", tmp_path / "nothing.a7s")[0] == 0
+    code, out, _ = train("verify", "--json")
+    document = json.loads(out)
+    assert code == 1 and document["passed"] is False
+    assert next(m["reason"] for m in document["marks"] if m["id"] == "complete").startswith("24 of 24 registrations")
+
+
+def test_hints_come_in_their_order_cost_points_and_end(train, tmp_path):
+    assert train("hint", 4)[0] == 2
+    at_the_references_seed(train)
+    hints = find_exercise("4").exercise.hints
+    for number, hint in enumerate(hints, start=1):
+        assert train("hint", 4)[1].startswith(f"hint {number} (-{hint.cost:g} points): {hint.text[:20]}")
+    code, _, err = train("hint", 4)
+    assert code == 2 and "all 3 were given" in err
+    assert "passed, 90 of 100 points" in train("verify", 4)[1]
+    (journal,) = (tmp_path / "home").rglob("session.jsonl")
+    assert "passed, 90 of 100 points" in train("verify", "--journal", journal.parent, "--seed", 4)[1]
+
+
+def test_a_damaged_journal_ends_in_three(train, tmp_path):
+    at_the_references_seed(train)
+    (journal,) = (tmp_path / "home").rglob("session.jsonl")
+    journal.write_bytes(journal.read_bytes().replace(b"PROJ1:BY 0.14", b"PROJ1:BY 0.15", 1))
+    code, _, err = train("verify", 4)
+    assert code == 3 and "the journal is damaged" in err
+
+
+def test_an_exam_gives_no_hints_ticks_nothing_and_is_over_with_its_grade(train, tmp_path):
+    (tmp_path / "nothing.a7s").write_text("scenario akwanga\n*CLS\n")
+    out = train("start", 4, "--exam", "--script", tmp_path / "nothing.a7s")[1]
+    assert "[ ]" not in out and "exam" in out
+    assert "there are no hints" in train("hint")[2]
+    assert train("watch")[0] == 2
+    assert "expected --exam" in train("start", 4)[2]
+    assert train("verify")[0] == 1
+    with Progress(tmp_path / "home") as progress:
+        last = progress.last("ada")
+        assert last.closed and last.seed == seed_of("ada", "04-parallax", "exam") != seed_of("ada", "04-parallax")
+
+
+def test_reset_keeps_the_old_attempt_and_begins_anew(train, tmp_path):
+    at_the_references_seed(train)
+    assert "attempt 1 is closed and kept" in train("reset", 4)[1]
+    assert "no attempt is open" in train("reset", 4)[1]
+    at_the_references_seed(train)
+    with Progress(tmp_path / "home") as progress:
+        first, second = progress.attempts("ada")
+    assert first.closed and not second.closed
+    assert (first.folder / "session.jsonl").exists() and first.folder != second.folder
+
+
+def test_answers_are_those_that_the_exercise_asks_for(train):
+    train("start", 1, "--seed", 1, "--script", EXERCISES / "01-counters" / "reference.a7s")
+    assert "expected play=" in train("answer", "slip=3")[2]
+    assert train("answer", "play=0.31")[1] == "play=0.31\n"
+    assert train("verify")[0] == 1
+    assert train("answer", "play=0.07")[0] == 0
+    assert train("watch", 1, "--every", "0.1")[0] == 0
+
+
+def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
+    at_the_references_seed(train)
+    (journal,) = (tmp_path / "home").rglob("session.jsonl")
+    code, _, err = train("verify", "--journal", journal.parent)
+    assert code == 3 and "expected an attempt with scenario_hash" in err
+    assert train("verify", "--journal", journal.parent, "--seed", 4)[0] == 0
+    (tmp_path / "empty").mkdir()
+    folders = ["--journal", journal.parent, "--journal", tmp_path / "home", "--journal", tmp_path / "empty"]
+    code, out, err = train("verify", "--seed", 4, "--json", *folders)
+    handed_in = json.loads(out)["handed_in"]
+    assert code == 3 and "expected the journal of a session" in err
+    assert [bool(each["grade"]) for each in handed_in] == [True, True, False]
+    assert [each["student"] for each in handed_in] == ["ada", "ada", ""]
+
+
+def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path):
+    shelved = find_exercise("14")
+    folders = []
+    for i in range(10):
+        seed = seed_of(f"student {i}", shelved.name)
+        folders.append(tmp_path / str(i))
+        assert attempted(shelved, Played(script="faulty-kind.a7s"), folders[-1], seed, f"student {i}") == ""
+    together = graded_folders(folders, workers=2)
+    assert together == [graded_folder(folder) for folder in folders]
+    assert [each.student for each in together] == [f"student {i}" for i in range(10)]
+    assert not any(each.grade.passed for each in together)
+
+
+def test_an_exercise_is_shown_with_what_is_graded(train):
+    out = train("list", "4")[1]
+    assert "The drum reads to 0.01 mm" in out and "25  the other by stands at zero" in out
+
+
+def test_reports_of_student_and_class_in_every_form(train, tmp_path, monkeypatch):
+    at_the_references_seed(train)
+    train("verify")
+    monkeypatch.setenv("A7SIM_STUDENT", "Bob O'Neill")
+    train("start", 4, "--seed", 4, "--script", EXERCISES / "04-parallax" / "faulty-by2-left.a7s")
+    train("verify")
+    rows = list(csv.DictReader(io.StringIO(train("report", "--class", "--to", "csv")[1])))
+    assert [(row["student_id"], row["assignment"], float(row["score"])) for row in rows] == [
+        ("Bob O'Neill", "04-parallax", 70.0),
+        ("ada", "04-parallax", 100.0),
+    ]
+    assert list(rows[0])[:4] == ["assignment", "duedate", "timestamp", "student_id"]
+    statements = [json.loads(line) for line in train("report", "--class", "--to", "xapi")[1].splitlines()]
+    assert [each["verb"]["display"]["en"] for each in statements] == ["passed", "failed"]
+    assert statements[1]["result"]["score"] == {"scaled": 0.7, "raw": 70.0, "min": 0, "max": 100.0}
+    document = json.loads(train("report", "--class", "--to", "json")[1])
+    assert {each["student"] for each in document["grades"]} == {"ada", "Bob O'Neill"}
+    for words in (["--class"], []):
+        out = tmp_path / f"sheet{len(words)}.html"
+        assert train("report", *words, "--out", out)[0] == 0
+        text = out.read_text()
+        assert "<svg" in text and not re.search(r'(src|href)="(?!#|data:)', text)
+    assert "by&quot; was never returned to 0" in text and "Bob O&#x27;Neill" in text
+
+
+def test_the_list_says_what_is_passed(train):
+    at_the_references_seed(train)
+    train("verify")
+    document = json.loads(train("list", "--json")[1])
+    four = next(each for each in document["exercises"] if each["number"] == 4)
+    assert (four["state"], four["points"], four["attempts"]) == ("passed", 100.0, 1)
+    assert re.search(r"4 +See and measure y-parallax +passed +100 +1", train("list")[1])
+
+
+def test_a_skeleton_is_read_and_check_says_what_is_missing(train, tmp_path):
+    assert train("new", tmp_path / "30-clouds")[0] == 0
+    code, out, err = train("check", tmp_path / "30-clouds")
+    assert code == 1 and err == ""
+    assert "hint: expected 2 hints or more, got 1" in out and "faulty: expected 2" in out
+    assert train("new", tmp_path / "30-clouds")[0] == 2
+
+
+def test_check_finds_an_exercise_that_does_not_hold(train, tmp_path):
+    folder = tmp_path / "04-parallax"
+    folder.mkdir()
+    for path in (EXERCISES / "04-parallax").iterdir():
+        (folder / path.name).write_text(path.read_text())
+    toml = folder / "exercise.toml"
+    toml.write_text(toml.read_text().replace("excellent = 12\npass = 30", "excellent = 1\npass = 1e6"))
+    code, out, _ = train("check", folder)
+    assert code == 1
+    assert re.search(r"cleared: expected excellent no better than eye and least count, 5\.9\d+, got 1\n", out)
+    assert "faulty-not-cleared.a7s: expected cleared to fail, got opposed" in out
+
+
+def test_served_anybodys_client_works_the_exercise(tmp_path):
+    """Two consoles and a kill -9: what was done is there, and start goes on with it."""
+    environment = {**os.environ, "A7SIM_HOME": str(tmp_path), "A7SIM_STUDENT": "ada"}
+    command = [sys.executable, "-m", "a7sim", "train", "start", "4", "--link", "tcp:127.0.0.1:0"]
+    for number in (1, 2):
+        server = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+        try:
+            lines = iter(server.stdout.readline, "")
+            url = next(line.split()[1] for line in lines if line.startswith("tcp"))
+            with Client.open(url) as client:
+                client.send('REC "1011",BY1')
+                assert client.ask("REC:COUN?") == str(number)
+                second = subprocess.run(
+                    command, env=environment, capture_output=True, text=True, timeout=60, check=False
+                )
+                assert second.returncode == 2 and "Traceback" not in second.stderr
+                server.send_signal(signal.SIGKILL)
+                server.wait(timeout=30)
+        finally:
+            server.kill()
+            server.wait(timeout=30)
+            server.stdout.close()
+    with Progress(tmp_path) as progress:
+        assert [each.number for each in progress.attempts("ada")] == [1]
+
+
+def test_two_consoles_write_progress_at_once_and_lose_nothing(tmp_path):
+    shelved = find_exercise("4")
+
+    def begin(student):
+        with Progress(tmp_path) as progress:
+            for _ in range(10):
+                progress.begin(student, shelved)
+
+    threads = [threading.Thread(target=begin, args=(name,)) for name in ("ada", "ada", "bob")]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
+    with Progress(tmp_path) as progress:
+        assert sorted(each.number for each in progress.attempts("ada")) == list(range(1, 21))
+        assert len(progress.attempts()) == 30
+
+
+def test_progress_of_a_newer_version_is_left_alone_and_an_empty_file_is_brought_up(tmp_path):
+    sqlite3.connect(tmp_path / FILE).close()
+    Progress(tmp_path).close()
+    database = sqlite3.connect(tmp_path / FILE)
+    assert database.execute("PRAGMA user_version").fetchone() == (len(MIGRATIONS),)
+    database.execute("PRAGMA user_version = 99")
+    database.close()
+    with pytest.raises(Mistake, match="a newer a7sim wrote it"):
+        Progress(tmp_path)
+
+
+def test_train_help_loads_nothing_heavy():
+    program = (
+        "import atexit, sys; atexit.register(lambda: print(sorted(sys.modules)))\n"
+        "sys.argv = ['a7sim', 'train', '--help']; from a7sim.cli import main; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert "check" in done.stdout
+    assert not {"'textual'", "'matplotlib'", "'scipy'"} & set(re.findall(r"'\w+'", done.stdout))

@@ -1,0 +1,107 @@
+"""Exercises 10 to 13 and 15: what their texts tell a student to compute holds, and their papers can be solved."""
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from a7sim.geometry import GON
+from a7sim.session.grid_test import true_errors
+from a7sim.training.attempts import attempted
+from a7sim.training.exercise import Played
+from a7sim.training.grading import account_in, grade_of
+from a7sim.training.handouts import handed_out
+from a7sim.training.measures.ground import element_at, last_readings
+from a7sim.training.shelf import find_exercise
+from a7sim.training.variation import scenario_for
+
+PERFECT = {
+    "parallax_um": 0.0,
+    "monocular_um": 0.0,
+    "stereo_um": 0.0,
+    "height_um": 0.0,
+    "fiducial_um": 0.0,
+    "last_digit_slip": 0.0,
+    "blunder_rate": 0.0,
+}
+
+
+@pytest.fixture(scope="module")
+def grid_tested(tmp_path_factory):
+    shelved, folder = find_exercise("13"), tmp_path_factory.mktemp("grid")
+    assert attempted(shelved, shelved.exercise.reference, folder, 3) == ""
+    return account_in(shelved, 3, folder)
+
+
+@pytest.mark.parametrize("projector", [1, 2])
+def test_the_grid_test_by_hand_finds_what_stands_in_a_worn_projector(grid_tested, projector):
+    """The three formulas of the text, on the registered counters of nine crosses at two levels."""
+    read = defaultdict(list)
+    for each in grid_tested.readings:
+        if each.eyes[projector - 1] is not None:
+            read[round(each.shown["Z"]), each.point].append([each.shown[axis] for axis in "XY"])
+    high, low = sorted({level for level, _ in read}, reverse=True)
+    names = [[f"G{row}{column}" for column in (1, 5, 9)] for row in (1, 5, 9)]
+    x, y = np.moveaxis(
+        [[[np.mean(read[level, name], axis=0) for name in row] for row in names] for level in (high, low)], -1, 0
+    )
+    spans = np.concatenate([x[:, :, 2] - x[:, :, 0], y[:, 2] - y[:, 0]], axis=1)
+    shown = grid_tested.autograph.element(f"c{projector}")
+    c = np.mean(200.0 * (high - low) / (spans[1] - spans[0]))
+    bent = shown**2 / (2.0 * -np.array([high, low]) * 100.0**2)
+    phi = -np.mean(bent[:, None] * (x[:, :, 2] + x[:, :, 0] - 2.0 * x[:, :, 1])) / GON
+    omega = np.mean(bent[:, None] * (y[:, 2] + y[:, 0] - 2.0 * y[:, 1])) / GON
+    truth = true_errors(grid_tested.autograph, grid_tested.autograph.condition, projector)["errors"]
+    assert c - shown == pytest.approx(truth["c"], abs=0.06)
+    assert phi == pytest.approx(truth["phi"], abs=0.05)
+    assert omega == pytest.approx(truth["omega"], abs=0.05)
+    assert abs(truth["c"]) > 0.06
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+def test_the_misread_point_can_be_found_and_the_strip_comes_to_the_true_ground(seed, tmp_path):
+    shelved = find_exercise("12")
+    scenario = scenario_for(shelved, seed)
+    made = handed_out("model sheets", scenario, seed, shelved.exercise.handout_options)
+    assert attempted(shelved, shelved.exercise.reference, tmp_path, seed) == ""
+    account = account_in(shelved, seed, tmp_path)
+    assert account.answers["bad"] == made.hidden["bad"]
+    for name in ("8003", "8005"):
+        found = [float(account.answers[f"{axis}{name}"]) for axis in "xyz"]
+        assert found == pytest.approx(account.scene.ground_points[name], abs=1.0)
+
+
+def test_who_leaves_the_misread_point_in_is_told_where_it_shows(tmp_path):
+    shelved = find_exercise("12")
+    played = Played(procedure="strip by cards", options={"wanted": ["8003", "8005"], "leave_out": False})
+    assert attempted(shelved, played, tmp_path, 12) == ""
+    failed = {each.id: each for each in grade_of(account_in(shelved, 12, tmp_path)).failed}
+    assert set(failed) == {"plan"}
+    assert "y8003 was answered" in failed["plan"].sentence
+
+
+@pytest.fixture(scope="module")
+def levelled(tmp_path_factory):
+    shelved, folder = find_exercise("10"), tmp_path_factory.mktemp("levelled")
+    assert attempted(shelved, Played(procedure="absolute orientation", observer=PERFECT), folder, 8) == ""
+    return account_in(shelved, 8, folder)
+
+
+def test_levelling_turns_both_projectors_as_the_text_says(levelled):
+    """Both phi alike, both omega alike, and the right centre sinks by bx times the tilt of phi (T 3.5)."""
+    opened = max(each.place for each in levelled.witness.deeds if each.client == "opening") + 1
+    level = last_readings(levelled, ["K1"])["K1"][-1]
+    turned = {
+        name: level.shown[name] - element_at(levelled, name, opened)
+        for name in ("phi1", "phi2", "omega1", "omega2", "bz1", "bz2")
+    }
+    assert turned["phi1"] == pytest.approx(turned["phi2"], abs=0.02)
+    assert turned["omega1"] == pytest.approx(turned["omega2"], abs=0.02)
+    assert abs(turned["phi1"]) > 0.03
+    sunk = -(turned["bz2"] - turned["bz1"])
+    assert sunk == pytest.approx(level.shown["bx"] * turned["phi1"] * GON, abs=0.03)
+
+
+def test_a_perfect_eye_is_left_with_what_film_and_counts_allow(levelled):
+    marks = {each.id: each for each in grade_of(levelled).marks}
+    assert marks["heights"].value < 0.15 and marks["on-the-ground"].value < 4.0
