@@ -81,7 +81,7 @@ def test_three_models_close_within_what_is_asked_of_ten(three):
 
 def test_the_scale_is_carried_by_the_heights_of_common_points(monkeypatch):
     """The comparison can fail: without the carrying of scale the flying height's changes break the strip."""
-    monkeypatch.setattr(bridging, "_scaled", lambda bench, who, model, before: np.ones(bench.crew.sessions))
+    monkeypatch.setattr(bridging, "carry_scale_on", lambda bench, who, model, before: np.ones(bench.crew.sessions))
     crowd, models = worked(scenario_of(2))
     assert len(models) == 2
     assert np.abs(misclosures(crowd, models)).max() > 10.0 * CLOSES_MM

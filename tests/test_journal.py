@@ -20,6 +20,7 @@ from a7sim.instrument.language import LinkEvent
 from a7sim.link.clock import Clock
 from a7sim.mistakes import Mistake
 from a7sim.scenario import carried, find_scenario, hash_of, load_scenario, scenario_from
+from a7sim.scene import PICTURES
 from a7sim.session import combinations, durable, run
 from a7sim.session.checkpoints import read_checkpoints
 from a7sim.session.durable import DurableFile, JournalStopped
@@ -78,7 +79,7 @@ def forged(journalled, header=None, change=lambda number, data: data):
 def test_the_header_says_what_a_session_follows_from_and_names_the_scenario_by_its_hash(whole):
     header = read_journal(whole / "session.jsonl").header
     assert header["software"] == f"a7sim {__version__}"
-    assert (header["command"], header["seed"], header["variant"]) == ("run", 7, "A7")
+    assert (header["command"], header["seed"], header["variant"], header["pictures"]) == ("run", 7, "A7", PICTURES)
     assert header["scenario_hash"] == hash_of(load_scenario("dewitt-pair", LIGHT))
     assert "scenario" not in header
     scenario = (whole / "session.scenario.json").read_text()

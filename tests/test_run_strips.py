@@ -28,7 +28,7 @@ def residuals(strip, role):
 @pytest.fixture(scope="module")
 def all_strips(tmp_path_factory):
     out = tmp_path_factory.mktemp("runs") / "all"
-    done = a7sim("run", "akwanga", "--strips", "all", "--out", out)
+    done = a7sim("run", "akwanga", "--strips", "all", "--set", "plan.parallax_readings=1", "--out", out)
     assert done.returncode == 0, done.stderr
     return json.loads((out / "results.json").read_text(encoding="utf-8")), out, done.stdout
 
@@ -59,7 +59,7 @@ def test_control_and_checks_are_accounted_for_apart(all_strips):
 
 def test_checks_take_no_part_in_the_strip():
     """A check moved by ten metres moves its own residual and nothing else; a control point moves the strip."""
-    scenario = load_scenario("akwanga")
+    scenario = load_scenario("akwanga", {"plan.parallax_readings": "1"})
     models = models_of(run(scenario, 3)["models"])
     ground = ground_of(scenario, build_scene(scenario, 3))
 
@@ -152,7 +152,7 @@ def test_strips_at_the_command_line_print_a_line_a_strip(all_strips):
 
 
 def test_a_run_without_control_says_that_there_is_no_strip():
-    done = a7sim("run", "dewitt-pair")
+    done = a7sim("run", "dewitt-pair", "--set", "plan.parallax_readings=1")
     assert done.returncode == 0
     assert "No strip on the ground: the scenario has no ground control" in done.stdout
 
@@ -192,4 +192,4 @@ def test_the_report_of_all_strips_has_a_row_and_a_mark_for_each(all_strips):
     assert [row[5] for row in table.rows] == [f"{s['accuracy_m']['checks']['plan']:.3f}" for s in document["strips"]]
     assert sum(tag == "svg" for tag, _ in page.elements) == 2
     alone = json.loads((out / "case-C" / "results.json").read_text(encoding="utf-8"))
-    assert alone["command_line"] == "a7sim run akwanga --seed 1985 --case C"
+    assert alone["command_line"] == "a7sim run akwanga --seed 1985 --case C --set plan.parallax_readings=1"

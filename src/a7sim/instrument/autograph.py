@@ -524,7 +524,7 @@ class Autograph:
             offset = mxv(transposed(self._view(projector, carrier)), seen)
             film = carrier.on_film(offset + self.mark_on_carrier(projector)[:, None, None])
             content = carrier.photograph.content
-            grey = content(film) if content else np.full((rows, columns), 0.5)
+            grey = content(film, pitch) if content else np.full((rows, columns), 0.5)
             if carrier.photograph.polarity == "negative":
                 grey = 1.0 - grey
             inside = np.abs(film).max(axis=0) <= FORMAT_MM / 2.0

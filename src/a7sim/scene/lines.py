@@ -8,6 +8,7 @@ import numpy as np
 from a7sim.geometry import Array, length_of
 from a7sim.mistakes import Mistake
 from a7sim.scenario.schema import Line
+from a7sim.scene.coverage import within_band
 
 TONE, TEXTURE = 0.85, 0.3
 """Mean grey of a road, where bare ground has 0.5 on the average, and what share of the ground's texture it has
@@ -15,6 +16,9 @@ TONE, TEXTURE = 0.85, 0.3
 
 _PIECES = 24
 """Straight pieces of a line between two of its vertices."""
+
+_POINT_M2 = 1e-12
+"""Square of the length of a piece that is no more than a point."""
 
 
 @dataclass(frozen=True)
@@ -26,18 +30,26 @@ class GroundLine:
     width: float
     middle: Array
 
-    def distance(self, plan: Array) -> Array:
-        """Return how far places ``(2, ...)`` lie from the middle, in m; infinity where that is certainly far."""
-        places = plan.reshape(2, -1)
-        low, high = places.min(axis=1)[:, None] - self.width, places.max(axis=1)[:, None] + self.width
-        begins, ends = self.middle[:, :-1], self.middle[:, 1:]
-        near = ((np.maximum(begins, ends) >= low) & (np.minimum(begins, ends) <= high)).all(axis=0)
-        nearest = np.full(places.shape[1], np.inf)
-        for begin, end in zip(begins[:, near].T, ends[:, near].T, strict=True):
-            piece = end - begin
-            share = np.clip(piece @ (places - begin[:, None]) / (piece @ piece), 0.0, 1.0)
-            nearest = np.minimum(nearest, length_of(places - begin[:, None] - piece[:, None] * share))
-        return nearest.reshape(plan.shape[1:])
+    def distance(self, plan: Array, within: float | None = None) -> Array:
+        """Return how far places ``(2, ...)`` lie from the middle, in m; infinity where it may be more than `within`.
+
+        Where nothing else is said that is the width.
+        """
+        return distance_from(self.middle, plan, self.width if within is None else within)
+
+
+def distance_from(chain: Array, plan: Array, within: float) -> Array:
+    """Return how far places ``(2, ...)`` lie from a chain ``(2, n)``; infinity where it may be more than `within`."""
+    places = plan.reshape(2, -1)
+    low, high = places.min(axis=1)[:, None] - within, places.max(axis=1)[:, None] + within
+    begins, ends = chain[:, :-1], chain[:, 1:]
+    near = ((np.maximum(begins, ends) >= low) & (np.minimum(begins, ends) <= high)).all(axis=0)
+    nearest = np.full(places.shape[1], np.inf)
+    for begin, end in zip(begins[:, near].T, ends[:, near].T, strict=True):
+        piece = end - begin
+        share = np.clip(piece @ (places - begin[:, None]) / max(piece @ piece, _POINT_M2), 0.0, 1.0)
+        nearest = np.minimum(nearest, length_of(places - begin[:, None] - piece[:, None] * share))
+    return nearest.reshape(plan.shape[1:])
 
 
 def lines_of(lines: Sequence[Line]) -> dict[str, GroundLine]:
@@ -62,8 +74,13 @@ def _smooth(vertices: Array) -> Array:
     return np.concatenate([curve.reshape(2, -1), vertices[:, -1:]], axis=1)
 
 
-def with_lines(lines: Sequence[GroundLine], plan: Array, grey: Array) -> Array:
-    """Return the grey ``(...)`` of ground places ``(2, ...)`` with the lines laid over it."""
+def with_lines(lines: Sequence[GroundLine], plan: Array, grey: Array, element: float) -> Array:
+    """Return the grey ``(...)`` of ground places ``(2, ...)`` with the lines laid over it.
+
+    Edges are as wide as a picture element is on the ground, in m.
+    """
     for line in lines:
-        grey = np.where(line.distance(plan) <= line.width / 2.0, TONE + TEXTURE * (grey - 0.5), grey)
+        distance = line.distance(plan, line.width + element)
+        cover = within_band(distance, line.width / 2.0, element)
+        grey = grey + cover * (TONE + TEXTURE * (grey - 0.5) - grey)
     return grey

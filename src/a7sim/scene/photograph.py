@@ -12,6 +12,9 @@ from a7sim.scenario.schema import Camera, Film
 SKETCH_SIGMA_MM = 0.3
 """Points are pricked on the paper print to about half a millimetre (protocol.md)."""
 
+Content = Callable[[Array, float], Array]
+"""Grey values 0..1 ``(...)`` of picture elements at film places ``(2, ...)``, so many mm wide on film."""
+
 
 @dataclass(frozen=True)
 class Marks:
@@ -31,7 +34,7 @@ class Marks:
 
 @dataclass(frozen=True)
 class Photograph:
-    """Film coordinates in mm from the fiducial centre; `content` gives grey values 0..1 of film places."""
+    """Film coordinates in mm from the fiducial centre, and what the film shows."""
 
     name: str
     camera: Camera
@@ -40,7 +43,7 @@ class Photograph:
     sketch: Marks
     polarity: str = "positive"
     laid: str = "right way up"
-    content: Callable[[Array], Array] | None = field(default=None, compare=False)
+    content: Content | None = field(default=None, compare=False)
 
 
 def sketched(points: Marks, rng: np.random.Generator) -> Marks:

@@ -1,7 +1,7 @@
 """The scene of a scenario: the ground, the stations, the photographs, and the truth about them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,8 +9,10 @@ from a7sim.geometry import GON, Array, image_of, length_of, mxm, mxv, rotation, 
 from a7sim.mistakes import Mistake
 from a7sim.scenario.schema import Model, Photo, Published, Scenario
 from a7sim.scene.camera import distorted, fiducial_places, lowered_by_curvature, refracted
-from a7sim.scene.content import picture_of_ground, picture_of_marks
+from a7sim.scene.content import Depicted, picture_of_ground, picture_of_marks, sharply
+from a7sim.scene.emulsion import Emulsion
 from a7sim.scene.grid_plate import grid_plate
+from a7sim.scene.houses import NOWHERE, houses_along
 from a7sim.scene.lines import GroundLine, lines_of
 from a7sim.scene.measured import measured_marks
 from a7sim.scene.photograph import Deformation, Marks, Photograph, chosen, sketched, within_format
@@ -19,6 +21,10 @@ from a7sim.standard_points import PLACES
 
 FILM_STREAM, SKETCH_STREAM = 1, 2
 """Spawn keys of the scene's random numbers; the instrument's and the operator's follow."""
+
+PICTURES = 2
+"""Which pictures the photographs show. Those of 1 had sharp edges, even light, no houses and no grain: sessions that
+were worked with them are said again with them."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +79,12 @@ class Scene:
         return self.published.get(model.name)
 
 
-def build_scene(scenario: Scenario, seed: int) -> Scene:
+def build_scene(scenario: Scenario, seed: int, pictures: int = PICTURES) -> Scene:
     """Return the scene of a scenario; the seed draws the film and the pricking. Raises Mistake for bad files."""
     ground = Ground.of(scenario.terrain)
+    lines = lines_of(scenario.lines)
+    houses = NOWHERE if pictures < 2 else houses_along(lines.values(), ground, scenario.terrain.seed)
+    depicted = Depicted(ground, tuple(lines.values()), houses)
     stations = {
         photo.name: Station(
             np.array(photo.position),
@@ -95,7 +104,7 @@ def build_scene(scenario: Scenario, seed: int) -> Scene:
         else:
             standard[model.name] = _lay_out_standard_points(scenario, model, stations, ground, signalised)
     photographs = {
-        photo.name: _photograph(scenario, photo, index, seed, stations, ground, signalised)
+        photo.name: _photograph(scenario, photo, index, seed, stations, depicted, signalised, pictures)
         for index, photo in enumerate(scenario.photos)
     }
     published = {model.name: _as_truth(model.published) for model in scenario.models if model.published is not None}
@@ -103,7 +112,8 @@ def build_scene(scenario: Scenario, seed: int) -> Scene:
     measured = [photographs[photo.name].points.names for photo in scenario.photos if photo.measured is not None]
     listed = dict.fromkeys([point.point for point in scenario.ground] + [name for names in measured for name in names])
     plate = grid_plate(scenario.grid_plate, scenario.camera, scenario.photos[0].polarity)
-    lines = lines_of(scenario.lines)
+    if pictures < 2:
+        photographs, plate = {name: _sharp(photo) for name, photo in photographs.items()}, _sharp(plate)
     return Scene(photographs, stations, signalised, standard, tuple(listed), published, plate, ground, lines)
 
 
@@ -169,10 +179,11 @@ def _photograph(
     index: int,
     seed: int,
     stations: dict[str, Station],
-    ground: Ground,
+    depicted: Depicted,
     signalised: dict[str, Array],
+    pictures: int,
 ) -> Photograph:
-    camera = scenario.camera
+    camera, ground = scenario.camera, depicted.ground
     sketching = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(SKETCH_STREAM, index)))
     if photo.measured is not None:
         fiducials, points = measured_marks(photo.measured, photo.name, camera)
@@ -188,16 +199,15 @@ def _photograph(
         visible = (places[2] < station.centre[2]) & ~ground.under_water(places[:2])
         imaged = Marks(imaged.names, deformation.of_points(imaged.xy, filming))
         points = chosen(imaged, within_format(imaged.xy) & visible)
-        to_film = deformation.matrix
         content = picture_of_ground(
-            ground,
+            depicted,
             station.centre,
             station.rotation,
-            camera.c,
-            to_film,
+            camera,
+            deformation.matrix,
             points,
             _imaging(scenario, station, ground),
-            tuple(lines_of(scenario.lines).values()),
+            None if pictures < 2 else Emulsion.drawn(seed, (FILM_STREAM, index)),
         )
     return Photograph(
         photo.name,
@@ -209,6 +219,10 @@ def _photograph(
         photo.laid,
         content,
     )
+
+
+def _sharp(photograph: Photograph) -> Photograph:
+    return replace(photograph, content=photograph.content and sharply(photograph.content))
 
 
 def _imaged(scenario: Scenario, station: Station, ground: Ground, points: Array) -> Array:

@@ -14,6 +14,7 @@ from a7sim.instrument.language import Desk, LinkEvent
 from a7sim.mistakes import Mistake
 from a7sim.operator.book import Entry
 from a7sim.scenario import Scenario, carried, hash_of
+from a7sim.scene import PICTURES
 from a7sim.session.checkpoints import EVERY, Checkpoint, as_lines, hash_of_state
 from a7sim.session.durable import Durability, DurableFile, JournalStopped, stopped
 from a7sim.session.folder import JOURNAL, SCENARIO_SUFFIX, STATES, TORN
@@ -52,6 +53,7 @@ def header_of(command: str, scenario: Scenario, seed: int, **settings: Any) -> H
         "scenario_hash": hash_of(scenario),
         "seed": seed,
         "variant": scenario.instrument.variant,
+        "pictures": PICTURES,
         "settings": settings,
     }
     return Header(line, scenario)

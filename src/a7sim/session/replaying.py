@@ -92,7 +92,8 @@ class Replay:
         settings = header.get("settings", {})
         if autograph is None:
             scenario, seed = scenario_of_journal(journalled, known)
-            autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
+            drawer = build_scene(scenario, seed, header.get("pictures", 1)).drawer
+            autograph = build_autograph(scenario.instrument, drawer, seed)
         self.journalled = journalled
         self.desk = Desk(
             autograph,

@@ -80,7 +80,9 @@ class AnswersOff(Measure, frozen=True, kw_only=True):
             try:
                 off[key] = abs(float(account.answers.get(key, "")) - float(account.hidden[key]))
             except (ValueError, KeyError):
-                return Found(None, f"{key}: expected a number, got {account.answers.get(key, 'no answer')!r}")
+                answered = account.answers.get(key, "")
+                said = f"expected a number, got {answered!r}" if answered else "not answered"
+                return Found(None, f"{key}: {said}")
         worst = max(off, key=lambda key: off[key])
         if not math.isfinite(off[worst]):
             return Found(None, f"{worst}: expected a number, got {account.answers[worst]!r}")

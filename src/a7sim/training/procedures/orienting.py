@@ -83,7 +83,7 @@ def numerical_orientation(
             _put_on_by(seated, mean)
     if mean_on_by == "in the end":
         bench.begin_round(who, len(cases) + 1)
-        _put_on_by(seated, _parallaxes(seated, "A", 1).p.mean(axis=0))
+        _put_on_by(seated, _parallaxes(seated, "A", readings).p.mean(axis=0))
 
 
 def _parallaxes(seated: Seated, case: str, readings: int) -> Parallaxes:
