@@ -16,29 +16,28 @@ from a7sim.console.seat import Seat
 from a7sim.console.sheet import JobSheet
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.training.attempts import begun, done
+from a7sim.training.attempts import begun
 from a7sim.training.checklist import Checklist
-from a7sim.training.exercise import Played
 from a7sim.training.progress import Progress
 from a7sim.training.shelf import find_exercise
 
 FIGURES = Path(__file__).parent / "figures"
 SIZE = (104, 35)
 LOOKS = 4
-POINT = "1011"
+FIRST, *OTHERS = ("1011", "1013", "1015", "1021", "1023", "1025")
 
 
 class Student:
     """Somebody at the console who sees exactly, and has it photographed."""
 
     def __init__(self, person, room):
-        self.person, self.room = person, room
+        self.person, self.room, self.point = person, room, FIRST
         self.looker = Client(InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0))
         plan, camera = room.scenario.plan, room.scenario.camera
         self.scale = 1e-3 * plan.projection_height / camera.c
 
     def seen(self):
-        return self.looker.numbers(f'EYEP1? "{POINT}";:EYEP2? "{POINT}"')
+        return self.looker.numbers(f'EYEP1? "{self.point}";:EYEP2? "{self.point}"')
 
     async def set_down(self):
         """Bring the mark onto the point and the ground."""
@@ -67,6 +66,25 @@ class Student:
         await self.person.turn(-0.05, "+", "-")
         await self.register()
 
+    async def at_rest(self):
+        """Put the by in hand back to zero."""
+        await self.person.press("s")
+        await self.person.type_in("0")
+
+    async def measure(self, point):
+        """Do a whole point: by', then by"."""
+        await self.at_rest()
+        self.point = point
+        await self.person.press("g")
+        await self.person.choose(point)
+        await self.set_down()
+        for side, sense in (("'", -1.0), ('"', 1.0)):
+            await self.person.press("y", side)
+            await self.clear(sense)
+            await self.twice()
+            if side == "'":
+                await self.at_rest()
+
     async def photograph(self, name):
         await self.person.look_on()
         await self.person.pilot.pause(1.2)
@@ -91,7 +109,7 @@ async def work(console, room):
         person = student.person
         await person.settle()
         await person.press("g")
-        await person.choose(POINT)
+        await person.choose(FIRST)
         await person.step_of(1.0)
         await student.photograph("1-sat-down")
         await student.set_down()
@@ -101,14 +119,13 @@ async def work(console, room):
         await student.photograph("3-cleared")
         await student.twice()
         await student.photograph("4-registered")
-        await person.press("s")
-        await person.type_in("0")
+        await student.at_rest()
         await person.press('"')
         await student.clear(1.0)
         await student.twice()
         await student.photograph("5-other-eye")
-        done(room, Played(procedure="measure parallaxes", observer={"skill": "first-order"}))
-        await person.press("up", "down")
+        for point in OTHERS:
+            await student.measure(point)
         await student.photograph("6-done")
 
 
