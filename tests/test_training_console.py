@@ -44,3 +44,26 @@ def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: 
 
 def shown(console: Console) -> str:
     return str(console.main.query_one("#tasks").content)  # type: ignore[attr-defined]
+
+
+def test_points_are_driven_to_with_a_gear_engaged_before_and_counters_preset_by_a_line(tmp_path: Path) -> None:
+    """As exercise 9 asks for it: its opening engages the gear, its text says COUN:X:PRES."""
+    shelved = find_exercise("9")
+
+    async def sit_down(console: Console) -> None:
+        async with console.run_test(size=(110, 34)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            preset = "COUN:X:PRES 5000;:COUN:Y:PRES 5000"
+            for point, line in (("1011", preset), ("1013", "COUN:Z:PRES 5000"), ("1025", "")):
+                await person.press("g")
+                await person.choose(point)
+                assert person.message() == f"near point {point}"
+                if line:
+                    await person.press(":")
+                    await person.type_in(line)
+
+    with begun(shelved, 9, tmp_path, "ada", "practice") as room:
+        port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
+        asyncio.run(sit_down(Console(Seat(lambda: Client(port), lambda: 0.0, drawing=Drawing.HALVES))))
+        assert abs(room.autograph.counter("X") - 5000.0 - 194.99) < 15.0

@@ -7,6 +7,7 @@ from a7sim.console.bench import BenchDeeds
 from a7sim.console.dialogs import Ask, Choose, HelpPage
 from a7sim.console.looking import LookingDeeds
 from a7sim.console.reaching import Reach
+from a7sim.console.recalling import follow
 from a7sim.console.recording import RecordingDeeds
 from a7sim.console.turning import TurningDeeds
 from a7sim.console.watching import WatchingDeeds
@@ -82,8 +83,11 @@ class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeed
     def _said(self, line: str | None) -> None:
         console = self._console
         if line is not None:
+            variant, dials = self._at()
 
             def shown(exchange: Any) -> None:
+                if not exchange.errors:
+                    follow(console.presets, variant, dials, line)
                 console.say(
                     exchange.shown or " ".join(exchange.errors) or f"said {line}", refused=bool(exchange.errors)
                 )

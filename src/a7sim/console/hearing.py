@@ -7,7 +7,7 @@ from typing import Any
 from textual.message import Message
 
 from a7sim.console.book import Entry, read_book
-from a7sim.console.dials import Dials
+from a7sim.console.dials import Dials, unquoted
 from a7sim.console.news import Met, News, Refused, Sight, Silent
 from a7sim.console.playback import TICK_S
 from a7sim.console.reaching import Presets, sketch_of
@@ -96,7 +96,11 @@ class Hearing(Sitting):
         """Take up what was there before anybody sat down here."""
         console = self._console
         past = console.seat.past
-        self.ask(lambda _: recalled(met.variant, past()), self._recall)
+        watching = console.seat.watching
+        self.ask(
+            lambda client: recalled(met.variant, past(), "" if watching else unquoted(client.ask("GEAR:HEIG?"))),
+            self._recall,
+        )
         if console.playback is not None:
             console.playback.go_to(0)
             console.set_interval(TICK_S, console.playback.tick)

@@ -18,12 +18,16 @@ class Said:
     answers: bool = False
 
 
-_PRESET = re.compile(r"COUN:([XYZ]):PRES ([-+.\d]+)")
-_GEARED = re.compile(r"GEAR:HEIG (.+)")
+_PRESET = re.compile(r":?COUN(?:TER)?:([XYZ]):PRES(?:ET)? ([-+.\d]+)", re.IGNORECASE)
+_GEARED = re.compile(r":?GEAR:HEIG(?:HT)? (.+)", re.IGNORECASE)
 
 
-def recalled(variant: Variant, past: Iterable[Said]) -> Presets:
-    """Return the presets that were made before, by what this console said and what it was told of the counters."""
+def recalled(variant: Variant, past: Iterable[Said], gear: str = "") -> Presets:
+    """Return the presets that were made before, by what this console said and what it was told of the counters.
+
+    `gear` is the height gear that is engaged now. Where nobody is known to have engaged it, the counter of Z is taken
+    to have stood at its zero then.
+    """
     presets = Presets()
     dials: Dials | None = None
     asked, asks = question(variant), False
@@ -33,16 +37,24 @@ def recalled(variant: Variant, past: Iterable[Said]) -> Presets:
             dials = read_dials(variant, reply.parts) if reply else dials
         asks = said.text == asked
         if dials is not None and not said.answers:
-            _follow(presets, variant, dials, said.text)
+            follow(presets, variant, dials, said.text)
+    if gear:
+        presets.units.setdefault("Z", units_of(variant, gear))
     return presets
 
 
-def _follow(presets: Presets, variant: Variant, dials: Dials, line: str) -> None:
-    if preset := _PRESET.fullmatch(line):
-        presets.preset(variant, dials, preset[1], float(preset[2]))
-    elif geared := _GEARED.fullmatch(line):
-        gear = unquoted(geared[1])
-        known = variant.height_gears.get(gear)
-        presets.regeared(variant, dials, known.units_per_mm if known else float(gear))
-    elif line == "*RST":
-        presets.origins.clear()
+def units_of(variant: Variant, gear: str) -> float:
+    """Return the units a mm that a height gear gives."""
+    known = variant.height_gears.get(gear)
+    return known.units_per_mm if known else float(gear)
+
+
+def follow(presets: Presets, variant: Variant, dials: Dials, line: str) -> None:
+    """Take note of what a line presets or engages, where that is what it does; the dials are those before it."""
+    for unit in line.split(";"):
+        if preset := _PRESET.fullmatch(unit):
+            presets.preset(variant, dials, preset[1].upper(), float(preset[2]))
+        elif geared := _GEARED.fullmatch(unit):
+            presets.regeared(variant, dials, units_of(variant, unquoted(geared[1])))
+        elif unit.upper() == "*RST":
+            presets.origins.clear()

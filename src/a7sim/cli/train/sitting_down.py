@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Iterator
 
 from a7sim.cli.console import KEYMAP
 from a7sim.cli.prompt import data_folder
@@ -9,7 +10,10 @@ from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import TIMEOUT_S
 from a7sim.mistakes import Mistake
+from a7sim.session.folder import JOURNAL
+from a7sim.session.lines import Event, read_journal
 from a7sim.training.checklist import Checklist
+from a7sim.training.exercise import OPENING
 from a7sim.training.room import Room
 
 
@@ -24,6 +28,7 @@ def sit_down(room: Room, checklist: Checklist, plain: bool) -> None:
         raise Mistake("start: expected textual to be installed: pip install 'a7sim[console]'") from error
     from a7sim.console.eyepiece import Drawing  # noqa: PLC0415
     from a7sim.console.keymap import default_keymap, load_keymap  # noqa: PLC0415
+    from a7sim.console.recalling import Said  # noqa: PLC0415
     from a7sim.console.seat import Seat  # noqa: PLC0415
     from a7sim.console.sheet import JobSheet  # noqa: PLC0415
 
@@ -47,5 +52,15 @@ def sit_down(room: Room, checklist: Checklist, plain: bool) -> None:
             drawing=Drawing.WORDS if plain else None,
             theme="contrast" if plain else "enamel",
             tasks=checklist.lines,
+            past=lambda: [Said(each.text, each.dir == "<") for each in _past(checklist)],
         )
     ).run()
+
+
+def _past(checklist: Checklist) -> Iterator[Event]:
+    """Yield what was said and answered in an attempt so far, but for its opening."""
+    there = read_journal(checklist.attempt.folder / JOURNAL)
+    for number in range(2, len(there) + 1):
+        event = there.event(number)
+        if event.dir in ("<", ">") and event.client != OPENING:
+            yield event
