@@ -12,7 +12,7 @@ from a7sim.reduction import PerspectiveCentre, Undetermined, perspective_centre
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES, PLACES
 from a7sim.training.account import Account
-from a7sim.training.measures.base import BEST_POINTING_UM, HALF_A_COUNT, Found, Measure, listed, measure, title
+from a7sim.training.measures.base import BEST_POINTING_UM, HALF_A_COUNT, Found, Measure, listed, measure, title, where
 from a7sim.training.witness import Reading
 
 FEWEST_POINTS = 3
@@ -97,6 +97,7 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
     def of(self, account: Account) -> Found:
         """Return it, over all registrations at the levels."""
         off: list[float] = []
+        worst = (0.0, "")
         for element in self.elements:
             eye = account.model.hand_of(int(element[-1]))
             for each in (each for some in self._pointings(account, element).values() for each in some):
@@ -107,10 +108,13 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
                         None, f"where {each.point} was registered with {title(element)} the {side} eye saw none"
                     )
                 off += seen
+                place = f"{where([each], account)} with {title(element)} at {each.shown['Z']:.0f}"
+                worst = max(worst, (math.hypot(*seen), place))
         if not off:
             return Found(None, "nothing was registered at the levels")
         rms = math.sqrt(fmean(each**2 for each in off))
-        told = f"over {len(off) // 2} pointings the images stood {rms:.1f} um (rms) beside the mark"
+        told = f"over {len(off) // 2} pointings the images stood {rms:.1f} um (rms) beside the mark, "
+        told += f"most of all by {worst[0]:.0f} um at {worst[1]}"
         return Found(round(rms, 2), told)
 
     def floor(self, scenario: Scenario) -> float:
