@@ -1,11 +1,15 @@
 """Studies: what a file may say, replicates that do not depend on how they are worked, statistics and the command."""
 
+import numpy as np
 import pytest
 
 from a7sim.mistakes import Mistake
 from a7sim.study.cells import cells_of
+from a7sim.study.executors import opened
 from a7sim.study.loading import SHELVES, load_study, study_of
+from a7sim.study.running import Pace, work
 from a7sim.study.schema import Factor, Study
+from a7sim.study.tally import Tally
 
 BY_COMPARATOR = {
     "schema_version": 1,
@@ -66,6 +70,94 @@ def test_settings_of_a_cell_reach_its_scenario_and_leave_the_others_alone(tmp_pa
 @pytest.mark.parametrize("name", sorted(path.stem for shelf in SHELVES for path in shelf.glob("*.toml")))
 def test_every_study_that_comes_with_a7sim_can_be_laid_out(name):
     assert len(load_study(name).cells) > 1
+
+
+def numbers_of(laid_study, kind="process", largest_chunk=2000, tally=None):
+    tally = tally or Tally.empty(len(laid_study.cells), len(laid_study.responses))
+    with opened(kind, 2) as (executor, at_once):
+        work(laid_study, tally, executor, at_once, pace=Pace(largest_chunk=largest_chunk))
+    return tally
+
+
+def bytes_of(tally, folder):
+    tally.save(folder / "tally.npz", "study")
+    return (folder / "tally.npz").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def by_comparator(tmp_path_factory):
+    study = laid(tmp_path_factory.mktemp("study"))
+    return study, numbers_of(study)
+
+
+@pytest.mark.parametrize(("kind", "largest_chunk"), [("process", 1), ("process", 4), ("pool", 2)])
+def test_a_study_gives_the_same_bytes_however_it_is_cut_and_whoever_works_it(
+    by_comparator, tmp_path, kind, largest_chunk
+):
+    study, tally = by_comparator
+    assert bytes_of(numbers_of(study, kind, largest_chunk), tmp_path) == bytes_of(tally, tmp_path)
+
+
+def test_cells_share_their_random_numbers_so_that_the_same_level_gives_the_same_numbers(tmp_path):
+    """Common random numbers: cells that differ in nothing that matters give identical replicates."""
+    study = laid(tmp_path, factor=[{"name": "f", "path": "plan.tolerated_centre_rms", "levels": [0.5, 0.6]}])
+    tally = numbers_of(study)
+    assert np.array_equal(tally.sample(0), tally.sample(1))
+    assert len(set(tally.sample(0)[0])) == 6
+
+
+def test_moments_are_those_of_numpy_and_leave_out_who_gave_up():
+    rng = np.random.default_rng(3)
+    values = rng.normal(1e6, 1e-3, (2, 500))
+    values[1, ::7] = np.nan
+    tally = Tally.empty(1, 2)
+    for part in np.split(values, (1, 30, 400), axis=1):
+        tally.add(0, part)
+    assert tally.mean[0] == pytest.approx(np.nanmean(values, axis=1), rel=1e-14)
+    assert tally.sd[0] == pytest.approx(np.nanstd(values, axis=1, ddof=1), rel=1e-6)
+    assert tally.count[0].tolist() == [500, np.isfinite(values[1]).sum()]
+    assert (tally.low[0] == np.nanmin(values, axis=1)).all()
+    assert (tally.high[0] == np.nanmax(values, axis=1)).all()
+
+
+def test_the_sample_is_bounded_and_the_moments_are_not(monkeypatch):
+    monkeypatch.setattr("a7sim.study.tally.SAMPLE", 10)
+    tally = Tally.empty(1, 1)
+    for start in range(0, 28, 4):
+        tally.add(0, np.arange(start, start + 4.0)[None])
+    assert tally.sample(0).tolist() == [list(range(10))]
+    assert (int(tally.done[0]), float(tally.mean[0, 0])) == (28, 13.5)
+
+
+def test_a_study_with_more_replicates_goes_on_from_the_checkpoint_of_one_with_fewer(by_comparator, tmp_path):
+    study, tally = by_comparator
+    checkpoint = tmp_path / "checkpoint.npz"
+    numbers_of(laid(tmp_path, replicates=4)).save(checkpoint, laid(tmp_path, replicates=4).identity)
+    resumed = numbers_of(study, tally=Tally.load(checkpoint, study.identity))
+    assert bytes_of(resumed, tmp_path) == bytes_of(tally, tmp_path)
+
+
+def test_the_checkpoint_of_another_study_is_refused(tmp_path):
+    Tally.empty(2, 2).save(tmp_path / "c.npz", laid(tmp_path, seed=6).identity)
+    with pytest.raises(Mistake, match="got that of another"):
+        Tally.load(tmp_path / "c.npz", laid(tmp_path).identity)
+    (tmp_path / "c.npz").write_bytes(b"nothing")
+    with pytest.raises(Mistake, match="got a file that is none"):
+        Tally.load(tmp_path / "c.npz", laid(tmp_path).identity)
+
+
+@pytest.mark.parametrize(("half_width", "replicates"), [(10.0, 2), (1e-6, 5)])
+def test_a_study_ends_when_its_precision_is_reached_or_its_replicates_are_done(
+    tmp_path, monkeypatch, half_width, replicates
+):
+    monkeypatch.setattr("a7sim.study.running.STEP", 2)
+    wanted = {"response": "strip_plan_at_checks_m", "half_width": half_width}
+    assert numbers_of(laid(tmp_path, precision=wanted, replicates=5)).done.tolist() == [replicates] * 2
+
+
+def test_a_response_that_the_results_do_not_have_is_a_mistake_that_names_its_place(tmp_path):
+    with pytest.raises(Mistake, match=r"at ways there are comparator, not 'A8'"):
+        numbers_of(laid(tmp_path, responses=["ways.A8.accuracy_m.checks.plan"]))
 
 
 MISTAKES = {

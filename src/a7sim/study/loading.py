@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+import a7sim
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
 from a7sim.scenario.validation import mistakes_of_form
@@ -48,9 +49,9 @@ class Laid:
 
     @property
     def identity(self) -> str:
-        """A hash of all that decides what a replicate gives; how many are worked does not."""
-        asked = msgspec.structs.replace(self.study, replicates=None, precision=None)
-        return sha256(msgspec.json.encode([asked, self.scenarios])).hexdigest()
+        """A hash of all that decides what a replicate gives; words, and how many are worked, do not."""
+        asked = msgspec.structs.replace(self.study, title="study", question="", replicates=None, precision=None)
+        return sha256(msgspec.json.encode([a7sim.__version__, asked, self.scenarios])).hexdigest()
 
 
 def find_study(name: str | Path) -> Path:

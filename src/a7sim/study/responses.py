@@ -12,6 +12,9 @@ from a7sim.mistakes import Mistake
 
 Reader = Callable[[Document], float]
 
+SIGNIFICANT = 10
+"""Digits of a response; the last bits of a sum depend on who sits beside a session."""
+
 BRANCHES = ("models", "strip", "ways", "operator", "a8_minus_comparator_m")
 """Where the paths of responses begin."""
 
@@ -26,11 +29,14 @@ class Response:
     read: Reader
 
     def of(self, document: Document) -> float:
-        """Return the response of a session, nan if it gave up. Raises Mistake where a complete session has none."""
+        """Return the response of a session to ten digits, nan if it gave up.
+
+        Raises Mistake where a complete session has none.
+        """
         if document["status"] != "complete":
             return math.nan
         try:
-            return float(self.read(document))
+            return float(f"{self.read(document):.{SIGNIFICANT}g}")
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise Mistake(f"response {self.name!r}: expected a number in the results, found none ({error})") from error
 
