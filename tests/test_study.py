@@ -22,13 +22,6 @@ BY_COMPARATOR = {
     "replicates": 6,
     "seed": 5,
 }
-AT_THE_PLOTTER = BY_COMPARATOR | {
-    "scenario": "akwanga",
-    "settings": {"models": [{"name": "1", "left": "101", "right": "102"}]},
-    "factor": [{"name": "case", "path": "plan.case", "levels": ["A", "D"]}],
-    "responses": ["residual_parallax_mm", "centre_Z_error", "hours"],
-    "replicates": 3,
-}
 
 
 def laid(tmp_path, raw=BY_COMPARATOR, **changes):
