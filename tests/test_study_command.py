@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
@@ -40,7 +41,6 @@ replicates = 2
 responses = ["residual_parallax_mm", "centre_Z_error", "hours"]
 settings = { models = [{ name = "1", left = "101", right = "102" }] }
 """
-LEFT = [name for name in FILES if name != PAGE]
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_a_study_that_was_killed_goes_on_to_the_same_bytes_and_leaves_no_worker_
     laid = load_study(path)
     assert 0 < Tally.load(out / CHECKPOINT, laid.identity).done.sum() < 24
     assert said_here(capsys, "study", path, "--executor", "process", "--out", out, "--quiet").returncode == 0
-    for name in LEFT:
+    for name in FILES:
         assert (out / name).read_bytes() == (whole / name).read_bytes(), name
 
 
@@ -101,6 +101,20 @@ def _wait_until(there):
     while not there():
         assert time.monotonic() < until
         time.sleep(0.01)
+
+
+def test_the_page_says_what_was_asked_how_and_the_answer(study):
+    page = (study[1] / PAGE).read_text()
+    for words in ("Do more pointings help?", "The answer", "Scenario a8-strip", "comparator.pointings = 8", "<svg"):
+        assert words in page
+
+
+def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    told = said_here(capsys, "study", study[0], "--replicates", 2, "--executor", "process", "--out", tmp_path / "out")
+    assert told.returncode == 0
+    assert "matplotlib" in told.stderr
+    assert {each.name for each in (tmp_path / "out").iterdir()} == set(FILES) - {PAGE}
 
 
 @pytest.mark.parametrize(

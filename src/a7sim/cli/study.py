@@ -21,11 +21,12 @@ from rich.text import Text
 
 from a7sim.cli import EXIT_DIFFERS
 from a7sim.cli.options import of_a_folder, of_results
-from a7sim.documents import as_json
+from a7sim.documents import Document, as_json
+from a7sim.mistakes import Mistake
 from a7sim.study.auditing import audited
 from a7sim.study.executors import KINDS, Kind, opened
 from a7sim.study.findings import document_of
-from a7sim.study.folder import CHECKPOINT, begun, leave
+from a7sim.study.folder import CHECKPOINT, begun, leave, leave_page
 from a7sim.study.loading import Laid, load_study
 from a7sim.study.running import work
 from a7sim.study.tables import of_study
@@ -75,12 +76,21 @@ def command(
     document = document_of(laid, tally)
     if out is not None:
         leave(out, laid, tally, document)
+        _leave_page(out, document)
     if as_document:
         click.echo(as_json(document), nl=False)
     elif not quiet:
         Console().print(of_study(document))
     if audit is not None:
         _audit(laid, tally, audit, as_document or quiet)
+
+
+def _leave_page(out: Path, document: Document) -> None:
+    """Leave the page; without matplotlib all else is there nevertheless."""
+    try:
+        leave_page(out, document)
+    except Mistake as missing:
+        click.echo(f"a7sim: {missing}", err=True)
 
 
 def _audit(laid: Laid, tally: Tally, picks: int, silent: bool) -> None:

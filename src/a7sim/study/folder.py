@@ -8,6 +8,7 @@ from a7sim.files import csv_text
 from a7sim.mistakes import Mistake
 from a7sim.session.folder import RESULTS, write_whole
 from a7sim.study.loading import Laid
+from a7sim.study.page import page_of
 from a7sim.study.simulating import seed_of
 from a7sim.study.tally import Tally
 
@@ -61,6 +62,11 @@ def leave(out: Path, laid: Laid, tally: Tally, document: Document) -> None:
     write_whole(out / COMPARISONS, _comparisons_csv(document))
     write_whole(out / REPLICATES, _replicates_csv(laid, tally))
     write_whole(out / RESULTS, as_json(document))
+
+
+def leave_page(out: Path, document: Document) -> None:
+    """Leave the page in a folder. Raises Mistake where matplotlib is not installed."""
+    write_whole(out / PAGE, page_of(document))
 
 
 def _cells_csv(document: Document) -> str:
