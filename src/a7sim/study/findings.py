@@ -157,7 +157,7 @@ def _answer(document: Document) -> Iterator[str]:
         yield f"{response['name']}: {_range(means, response['unit'])}{_dependence(document, response['name'])}."
     gave_up = sum(cell["gave_up"] for cell in document["cells"])
     if gave_up:
-        yield f"{gave_up} sessions gave up and are left out."
+        yield f"{gave_up} sessions gave up (nan in replicates.csv; `a7sim run` with their seed says why)."
 
 
 def _range(means: Sequence[tuple[float, Any]], unit: str) -> str:
