@@ -135,6 +135,8 @@ def test_documents_are_those_of_a_run_without_its_line():
     alone = run(scenario, 7)
     assert document["models"] == alone["models"]
     assert document["status"] == "complete"
+    assert document["strip"] == alone["strip"]
+    assert document["operator"].items() <= alone["operator"].items()
 
 
 @pytest.mark.parametrize(

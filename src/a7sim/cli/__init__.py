@@ -29,6 +29,7 @@ _VERBS = {
     "compare": "a7sim.cli.compare",
     "console": "a7sim.cli.console",
     "train": "a7sim.cli.train",
+    "study": "a7sim.cli.study",
 }
 
 

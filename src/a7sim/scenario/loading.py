@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -53,8 +54,12 @@ def bare_name(name: str | Path) -> str:
     return path.stem if path.parent in [shelf.resolve() for shelf in SHELVES] else path.name
 
 
-def load_scenario(name: str | Path, overrides: Mapping[str, str] | None = None) -> Scenario:
+def load_scenario(
+    name: str | Path, overrides: Mapping[str, str] | None = None, settings: Mapping[str, Any] | None = None
+) -> Scenario:
     """Return the scenario of a file with overrides such as ``{"plan.case": '"B"'}`` (values in TOML).
+
+    `settings` are the same as values: ``{"plan.case": "B"}``.
 
     Raises ScenarioError, which names every mistake at once.
     """
@@ -67,7 +72,9 @@ def load_scenario(name: str | Path, overrides: Mapping[str, str] | None = None) 
         raise ScenarioError(str(path), [f"expected a readable file: {error.strerror}"]) from error
     raw = _with_skill_as_table(raw)
     for key, text in (overrides or {}).items():
-        _override(raw, key, text)
+        _set(raw, key, _value_of(text), f"--set {key}={text}")
+    for key, value in (settings or {}).items():
+        _set(raw, key, deepcopy(value), key)
     return scenario_of(raw, path.parent, str(path))
 
 
@@ -130,12 +137,15 @@ def _expected() -> msgspec.inspect.Type:
     return msgspec.inspect.type_info(Scenario)
 
 
-def _override(raw: dict[str, Any], key: str, text: str) -> None:
-    source = f"--set {key}={text}"
+def _value_of(text: str) -> Any:
+    """Return a value as TOML says it, or the text itself."""
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
+        return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
-        value = text
+        return text
+
+
+def _set(raw: dict[str, Any], key: str, value: Any, source: str) -> None:
     *parents, last = key.split(".")
     table: Any = raw
     for parent in parents:

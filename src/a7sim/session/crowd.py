@@ -14,7 +14,8 @@ from a7sim.scenario import Scenario
 from a7sim.scene import Scene, build_scene
 from a7sim.session import results
 from a7sim.session.fleet_hands import FleetHands
-from a7sim.session.running import job_of
+from a7sim.session.running import job_of, strip_of
+from a7sim.session.strips import ground_of
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Crowd:
         return worked(self.bench)
 
     def documents(self) -> list[Document]:
-        """Work to the end and return a document a seed, as `run` gives it, without what is told of the line."""
+        """Work to the end and return a document a seed, as `run` gives it, without what is told of line and book."""
         found: list[list[Document]] = [[] for _ in self.seeds]
         for records in self.worked():
             plan = next(model for model in self.scenario.models if model.name == records.model.name)
@@ -41,16 +42,20 @@ class Crowd:
                 truth = self.scenes[session].relative_truth(plan)
                 one = self.fleet.one(int(session))
                 found[session].append(results.of_model(records.of(int(session)), one, truth, plan.published))
-        reasons = self.bench.crew.reasons
-        return [
-            results.header(self.scenario, seed)
-            | {
-                "status": "does not fit" if i in reasons else "complete",
-                "message": reasons.get(i, ""),
-                "models": models,
-            }
-            for i, (seed, models) in enumerate(zip(self.seeds, found, strict=True))
-        ]
+        return [self._document(session, models) for session, models in enumerate(found)]
+
+    def _document(self, session: int, models: list[Document]) -> Document:
+        crew, scenario = self.bench.crew, self.scenario
+        why = crew.reasons.get(session)
+        document: Document = results.header(scenario, self.seeds[session]) | {
+            "status": "complete" if why is None else "does not fit",
+            "message": why or "",
+            "models": models,
+            "operator": results.of_hours(float(crew.seconds[session]), crew.timesheet, session),
+        }
+        if why is None:
+            document["strip"], _ = strip_of(scenario, ground_of(scenario, self.scenes[session]), models)
+        return document
 
 
 def open_crowd(scenario: Scenario, seeds: Sequence[int]) -> Crowd:

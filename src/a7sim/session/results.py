@@ -11,6 +11,7 @@ from a7sim.documents import Document, head
 from a7sim.files import csv_text
 from a7sim.operator import ModelRecord, Person
 from a7sim.operator.absolute import OnGround
+from a7sim.operator.timesheet import Timesheet
 from a7sim.reduction import Model, PerspectiveCentre
 from a7sim.scenario import RequestedScenario, Scenario
 from a7sim.scenario.schema import Published
@@ -102,15 +103,21 @@ def of_model(
 
 def of_operator(person: Person, lines: int) -> dict[str, Any]:
     """Return what an operator wrote and where the time went, hours."""
-    book, timesheet = person.book, person.timesheet
-    return {
-        "hours": round(person.clock.now / 3600.0, 3),
-        "time_by_activity_h": _hours(timesheet.activities_of(0)),
-        "time_by_act_h": _hours(timesheet.acts_of(0)),
+    book = person.book
+    return of_hours(person.clock.now, person.timesheet) | {
         "lines_over_the_link": lines,
         "book_entries": len(book.entries),
         "struck_out": sum(bool(entry.struck) for entry in book.entries),
         "remarks": book.remarks,
+    }
+
+
+def of_hours(seconds: float, timesheet: Timesheet, session: int = 0) -> dict[str, Any]:
+    """Return how long a session took and where the time went, hours."""
+    return {
+        "hours": round(seconds / 3600.0, 3),
+        "time_by_activity_h": _hours(timesheet.activities_of(session)),
+        "time_by_act_h": _hours(timesheet.acts_of(session)),
     }
 
 

@@ -143,21 +143,24 @@ def _concluded(session: Session, document: Document, out: Path | None) -> Docume
     if document["status"] != "complete":
         return document
     ground = ground_of(session.scenario, session.scene)
-    try:
-        if not ground.used.any():
-            raise Mistake("the scenario has no ground control")
-        plan = session.scenario.strip
-        strip = grounded(models_of(document["models"]), ground, plan.join, plan.polynomial)
-    except (Mistake, Undetermined) as reason:
-        document["strip"] = {"message": str(reason)}
-    else:
-        document["strip"] = of_grounded(strip)
-        if out is not None:
-            write_whole(out / STRIP, results.points_csv(strip.points))
-            _write_cards(out, strip, models_of(document["models"]), ground)
+    document["strip"], strip = strip_of(session.scenario, ground, document["models"])
+    if out is not None and strip is not None:
+        write_whole(out / STRIP, results.points_csv(strip.points))
+        _write_cards(out, strip, models_of(document["models"]), ground)
     if out is not None:
         write_whole(out / RESULTS, as_json(document))
     return document
+
+
+def strip_of(scenario: Scenario, ground: Ground, models: Sequence[Document]) -> tuple[Document, GroundedStrip | None]:
+    """Return the strip that the models of a document make on the ground, or why they make none in its `message`."""
+    try:
+        if not ground.used.any():
+            raise Mistake("the scenario has no ground control")
+        strip = grounded(models_of(models), ground, scenario.strip.join, scenario.strip.polynomial)
+    except (Mistake, Undetermined) as reason:
+        return {"message": str(reason)}, None
+    return of_grounded(strip), strip
 
 
 def _write_cards(out: Path, strip: GroundedStrip, models: Sequence[Model], ground: Ground) -> None:

@@ -1,5 +1,6 @@
 """Every way in which a scenario asks for its strip: an operator at the plotter, the comparator, or both (P)."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from a7sim.documents import Document, as_json, of_differences
@@ -39,15 +40,26 @@ def run_all_ways(
         if out is not None:
             prepare_folder(out, force)
     strips = _computed(scenario, build_scene(scenario, seed), seed)
-    if strips:
-        document["ways"] = {name: of_grounded(each.strip) for name, each in strips.items()}
-    if len(strips) > 1:
-        document["a8_minus_comparator_m"] = of_differences(differences(strips["comparator"], strips["A8"]))
+    document |= _of_ways(strips)
     if out is not None and strips:
         for name, each in strips.items():
             write_whole(out / MODELS_OF_WAY.format(name.lower()), results.models_csv(each.models))
             write_whole(out / STRIP_OF_WAY.format(name.lower()), results.points_csv(each.strip.points))
         write_whole(out / RESULTS, as_json(document))
+    return document
+
+
+def results_by_computing(scenario: Scenario, scene: Scene, seed: int) -> Document:
+    """Return what `run_all_ways` says of the ways that need no operator; nothing where the scenario asks for none."""
+    return _of_ways(_computed(scenario, scene, seed))
+
+
+def _of_ways(strips: Mapping[str, StripResult]) -> Document:
+    document: Document = {}
+    if strips:
+        document["ways"] = {name: of_grounded(each.strip) for name, each in strips.items()}
+    if len(strips) > 1:
+        document["a8_minus_comparator_m"] = of_differences(differences(strips["comparator"], strips["A8"]))
     return document
 
 

@@ -1,0 +1,123 @@
+"""`a7sim study`: a question asked of the simulator as often as the answer needs."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+from a7sim.cli import EXIT_DIFFERS
+from a7sim.cli.options import of_a_folder, of_results
+from a7sim.documents import Document, as_json
+from a7sim.mistakes import Mistake
+from a7sim.study.auditing import audited
+from a7sim.study.executors import KINDS, Kind, opened
+from a7sim.study.findings import document_of
+from a7sim.study.folder import CHECKPOINT, begun, leave, leave_page
+from a7sim.study.loading import Laid, load_study
+from a7sim.study.running import work
+from a7sim.study.tables import of_study
+from a7sim.study.tally import Tally
+
+
+@click.command("study")
+@click.argument("study")
+@click.option("--replicates", type=int, metavar="N", help="Sessions in every cell, instead of what STUDY says.")
+@click.option(
+    "--executor",
+    type=click.Choice(KINDS),
+    default="pool",
+    show_default=True,
+    help="Who works: this process alone, or a pool of others.",
+)
+@click.option("--workers", type=click.IntRange(min=1), help="Of the pool; as many as there are cores.")
+@click.option("--audit", type=click.IntRange(min=1), metavar="N", help="Work N picked sessions again over the link.")
+@of_a_folder
+@of_results
+def command(
+    study: str,
+    replicates: int | None,
+    executor: Kind,
+    workers: int | None,
+    audit: int | None,
+    out: Path | None,
+    force: bool,
+    as_document: bool,
+    quiet: bool,
+) -> None:
+    """Work the cells of STUDY, a file or the name of one that comes with a7sim, and say what comes of it.
+
+    A study that was cut off goes on with the same command, and one that is done goes on with more --replicates.
+    With --audit, exit code 3 where a session over the link gives another digit than the batch bench.
+
+    Example: a7sim study levels --replicates 50 --out runs/levels --audit 4
+    """
+    laid = load_study(study, replicates)
+    tally = begun(laid, out, force)
+    with (
+        _watched(laid, tally, as_document or quiet) as (progress, task),
+        opened(executor, workers) as (others, at_once),
+    ):
+        checkpoint = out / CHECKPOINT if out is not None else None
+        work(laid, tally, others, at_once, checkpoint, lambda done: progress.advance(task, done))
+    document = document_of(laid, tally)
+    if out is not None:
+        leave(out, laid, tally, document)
+        _leave_page(out, document)
+    if as_document:
+        click.echo(as_json(document), nl=False)
+    elif not quiet:
+        Console().print(of_study(document))
+    if audit is not None:
+        _audit(laid, tally, audit, as_document or quiet)
+
+
+def _leave_page(out: Path, document: Document) -> None:
+    """Leave the page; without matplotlib all else is there nevertheless."""
+    try:
+        leave_page(out, document)
+    except Mistake as missing:
+        click.echo(f"a7sim: {missing}", err=True)
+
+
+def _audit(laid: Laid, tally: Tally, picks: int, silent: bool) -> None:
+    differences = audited(laid, tally, picks)
+    for each in differences:
+        click.echo(f"a7sim: {each}", err=True)
+    if differences:
+        raise click.exceptions.Exit(EXIT_DIFFERS)
+    if not silent:
+        worked = min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells))))
+        click.echo(f"{worked} sessions worked again over the link gave the same digits.")
+
+
+class _Rate(ProgressColumn):
+    """Sessions a second."""
+
+    def render(self, task: Task) -> Text:
+        """Return the rate, once there is one."""
+        return Text(f"{task.speed:.1f} a second" if task.speed else "")
+
+
+@contextmanager
+def _watched(laid: Laid, tally: Tally, silent: bool) -> Iterator[tuple[Progress, TaskID]]:
+    """Show on a terminal how many sessions are done, at what rate, and how long it will take."""
+    title = TextColumn(laid.study.title, markup=False)
+    columns = (title, BarColumn(), MofNCompleteColumn(), _Rate(), TimeRemainingColumn())
+    hidden = silent or not sys.stderr.isatty()
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=hidden) as progress:
+        total = laid.replicates * len(laid.cells)
+        yield progress, progress.add_task("", total=total, completed=int(tally.done.sum()))

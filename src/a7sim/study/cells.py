@@ -1,0 +1,111 @@
+"""The cells of a study: every combination of levels that its design asks for."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from a7sim.mistakes import Mistake
+from a7sim.study.schema import MOST_CELLS, Factor, Settings, Study
+
+
+@dataclass(frozen=True)
+class Level:
+    """A level of a factor: how it is called, and what it sets."""
+
+    label: str
+    settings: Settings
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A combination of levels, by the names of their factors."""
+
+    number: int
+    levels: Mapping[str, str]
+    settings: Settings
+
+    @property
+    def label(self) -> str:
+        """Its levels in words."""
+        return ", ".join(f"{factor} {level}" for factor, level in self.levels.items()) or "as it stands"
+
+
+def cells_of(study: Study) -> list[Cell]:
+    """Return the cells of a study, numbered from 1. Raises Mistake for factors that do not make a design."""
+    for factor in study.factor:
+        _see_that_it_varies(factor, study.design)
+    rows = _hypercube(study) if study.design == "latin-hypercube" else _rows(study)
+    if len(rows) > MOST_CELLS:
+        raise Mistake(f"factor: expected levels that make at most {MOST_CELLS} cells, got {len(rows)}")
+    names = [factor.name for factor in study.factor]
+    return [
+        Cell(
+            number,
+            {name: level.label for name, level in zip(names, row, strict=True)},
+            study.settings | {path: value for level in row for path, value in level.settings.items()},
+        )
+        for number, row in enumerate(rows, start=1)
+    ]
+
+
+def levels_of(factor: Factor) -> list[Level]:
+    """Return the levels of a factor as its file lists them."""
+    if factor.groups:
+        return [Level(name, settings) for name, settings in factor.groups.items()]
+    return [Level(label_of(each), {factor.path or "": each}) for each in factor.levels]
+
+
+def label_of(value: Any) -> str:
+    """Return a value as a label: lists with dashes, numbers as short as they are."""
+    if isinstance(value, list):
+        return " - ".join(label_of(each) for each in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _see_that_it_varies(factor: Factor, design: str) -> None:
+    where = f"factor {factor.name!r}"
+    if factor.range is not None:
+        low, high = factor.range
+        if design != "latin-hypercube":
+            raise Mistake(f"{where}: expected levels, got a range, which only design = 'latin-hypercube' takes")
+        if factor.levels or factor.groups or factor.path is None or not low < high:
+            raise Mistake(f"{where}: expected a path and a range from low to high alone, got {low:g} to {high:g}")
+        return
+    if factor.groups and (factor.levels or factor.path):
+        raise Mistake(f"{where}: expected either path and levels or groups, got both")
+    if factor.levels and factor.path is None:
+        raise Mistake(f"{where}: expected the path of the scenario value that its levels give, got none")
+    labels = [level.label for level in levels_of(factor)]
+    if len(labels) < 2 or len(set(labels)) < len(labels):
+        raise Mistake(f"{where}: expected two different levels or more, got {', '.join(labels) or 'none'}")
+
+
+def _rows(study: Study) -> Sequence[tuple[Level, ...]]:
+    choices = [levels_of(factor) for factor in study.factor]
+    if study.design == "full":
+        return list(product(*choices))
+    first = tuple(levels[0] for levels in choices)
+    others = [
+        (*first[:place], level, *first[place + 1 :]) for place, levels in enumerate(choices) for level in levels[1:]
+    ]
+    return [first, *others]
+
+
+def _hypercube(study: Study) -> Sequence[tuple[Level, ...]]:
+    from scipy.stats import qmc  # noqa: PLC0415
+
+    if study.samples is None or not study.factor:
+        raise Mistake("samples: expected the number of cells of the Latin hypercube and factors to vary, got none")
+    places = qmc.LatinHypercube(d=len(study.factor), rng=study.seed).random(study.samples)
+    return [tuple(_at(factor, at) for factor, at in zip(study.factor, row, strict=True)) for row in places.tolist()]
+
+
+def _at(factor: Factor, place: float) -> Level:
+    """Return the level of a factor at a place from 0 to 1."""
+    if factor.range is None:
+        levels = levels_of(factor)
+        return levels[int(place * len(levels))]
+    low, high = factor.range
+    value = float(f"{low + place * (high - low):.6g}")
+    return Level(label_of(value), {factor.path or "": value})

@@ -1,0 +1,201 @@
+"""What a study found, as one document: its cells, their comparisons, variance by factor, and the answer in words."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+import a7sim
+from a7sim.documents import Document, head
+from a7sim.geometry import Array
+from a7sim.study.cells import Cell, levels_of
+from a7sim.study.loading import Laid
+from a7sim.study.running import reached
+from a7sim.study.statistics import (
+    CONFIDENCE,
+    QUANTILES,
+    Effect,
+    compared,
+    holm,
+    mean_interval,
+    quantile_with_interval,
+    sd_interval,
+    variance_by_factor,
+)
+from a7sim.study.tally import Tally
+
+SIGNIFICANT = 1.0 - CONFIDENCE
+
+
+def document_of(laid: Laid, tally: Tally) -> Document:
+    """Return the document of a study; the same study and tally give the same document."""
+    study = laid.study
+    document = head("study") | {
+        "software": f"a7sim {a7sim.__version__}",
+        "study": study.title,
+        "question": study.question,
+        "scenario": study.scenario,
+        "settings": study.settings,
+        "design": study.design,
+        "seed": study.seed,
+        "replicates": int(tally.done.min()),
+        "factors": [factor.name for factor in study.factor],
+        "responses": [{"name": each.name, "unit": each.unit, "meaning": each.meaning} for each in laid.responses],
+        "confidence": CONFIDENCE,
+        "cells": [_cell(laid, tally, i, cell) for i, cell in enumerate(laid.cells)],
+        "comparisons": list(_comparisons(laid, tally)),
+        "variance": list(_variance(laid, tally)),
+    }
+    if study.precision is not None:
+        document["precision_reached"] = reached(laid, tally)
+    return document | {"answer": list(_answer(document))}
+
+
+def _cell(laid: Laid, tally: Tally, i: int, cell: Cell) -> Document:
+    sample = tally.sample(i)
+    return {
+        "cell": cell.number,
+        "levels": dict(cell.levels),
+        "settings": cell.settings,
+        "replicates": int(tally.done[i]),
+        "gave_up": int(tally.done[i] - tally.count[i].max()),
+        "responses": {
+            response.name: _spread(laid, tally, (i, j), sample[j]) for j, response in enumerate(laid.responses)
+        },
+    }
+
+
+def _spread(laid: Laid, tally: Tally, at: tuple[int, int], sample: Array) -> Document:
+    count = int(tally.count[at])
+    if count == 0:
+        return {"count": 0}
+    mean, sd = float(tally.mean[at]), float(tally.sd[at])
+    known = sample[np.isfinite(sample)]
+    quantiles = {share: quantile_with_interval(known, share) for share in QUANTILES}
+    return {
+        "count": count,
+        "mean": mean,
+        "mean_interval": mean_interval(mean, sd, count),
+        "sd": sd,
+        "sd_interval": sd_interval(known, laid.study.seed, at),
+        "least": float(tally.low[at]),
+        "largest": float(tally.high[at]),
+        "quantiles": {f"{share:g}": {"value": v, "interval": interval} for share, (v, interval) in quantiles.items()},
+    }
+
+
+def _comparisons(laid: Laid, tally: Tally) -> Iterator[Document]:
+    """Yield every other cell beside the first, response by response, adjusted for as many comparisons."""
+    first = tally.sample(0)
+    others = [tally.sample(i) for i in range(1, len(laid.cells))]
+    for j, response in enumerate(laid.responses):
+        found = [compared(other[j], first[j]) for other in others]
+        adjusted = holm([each.p for each in found])
+        for cell, each, p in zip(laid.cells[1:], found, adjusted, strict=True):
+            yield {
+                "response": response.name,
+                "cell": cell.number,
+                "against": 1,
+                "pairs": each.pairs,
+                "difference": each.difference,
+                "interval": each.interval,
+                "sd": each.sd,
+                "effect": each.effect,
+                "p": each.p,
+                "p_adjusted": p,
+            }
+
+
+def _variance(laid: Laid, tally: Tally) -> Iterator[Document]:
+    for j, response in enumerate(laid.responses):
+        for effects in _analyses(laid, tally, j):
+            if effects:
+                yield {"response": response.name, "sources": [_effect(each) for each in effects]}
+
+
+def _analyses(laid: Laid, tally: Tally, response: int) -> Iterator[Sequence[Effect]]:
+    """Yield one analysis of a full factorial, one a factor where factors were varied one at a time, none else."""
+    factors, design = laid.study.factor, laid.study.design
+    n = min(tally.sample(i).shape[1] for i in range(len(laid.cells)))
+    values = np.array([tally.sample(i)[response, :n] for i in range(len(laid.cells))])
+    if not factors or design == "latin-hypercube":
+        return
+    counts = [len(levels_of(factor)) for factor in factors]
+    if design == "full":
+        yield variance_by_factor(values.reshape(*counts, n), [factor.name for factor in factors])
+        return
+    begin = 1
+    for factor, count in zip(factors, counts, strict=True):
+        of_factor = [0, *range(begin, begin + count - 1)]
+        yield variance_by_factor(values[of_factor], [factor.name])
+        begin += count - 1
+
+
+def _effect(effect: Effect) -> Document:
+    return {
+        "source": " x ".join(effect.source) or "remaining",
+        "squares": effect.squares,
+        "freedom": effect.freedom,
+        "F": effect.F,
+        "p": effect.p,
+        "partial_eta_squared": effect.partial_eta_squared,
+    }
+
+
+def _answer(document: Document) -> Iterator[str]:
+    """Yield a sentence a response: what it comes to, and which factors it depends on by how much."""
+    for response in document["responses"]:
+        means = [
+            (cell["responses"][response["name"]]["mean"], cell)
+            for cell in document["cells"]
+            if cell["responses"][response["name"]]["count"]
+        ]
+        if not means:
+            yield f"{response['name']}: every session gave up."
+            continue
+        yield f"{response['name']}: {_range(means, response['unit'])}{_dependence(document, response['name'])}."
+    gave_up = sum(cell["gave_up"] for cell in document["cells"])
+    if gave_up:
+        yield f"{gave_up} sessions gave up (nan in replicates.csv; `a7sim run` with their seed says why)."
+
+
+def _range(means: Sequence[tuple[float, Any]], unit: str) -> str:
+    unit = f" {unit}" if unit else ""
+    (low, at_low), (high, at_high) = (choose(means, key=lambda each: each[0]) for choose in (min, max))
+    if len(means) == 1:
+        return f"{low:.4g}{unit} on the average"
+    if low == high:
+        return f"{low:.4g}{unit} on the average in every cell"
+    return f"from {low:.4g}{unit} ({in_words(at_low)}) to {high:.4g}{unit} ({in_words(at_high)}) on the average"
+
+
+def in_words(cell: Document) -> str:
+    """Return the levels of a cell of a document in words."""
+    return ", ".join(f"{factor} {level}" for factor, level in cell["levels"].items()) or "as it stands"
+
+
+def _dependence(document: Document, response: str) -> str:
+    sources = [
+        source
+        for analysis in document["variance"]
+        if analysis["response"] == response
+        for source in analysis["sources"]
+        if source["source"] != "remaining"
+    ]
+    matters = [each for each in sources if each["p"] < SIGNIFICANT]
+    if not sources:
+        return ""
+    if not matters:
+        return "; no factor was seen to matter"
+    listed = [f"{each['source']} ({_chance(each['p'])}, {_share(each)})" for each in matters]
+    return f"; it depends on {', '.join(listed)}"
+
+
+def _share(source: Document) -> str:
+    share = source["partial_eta_squared"]
+    return "eta² unknown" if math.isnan(share) else f"partial eta² {share:.2f}"
+
+
+def _chance(p: float) -> str:
+    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"

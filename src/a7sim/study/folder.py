@@ -1,0 +1,117 @@
+"""The folder that a study leaves, and in which one that was cut off goes on."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from a7sim.documents import Document, as_json
+from a7sim.files import csv_text
+from a7sim.mistakes import Mistake
+from a7sim.session.folder import RESULTS, write_whole
+from a7sim.study.loading import Laid
+from a7sim.study.page import page_of
+from a7sim.study.simulating import seed_of
+from a7sim.study.tally import Tally
+
+CHECKPOINT, CELLS, COMPARISONS, REPLICATES, PAGE = (
+    "checkpoint.npz",
+    "cells.csv",
+    "comparisons.csv",
+    "replicates.csv",
+    "study.html",
+)
+FILES = (CHECKPOINT, CELLS, COMPARISONS, REPLICATES, PAGE, RESULTS)
+
+
+def begun(laid: Laid, out: Path | None, force: bool) -> Tally:
+    """Return the tally of a study as its folder holds it, or an empty one, and make the folder.
+
+    Raises Mistake for a folder that holds something else, unless forced to begin anew.
+    """
+    empty = Tally.empty(len(laid.cells), len(laid.responses))
+    if out is None:
+        return empty
+    try:
+        if out.exists() and not out.is_dir():
+            raise Mistake(f"{out}: expected a folder, got a file")
+        checkpoint = out / CHECKPOINT
+        if out.is_dir() and not force:
+            if checkpoint.exists():
+                return _not_beyond(Tally.load(checkpoint, laid.identity), laid, checkpoint)
+            if any(out.iterdir()):
+                raise Mistake(f"{out}: expected an empty folder or that of a study, got another (--force writes there)")
+        out.mkdir(parents=True, exist_ok=True)
+        for name in FILES:
+            (out / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise Mistake(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
+    return empty
+
+
+def _not_beyond(tally: Tally, laid: Laid, checkpoint: Path) -> Tally:
+    done = int(tally.done.max())
+    if done > laid.replicates:
+        raise Mistake(
+            f"{checkpoint}: expected {done} replicates or more, since so many are done, got {laid.replicates}"
+        )
+    return tally
+
+
+def leave(out: Path, laid: Laid, tally: Tally, document: Document) -> None:
+    """Leave results and tables in a folder."""
+    write_whole(out / CELLS, _cells_csv(document))
+    write_whole(out / COMPARISONS, _comparisons_csv(document))
+    write_whole(out / REPLICATES, _replicates_csv(laid, tally))
+    write_whole(out / RESULTS, as_json(document))
+
+
+def leave_page(out: Path, document: Document) -> None:
+    """Leave the page in a folder. Raises Mistake where matplotlib is not installed."""
+    write_whole(out / PAGE, page_of(document))
+
+
+def _cells_csv(document: Document) -> str:
+    factors = document["factors"]
+    measured = ("count", "mean", "mean_low", "mean_high", "sd", "sd_low", "sd_high", "least", "largest")
+    quantiles = list(next(_spreads(document), {"quantiles": {}})["quantiles"])
+    header = ("cell", *factors, "response", "unit", *measured, *(f"quantile_{share}" for share in quantiles))
+    rows = [
+        (str(cell["cell"]), *cell["levels"].values(), response["name"], response["unit"], *_numbers(spread, quantiles))
+        for cell in document["cells"]
+        for response in document["responses"]
+        if (spread := cell["responses"][response["name"]])["count"]
+    ]
+    return csv_text(header, rows)
+
+
+def _spreads(document: Document) -> Iterator[Document]:
+    yield from (each for cell in document["cells"] for each in cell["responses"].values() if each["count"])
+
+
+def _numbers(spread: Document, quantiles: list[str]) -> tuple[str, ...]:
+    values = (
+        *(spread["mean"], *spread["mean_interval"]),
+        *(spread["sd"], *spread["sd_interval"]),
+        *(spread["least"], spread["largest"]),
+        *(spread["quantiles"][share]["value"] for share in quantiles),
+    )
+    return str(spread["count"]), *(f"{value:.10g}" for value in values)
+
+
+def _comparisons_csv(document: Document) -> str:
+    header = ("response", "cell", "against", "pairs", "difference", "low", "high", "sd", "effect", "p", "p_adjusted")
+    rows = []
+    for each in document["comparisons"]:
+        values = (each["difference"], *each["interval"], each["sd"], each["effect"], each["p"], each["p_adjusted"])
+        whole = (each["response"], str(each["cell"]), str(each["against"]), str(each["pairs"]))
+        rows.append((*whole, *(f"{value:.10g}" for value in values)))
+    return csv_text(header, rows)
+
+
+def _replicates_csv(laid: Laid, tally: Tally) -> str:
+    """Return the sample, a replicate a line; nan is a session that gave up."""
+    rows = (
+        (str(cell.number), str(number), str(seed_of(laid.study.seed, number - 1)), *(f"{each:.10g}" for each in values))
+        for i, cell in enumerate(laid.cells)
+        for number, values in enumerate(tally.sample(i).T.tolist(), start=1)
+    )
+    return csv_text(("cell", "replicate", "seed", *laid.study.responses), rows)

@@ -1,0 +1,138 @@
+"""Reading a study: every mistake in one sentence, before anything is worked."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+import a7sim
+from a7sim.mistakes import Mistake
+from a7sim.scenario import Scenario, ScenarioError, load_scenario
+from a7sim.scenario.validation import mistakes_of_form
+from a7sim.study.cells import Cell, cells_of
+from a7sim.study.reach import beyond_reach
+from a7sim.study.responses import Response, response_of
+from a7sim.study.schema import Study
+
+SHELVES = (Path(__file__).parents[1] / "studies", Path(__file__).parents[3] / "studies")
+"""Where the studies are that come with a7sim."""
+
+
+class StudyError(Mistake):
+    """A study that cannot be used; every line names a mistake and where it stands."""
+
+    def __init__(self, source: str, mistakes: Sequence[str]) -> None:
+        super().__init__("\n".join(f"{source}: {mistake}" for mistake in mistakes))
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A study with its cells, the scenario of each, and its responses, ready to be worked."""
+
+    study: Study
+    cells: tuple[Cell, ...]
+    scenarios: tuple[Scenario, ...]
+    responses: tuple[Response, ...]
+    source: str
+
+    @property
+    def replicates(self) -> int:
+        """How many replicates a cell has, at most."""
+        if self.study.replicates is None:
+            raise StudyError(self.source, ["replicates: expected how often each cell is worked, got nothing"])
+        return self.study.replicates
+
+    @property
+    def identity(self) -> str:
+        """A hash of all that decides what a replicate gives; words, and how many are worked, do not."""
+        asked = msgspec.structs.replace(self.study, title="study", question="", replicates=None, precision=None)
+        return sha256(msgspec.json.encode([a7sim.__version__, asked, self.scenarios])).hexdigest()
+
+
+def find_study(name: str | Path) -> Path:
+    """Return the path of a study's file, by path or by the bare name of one that comes with a7sim.
+
+    Raises StudyError.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    for shelf in SHELVES:
+        found = shelf / f"{path.name.removesuffix('.toml')}.toml"
+        if path.parent in (Path(), Path("studies")) and found.is_file():
+            return found
+    known = ", ".join(sorted({file.stem for shelf in SHELVES for file in shelf.glob("*.toml")}))
+    raise StudyError(str(name)[:200], [f"expected the file of a study or one of {known}, found no such file"])
+
+
+def load_study(name: str | Path, replicates: int | None = None) -> Laid:
+    """Return a study ready to be worked, with other replicates if given. Raises StudyError."""
+    path = find_study(name)
+    source = str(path)
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise StudyError(source, [f"expected TOML, got a file that breaks its rules: {error}"]) from error
+    if replicates is not None:
+        raw["replicates"] = replicates
+    return study_of(raw, path.parent, source)
+
+
+def study_of(raw: Mapping[str, Any], folder: Path, source: str = "study") -> Laid:
+    """Return the study of raw tables whose scenario stands in `folder`, or comes with a7sim. Raises StudyError."""
+    mistakes = [mistake.replace("the scenario", "the study") for mistake in mistakes_of_form(raw, _expected())]
+    if mistakes:
+        raise StudyError(source, mistakes)
+    study = msgspec.convert(raw, Study)
+    try:
+        cells, responses = cells_of(study), [response_of(name) for name in study.responses]
+    except Mistake as mistake:
+        raise StudyError(source, [str(mistake)]) from mistake
+    mistakes = list(_mistakes_between(study))
+    if mistakes:
+        raise StudyError(source, mistakes)
+    scenarios = _scenarios(study, cells, folder, source)
+    return Laid(study, tuple(cells), scenarios, tuple(responses), source)
+
+
+def _mistakes_between(study: Study) -> list[str]:
+    mistakes = []
+    names = [factor.name for factor in study.factor]
+    if len(set(names)) < len(names):
+        mistakes.append(f"factor: expected every name once, got {', '.join(names)}")
+    if len(set(study.responses)) < len(study.responses):
+        mistakes.append("responses: expected every response once")
+    if study.replicates is None:
+        mistakes.append("replicates: expected how often each cell is worked (1 to 1000000), got nothing")
+    if study.precision is not None and study.precision.response not in study.responses:
+        known = ", ".join(study.responses)
+        mistakes.append(f"precision.response: expected one of {known}, got {study.precision.response!r}")
+    return mistakes
+
+
+def _scenarios(study: Study, cells: Sequence[Cell], folder: Path, source: str) -> tuple[Scenario, ...]:
+    """Return the scenario of every cell. Raises StudyError with what is wrong in the first cell that cannot be."""
+    beside = folder / study.scenario
+    name = beside if beside.is_file() else study.scenario
+    scenarios = []
+    for cell in cells:
+        where = f"cell {cell.number} ({cell.label})"
+        try:
+            scenario = load_scenario(name, settings=cell.settings)
+        except ScenarioError as error:
+            raise StudyError(source, [f"{where}: {mistake}" for mistake in error.mistakes]) from error
+        beyond = [f"{where}: {mistake}" for mistake in beyond_reach(scenario)]
+        if beyond:
+            raise StudyError(source, beyond)
+        scenarios.append(scenario)
+    return tuple(scenarios)
+
+
+@cache
+def _expected() -> msgspec.inspect.Type:
+    return msgspec.inspect.type_info(Study)

@@ -1,0 +1,141 @@
+"""What a study reads from the document of results of every replicate: one number a response."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from types import MappingProxyType
+from typing import Any
+
+from a7sim.documents import Document
+from a7sim.mistakes import Mistake
+
+Reader = Callable[[Document], float]
+
+SIGNIFICANT = 10
+"""Digits of a response; the last bits of a sum depend on who sits beside a session."""
+
+BRANCHES = ("models", "strip", "ways", "operator", "a8_minus_comparator_m")
+"""Where the paths of responses begin."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """A number of a session: its name, its unit, what it is, and how it is read from the results."""
+
+    name: str
+    unit: str
+    meaning: str
+    read: Reader
+
+    def of(self, document: Document) -> float:
+        """Return the response of a session to ten digits, nan if it gave up.
+
+        Raises Mistake where a complete session has none.
+        """
+        if document["status"] != "complete":
+            return math.nan
+        try:
+            return float(f"{self.read(document):.{SIGNIFICANT}g}")
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            raise Mistake(f"response {self.name!r}: expected a number in the results, found none ({error})") from error
+
+
+def response_of(name: str) -> Response:
+    """Return a response by its name or its path. Raises Mistake for neither."""
+    if name in RESPONSES:
+        return RESPONSES[name]
+    parts = name.split(".")
+    if len(parts) > 1 and parts[0] in BRANCHES:
+        return Response(name, "", f"{name} in results.json", lambda document: _at(document, parts))
+    near = get_close_matches(name, RESPONSES, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(RESPONSES)}"
+    raise Mistake(f"responses: expected a response or a path that begins with models., got {name!r}; {hint}")
+
+
+def _at(document: Document, parts: list[str]) -> float:
+    value: Any = document
+    for depth, part in enumerate(parts):
+        try:
+            value = value[int(part)] if isinstance(value, list) else value[part]
+        except (KeyError, IndexError, ValueError):
+            known = list(value) if isinstance(value, Mapping) else range(len(value))
+            where = ".".join(parts[:depth])
+            raise KeyError(f"at {where} there are {', '.join(map(str, known))}, not {part!r}") from None
+    if not isinstance(value, int | float):
+        raise TypeError(f"{'.'.join(parts)} is no number")
+    return value
+
+
+def _rms(values: Iterator[float]) -> float:
+    squares = [value * value for value in values]
+    if not squares:
+        raise ValueError("no model has one")
+    return math.sqrt(math.fsum(squares) / len(squares))
+
+
+def _of_models(read: Reader) -> Reader:
+    return lambda document: _rms(read(model) for model in document["models"])
+
+
+def _centre_difference(axis: str) -> Reader:
+    return lambda document: _rms(
+        side[f"{axis}0"] for model in document["models"] for side in model["truth"]["centre_differences"].values()
+    )
+
+
+def _accuracy(on: str, what: str) -> Reader:
+    def read(document: Document) -> float:
+        strip = document["strip"] if "strip" in document else next(iter(document["ways"].values()))
+        if "message" in strip:
+            raise ValueError(strip["message"])
+        return float(strip["accuracy_m"][on][what])
+
+    return read
+
+
+_COUNTER = "counter units"
+_LISTED = (
+    Response(
+        "residual_parallax_mm",
+        "mm",
+        "rms residual y-parallax of the models, at model scale",
+        _of_models(lambda model: float(model["relative_orientation"]["rms_parallax_mm"])),
+    ),
+    Response(
+        "iterations",
+        "",
+        "rounds of relative orientation, rms of the models",
+        _of_models(lambda model: float(model["relative_orientation"]["iterations"])),
+    ),
+    Response(
+        "rotation_error_gon",
+        "gon",
+        "angle between found and true relative rotation, rms of the models",
+        _of_models(lambda model: float(model["truth"]["rotation_difference_gon"])),
+    ),
+    Response(
+        "base_error_gon",
+        "gon",
+        "angle between found and true base, rms of the models",
+        _of_models(lambda model: float(model["truth"]["base_difference_gon"])),
+    ),
+    *(
+        Response(
+            f"centre_{axis}_error",
+            _COUNTER,
+            f"{axis} of the perspective centres, found minus true, rms of all",
+            _centre_difference(axis),
+        )
+        for axis in "XYZ"
+    ),
+    *(
+        Response(f"strip_{what}_at_{on}_m", "m", f"rms residual of the strip in {what} at {on}", _accuracy(on, what))
+        for on in ("control", "checks")
+        for what in ("plan", "height")
+    ),
+    Response("hours", "h", "hours at the instrument", lambda document: float(document["operator"]["hours"])),
+)
+
+RESPONSES: Mapping[str, Response] = MappingProxyType({each.name: each for each in _LISTED})
+"""Responses by their short names."""

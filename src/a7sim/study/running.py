@@ -1,0 +1,134 @@
+"""Working a study: chunks of replicates, the same result however they are cut and whoever works them."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from a7sim.geometry import Array
+from a7sim.mistakes import Mistake
+from a7sim.scenario import Scenario
+from a7sim.study.loading import Laid
+from a7sim.study.simulating import seed_of, together
+from a7sim.study.tally import Tally
+
+STEP = 100
+"""Replicates of every cell between two looks at a precision to be reached."""
+
+_TWO_SIDED_95 = 1.959964
+_FIRST_CHUNK, _FASTEST_GROWTH = 8, 4.0
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How a study is cut in chunks; what comes of it does not depend on this."""
+
+    chunk_seconds: float = 20.0
+    """About how long a chunk takes."""
+    save_seconds: float = 5.0
+    """A checkpoint is written no more often than this."""
+    largest_chunk: int = 2000
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    cell: int
+    seeds: tuple[int, ...]
+
+
+def work(
+    laid: Laid,
+    tally: Tally,
+    executor: Executor,
+    at_once: int = 1,
+    checkpoint: Path | None = None,
+    tick: Callable[[int], None] = lambda _: None,
+    pace: Pace | None = None,
+) -> None:
+    """Work a study on from where its tally stands until all replicates are done or its precision is reached.
+
+    `at_once` chunks are under way beside as many that wait; results are added in the order in which they were asked
+    for. However it ends, the checkpoint holds what was added. Raises Mistake where a worker is lost.
+    """
+    pace = pace or Pace()
+    saved_at = -np.inf
+    try:
+        for chunk, values in _results(laid, tally, executor, 2 * at_once, pace):
+            tally.add(chunk.cell, values)
+            tick(len(chunk.seeds))
+            if checkpoint is not None and time.monotonic() - saved_at > pace.save_seconds:
+                tally.save(checkpoint, laid.identity)
+                saved_at = time.monotonic()
+    except BrokenExecutor as error:
+        raise Mistake("a worker of the study was lost (killed, or out of memory); the same command goes on") from error
+    finally:
+        if checkpoint is not None:
+            tally.save(checkpoint, laid.identity)
+
+
+def reached(laid: Laid, tally: Tally) -> bool:
+    """Return whether the mean that a study wants to know is known well enough in every cell."""
+    wanted = laid.study.precision
+    if wanted is None or int(tally.done.min()) == 0:
+        return False
+    column = laid.study.responses.index(wanted.response)
+    half_widths = _TWO_SIDED_95 * tally.sd[:, column] / np.sqrt(np.maximum(tally.count[:, column], 1))
+    return bool((half_widths <= wanted.half_width).all())
+
+
+def _results(
+    laid: Laid, tally: Tally, executor: Executor, most_waiting: int, pace: Pace
+) -> Iterator[tuple[_Chunk, Array]]:
+    for stop in _stops(laid):
+        if int(tally.done.min()) >= stop:
+            continue
+        if _on_a_step(tally) and reached(laid, tally):
+            return
+        yield from _up_to(stop, laid, tally, executor, most_waiting, pace)
+
+
+def _on_a_step(tally: Tally) -> bool:
+    """Return whether a study stands where it looks, also if it was not cut off before."""
+    return bool((tally.done == tally.done[0]).all()) and int(tally.done[0]) % STEP == 0
+
+
+def _stops(laid: Laid) -> Iterator[int]:
+    """Yield the numbers of replicates that every cell must have before the study looks whether that is enough."""
+    if laid.study.precision is not None:
+        yield from range(STEP, laid.replicates, STEP)
+    yield laid.replicates
+
+
+def _up_to(
+    stop: int, laid: Laid, tally: Tally, executor: Executor, most_waiting: int, pace: Pace
+) -> Iterator[tuple[_Chunk, Array]]:
+    asked = tally.done.copy()
+    size = min(_FIRST_CHUNK, pace.largest_chunk)
+    waiting: deque[tuple[_Chunk, Future[tuple[Array, float]]]] = deque()
+    try:
+        while waiting or int(asked.min()) < stop:
+            while int(asked.min()) < stop and len(waiting) < most_waiting:
+                cell = int(asked.argmin())
+                first, last = int(asked[cell]), min(int(asked[cell]) + size, stop)
+                chunk = _Chunk(cell, tuple(seed_of(laid.study.seed, each) for each in range(first, last)))
+                responses = laid.study.responses
+                waiting.append((chunk, executor.submit(_timed, laid.scenarios[cell], chunk.seeds, responses)))
+                asked[cell] = last
+            chunk, future = waiting.popleft()
+            values, seconds = future.result()
+            grown = len(chunk.seeds) * min(pace.chunk_seconds / max(seconds, 1e-3), _FASTEST_GROWTH)
+            size = max(1, min(int(grown), pace.largest_chunk))
+            yield chunk, values
+    finally:
+        for _, future in waiting:
+            future.cancel()
+
+
+def _timed(scenario: Scenario, seeds: Sequence[int], responses: Sequence[str]) -> tuple[Array, float]:
+    """Return the responses of replicates and the seconds that they took."""
+    began = time.monotonic()
+    return together(scenario, seeds, responses), time.monotonic() - began

@@ -1,0 +1,191 @@
+"""Studies: what a file may say, replicates that do not depend on how they are worked, statistics and the command."""
+
+import numpy as np
+import pytest
+
+from a7sim.mistakes import Mistake
+from a7sim.study.cells import cells_of
+from a7sim.study.executors import opened
+from a7sim.study.loading import SHELVES, load_study, study_of
+from a7sim.study.running import Pace, work
+from a7sim.study.schema import Factor, Study
+from a7sim.study.tally import Tally
+
+BY_COMPARATOR = {
+    "schema_version": 1,
+    "title": "Pointings",
+    "question": "Do two pointings help?",
+    "scenario": "a8-strip",
+    "settings": {"work": ["comparator"]},
+    "factor": [{"name": "pointings", "path": "comparator.pointings", "levels": [1, 4]}],
+    "responses": ["strip_plan_at_checks_m", "ways.comparator.accuracy_m.checks.height"],
+    "replicates": 6,
+    "seed": 5,
+}
+
+
+def laid(tmp_path, raw=BY_COMPARATOR, **changes):
+    return study_of(raw | changes, tmp_path)
+
+
+def a_design(design, *factors, **others):
+    required = {"schema_version": 1, "title": "t", "question": "q", "scenario": "akwanga", "responses": ["hours"]}
+    return Study(**required, design=design, factor=list(factors), **others)
+
+
+CASE = Factor(name="case", path="plan.case", levels=["A", "B", "C"])
+READINGS = Factor(name="readings", path="plan.parallax_readings", levels=[1, 3])
+
+
+def test_a_full_design_has_every_combination_and_one_at_a_time_every_level_once():
+    full = [cell.levels for cell in cells_of(a_design("full", CASE, READINGS))]
+    assert len(full) == 6
+    assert full[1] == {"case": "A", "readings": "3"}
+    single = [tuple(cell.levels.values()) for cell in cells_of(a_design("one-at-a-time", CASE, READINGS))]
+    assert single == [("A", "1"), ("B", "1"), ("C", "1"), ("A", "3")]
+
+
+def test_a_latin_hypercube_has_one_cell_in_every_tenth_of_every_range():
+    bx = Factor(name="bx", path="plan.bx", range=(180.0, 200.0))
+    height = Factor(name="height", path="plan.projection_height", range=(300.0, 340.0))
+    cells = cells_of(a_design("latin-hypercube", bx, height, samples=10))
+    for path, low, high in (("plan.bx", 180.0, 200.0), ("plan.projection_height", 300.0, 340.0)):
+        tenths = sorted(int(10 * (cell.settings[path] - low) / (high - low)) for cell in cells)
+        assert tenths == list(range(10))
+
+
+def test_settings_of_a_cell_reach_its_scenario_and_leave_the_others_alone(tmp_path):
+    one, four = laid(tmp_path).scenarios
+    assert (one.comparator.pointings, four.comparator.pointings) == (1, 4)
+    assert one.work == four.work == ["comparator"]
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for shelf in SHELVES for path in shelf.glob("*.toml")))
+def test_every_study_that_comes_with_a7sim_can_be_laid_out(name):
+    assert len(load_study(name).cells) > 1
+
+
+def numbers_of(laid_study, kind="process", largest_chunk=2000, tally=None):
+    tally = tally or Tally.empty(len(laid_study.cells), len(laid_study.responses))
+    with opened(kind, 2) as (executor, at_once):
+        work(laid_study, tally, executor, at_once, pace=Pace(largest_chunk=largest_chunk))
+    return tally
+
+
+def bytes_of(tally, folder):
+    tally.save(folder / "tally.npz", "study")
+    return (folder / "tally.npz").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def by_comparator(tmp_path_factory):
+    study = laid(tmp_path_factory.mktemp("study"))
+    return study, numbers_of(study)
+
+
+@pytest.mark.parametrize(("kind", "largest_chunk"), [("process", 1), ("process", 4), ("pool", 2)])
+def test_a_study_gives_the_same_bytes_however_it_is_cut_and_whoever_works_it(
+    by_comparator, tmp_path, kind, largest_chunk
+):
+    study, tally = by_comparator
+    assert bytes_of(numbers_of(study, kind, largest_chunk), tmp_path) == bytes_of(tally, tmp_path)
+
+
+def test_cells_share_their_random_numbers_so_that_the_same_level_gives_the_same_numbers(tmp_path):
+    """Common random numbers: cells that differ in nothing that matters give identical replicates."""
+    study = laid(tmp_path, factor=[{"name": "f", "path": "plan.tolerated_centre_rms", "levels": [0.5, 0.6]}])
+    tally = numbers_of(study)
+    assert np.array_equal(tally.sample(0), tally.sample(1))
+    assert len(set(tally.sample(0)[0])) == 6
+
+
+def test_moments_are_those_of_numpy_and_leave_out_who_gave_up():
+    rng = np.random.default_rng(3)
+    values = rng.normal(1e6, 1e-3, (2, 500))
+    values[1, ::7] = np.nan
+    tally = Tally.empty(1, 2)
+    for part in np.split(values, (1, 30, 400), axis=1):
+        tally.add(0, part)
+    assert tally.mean[0] == pytest.approx(np.nanmean(values, axis=1), rel=1e-14)
+    assert tally.sd[0] == pytest.approx(np.nanstd(values, axis=1, ddof=1), rel=1e-6)
+    assert tally.count[0].tolist() == [500, np.isfinite(values[1]).sum()]
+    assert (tally.low[0] == np.nanmin(values, axis=1)).all()
+    assert (tally.high[0] == np.nanmax(values, axis=1)).all()
+
+
+def test_the_sample_is_bounded_and_the_moments_are_not(monkeypatch):
+    monkeypatch.setattr("a7sim.study.tally.SAMPLE", 10)
+    tally = Tally.empty(1, 1)
+    for start in range(0, 28, 4):
+        tally.add(0, np.arange(start, start + 4.0)[None])
+    assert tally.sample(0).tolist() == [list(range(10))]
+    assert (int(tally.done[0]), float(tally.mean[0, 0])) == (28, 13.5)
+
+
+def test_a_study_with_more_replicates_goes_on_from_the_checkpoint_of_one_with_fewer(by_comparator, tmp_path):
+    study, tally = by_comparator
+    checkpoint = tmp_path / "checkpoint.npz"
+    numbers_of(laid(tmp_path, replicates=4)).save(checkpoint, laid(tmp_path, replicates=4).identity)
+    resumed = numbers_of(study, tally=Tally.load(checkpoint, study.identity))
+    assert bytes_of(resumed, tmp_path) == bytes_of(tally, tmp_path)
+
+
+def test_the_checkpoint_of_another_study_is_refused(tmp_path):
+    Tally.empty(2, 2).save(tmp_path / "c.npz", laid(tmp_path, seed=6).identity)
+    with pytest.raises(Mistake, match="got that of another"):
+        Tally.load(tmp_path / "c.npz", laid(tmp_path).identity)
+    (tmp_path / "c.npz").write_bytes(b"nothing")
+    with pytest.raises(Mistake, match="got a file that is none"):
+        Tally.load(tmp_path / "c.npz", laid(tmp_path).identity)
+
+
+@pytest.mark.parametrize(("half_width", "replicates"), [(10.0, 2), (1e-6, 5)])
+def test_a_study_ends_when_its_precision_is_reached_or_its_replicates_are_done(
+    tmp_path, monkeypatch, half_width, replicates
+):
+    monkeypatch.setattr("a7sim.study.running.STEP", 2)
+    wanted = {"response": "strip_plan_at_checks_m", "half_width": half_width}
+    assert numbers_of(laid(tmp_path, precision=wanted, replicates=5)).done.tolist() == [replicates] * 2
+
+
+def test_a_response_that_the_results_do_not_have_is_a_mistake_that_names_its_place(tmp_path):
+    with pytest.raises(Mistake, match=r"at ways there are comparator, not 'A8'"):
+        numbers_of(laid(tmp_path, responses=["ways.A8.accuracy_m.checks.plan"]))
+
+
+MISTAKES = {
+    "a wrong path": ({"factor": [{"name": "f", "path": "comparator.points", "levels": [1, 2]}]}, "did you mean pointi"),
+    "a level outside the schema": (
+        {"factor": [{"name": "f", "path": "comparator.pointings", "levels": [1, 99]}]},
+        "99",
+    ),
+    "one level": ({"factor": [{"name": "f", "path": "comparator.pointings", "levels": [1]}]}, "two different levels"),
+    "no path": ({"factor": [{"name": "f", "levels": [1, 2]}]}, "expected the path"),
+    "a range in a full design": ({"factor": [{"name": "f", "path": "plan.bx", "range": [1, 2]}]}, "latin-hypercube"),
+    "a name twice": ({"factor": [BY_COMPARATOR["factor"][0]] * 2}, "every name once"),
+    "no replicates": ({"replicates": None}, "replicates: expected how often"),
+    "zero replicates": ({"replicates": 0}, "replicates: expected a whole number from 1"),
+    "an unknown response": ({"responses": ["hour"]}, "did you mean hours?"),
+    "precision of another response": ({"precision": {"response": "hours", "half_width": 0.1}}, "expected one of strip"),
+    "an unknown key": ({"replicate": 3}, "did you mean replicates?"),
+    "an unknown scenario": ({"scenario": "nowhere"}, "no such file"),
+    "levels beyond the Z carriage": (
+        {
+            "scenario": "akwanga",
+            "settings": {},
+            "factor": [{"name": "f", "path": "plan.centre_levels", "levels": [[4900, 5100], [2000, 5100]]}],
+            "responses": ["hours"],
+        },
+        "plan.centre_levels: expected 3686 to 6486",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", list(MISTAKES))
+def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
+    changes, words = MISTAKES[name]
+    with pytest.raises(Mistake) as told:
+        laid(tmp_path, **changes)
+    assert words in str(told.value)
+    assert str(told.value).startswith("study: ")
+    assert len(str(told.value).splitlines()) == 1

@@ -1,0 +1,158 @@
+"""`a7sim study` at the door: what it prints and leaves, going on after being killed, and its audit."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from a7sim.session.fleet_hands import FleetHands
+from a7sim.study.auditing import audited
+from a7sim.study.executors import InProcess
+from a7sim.study.folder import CHECKPOINT, FILES, PAGE
+from a7sim.study.loading import load_study
+from a7sim.study.running import work
+from a7sim.study.tally import Tally
+from tests.processes import COMMAND, a7sim, said_here
+from tests.served import PATIENCE
+
+STUDY = """
+schema_version = 1
+title = "Pointings"
+question = "Do more pointings help?"
+scenario = "a8-strip"
+replicates = 12
+responses = ["strip_plan_at_checks_m", "strip_height_at_checks_m"]
+settings = { work = ["comparator"] }
+[[factor]]
+name = "pointings"
+path = "comparator.pointings"
+levels = [1, 4]
+"""
+AT_THE_PLOTTER = """
+schema_version = 1
+title = "As it stands"
+question = "What does a model come to?"
+scenario = "akwanga"
+replicates = 1
+responses = ["residual_parallax_mm", "centre_Z_error", "hours"]
+settings = { models = [{ name = "1", left = "101", right = "102" }], "plan.parallax_readings" = 1 }
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A study and the folder that it left, worked in this process without interruption."""
+    folder = tmp_path_factory.mktemp("study")
+    path = folder / "pointings.toml"
+    path.write_text(STUDY)
+    done = a7sim("study", path, "--executor", "process", "--out", folder / "out", "--audit", 1)
+    assert done.returncode == 0, done.stderr
+    return path, folder / "out", done
+
+
+def test_a_study_says_what_was_asked_and_answers_in_words(study):
+    words = " ".join(study[2].stdout.split())
+    assert "Do more pointings help?" in words
+    assert "strip_height_at_checks_m: from" in words
+    assert "pointings 4" in words
+    assert "1 sessions worked again over the link gave the same digits." in words
+
+
+def test_a_replicate_in_the_table_is_the_session_that_run_gives_for_its_seed(study, capsys):
+    _, out, _ = study
+    line = next(each for each in (out / "replicates.csv").read_text().splitlines() if each.startswith("2,1,"))
+    _, _, seed, _, height = line.split(",")
+    settings = ("--set", "work=['comparator']", "--set", "comparator.pointings=4")
+    ran = json.loads(said_here(capsys, "run", "a8-strip", "--seed", seed, *settings, "--json").stdout)
+    checks = ran["ways"]["comparator"]["accuracy_m"]["checks"]
+    assert float(height) == pytest.approx(checks["height"], rel=1e-9)
+
+
+def test_a_study_that_was_killed_goes_on_to_the_same_bytes_and_leaves_no_worker_behind(study, tmp_path, capsys):
+    path, whole, _ = study
+    out = tmp_path / "out"
+    command = [*COMMAND, "study", str(path), "--workers", "1", "--out", str(out)]
+    killed = subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _wait_until((out / CHECKPOINT).exists)
+    os.kill(killed.pid, signal.SIGKILL)
+    killed.wait()
+    _wait_until(lambda: _gone(killed.pid))
+    laid = load_study(path)
+    assert 0 < Tally.load(out / CHECKPOINT, laid.identity).done.sum() < 24
+    assert said_here(capsys, "study", path, "--executor", "process", "--out", out, "--quiet").returncode == 0
+    for name in FILES:
+        assert (out / name).read_bytes() == (whole / name).read_bytes(), name
+
+
+def _gone(group):
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def _wait_until(there):
+    until = time.monotonic() + PATIENCE
+    while not there():
+        assert time.monotonic() < until
+        time.sleep(0.01)
+
+
+def test_the_page_says_what_was_asked_how_and_the_answer(study):
+    page = (study[1] / PAGE).read_text()
+    for words in ("Do more pointings help?", "The answer", "Scenario a8-strip", "comparator.pointings = 4", "<svg"):
+        assert words in page
+
+
+def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    told = said_here(capsys, "study", study[0], "--replicates", 2, "--executor", "process", "--out", tmp_path / "out")
+    assert told.returncode == 0
+    assert "matplotlib" in told.stderr
+    assert {each.name for each in (tmp_path / "out").iterdir()} == set(FILES) - {PAGE}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--replicates", "0"), "expected a whole number from 1"),
+        (("--replicates", "5"), "expected 12 replicates or more"),
+    ],
+)
+def test_replicates_that_cannot_be_are_one_sentence_and_exit_code_2(study, capsys, arguments, words):
+    path, out, _ = study
+    told = said_here(capsys, "study", path, "--out", out, *arguments)
+    assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
+    assert words in told.stderr
+
+
+def test_a_folder_of_something_else_is_left_alone(study, tmp_path, capsys):
+    (tmp_path / "precious").write_text("x")
+    told = said_here(capsys, "study", study[0], "--out", tmp_path)
+    assert told.returncode == 2
+    assert "expected an empty folder" in told.stderr
+    assert [each.name for each in tmp_path.iterdir()] == ["precious"]
+
+
+def test_an_audit_finds_a_batch_bench_that_is_off_by_one_count(tmp_path, monkeypatch):
+    """The audit agrees with the true bench in every digit, and not with one whose counter shows a count too much."""
+    path = tmp_path / "cases.toml"
+    path.write_text(AT_THE_PLOTTER)
+    laid = load_study(path)
+    tally = Tally.empty(1, 3)
+    work(laid, tally, InProcess())
+    assert audited(laid, tally, 1) == []
+    truly = FleetHands.elements
+
+    def a_count_too_much(self, who, names):
+        return {name: counts + 0.01 * (name == "by1") for name, counts in truly(self, who, names).items()}
+
+    monkeypatch.setattr(FleetHands, "elements", a_count_too_much)
+    off = Tally.empty(1, 3)
+    work(laid, off, InProcess())
+    assert {each.response for each in audited(laid, off, 1)} >= {"residual_parallax_mm"}

@@ -1,0 +1,99 @@
+"""Statistics of studies against independent programs and against what they promise."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from a7sim.study.statistics import (
+    compared,
+    holm,
+    mean_interval,
+    quantile_with_interval,
+    sd_interval,
+    variance_by_factor,
+)
+
+RNG = np.random.default_rng(12)
+
+
+def test_a_comparison_is_the_paired_t_test_of_scipy():
+    one, other = RNG.normal(1.0, 1.0, 40), RNG.normal(0.8, 1.0, 40)
+    expected = stats.ttest_rel(one, other)
+    found = compared(one, other)
+    assert found.p == pytest.approx(expected.pvalue)
+    assert found.interval == pytest.approx(tuple(expected.confidence_interval()))
+
+
+def test_a_comparison_leaves_out_pairs_of_which_one_gave_up():
+    found = compared(np.array([1.0, np.nan, 3.0, 5.0]), np.array([0.0, 1.0, np.nan, 2.0]))
+    assert (found.pairs, found.difference) == (2, 2.0)
+
+
+def test_one_factor_in_blocks_is_the_paired_t_test_squared():
+    values = RNG.normal(size=(2, 25)) + RNG.normal(size=25)
+    effect, rest = variance_by_factor(values, ["f"])
+    expected = stats.ttest_rel(*values)
+    assert pytest.approx(expected.statistic**2) == effect.F
+    assert effect.p == pytest.approx(expected.pvalue)
+    assert (effect.freedom, rest.freedom) == (1, 24)
+
+
+def test_variance_of_two_factors_is_that_of_a_least_squares_fit():
+    """The squares of every source are what a fit loses without its columns."""
+    values = RNG.normal(size=(2, 3, 7)) + np.array([0.0, 1.0])[:, None, None] + np.arange(3.0)[None, :, None]
+    i, j, k = (axis.ravel() for axis in np.indices(values.shape))
+    columns = {
+        ("f",): _contrasts(i, 2),
+        ("g",): _contrasts(j, 3),
+        ("f", "g"): np.stack([a * b for a in _contrasts(i, 2).T for b in _contrasts(j, 3).T], axis=1),
+        "blocks": _contrasts(k, 7),
+    }
+    everything = _remaining(columns.values(), values.ravel())
+    found = {each.source: each for each in variance_by_factor(values, ["f", "g"])}
+    assert found[()].squares == pytest.approx(everything)
+    for source in (("f",), ("g",), ("f", "g")):
+        without = _remaining([each for name, each in columns.items() if name != source], values.ravel())
+        assert found[source].squares == pytest.approx(without - everything)
+        assert found[source].freedom == columns[source].shape[1]
+
+
+def _contrasts(level, levels):
+    return np.stack([(level == each).astype(float) - (level == levels - 1) for each in range(levels - 1)], axis=1)
+
+
+def _remaining(columns, values):
+    design = np.column_stack([np.ones(len(values)), *columns])
+    return float(((values - design @ np.linalg.lstsq(design, values, rcond=None)[0]) ** 2).sum())
+
+
+def test_the_interval_of_a_quantile_is_what_many_resamples_give():
+    values = RNG.exponential(size=60)
+    found, interval = quantile_with_interval(values, 0.5)
+    resampled = np.sort(RNG.choice(values, (20_000, 60)), axis=1)[:, 29]
+    assert found == np.sort(values)[29]
+    for limit, share in zip(interval, (0.025, 0.975), strict=True):
+        assert (resampled < limit).mean() <= share + 0.005
+        assert (resampled <= limit).mean() >= share - 0.005
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    held = {"mean": 0, "sd": 0, "median": 0}
+    for key in range(100):
+        values = RNG.normal(size=50)
+        intervals = {
+            "mean": (mean_interval(float(values.mean()), float(values.std(ddof=1)), 50), 0.0),
+            "sd": (sd_interval(values, 1, (key,)), 1.0),
+            "median": (quantile_with_interval(values, 0.5)[1], 0.0),
+        }
+        for name, ((low, high), truth) in intervals.items():
+            held[name] += low <= truth <= high
+    assert all(86 <= count <= 100 for count in held.values())
+
+
+def test_the_bootstrap_is_the_same_for_the_same_seed_and_key():
+    values = RNG.normal(size=30)
+    assert sd_interval(values, 1, (0, 2)) == sd_interval(values, 1, (0, 2)) != sd_interval(values, 1, (0, 3))
+
+
+def test_holm_by_hand():
+    assert holm([0.01, 0.04, 0.03, float("nan")]) == pytest.approx([0.03, 0.06, 0.06, float("nan")], nan_ok=True)
