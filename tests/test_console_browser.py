@@ -2,11 +2,13 @@
 
 import asyncio
 import contextlib
+import os
 import re
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator, Iterator
@@ -29,15 +31,22 @@ FETCHED = re.compile(r"""(?:src|href)=["']?([^"'> ]+)|url\(["']?([^"')]+)|@impor
 def serving(*words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Serve Akwanga's console at any port; give the process and the address it says."""
     command = [*COMMAND, "console", "akwanga", "--seed", "7", "--browser", "--port", "0", *words]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout is not None and process.stderr is not None
-        said = process.stdout.readline()
-        assert said.startswith("http://127.0.0.1:"), said + process.stderr.read()
-        yield process, said.split()[0]
-    finally:
-        process.kill()
-        process.communicate()
+    with tempfile.TemporaryDirectory() as data:
+        environment = {**os.environ, "XDG_DATA_HOME": data}
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        process = subprocess.Popen(command, **pipes, text=True, env=environment)
+        try:
+            yield process, _address_said(process)
+        finally:
+            process.kill()
+            process.communicate()
+
+
+def _address_said(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None and process.stderr is not None
+    said = process.stdout.readline()
+    assert said.startswith("http://127.0.0.1:"), said + process.stderr.read()
+    return said.split()[0]
 
 
 @contextlib.asynccontextmanager

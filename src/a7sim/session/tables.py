@@ -41,13 +41,16 @@ def of_session(document: dict[str, Any]) -> RenderableType:
 
 
 def of_hours(operator: dict[str, Any]) -> Text:
-    """Return how long an operator took and for what."""
+    """Return how long an operator took and for what; of one in a crowd nothing is told of line and book."""
     activities = (f"{name} {hours:.1f}" for name, hours in operator["time_by_activity_h"].items())
-    return Text(
-        f"{operator['hours']:.1f} hours at the instrument, {operator['lines_over_the_link']} lines over the link, "
-        f"{operator['book_entries']} readings in the book, {operator['struck_out']} struck out\n"
-        f"Where they went: {', '.join(activities)}"
-    )
+    counted = [f"{operator['hours']:.1f} hours at the instrument"]
+    if "book_entries" in operator:
+        counted += [
+            f"{operator['lines_over_the_link']} lines over the link",
+            f"{operator['book_entries']} readings in the book",
+            f"{operator['struck_out']} struck out",
+        ]
+    return Text(f"{', '.join(counted)}\nWhere they went: {', '.join(activities)}")
 
 
 def of_strips(document: dict[str, Any]) -> RenderableType:
