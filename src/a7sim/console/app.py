@@ -16,7 +16,7 @@ from a7sim.console.deeds import BEFORE_ANYTHING_ANSWERS, Deeds
 from a7sim.console.dialogs import Choose
 from a7sim.console.dials import Dials
 from a7sim.console.drum_panels import Wheeled
-from a7sim.console.front import Front
+from a7sim.console.front import WELCOME, Front
 from a7sim.console.hands import Hands
 from a7sim.console.hearing import Hearing
 from a7sim.console.keymap import deeds_by_key, deeds_of, pressed, shown
@@ -65,7 +65,7 @@ class Console(Hearing, Deeds, App[None]):
         self.playback = Playback(seat.film, self.ask, self.show_frame) if seat.film else None
         self._by_key = deeds_by_key(seat.keymap, seat.watching)
         self._early: deque[events.Key] | None = deque()
-        self.main = Front(self.binocular, self.key_pressed, self.utf8, seat.welcome, seat.tasks)
+        self.main = Front(self.binocular, self.key_pressed, self.utf8, seat.goal or WELCOME * seat.welcome, seat.tasks)
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = seat.theme

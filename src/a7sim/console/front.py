@@ -41,7 +41,7 @@ class Front(Screen[None]):
         binocular: Binocular,
         pressed: Callable[[events.Key], bool],
         utf8: bool,
-        welcome: bool,
+        welcome: str,
         tasks: Callable[[], Sequence[str]] | None = None,
     ) -> None:
         super().__init__(id="bench", classes="" if utf8 else "-ascii")
@@ -76,7 +76,7 @@ class Front(Screen[None]):
         yield Static(id="hints", markup=False)
         yield Static(id="banner", markup=False)
         if self._welcome:
-            yield Static(WELCOME, id="welcome", markup=False)
+            yield Static(self._welcome, id="welcome", markup=False)
 
     def on_mount(self) -> None:
         """Fit the panels to the terminal."""
@@ -96,7 +96,7 @@ class Front(Screen[None]):
     def on_key(self, event: events.Key) -> None:
         """Do what the keymap says."""
         if self._welcome:
-            self._welcome = False
+            self._welcome = ""
             self.query_one("#welcome").remove()
         if self._pressed(event):
             event.stop()

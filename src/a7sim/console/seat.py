@@ -43,6 +43,8 @@ class Seat:
     theme: str = "enamel"
     tasks: Callable[[], Sequence[str]] | None = None
     """What there is to do, a line each, asked again every second; None where nobody has set any tasks."""
+    goal: str = ""
+    """What is to be reached, told over the eyepieces until the first key."""
     welcome: bool = False
     """Whether to tell a first-time visitor what there is."""
     resumable: Callable[[], Resumable | None] = lambda: None

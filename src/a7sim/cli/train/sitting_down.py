@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Iterator
+from textwrap import fill
 
 from a7sim.cli.console import KEYMAP
 from a7sim.cli.prompt import data_folder
@@ -15,6 +16,9 @@ from a7sim.session.lines import Event, read_journal
 from a7sim.training.checklist import Checklist
 from a7sim.training.exercise import OPENING
 from a7sim.training.room import Room
+
+GOAL_WIDTH = 64
+"""Columns, so that it has room on every terminal."""
 
 
 def sit_down(room: Room, checklist: Checklist, plain: bool) -> None:
@@ -52,6 +56,7 @@ def sit_down(room: Room, checklist: Checklist, plain: bool) -> None:
             drawing=Drawing.WORDS if plain else None,
             theme="contrast" if plain else "enamel",
             tasks=checklist.lines,
+            goal=fill(" ".join(checklist.exercise.goal.split()), GOAL_WIDTH),
             past=lambda: [Said(each.text, each.dir == "<") for each in _past(checklist)],
         )
     ).run()
