@@ -1,54 +1,39 @@
 """The command line: one thin click command a verb."""
 
-import importlib
 import io
 import sys
 
 import click
 
 import a7sim
+from a7sim.cli.verbs import Verbs
 from a7sim.mistakes import Mistake
 
 EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_DIFFERS, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 _VERBS = {
-    "run": "a7sim.cli.run",
-    "operate": "a7sim.cli.operate",
-    "send": "a7sim.cli.send",
-    "compile": "a7sim.cli.compile",
-    "calibrate": "a7sim.cli.calibrate",
-    "reduce": "a7sim.cli.reduce",
-    "scenario": "a7sim.cli.scenario",
-    "prepare": "a7sim.cli.prepare",
-    "bridge": "a7sim.cli.bridge",
-    "serve": "a7sim.cli.serve",
-    "replay": "a7sim.cli.replay",
-    "record": "a7sim.cli.record",
-    "report": "a7sim.cli.report",
-    "export": "a7sim.cli.export",
-    "compare": "a7sim.cli.compare",
-    "console": "a7sim.cli.console",
-    "train": "a7sim.cli.train",
-    "study": "a7sim.cli.study",
+    "run": "a7sim.cli.run:command",
+    "operate": "a7sim.cli.operate:command",
+    "send": "a7sim.cli.send:command",
+    "compile": "a7sim.cli.compile:command",
+    "calibrate": "a7sim.cli.calibrate:command",
+    "reduce": "a7sim.cli.reduce:command",
+    "scenario": "a7sim.cli.scenario:command",
+    "prepare": "a7sim.cli.prepare:command",
+    "bridge": "a7sim.cli.bridge:command",
+    "serve": "a7sim.cli.serve:command",
+    "replay": "a7sim.cli.replay:command",
+    "record": "a7sim.cli.record:command",
+    "report": "a7sim.cli.report:command",
+    "export": "a7sim.cli.export:command",
+    "compare": "a7sim.cli.compare:command",
+    "console": "a7sim.cli.console:command",
+    "train": "a7sim.cli.train:command",
+    "study": "a7sim.cli.study:command",
 }
 
 
-class _Verbs(click.Group):
-    """Commands imported when they are asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in their order."""
-        return list(_VERBS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import and return a verb's command."""
-        if cmd_name not in _VERBS:
-            return None
-        command = importlib.import_module(_VERBS[cmd_name]).command
-        return command if isinstance(command, click.Command) else None
-
-
-@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Verbs, verbs=_VERBS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(a7sim.__version__, prog_name="a7sim")
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 def cli(debug: bool) -> None:

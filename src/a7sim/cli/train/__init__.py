@@ -1,40 +1,24 @@
 """`a7sim train`: exercises, from the first counter to an independent strip, graded."""
 
-import importlib
-
 import click
 
+from a7sim.cli.verbs import Verbs
+
 _VERBS = {
-    "list": "sheets",
-    "start": "starting",
-    "hint": "working",
-    "answer": "working",
-    "verify": "judging",
-    "watch": "judging",
-    "report": "sheets",
-    "reset": "working",
-    "check": "authoring",
-    "new": "authoring",
+    "list": "a7sim.cli.train.sheets:list_",
+    "start": "a7sim.cli.train.starting:start_",
+    "hint": "a7sim.cli.train.working:hint_",
+    "answer": "a7sim.cli.train.working:answer_",
+    "verify": "a7sim.cli.train.judging:verify_",
+    "watch": "a7sim.cli.train.judging:watch_",
+    "report": "a7sim.cli.train.sheets:report_",
+    "reset": "a7sim.cli.train.working:reset_",
+    "check": "a7sim.cli.train.authoring:check_",
+    "new": "a7sim.cli.train.authoring:new_",
 }
 
 
-class _Verbs(click.Group):
-    """Commands imported when they are asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in their order."""
-        return list(_VERBS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import and return a verb's command."""
-        if cmd_name not in _VERBS:
-            return None
-        module = importlib.import_module(f"a7sim.cli.train.{_VERBS[cmd_name]}")
-        command = getattr(module, f"{cmd_name}_")
-        return command if isinstance(command, click.Command) else None
-
-
-@click.group("train", cls=_Verbs)
+@click.group("train", cls=Verbs, verbs=_VERBS)
 def command() -> None:
     """Learn to work the plotter: exercises with a checklist, hints, and grades that say what to do better.
 
