@@ -5,11 +5,15 @@ import fcntl
 import os
 import termios
 import tty
+from contextlib import suppress
 from pathlib import Path
 
 from a7sim.link.conversation import Conversation
 from a7sim.link.wires import MOST_UNREAD, Host
 from a7sim.mistakes import Mistake
+
+READS_IN_A_ROW = 8
+"""A client that was answered has often asked again before the loop comes round."""
 
 LARGEST_READ = 4096
 """Bytes that a terminal of Linux holds."""
@@ -66,11 +70,12 @@ class PtyWire:
         os.close(self._far)
 
     def _readable(self) -> None:
-        try:
-            data = os.read(self._near, LARGEST_READ)
-        except (BlockingIOError, InterruptedError):
-            return
-        self._conversation.received(data)
+        near, received = self._near, self._conversation.received
+        with suppress(BlockingIOError, InterruptedError):
+            for _ in range(READS_IN_A_ROW):
+                received(os.read(near, LARGEST_READ))
+                if not self._reading:
+                    return
 
     def _writable(self) -> None:
         self._unsent = self._unsent[self._sent(self._unsent) :]
