@@ -13,7 +13,8 @@ import time
 import numpy as np
 
 from a7sim.geometry import image_of, mxm, rotation, transposed, turn_of
-from a7sim.reduction.coplanarity import coplanarity, rays_of, relative_orientation, relative_poses
+from a7sim.reduction.coplanarity import coplanarity, rays_of, relative_orientation
+from a7sim.reduction.relative_poses import relative_poses
 from a7sim.reduction.similarity import similarity_by_iteration, similarity_by_quaternion
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

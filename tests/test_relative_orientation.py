@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from a7sim.geometry import image_of, mxm, rotation, transposed, turn_of
 from a7sim.reduction import Stand, Undetermined, element_corrections
-from a7sim.reduction.coplanarity import relative_orientation, relative_poses
+from a7sim.reduction.coplanarity import relative_orientation
 from a7sim.reduction.hallert import orientation_by_parallaxes, six_point_corrections
 from a7sim.reduction.modelling import a8_model_coordinates, model_coordinates
+from a7sim.reduction.relative_poses import relative_poses
 from a7sim.reduction.schut import orientation_by_schut
 from a7sim.reduction.snooping import snooped_orientation, standardised_residuals
 

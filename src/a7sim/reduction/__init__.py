@@ -14,7 +14,7 @@ from a7sim.reduction.centres import (
     perspective_centre,
     perspective_centre_of_levels,
 )
-from a7sim.reduction.coplanarity import RelativeOrientation, relative_orientation, relative_poses
+from a7sim.reduction.coplanarity import RelativeOrientation, relative_orientation
 from a7sim.reduction.corrections import corrected_image
 from a7sim.reduction.grid_test import Elements, PlateLie, ProjectorTest, grid_test, plate_lie
 from a7sim.reduction.hallert import orientation_by_parallaxes
@@ -29,6 +29,7 @@ from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
 from a7sim.reduction.modelling import a8_model_coordinates, model_coordinates
 from a7sim.reduction.parallax import Stand, element_corrections
 from a7sim.reduction.polynomials import StripAdjustment, StripDeformation, strip_adjustment
+from a7sim.reduction.relative_poses import relative_poses
 from a7sim.reduction.resection import Resection
 from a7sim.reduction.schut import orientation_by_schut
 from a7sim.reduction.similarity import Similarity, similarity_by_iteration, similarity_by_quaternion

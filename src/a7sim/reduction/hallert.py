@@ -14,18 +14,10 @@ from a7sim.geometry import (
     rotation,
     stereoscopic_intersection,
 )
-from a7sim.reduction.coplanarity import (
-    FEWEST_POINTS,
-    LARGEST_CONDITION,
-    MOST_ITERATIONS,
-    TOLERANCE,
-    RelativeOrientation,
-    Unknowns,
-    coplanarity,
-    finished,
-    rays_of,
-)
+from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, coplanarity, finished, rays_of
 from a7sim.reduction.least_squares import Undetermined, adjusted
+from a7sim.reduction.normal_equations import LARGEST_CONDITION
+from a7sim.reduction.relative_poses import FEWEST_POINTS, MOST_ITERATIONS, TOLERANCE
 
 Scalars = float | Array
 """One number, or one for each pair of a batch ``(...)``."""

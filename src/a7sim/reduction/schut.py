@@ -3,18 +3,11 @@
 import numpy as np
 
 from a7sim.geometry import Array, mxm
-from a7sim.reduction.coplanarity import (
-    FEWEST_POINTS,
-    LARGEST_CONDITION,
-    MOST_ITERATIONS,
-    TOLERANCE,
-    RelativeOrientation,
-    coplanarity,
-    finished,
-    rays_of,
-    turn_about,
-)
+from a7sim.reduction.coplanarity import RelativeOrientation, coplanarity, finished, rays_of
 from a7sim.reduction.least_squares import Undetermined, adjusted
+from a7sim.reduction.normal_equations import LARGEST_CONDITION
+from a7sim.reduction.relative_poses import FEWEST_POINTS, MOST_ITERATIONS, TOLERANCE
+from a7sim.reduction.turns import turn_about
 
 
 def orientation_by_schut(image1: Array, image2: Array, c1: float, c2: float, bx: float = 1.0) -> RelativeOrientation:

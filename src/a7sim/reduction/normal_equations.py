@@ -1,0 +1,220 @@
+"""The normal equations of coplanarity, formed and solved for many pairs in arrays that are filled anew."""
+
+import numpy as np
+
+from a7sim.geometry import Array, mxv
+from a7sim.reduction.turns import TurningWork, aligned
+
+LARGEST_CONDITION = 3e5
+"""Of the scaled normal equations for turns about the axes of the base. Six standard points have some 3e2, the weak pair
+of reference 07 has 8e3; points on a line or on a critical surface, measured to 5 um, have 2e6 and more. Beyond 3e5 such
+errors turn a camera by half a degree."""
+
+CONDITION_BY_DETERMINANT = 5.0 * 5.0**0.5 * 1.25**4
+"""Of five scaled equations: the 1-norm is at most 5 and root 5 times the spectral norm of the inverse, whose
+eigenvalues add up to 5 before they are inverted."""
+
+
+class Work(TurningWork):
+    """Arrays that the steps of an iteration fill anew, of pairs ``(...)`` with n points.
+
+    They begin at lines of the cache: numpy takes half the time for them that it takes for arrays where malloc puts
+    them.
+    """
+
+    def __init__(self, n: int, batch: tuple[int, ...]) -> None:
+        super().__init__(batch)
+        self.shape = (n, *batch)
+        empty = aligned if batch else np.empty
+        self.rays = empty((2, 3, n, *batch))
+        self.turned = empty((2, 3, n, *batch))
+        self.spare = empty((6, n, *batch))
+        self.rows = empty((6, n, *batch))
+        self.steepness = empty((n, *batch))
+        self.normal = empty((6, 6, *batch))
+        self.reduced = empty((6, 6, *batch))
+        self.product = empty((5, 5, *batch))
+        self.shares = empty((5, *batch))
+
+
+def conditions_of(work: Work) -> Array:
+    """Return the condition numbers ``(...)`` of the scaled normal equations, in the 1-norm, or small bounds of them.
+
+    Their determinant bounds them, so that hardly any inverse is needed.
+    """
+    normal, pivots = work.normal[:5, :5], work.reduced[:5, :5].diagonal().T
+    shares = np.divide(pivots, normal.diagonal().T, out=work.shares)
+    bound = np.array(CONDITION_BY_DETERMINANT / shares.prod(axis=0))
+    doubtful = ~((bound > 0.0) & (bound < LARGEST_CONDITION))
+    if doubtful.any():
+        bound[doubtful] = _condition(normal[..., doubtful]) if normal.ndim > 2 else _condition(normal)
+    return bound
+
+
+def symmetric(normal: Array) -> Array:
+    """Return normal equations that stand above the diagonal in full."""
+    full = normal.copy()
+    for i in range(len(full) - 1):
+        full[i + 1 :, i] = full[i, i + 1 :]
+    return full
+
+
+def _condition(normal: Array) -> Array:
+    """Return the condition numbers ``(...)`` of normal equations ``(5, 5, ...)`` when scaled, in the 1-norm."""
+    spread = np.sqrt(normal.diagonal().T)
+    scaled = symmetric(normal) / (spread[:, None] * spread)
+    condition = np.abs(scaled).sum(axis=0).max(axis=0) * np.abs(inverse_of(scaled)).sum(axis=0).max(axis=0)
+    return np.where(np.isfinite(condition), condition, np.inf)
+
+
+def times(matrix: Array, vector: Array) -> Array:
+    """Multiply as `mxv` does, in less time for a single matrix."""
+    return np.asarray(matrix @ vector) if matrix.ndim == 2 else mxv(matrix, vector)
+
+
+def in_base_frame(R: Array, rays: Array) -> Array:
+    """Turn the rays ``(2, 3, n, ...)`` of both cameras by rows of their rotations ``(2, i, 3, ...)``."""
+    return R @ rays if rays.ndim == 3 else np.asarray(np.einsum("kij...,kjn...->kin...", R, rays))
+
+
+def discrepancies_of(across: Array) -> Array:
+    """Return ``y1 z2 - z1 y2`` of ray components y, z ``(2, 2, n, ...)``."""
+    return np.asarray(across[0, 0] * across[1, 1] - across[0, 1] * across[1, 0])
+
+
+def form_equations(R: Array, rays: Array, work: Work) -> None:
+    """Form the equations in mm of one image coordinate, in `work.rows`, of turned rays.
+
+    The left rays are divided by what the four image coordinates change the condition by: that is the whole of
+    ``(0, -z, y)`` of the other ray but for its component along the axis of the camera.
+    """
+    a, steepness = work.turned, work.steepness
+    spare = work.spare.reshape(a.shape)
+    if rays.ndim == 3:
+        np.matmul(R, rays, out=a)
+    else:
+        np.multiply(R[:, :, 0, None], rays[:, None, 0], out=a)
+        np.multiply(R[:, :, 1, None], rays[:, None, 1], out=spare)
+        a += spare
+        a += (R[:, :, 2] * rays[:, 2:, 0])[:, :, None]
+    one, other = spare.reshape((3, 2, *work.shape))[:2]
+    np.multiply(a[0, 1:], a[0, 1:], out=one)
+    np.multiply(a[1, 1:], a[1, 1:], out=other)
+    one += other
+    np.add(one[0], one[1], out=steepness)
+    np.multiply(R[::-1, 1, 2, None], a[:, 2], out=one)
+    np.multiply(R[::-1, 2, 2, None], a[:, 1], out=other)
+    one -= other
+    one *= one
+    steepness -= one[0]
+    steepness -= one[1]
+    np.sqrt(steepness, out=steepness)
+    a[0] /= steepness
+    _form_rows(a, work)
+
+
+def form_level_equations(rays: Array, work: Work) -> None:
+    """Form what `form_equations` does for cameras that stand level."""
+    work.steepness[:] = np.hypot(rays[0, 2].flat[0], rays[1, 2].flat[0])
+    work.turned[:] = rays
+    work.turned[0] /= work.steepness
+    _form_rows(work.turned, work)
+
+
+def _form_rows(a: Array, work: Work) -> None:
+    """Form the five coefficients and the discrepancy ``(6, n, ...)`` from rays ``(2, 3, n, ...)``.
+
+    Those of the right camera are for turns the other way.
+    """
+    rows, products = work.rows, work.spare[:2]
+    (x1, y1, z1), (x2, y2, z2) = a
+    np.multiply(x1, a[1, 1:], out=rows[0:2])
+    np.multiply(x2, a[0, 1:], out=rows[2:4])
+    np.multiply(y1, a[1, 1:], out=rows[4:6])
+    np.multiply(z1, z2, out=products[0])
+    np.multiply(z1, y2, out=products[1])
+    rows[4] += products[0]
+    rows[5] -= products[1]
+
+
+def form_products(work: Work) -> None:
+    """Form the sums over n of products ``(6, 6, ...)`` of the rows; in a batch, on the diagonal and above."""
+    rows, normal = work.rows, work.normal
+    if rows.ndim == 2:
+        np.matmul(rows, rows.T, out=normal)
+        return
+    for i, row in enumerate(rows):
+        np.einsum("n...,vn...->v...", row, rows[i:], out=normal[i, i:])
+
+
+def solved(work: Work, stiffness: Array) -> Array:
+    """Return the corrections ``(5, ...)`` of the normal equations, stiffened by a share of their diagonal.
+
+    What elimination leaves stands in `work.reduced`: the pivots and, last of all, the sum of squared residuals.
+    """
+    if work.normal.ndim == 2:
+        return _solved_alone(work, float(stiffness))
+    reduced, shares, product = work.reduced, work.shares, work.product[0]
+    for i in range(6):
+        reduced[i, i:] = work.normal[i, i:]
+    stiffer = 1.0 + stiffness
+    for i in range(5):
+        reduced[i, i] *= stiffer
+    for i in range(5):
+        row = reduced[i]
+        np.divide(row[i + 1 :], row[i], out=shares[i:])
+        for j in range(i + 1, 6):
+            np.multiply(row[j], shares[j - 1 :], out=product[j - 1 :])
+            reduced[j, j:] -= product[j - 1 :]
+        row[i + 1 :] = shares[i:]
+    corrections = -reduced[:5, 5]
+    for i in range(4, 0, -1):
+        corrections[:i] -= reduced[:i, i] * corrections[i]
+    return corrections
+
+
+def _solved_alone(work: Work, stiffness: float) -> Array:
+    """Do what `solved` does for one pair, with the numbers of Python, which are quicker than arrays of one number."""
+    rows = work.normal.tolist()
+    for i in range(5):
+        rows[i][i] *= 1.0 + stiffness
+    try:
+        for i in range(5):
+            row = rows[i]
+            for j in range(i + 1, 6):
+                share = row[j] / row[i]
+                for k in range(j, 6):
+                    rows[j][k] -= share * row[k]
+            row[i + 1 :] = [value / row[i] for value in row[i + 1 :]]
+    except ZeroDivisionError:
+        work.reduced[:] = np.nan
+        return np.full(5, np.nan)
+    work.reduced[:] = rows
+    corrections = [-row[5] for row in rows[:5]]
+    for i in range(4, 0, -1):
+        for j in range(i):
+            corrections[j] -= rows[j][i] * corrections[i]
+    return np.array(corrections)
+
+
+def inverse_of(matrix: Array) -> Array:
+    """Return the inverses of positive definite matrices ``(u, u, ...)``; of singular ones, what is not finite.
+
+    A batch is worked elementwise by exchange of one unknown after the other, a single matrix by LAPACK.
+    """
+    if matrix.ndim == 2:
+        try:
+            return np.asarray(np.linalg.inv(matrix))
+        except np.linalg.LinAlgError:
+            return np.full_like(matrix, np.nan)
+    inverse, product = aligned(matrix.shape), aligned(matrix.shape)
+    inverse[:] = matrix
+    for j in range(len(matrix)):
+        reciprocal = 1.0 / inverse[j, j]
+        column, row = inverse[:, j] * reciprocal, inverse[j].copy()
+        np.multiply(column[:, None], row, out=product)
+        inverse -= product
+        np.multiply(row, reciprocal, out=inverse[j])
+        np.negative(column, out=inverse[:, j])
+        inverse[j, j] = reciprocal
+    return inverse
