@@ -12,7 +12,9 @@ from pathlib import Path
 
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk, Engine, ErrorNumber
-from a7sim.instrument.language.commands import COMMANDS, LARGEST_PICTURE, LARGEST_READING
+from a7sim.instrument.language.commands import COMMANDS
+from a7sim.instrument.language.commands.carriages import LARGEST_READING
+from a7sim.instrument.language.commands.pictures import LARGEST_PICTURE
 from a7sim.instrument.language.table import Choice, Command, Quantity, QuotedOrNumber, short_form
 from a7sim.instrument.refusals import Refusal
 from a7sim.link.clock import Clock

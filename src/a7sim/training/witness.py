@@ -8,7 +8,7 @@ import numpy as np
 
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import LinkEvent
-from a7sim.instrument.language.commands import recorded_element
+from a7sim.instrument.language.commands.recording import recorded_element
 from a7sim.instrument.language.program import Fault, Step, program_of
 from a7sim.instrument.recorder import Recorder, Registration
 from a7sim.scenario import Condition

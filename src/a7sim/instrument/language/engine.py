@@ -6,6 +6,7 @@ import re
 import zlib
 from typing import TYPE_CHECKING, Any
 
+from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 from a7sim.instrument.language.logins import without_token
 from a7sim.instrument.language.program import Fault, Program, Question, Step, program_of, question_of, text_of
@@ -259,6 +260,11 @@ class Engine:
             self._completes_at = None
             status.event |= OPERATION_COMPLETE
         return status
+
+    @property
+    def headers(self) -> list[str]:
+        """All headers that the engine knows."""
+        return COMMANDS.headers()
 
     @property
     def errors(self) -> tuple[str, ...]:

@@ -1,0 +1,88 @@
+"""Counters and carriages."""
+
+from typing import TYPE_CHECKING
+
+from a7sim.instrument.language.commands.parts import autograph_of
+from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.table import (
+    Call,
+    Command,
+    Limits,
+    Quantity,
+)
+
+if TYPE_CHECKING:
+    from a7sim.instrument.language.engine import Engine
+
+
+LARGEST_READING = 999999.99
+"""Of a counter's drums."""
+
+
+def _counters(engine: "Engine", call: Call) -> str:
+    return ",".join(autograph_of(engine).counter_text(axis) for axis in "XYZ")
+
+
+def _axis(axis: str) -> list[Command]:
+    usual = "" if axis == "Z" else "mm"
+
+    def unit(engine: "Engine") -> str:
+        return autograph_of(engine).variant.scales[axis].unit
+
+    def limits(engine: "Engine", suffix: int) -> Limits:
+        autograph = autograph_of(engine)
+        low, high = autograph.counter_limits(axis)
+        return low, high, autograph.counter_at_rest(axis)
+
+    def to_the_ends(engine: "Engine", suffix: int) -> Limits:
+        autograph = autograph_of(engine)
+        low, high = autograph.counter_limits(axis)
+        here = autograph.counter(axis)
+        return low - here, high - here, 0.0
+
+    def preset_limits(engine: "Engine", suffix: int) -> Limits:
+        return -LARGEST_READING, LARGEST_READING, 0.0
+
+    def preset(engine: "Engine", call: Call) -> None:
+        if abs(call.arguments[0]) > LARGEST_READING:
+            raise LanguageError(
+                ErrorNumber.DATA_OUT_OF_RANGE, f"expected at most {LARGEST_READING}, got {call.arguments[0]:.10g}"
+            )
+        autograph_of(engine).preset(axis, call.arguments[0])
+
+    def drive(engine: "Engine", call: Call) -> None:
+        autograph_of(engine).drive(axis, call.arguments[0])
+
+    def wheel(engine: "Engine", call: Call) -> None:
+        autograph_of(engine).wheel(axis, call.arguments[0])
+
+    return [
+        Command(f"COUNter:{axis}?", lambda e, c: autograph_of(e).counter_text(axis), about=f"{axis} counter"),
+        Command(
+            f"COUNter:{axis}:PRESet",
+            preset,
+            (Quantity(usual, preset_limits, name="reading", unit_there=unit),),
+            turns=True,
+            about="what the counter shall show here",
+        ),
+        Command(
+            f"DRIVe:{axis}",
+            drive,
+            (Quantity(usual, limits, name="reading", unit_there=unit),),
+            turns=True,
+            about="run to a counter reading",
+        ),
+        Command(
+            f"WHEel:{axis}",
+            wheel,
+            (Quantity(usual, to_the_ends, name="amount", unit_there=unit),),
+            turns=True,
+            about="turn by so much counter, signed",
+        ),
+    ]
+
+
+CARRIAGES = [
+    Command("COUNter?", _counters, about="X, Y and Z"),
+    *(command for axis in "XYZ" for command in _axis(axis)),
+]

@@ -1,0 +1,42 @@
+"""What the commands of several subsystems share."""
+
+from typing import TYPE_CHECKING
+
+from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.table import Choice
+
+if TYPE_CHECKING:
+    from a7sim.instrument.autograph import Autograph
+    from a7sim.instrument.language.engine import Engine
+
+
+LONGEST_TEXT = 1000
+"""Characters of a remark or of a point's name."""
+
+ELEMENT_NODES = (
+    ("KAPPa", "kappa", "gon", "swing"),
+    ("PHI", "phi", "gon", "longitudinal tilt"),
+    ("OMEGa", "omega", "gon", "lateral tilt"),
+    ("BY", "by", "mm", "base component across"),
+    ("BZ", "bz", "mm", "base component in height"),
+    ("PDIStance", "c", "mm", "principal distance"),
+)
+
+LIMIT = Choice(("MINimum", "MAXimum", "DEFault"), optional=True)
+
+
+def autograph_of(engine: "Engine") -> "Autograph":
+    """Return the instrument that an engine speaks for."""
+    return engine.desk.autograph
+
+
+def fixed(value: float, decimals: int = 2) -> str:
+    """Return a number with its decimals, never as minus zero."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+
+
+def text_within(text: str) -> str:
+    """Return a text. Raises LanguageError for an empty one and for one that is too long."""
+    if not 1 <= len(text) <= LONGEST_TEXT:
+        raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {LONGEST_TEXT} characters, got {len(text)}")
+    return text

@@ -1,0 +1,137 @@
+"""Photographs in their carriers, and what the eyepieces show."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from a7sim.instrument.language.commands.parts import autograph_of, fixed
+from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.syntax import quoted
+from a7sim.instrument.language.table import (
+    Call,
+    Command,
+    Limits,
+    Quantity,
+    Quoted,
+)
+from a7sim.manual import NOT_VISIBLE
+
+if TYPE_CHECKING:
+    from a7sim.instrument.language.engine import Engine
+
+
+LARGEST_PICTURE = 1024
+"""Columns or rows of an eyepiece picture."""
+
+
+def _load(engine: "Engine", call: Call) -> None:
+    autograph_of(engine).load(call.suffix, call.arguments[0])
+
+
+def _unload(engine: "Engine", call: Call) -> None:
+    autograph_of(engine).unload(call.suffix)
+
+
+def _catalogue(engine: "Engine", call: Call) -> str:
+    return ",".join(quoted(name) for name in autograph_of(engine).catalogue) or '""'
+
+
+def _centre(engine: "Engine", call: Call) -> None:
+    autograph_of(engine).centre_picture(call.suffix, *call.arguments)
+
+
+def _centring_limits(name: str) -> Callable[["Engine", int], Limits]:
+    def limits(engine: "Engine", suffix: int) -> Limits:
+        limit = getattr(autograph_of(engine).variant, name)
+        return -limit, limit, 0.0
+
+    return limits
+
+
+def _centring(engine: "Engine", call: Call) -> str:
+    return ",".join(fixed(value, 3) for value in autograph_of(engine).carrier(call.suffix).centring)
+
+
+def _fiducials(engine: "Engine", call: Call) -> str:
+    displacements = autograph_of(engine).carrier(call.suffix).fiducial_displacements()
+    return ",".join(f"{quoted(name)},{fixed(dx, 3)},{fixed(dy, 3)}" for name, dx, dy in displacements)
+
+
+def _sketch(engine: "Engine", call: Call) -> str:
+    sketch = autograph_of(engine).carrier(call.suffix).photograph.sketch
+    places = zip(sketch.names, sketch.xy[0], sketch.xy[1], strict=True)
+    return ",".join(f"{quoted(name)},{fixed(float(x), 1)},{fixed(float(y), 1)}" for name, x, y in places) or '""'
+
+
+def _pair(seen: tuple[float, float] | None) -> str:
+    return f"{fixed(seen[0])},{fixed(seen[1])}" if seen else f"{NOT_VISIBLE},{NOT_VISIBLE}"
+
+
+def _eyepiece(engine: "Engine", call: Call) -> str:
+    return _pair(autograph_of(engine).eyepiece(call.suffix, call.arguments[0]))
+
+
+def _stereo(engine: "Engine", call: Call) -> str:
+    return _pair(autograph_of(engine).stereo(call.arguments[0]))
+
+
+def _picture(engine: "Engine", call: Call) -> bytes:
+    columns, rows, magnification = call.arguments
+    for name, value, largest in (("columns", columns, LARGEST_PICTURE), ("rows", rows, LARGEST_PICTURE)):
+        if not 1 <= value <= largest:
+            raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {largest} {name}, got {value:g}")
+    if not 0.1 <= magnification <= 100.0:
+        raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 0.1 to 100 times, got {magnification:g}")
+    grey = autograph_of(engine).picture(call.suffix, int(columns), int(rows), magnification)
+    pixels = np.round(255.0 * grey).astype(np.uint8).tobytes()
+    length = str(len(pixels))
+    return f"#{len(length)}{length}".encode("ascii") + pixels
+
+
+PICTURES = [
+    Command("PHOTo<n>:LOAD", _load, (Quoted("picture"),), turns=True, about="lay a picture on the carrier"),
+    Command("PHOTo<n>:UNLoad", _unload, turns=True, about="take it off"),
+    Command("PHOTo<n>?", lambda e, c: quoted(autograph_of(e).loaded(c.suffix) or ""), about="its name"),
+    Command("PHOTo:CATalog?", _catalogue, about="the pictures at hand"),
+    Command(
+        "PHOTo<n>:CENTring",
+        _centre,
+        (
+            Quantity("mm", _centring_limits("centring_mm"), name="dx"),
+            Quantity("mm", _centring_limits("centring_mm"), name="dy"),
+            Quantity("gon", _centring_limits("centring_gon"), name="dkappa"),
+        ),
+        turns=True,
+        about="shift and turn the picture from where it was laid",
+    ),
+    Command("PHOTo<n>:CENTring?", _centring),
+    Command(
+        "PHOTo<n>:FIDucial?",
+        _fiducials,
+        about="name,dx,dy,... of the fiducials from their collimating marks, mm",
+    ),
+    Command("PHOTo<n>:SKETch?", _sketch, about="name,x,y,... of the points pricked on the paper print, mm"),
+    Command(
+        "EYEPiece<n>?",
+        _eyepiece,
+        (Quoted("point"),),
+        about="dx,dy of the image from the floating mark, um at photo scale; n is the observer's eye",
+    ),
+    Command(
+        "EYEPiece<n>:PICTure?",
+        _picture,
+        (
+            Quantity(whole=True, name="columns"),
+            Quantity(whole=True, name="rows"),
+            Quantity(name="magnification"),
+        ),
+        about="block of grey bytes, row by row from the top",
+    ),
+    Command(
+        "EYEPiece:STEReo?",
+        _stereo,
+        (Quoted("point"),),
+        about="px,py, left image minus right, um at photo scale",
+    ),
+]

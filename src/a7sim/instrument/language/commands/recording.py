@@ -1,0 +1,105 @@
+"""Registrations, strikes and remarks."""
+
+import re
+from typing import TYPE_CHECKING
+
+from a7sim.instrument.language.commands.parts import ELEMENT_NODES, autograph_of, fixed, text_within
+from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.syntax import quoted
+from a7sim.instrument.language.table import (
+    AnyWord,
+    Call,
+    Command,
+    Quantity,
+    Quoted,
+    short_form,
+)
+from a7sim.instrument.recorder import Registration
+
+if TYPE_CHECKING:
+    from a7sim.instrument.language.engine import Engine
+
+
+_RECORDED = {short_form(node): name for node, name, _, _ in ELEMENT_NODES}
+_RECORDED |= {node.upper(): name for node, name, _, _ in ELEMENT_NODES}
+
+
+_COMMON_TO_BOTH = {"BX": "bx", "CPHI": "common_phi"}
+
+
+def recorded_element(word: str) -> str:
+    """Return the element that a word in a registration names. Raises LanguageError."""
+    if word in _COMMON_TO_BOTH:
+        return _COMMON_TO_BOTH[word]
+    found = re.fullmatch(r"([A-Z]+)([12])", word)
+    if found is None or found[1] not in _RECORDED:
+        raise LanguageError(
+            ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected BX, CPHI or an element such as BY1, got {word}"
+        )
+    return f"{_RECORDED[found[1]]}{found[2]}"
+
+
+def _record(engine: "Engine", call: Call) -> None:
+    autograph = autograph_of(engine)
+    point, *words = call.arguments
+    elements = [(word, fixed(autograph.element(recorded_element(word)))) for word in words]
+    counters = [(axis, autograph.counter_text(axis)) for axis in "XYZ"]
+    autograph.recorder.register(text_within(point), counters + elements)
+
+
+def _last_record(engine: "Engine", call: Call) -> str:
+    registrations = autograph_of(engine).recorder.registrations
+    if not registrations:
+        raise LanguageError(ErrorNumber.EXECUTION_ERROR, "nothing is registered yet")
+    return _shown(registrations[-1])
+
+
+def _numbered_record(engine: "Engine", call: Call) -> str:
+    return _shown(autograph_of(engine).recorder.numbered(int(call.arguments[0])))
+
+
+def _shown(registration: Registration) -> str:
+    counters = [reading for _, reading in registration.readings[:3]]
+    elements = [f"{name},{reading}" for name, reading in registration.readings[3:]]
+    struck = [quoted(f"struck: {registration.struck}")] if registration.struck is not None else []
+    return ",".join([str(registration.number), quoted(registration.point), *counters, *elements, *struck])
+
+
+def _struck_records(engine: "Engine", call: Call) -> str:
+    return str(sum(each.struck is not None for each in autograph_of(engine).recorder.registrations))
+
+
+def _strike(engine: "Engine", call: Call) -> None:
+    number, why = call.arguments
+    autograph_of(engine).recorder.strike(int(number), text_within(why))
+
+
+def _note(engine: "Engine", call: Call) -> None:
+    text_within(call.arguments[0])
+
+
+RECORDING = [
+    Command(
+        "RECord",
+        _record,
+        (Quoted("point"),),
+        repeats=AnyWord("element"),
+        about="register X, Y, Z and the named elements (BY1, KAPP2, BX, CPHI ...) under the point",
+    ),
+    Command(
+        "RECord?",
+        _numbered_record,
+        (Quantity(whole=True, name="number"),),
+        about="a registration as it stands: number, point, X, Y, Z and element,reading ...",
+    ),
+    Command("RECord:LAST?", _last_record, about="number, point, X, Y, Z and element,reading ..."),
+    Command("RECord:COUNt?", lambda e, c: str(len(autograph_of(e).recorder.registrations)), about="registrations"),
+    Command(
+        "RECord:STRike",
+        _strike,
+        (Quantity(whole=True, name="number"), Quoted("why")),
+        about="strike a registration out; it stays, marked",
+    ),
+    Command("RECord:STRike:COUNt?", _struck_records, about="registrations that are struck out"),
+    Command("NOTE", _note, (Quoted("text"),), about="a remark into the journal"),
+]

@@ -1,0 +1,128 @@
+"""Common commands of IEEE 488.2, status and system."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from a7sim.instrument.language.commands.parts import autograph_of
+from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.status import Register
+from a7sim.instrument.language.syntax import quoted
+from a7sim.instrument.language.table import (
+    Call,
+    Command,
+    Quantity,
+    Quoted,
+)
+from a7sim.manual import SCPI_VERSION
+
+if TYPE_CHECKING:
+    from a7sim.instrument.language.engine import Engine
+
+
+def _identity(engine: "Engine", call: Call) -> str:
+    autograph = autograph_of(engine)
+    return f"WILD HEERBRUGG,{autograph.variant.name},{autograph.serial},{engine.desk.version}"
+
+
+def _clear(engine: "Engine", call: Call) -> None:
+    engine.clear()
+
+
+def _complete(engine: "Engine", call: Call) -> None:
+    engine.complete()
+
+
+def _reset(engine: "Engine", call: Call) -> None:
+    engine.forget_completion()
+    autograph_of(engine).reset()
+
+
+def _mask(call: Call, largest: int) -> int:
+    value = call.arguments[0]
+    if not 0 <= value <= largest:
+        raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 0 to {largest}, got {value:g}")
+    return int(value)
+
+
+def _enable_events(engine: "Engine", call: Call) -> None:
+    engine.status.event_enable = _mask(call, 255)
+
+
+def _enable_service(engine: "Engine", call: Call) -> None:
+    engine.status.service_enable = _mask(call, 255) & ~64
+
+
+def _preset_status(engine: "Engine", call: Call) -> None:
+    engine.status.operation.enable = engine.status.questionable.enable = 0
+
+
+def _release(engine: "Engine", call: Call) -> None:
+    engine.desk.release_lock(engine.client)
+
+
+def _log_in(engine: "Engine", call: Call) -> None:
+    engine.log_in(call.arguments[0])
+
+
+def _registers(node: str, which: Callable[["Engine"], Register]) -> list[Command]:
+    def enable(engine: "Engine", call: Call) -> None:
+        which(engine).enable = _mask(call, 65535) & 32767
+
+    return [
+        Command(
+            f"STATus:{node}[:EVENt]?",
+            lambda e, c: str(which(e).read_event()),
+            polls=True,
+            about="events, cleared by reading",
+        ),
+        Command(
+            f"STATus:{node}:CONDition?",
+            lambda e, c: str(which(e).condition),
+            polls=True,
+            about="condition now",
+        ),
+        Command(f"STATus:{node}:ENABle", enable, (Quantity(whole=True, name="mask"),), about="what is reported"),
+        Command(f"STATus:{node}:ENABle?", lambda e, c: str(which(e).enable)),
+    ]
+
+
+SYSTEM = [
+    Command("*CLS", _clear, about="clear events and errors"),
+    Command("*ESE", _enable_events, (Quantity(whole=True, name="mask"),), about="events that bit 5 sums up"),
+    Command("*ESE?", lambda e, c: str(e.status.event_enable)),
+    Command("*ESR?", lambda e, c: str(e.status.read_event()), polls=True, about="standard events, cleared by reading"),
+    Command("*IDN?", _identity, open_to_all=True, about="maker, type, serial number, version"),
+    Command("*OPC", _complete, about="raise bit 0 of the events when all movement is done"),
+    Command("*OPC?", lambda e, c: "1", waits=True, about="1 when all movement is done"),
+    Command(
+        "*RST",
+        _reset,
+        turns=True,
+        about="elements to their zeros, base inside, fittings for a positive, no presets",
+    ),
+    Command("*SRE", _enable_service, (Quantity(whole=True, name="mask"),), about="bits that ask for service"),
+    Command("*SRE?", lambda e, c: str(e.status.service_enable)),
+    Command("*STB?", lambda e, c: str(e.status.status_byte()), polls=True, about="status byte"),
+    Command("*TST?", lambda e, c: "0", about="0: the instrument finds itself in order"),
+    Command("*WAI", lambda e, c: None, waits=True, about="wait until all movement is done"),
+    Command("SYSTem:ERRor[:NEXT]?", lambda e, c: e.status.next_error(), about="oldest error, taken off the queue"),
+    Command("SYSTem:ERRor:COUNt?", lambda e, c: str(len(e.status.errors)), about="errors in the queue"),
+    Command("SYSTem:VERSion?", lambda e, c: SCPI_VERSION, about="version of SCPI"),
+    Command("SYSTem:HELP:HEADers?", lambda e, c: ",".join(map(quoted, e.headers)), about="all headers, in quotes"),
+    Command(
+        "SYSTem:LOCK:REQuest?",
+        lambda e, c: "1" if e.desk.request_lock(e.client) else "0",
+        about="1: this client alone may turn now; 0: another may",
+    ),
+    Command(
+        "SYSTem:LOGin",
+        _log_in,
+        (Quoted("token"),),
+        open_to_all=True,
+        about="first of all, where the instrument is served to other machines",
+    ),
+    Command("SYSTem:LOCK:RELease", _release, about="give the lock back"),
+    *_registers("OPERation", lambda e: e.status.operation),
+    *_registers("QUEStionable", lambda e: e.status.questionable),
+    Command("STATus:PRESet", _preset_status, about="report nothing of the two registers"),
+]
