@@ -11,8 +11,9 @@ import pytest
 
 from a7sim.session.fleet_hands import FleetHands
 from a7sim.study.auditing import audited
+from a7sim.study.checkpoint import KINDS, checkpoint_in, load
 from a7sim.study.executors import InProcess
-from a7sim.study.folder import CHECKPOINT, FILES, PAGE
+from a7sim.study.folder import FILES, PAGE
 from a7sim.study.loading import load_study
 from a7sim.study.running import work
 from a7sim.study.tally import Tally
@@ -77,15 +78,18 @@ def test_a_study_that_was_killed_goes_on_to_the_same_bytes_and_leaves_no_worker_
     out = tmp_path / "out"
     command = [*COMMAND, "study", str(path), "--workers", "1", "--out", str(out)]
     killed = subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _wait_until((out / CHECKPOINT).exists)
+    _wait_until(checkpoint_in(out).exists)
     os.kill(killed.pid, signal.SIGKILL)
     killed.wait()
     _wait_until(lambda: _gone(killed.pid))
     laid = load_study(path)
-    assert 0 < Tally.load(out / CHECKPOINT, laid.identity).done.sum() < 24
+    assert 0 < load(checkpoint_in(out), laid.identity).done.sum() < 24
     assert said_here(capsys, "study", path, "--executor", "process", "--out", out, "--quiet").returncode == 0
-    for name in FILES:
-        assert (out / name).read_bytes() == (whole / name).read_bytes(), name
+    assert _files_in(out) == _files_in(whole)
+
+
+def _files_in(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 def _gone(group):
@@ -114,7 +118,8 @@ def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, c
     told = said_here(capsys, "study", study[0], "--replicates", 2, "--executor", "process", "--out", tmp_path / "out")
     assert told.returncode == 0
     assert "matplotlib" in told.stderr
-    assert {each.name for each in (tmp_path / "out").iterdir()} == set(FILES) - {PAGE}
+    expected = {*FILES, checkpoint_in(tmp_path).name} - {PAGE} - ({*KINDS} - {checkpoint_in(tmp_path).name})
+    assert set(_files_in(tmp_path / "out")) == expected
 
 
 @pytest.mark.parametrize(

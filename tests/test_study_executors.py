@@ -12,6 +12,7 @@ import pytest
 
 from a7sim.documents import as_json
 from a7sim.mistakes import Mistake
+from a7sim.study.checkpoint import checkpoint_in, save
 from a7sim.study.executors import opened
 from a7sim.study.findings import document_of
 from a7sim.study.folder import leave
@@ -39,7 +40,7 @@ def left(study, tally, folder):
     folder.mkdir()
     document = document_of(study, tally)
     leave(folder, study, tally, document)
-    tally.save(folder / "checkpoint", study.identity)
+    save(tally, checkpoint_in(folder), study.identity)
     return {path.name: path.read_bytes() for path in folder.iterdir()} | {"--json": as_json(document)}
 
 

@@ -24,9 +24,10 @@ from a7sim.cli.options import of_a_folder, of_results
 from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.study.auditing import audited
+from a7sim.study.checkpoint import checkpoint_in
 from a7sim.study.executors import KINDS, Kind, opened
 from a7sim.study.findings import document_of
-from a7sim.study.folder import CHECKPOINT, begun, leave, leave_page
+from a7sim.study.folder import begun, leave, leave_page
 from a7sim.study.loading import Laid, load_study
 from a7sim.study.running import work
 from a7sim.study.tables import of_study
@@ -73,7 +74,7 @@ def command(
     with opened(executor, workers, scheduler) as (others, at_once):
         tally = begun(laid, out, force)
         with _watched(laid, tally, as_document or quiet) as (progress, task):
-            checkpoint = out / CHECKPOINT if out is not None else None
+            checkpoint = checkpoint_in(out) if out is not None else None
             work(laid, tally, others, at_once, checkpoint, lambda done: progress.advance(task, done))
     document = document_of(laid, tally)
     if out is not None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from a7sim.geometry import Array
 from a7sim.scenario import Scenario
+from a7sim.study.checkpoint import save
 from a7sim.study.loading import Laid
 from a7sim.study.simulating import seed_of, together
 from a7sim.study.tally import Tally
@@ -60,11 +61,11 @@ def work(
             tally.add(chunk.cell, values)
             tick(len(chunk.seeds))
             if checkpoint is not None and time.monotonic() - saved_at > pace.save_seconds:
-                tally.save(checkpoint, laid.identity)
+                save(tally, checkpoint, laid.identity)
                 saved_at = time.monotonic()
     finally:
         if checkpoint is not None:
-            tally.save(checkpoint, laid.identity)
+            save(tally, checkpoint, laid.identity)
 
 
 def reached(laid: Laid, tally: Tally) -> bool:
