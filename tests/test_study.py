@@ -139,14 +139,26 @@ MISTAKES = {
         },
         "plan.centre_levels: expected 3686 to 6486",
     ),
+    "tilts beyond an element": (
+        {
+            "scenario": "akwanga",
+            "settings": {},
+            "factor": [{"name": "f", "path": "photos.0.omega", "levels": [1.0, -12.0]}],
+            "responses": ["hours"],
+        },
+        "omega1 of the A7 can take (70 to 109 gon), got 111",
+    ),
+    "a scenario in its place": ({"photos": []}, "expected a study, got a scenario"),
+    "a study in the place of its scenario": ({"scenario": "study.toml"}, "expected a scenario, got a study"),
 }
 
 
 @pytest.mark.parametrize("name", list(MISTAKES))
 def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
     changes, words = MISTAKES[name]
+    (tmp_path / "study.toml").write_text('responses = ["hours"]')
     with pytest.raises(Mistake) as told:
-        laid(tmp_path, **changes)
+        laid(tmp_path, **changes) if "photos" not in changes else study_of(changes, tmp_path)
     assert words in str(told.value)
     assert str(told.value).startswith("study: ")
     assert len(str(told.value).splitlines()) == 1
