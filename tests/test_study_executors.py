@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -20,6 +21,7 @@ from a7sim.study.loading import study_of
 from a7sim.study.running import Pace, work
 from a7sim.study.tally import Tally
 from tests.processes import said_here
+from tests.served import PATIENCE
 from tests.test_study import BY_COMPARATOR
 
 RUN_BY_MPI = shutil.which("mpiexec", path=os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]]))  # noqa: PTH120
@@ -82,6 +84,17 @@ def test_a_pool_that_lost_a_worker_says_so_and_the_study_goes_on_to_the_same_byt
     assert 0 < tally.done.sum() < 12
     worked(study, tally, "process", None)
     assert left(study, tally, tmp_path / "out") == alone
+
+
+def test_an_interrupted_pool_does_not_wait_for_what_its_workers_do():
+    with pytest.raises(KeyboardInterrupt), opened("pool", 1) as (executor, _):
+        worker = executor.submit(os.getpid).result()
+        executor.submit(time.sleep, 10 * PATIENCE)
+        began = time.monotonic()
+        raise KeyboardInterrupt
+    assert time.monotonic() - began < PATIENCE
+    with pytest.raises(ProcessLookupError):
+        os.kill(worker, 0)
 
 
 @pytest.mark.slow

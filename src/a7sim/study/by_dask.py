@@ -2,6 +2,7 @@
 
 import logging
 import re
+import signal
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor
 from contextlib import ExitStack, contextmanager
@@ -44,6 +45,7 @@ def on_dask(scheduler: str | None, workers: int) -> Iterator[tuple[Executor, int
                     host="127.0.0.1",
                     dashboard_address=None,
                     silence_logs=logging.CRITICAL,
+                    preload=__name__,
                 )
             )
         else:
@@ -59,6 +61,11 @@ def on_dask(scheduler: str | None, workers: int) -> Iterator[tuple[Executor, int
             yield executor, at_once
         except (distributed.scheduler.KilledWorker, distributed.CancelledError, CancelledError) as error:
             raise Mistake(f"dask lost its scheduler, or one worker after the other; {GOES_ON}") from error
+
+
+def dask_setup(worker: object) -> None:
+    """Let the process that asked decide what an interrupt ends; dask calls this in the workers of this computer."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _checked(scheduler: str) -> str:

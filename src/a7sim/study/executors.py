@@ -5,7 +5,8 @@ import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from threading import Thread
 from typing import Any, Literal, ParamSpec, TypeVar, get_args
 
@@ -68,27 +69,30 @@ def opened(kind: Kind, workers: int | None = None, scheduler: str | None = None)
 
 @contextmanager
 def _pool(workers: int) -> Iterator[Executor]:
-    with _environment(dict.fromkeys(_ONE_THREAD, "1")):
-        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_as_a_worker)
+    context = get_context("spawn")
+    theirs, ours = context.Pipe(duplex=False)
+    with theirs, ours, _environment(dict.fromkeys(_ONE_THREAD, "1")):
+        pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_as_a_worker, initargs=(theirs,))
         try:
             yield pool
-        except BrokenExecutor as error:
-            raise Mistake(f"a worker of the study was lost (killed, or out of memory); {GOES_ON}") from error
+        except BaseException as error:
+            ours.close()
+            if isinstance(error, BrokenExecutor):
+                raise Mistake(f"a worker of the study was lost (killed, or out of memory); {GOES_ON}") from error
+            raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _as_a_worker() -> None:
-    """Let the process that asked decide what an interrupt ends, and end with it, however it ends."""
+def _as_a_worker(asker: "Connection[Any, Any]") -> None:
+    """Let the process that asked decide what an interrupt ends, and end once it lets go, or ends in whatever way."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_parent, daemon=True).start()
+    Thread(target=_end_with, args=(asker,), daemon=True).start()
 
 
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+def _end_with(asker: "Connection[Any, Any]") -> None:
+    asker.poll(None)
+    os._exit(1)
 
 
 @contextmanager
