@@ -5,6 +5,7 @@ import pytest
 
 from a7sim.mistakes import Mistake
 from a7sim.study.cells import cells_of
+from a7sim.study.checkpoint import save
 from a7sim.study.executors import opened
 from a7sim.study.loading import SHELVES, load_study, study_of
 from a7sim.study.running import Pace, work
@@ -67,13 +68,13 @@ def test_every_study_that_comes_with_a7sim_can_be_laid_out(name):
 
 def numbers_of(laid_study, kind="process", largest_chunk=2000, tally=None):
     tally = tally or Tally.empty(len(laid_study.cells), len(laid_study.responses))
-    with opened(kind, 2) as (executor, at_once):
+    with opened(kind, 2 if kind == "pool" else None) as (executor, at_once):
         work(laid_study, tally, executor, at_once, pace=Pace(largest_chunk=largest_chunk))
     return tally
 
 
 def bytes_of(tally, folder):
-    tally.save(folder / "tally.npz", "study")
+    save(tally, folder / "tally.npz", "study")
     return (folder / "tally.npz").read_bytes()
 
 
@@ -97,46 +98,6 @@ def test_cells_share_their_random_numbers_so_that_the_same_level_gives_the_same_
     tally = numbers_of(study)
     assert np.array_equal(tally.sample(0), tally.sample(1))
     assert len(set(tally.sample(0)[0])) == 6
-
-
-def test_moments_are_those_of_numpy_and_leave_out_who_gave_up():
-    rng = np.random.default_rng(3)
-    values = rng.normal(1e6, 1e-3, (2, 500))
-    values[1, ::7] = np.nan
-    tally = Tally.empty(1, 2)
-    for part in np.split(values, (1, 30, 400), axis=1):
-        tally.add(0, part)
-    assert tally.mean[0] == pytest.approx(np.nanmean(values, axis=1), rel=1e-14)
-    assert tally.sd[0] == pytest.approx(np.nanstd(values, axis=1, ddof=1), rel=1e-6)
-    assert tally.count[0].tolist() == [500, np.isfinite(values[1]).sum()]
-    assert (tally.low[0] == np.nanmin(values, axis=1)).all()
-    assert (tally.high[0] == np.nanmax(values, axis=1)).all()
-
-
-def test_the_sample_is_bounded_and_the_moments_are_not(monkeypatch):
-    monkeypatch.setattr("a7sim.study.tally.SAMPLE", 10)
-    tally = Tally.empty(1, 1)
-    for start in range(0, 28, 4):
-        tally.add(0, np.arange(start, start + 4.0)[None])
-    assert tally.sample(0).tolist() == [list(range(10))]
-    assert (int(tally.done[0]), float(tally.mean[0, 0])) == (28, 13.5)
-
-
-def test_a_study_with_more_replicates_goes_on_from_the_checkpoint_of_one_with_fewer(by_comparator, tmp_path):
-    study, tally = by_comparator
-    checkpoint = tmp_path / "checkpoint.npz"
-    numbers_of(laid(tmp_path, replicates=4)).save(checkpoint, laid(tmp_path, replicates=4).identity)
-    resumed = numbers_of(study, tally=Tally.load(checkpoint, study.identity))
-    assert bytes_of(resumed, tmp_path) == bytes_of(tally, tmp_path)
-
-
-def test_the_checkpoint_of_another_study_is_refused(tmp_path):
-    Tally.empty(2, 2).save(tmp_path / "c.npz", laid(tmp_path, seed=6).identity)
-    with pytest.raises(Mistake, match="got that of another"):
-        Tally.load(tmp_path / "c.npz", laid(tmp_path).identity)
-    (tmp_path / "c.npz").write_bytes(b"nothing")
-    with pytest.raises(Mistake, match="got a file that is none"):
-        Tally.load(tmp_path / "c.npz", laid(tmp_path).identity)
 
 
 @pytest.mark.parametrize(("half_width", "replicates"), [(10.0, 2), (1e-6, 5)])
@@ -178,14 +139,26 @@ MISTAKES = {
         },
         "plan.centre_levels: expected 3686 to 6486",
     ),
+    "tilts beyond an element": (
+        {
+            "scenario": "akwanga",
+            "settings": {},
+            "factor": [{"name": "f", "path": "photos.0.omega", "levels": [1.0, -12.0]}],
+            "responses": ["hours"],
+        },
+        "omega1 of the A7 can take (70 to 109 gon), got 111",
+    ),
+    "a scenario in its place": ({"photos": []}, "expected a study, got a scenario"),
+    "a study in the place of its scenario": ({"scenario": "study.toml"}, "expected a scenario, got a study"),
 }
 
 
 @pytest.mark.parametrize("name", list(MISTAKES))
 def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
     changes, words = MISTAKES[name]
+    (tmp_path / "study.toml").write_text('responses = ["hours"]')
     with pytest.raises(Mistake) as told:
-        laid(tmp_path, **changes)
+        laid(tmp_path, **changes) if "photos" not in changes else study_of(changes, tmp_path)
     assert words in str(told.value)
     assert str(told.value).startswith("study: ")
     assert len(str(told.value).splitlines()) == 1

@@ -9,13 +9,10 @@ import time
 
 import pytest
 
-from a7sim.session.fleet_hands import FleetHands
-from a7sim.study.auditing import audited
-from a7sim.study.executors import InProcess
-from a7sim.study.folder import CHECKPOINT, FILES, PAGE
+from a7sim.study.auditing import Difference
+from a7sim.study.checkpoint import KINDS, checkpoint_in, load
+from a7sim.study.folder import FILES, PAGE
 from a7sim.study.loading import load_study
-from a7sim.study.running import work
-from a7sim.study.tally import Tally
 from tests.processes import COMMAND, a7sim, said_here
 from tests.served import PATIENCE
 
@@ -31,15 +28,6 @@ settings = { work = ["comparator"] }
 name = "pointings"
 path = "comparator.pointings"
 levels = [1, 4]
-"""
-AT_THE_PLOTTER = """
-schema_version = 1
-title = "As it stands"
-question = "What does a model come to?"
-scenario = "akwanga"
-replicates = 1
-responses = ["residual_parallax_mm", "centre_Z_error", "hours"]
-settings = { models = [{ name = "1", left = "101", right = "102" }], "plan.parallax_readings" = 1 }
 """
 
 
@@ -77,15 +65,18 @@ def test_a_study_that_was_killed_goes_on_to_the_same_bytes_and_leaves_no_worker_
     out = tmp_path / "out"
     command = [*COMMAND, "study", str(path), "--workers", "1", "--out", str(out)]
     killed = subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _wait_until((out / CHECKPOINT).exists)
+    _wait_until(checkpoint_in(out).exists)
     os.kill(killed.pid, signal.SIGKILL)
     killed.wait()
     _wait_until(lambda: _gone(killed.pid))
     laid = load_study(path)
-    assert 0 < Tally.load(out / CHECKPOINT, laid.identity).done.sum() < 24
+    assert 0 < load(checkpoint_in(out), laid.identity).done.sum() < 24
     assert said_here(capsys, "study", path, "--executor", "process", "--out", out, "--quiet").returncode == 0
-    for name in FILES:
-        assert (out / name).read_bytes() == (whole / name).read_bytes(), name
+    assert _files_in(out) == _files_in(whole)
+
+
+def _files_in(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 def _gone(group):
@@ -114,7 +105,8 @@ def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, c
     told = said_here(capsys, "study", study[0], "--replicates", 2, "--executor", "process", "--out", tmp_path / "out")
     assert told.returncode == 0
     assert "matplotlib" in told.stderr
-    assert {each.name for each in (tmp_path / "out").iterdir()} == set(FILES) - {PAGE}
+    expected = {*FILES, checkpoint_in(tmp_path).name} - {PAGE} - ({*KINDS} - {checkpoint_in(tmp_path).name})
+    assert set(_files_in(tmp_path / "out")) == expected
 
 
 @pytest.mark.parametrize(
@@ -139,20 +131,13 @@ def test_a_folder_of_something_else_is_left_alone(study, tmp_path, capsys):
     assert [each.name for each in tmp_path.iterdir()] == ["precious"]
 
 
-def test_an_audit_finds_a_batch_bench_that_is_off_by_one_count(tmp_path, monkeypatch):
-    """The audit agrees with the true bench in every digit, and not with one whose counter shows a count too much."""
-    path = tmp_path / "cases.toml"
-    path.write_text(AT_THE_PLOTTER)
-    laid = load_study(path)
-    tally = Tally.empty(1, 3)
-    work(laid, tally, InProcess())
-    assert audited(laid, tally, 1) == []
-    truly = FleetHands.elements
-
-    def a_count_too_much(self, who, names):
-        return {name: counts + 0.01 * (name == "by1") for name, counts in truly(self, who, names).items()}
-
-    monkeypatch.setattr(FleetHands, "elements", a_count_too_much)
-    off = Tally.empty(1, 3)
-    work(laid, off, InProcess())
-    assert {each.response for each in audited(laid, off, 1)} >= {"residual_parallax_mm"}
+def test_a_failed_audit_is_one_sentence_and_exit_code_3(study, capsys, monkeypatch):
+    path, out, _ = study
+    differences = [Difference(2, each, 99, "strip.rms", 0.25, 0.5, 7) for each in (3, 4)]
+    monkeypatch.setattr("a7sim.cli.study.audited", lambda laid, tally, picks: differences)
+    told = said_here(capsys, "study", path, "--executor", "process", "--out", out, "--audit", 5, "--quiet")
+    assert (told.returncode, told.stdout) == (3, "")
+    assert told.stderr == (
+        "a7sim: 2 of 5 sessions differ over the link; cell 2, replicate 3, seed 99: "
+        "strip.rms is 0.25 on the batch bench and 0.5 over the link (7 values more differ)\n"
+    )

@@ -24,9 +24,10 @@ from a7sim.cli.options import of_a_folder, of_results
 from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.study.auditing import audited
+from a7sim.study.checkpoint import checkpoint_in
 from a7sim.study.executors import KINDS, Kind, opened
 from a7sim.study.findings import document_of
-from a7sim.study.folder import CHECKPOINT, begun, leave, leave_page
+from a7sim.study.folder import begun, leave, leave_page
 from a7sim.study.loading import Laid, load_study
 from a7sim.study.running import work
 from a7sim.study.tables import of_study
@@ -41,9 +42,10 @@ from a7sim.study.tally import Tally
     type=click.Choice(KINDS),
     default="pool",
     show_default=True,
-    help="Who works: this process alone, or a pool of others.",
+    help="Who works: this process alone, a pool of others, dask, or MPI.",
 )
-@click.option("--workers", type=click.IntRange(min=1), help="Of the pool; as many as there are cores.")
+@click.option("--workers", type=click.IntRange(min=1), help="Of the pool or of dask here; as many as there are cores.")
+@click.option("--scheduler", metavar="URL", help="Of dask, such as tcp://HOST:8786, whose workers work; else its own.")
 @click.option("--audit", type=click.IntRange(min=1), metavar="N", help="Work N picked sessions again over the link.")
 @of_a_folder
 @of_results
@@ -52,6 +54,7 @@ def command(
     replicates: int | None,
     executor: Kind,
     workers: int | None,
+    scheduler: str | None,
     audit: int | None,
     out: Path | None,
     force: bool,
@@ -63,16 +66,16 @@ def command(
     A study that was cut off goes on with the same command, and one that is done goes on with more --replicates.
     With --audit, exit code 3 where a session over the link gives another digit than the batch bench.
 
+    With --executor mpi, start it as `mpiexec -n 5 a7sim study STUDY --executor mpi`: one process asks, four work.
+
     Example: a7sim study levels --replicates 50 --out runs/levels --audit 4
     """
     laid = load_study(study, replicates)
-    tally = begun(laid, out, force)
-    with (
-        _watched(laid, tally, as_document or quiet) as (progress, task),
-        opened(executor, workers) as (others, at_once),
-    ):
-        checkpoint = out / CHECKPOINT if out is not None else None
-        work(laid, tally, others, at_once, checkpoint, lambda done: progress.advance(task, done))
+    with opened(executor, workers, scheduler) as (others, at_once):
+        tally = begun(laid, out, force)
+        with _watched(laid, tally, as_document or quiet) as (progress, task):
+            checkpoint = checkpoint_in(out) if out is not None else None
+            work(laid, tally, others, at_once, checkpoint, lambda done: progress.advance(task, done))
     document = document_of(laid, tally)
     if out is not None:
         leave(out, laid, tally, document)
@@ -95,12 +98,11 @@ def _leave_page(out: Path, document: Document) -> None:
 
 def _audit(laid: Laid, tally: Tally, picks: int, silent: bool) -> None:
     differences = audited(laid, tally, picks)
-    for each in differences:
-        click.echo(f"a7sim: {each}", err=True)
+    worked = min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells))))
     if differences:
+        click.echo(f"a7sim: {len(differences)} of {worked} sessions differ over the link; {differences[0]}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
     if not silent:
-        worked = min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells))))
         click.echo(f"{worked} sessions worked again over the link gave the same digits.")
 
 

@@ -80,6 +80,8 @@ def load_scenario(
 
 def scenario_of(raw: Mapping[str, Any], folder: Path, source: str = "scenario") -> Scenario:
     """Return the scenario of raw tables whose files stand in `folder`. Raises ScenarioError."""
+    if "photos" not in raw and "responses" in raw:
+        raise ScenarioError(source, ["expected a scenario, got a study (`a7sim study` takes it)"])
     raw = _with_models(_with_profile(_with_skill_as_table(raw)))
     mistakes = [
         *mistakes_of_form(raw, _expected()),

@@ -1,52 +1,102 @@
-"""An audit: replicates picked from a study are worked again, alone and over the link, and must give every digit."""
+"""An audit: replicates picked from a study are worked again on both benches, and must be the same in all they leave."""
 
-from collections.abc import Callable
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from a7sim.session.ways import run_all_ways
 from a7sim.study.loading import Laid
-from a7sim.study.simulating import alone, seed_of
+from a7sim.study.responses import SIGNIFICANT
+from a7sim.study.simulating import crowded, seed_of
 from a7sim.study.tally import Tally
 
 _STREAM = 11
 """Spawns the picks."""
+_AS_NOTHING = 1e-9
+"""What is left where two sums cancel; a least count is far above."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A response of a replicate that is not the same over the link."""
+    """What is not the same over the link in a session: the first of it."""
 
     cell: int
     replicate: int
     seed: int
-    response: str
-    on_the_bench: float
-    over_the_link: float
+    place: str
+    """A response, or the path of a value in the results."""
+    on_the_bench: Any
+    over_the_link: Any
+    others: int = 0
+    """How many values more are not the same."""
 
     def __str__(self) -> str:
-        where = f"cell {self.cell}, replicate {self.replicate}, seed {self.seed}"
+        more = f" ({self.others} values more differ)" if self.others else ""
         return (
-            f"{where}: {self.response} is {self.on_the_bench:.10g} on the batch bench and "
-            f"{self.over_the_link:.10g} over the link"
+            f"cell {self.cell}, replicate {self.replicate}, seed {self.seed}: {self.place} is "
+            f"{_said(self.on_the_bench)} on the batch bench and {_said(self.over_the_link)} over the link{more}"
         )
 
 
 def audited(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] = lambda: None) -> list[Difference]:
-    """Work so many picked replicates over the link and return all that differs from the tally, to the last digit.
+    """Work so many picked replicates on both benches and return a difference for every one that is not the same.
 
-    The picks follow from the study's seed, each another replicate; fewer where the study has fewer.
+    Over the link a replicate must give the responses that the tally holds, to the last digit, and all values of the
+    results that the batch bench gives: settings, readings, centres, model coordinates, strip. The picks follow from the
+    study's seed, each another replicate; fewer where the study has fewer.
     """
-    samples = [tally.sample(i) for i in range(len(laid.cells))]
-    there = [(i, replicate) for i, sample in enumerate(samples) for replicate in range(sample.shape[1])]
-    rng = np.random.default_rng(np.random.SeedSequence(laid.study.seed, spawn_key=(_STREAM,)))
+    picked = _picked(laid, tally, picks)
     found = []
+    for i, replicates in picked.items():
+        seeds = [seed_of(laid.study.seed, replicate) for replicate in replicates]
+        sample = tally.sample(i)
+        for replicate, seed, on_the_bench in zip(replicates, seeds, crowded(laid.scenarios[i], seeds), strict=True):
+            linked = run_all_ways(laid.scenarios[i], seed)
+            kept = zip(laid.responses, sample[:, replicate].tolist(), strict=True)
+            differences = [
+                *((response.name, one, other) for response, one in kept if _off(one, other := response.of(linked))),
+                *_different(on_the_bench, linked),
+            ]
+            if differences:
+                where = (laid.cells[i].number, replicate + 1, seed)
+                found.append(Difference(*where, *differences[0], others=len(differences) - 1))
+            tick()
+    return found
+
+
+def _picked(laid: Laid, tally: Tally, picks: int) -> Mapping[int, list[int]]:
+    """Return the picked replicates by the place of their cell."""
+    there = [(i, replicate) for i in range(len(laid.cells)) for replicate in range(tally.sample(i).shape[1])]
+    rng = np.random.default_rng(np.random.SeedSequence(laid.study.seed, spawn_key=(_STREAM,)))
+    picked = defaultdict(list)
     for pick in rng.permutation(len(there))[:picks].tolist():
         i, replicate = there[pick]
-        seed = seed_of(laid.study.seed, replicate)
-        again = alone(laid.scenarios[i], seed, laid.study.responses)
-        for name, one, other in zip(laid.study.responses, samples[i][:, replicate].tolist(), again, strict=True):
-            if not np.array_equal(one, other, equal_nan=True):
-                found.append(Difference(laid.cells[i].number, replicate + 1, seed, name, one, float(other)))
-        tick()
-    return found
+        picked[i].append(replicate)
+    return picked
+
+
+def _off(one: float, other: float) -> bool:
+    return one != other and not (math.isnan(one) and math.isnan(other))
+
+
+def _different(bench: Any, link: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yield place and values of whatever of the batch bench's results is not so over the link, which tell more."""
+    if isinstance(bench, Mapping) and isinstance(link, Mapping):
+        for name, value in bench.items():
+            yield from _different(value, link.get(name), f"{place}.{name}".lstrip("."))
+    elif isinstance(bench, list | tuple) and isinstance(link, list | tuple) and len(bench) == len(link):
+        for i, (one, other) in enumerate(zip(bench, link, strict=True)):
+            yield from _different(one, other, f"{place}.{i}")
+    elif isinstance(bench, float) and isinstance(link, float):
+        if not (math.isclose(bench, link, rel_tol=10.0**-SIGNIFICANT, abs_tol=_AS_NOTHING) or not _off(bench, link)):
+            yield place, bench, link
+    elif bench != link:
+        yield place, bench, link
+
+
+def _said(value: Any) -> str:
+    return f"{value:.{SIGNIFICANT}g}" if isinstance(value, float) else str(value)[:60]

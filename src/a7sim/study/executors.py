@@ -1,16 +1,22 @@
-"""Who works the chunks of a study: this process or a pool of others, behind one interface."""
+"""Who works the chunks of a study: this process, a pool of others, dask or MPI, behind one interface."""
 
 import os
 import signal
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from threading import Thread
 from typing import Any, Literal, ParamSpec, TypeVar, get_args
 
-Kind = Literal["process", "pool"]
+from a7sim.mistakes import Mistake
+
+Kind = Literal["process", "pool", "dask", "mpi"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+
+GOES_ON = "the same command goes on where a checkpoint was left (--out)"
+"""What to do about a study that ended too early."""
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -32,31 +38,61 @@ class InProcess(Executor):
 
 
 @contextmanager
-def opened(kind: Kind, workers: int | None = None) -> Iterator[tuple[Executor, int]]:
-    """Yield an executor and how many chunks it works at once; what was not begun is dropped in the end."""
+def opened(kind: Kind, workers: int | None = None, scheduler: str | None = None) -> Iterator[tuple[Executor, int]]:
+    """Yield an executor and how many chunks it works at once; what was not begun is dropped in the end.
+
+    `workers` are of the pool, or of the cluster that dask makes on this computer where no `scheduler` is given.
+    Raises Mistake for what is not installed or does not answer, and where a worker is lost in the body.
+    """
+    if scheduler is not None and kind != "dask":
+        raise Mistake(f"--scheduler: expected it beside --executor dask, got --executor {kind}")
+    if workers is not None and (scheduler is not None or kind in ("process", "mpi")):
+        asked = f"--executor {kind}" if scheduler is None else "--scheduler, which has workers of its own"
+        raise Mistake(f"--workers: expected it for a pool or for dask on this computer, got {asked}")
     workers = workers or os.cpu_count() or 1
     if kind == "process":
         yield InProcess(), 1
-        return
-    with _environment(dict.fromkeys(_ONE_THREAD, "1")):
-        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_as_a_worker)
-        try:
+    elif kind == "pool":
+        with _pool(workers) as pool:
             yield pool, workers
+    elif kind == "dask":
+        from a7sim.study.by_dask import on_dask  # noqa: PLC0415
+
+        with on_dask(scheduler, workers) as working:
+            yield working
+    else:
+        from a7sim.study.by_mpi import on_mpi  # noqa: PLC0415
+
+        with on_mpi(dict.fromkeys(_ONE_THREAD, "1")) as working:
+            yield working
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[Executor]:
+    context = get_context("spawn")
+    theirs, ours = context.Pipe(duplex=False)
+    with theirs, ours, _environment(dict.fromkeys(_ONE_THREAD, "1")):
+        pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_as_a_worker, initargs=(theirs,))
+        try:
+            yield pool
+        except BaseException as error:
+            ours.close()
+            if isinstance(error, BrokenExecutor):
+                raise Mistake(f"a worker of the study was lost (killed, or out of memory); {GOES_ON}") from error
+            raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _as_a_worker() -> None:
-    """Let the process that asked decide what an interrupt ends, and end with it, however it ends."""
+def _as_a_worker(asker: "Connection[Any, Any]") -> None:
+    """Let the process that asked decide what an interrupt ends, and end once it lets go, or ends in whatever way."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_parent, daemon=True).start()
+    Thread(target=_end_with, args=(asker,), daemon=True).start()
 
 
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+def _end_with(asker: "Connection[Any, Any]") -> None:
+    asker.poll(None)
+    os._exit(1)
 
 
 @contextmanager

@@ -72,7 +72,8 @@ def _spread(laid: Laid, tally: Tally, at: tuple[int, int], sample: Array) -> Doc
         return {"count": 0}
     mean, sd = float(tally.mean[at]), float(tally.sd[at])
     known = sample[np.isfinite(sample)]
-    quantiles = {share: quantile_with_interval(known, share) for share in QUANTILES}
+    values, counts = tally.spread(*at)
+    quantiles = {share: quantile_with_interval(values, share, counts) for share in QUANTILES}
     return {
         "count": count,
         "mean": mean,

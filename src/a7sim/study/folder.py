@@ -2,24 +2,25 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from a7sim.documents import Document, as_json
 from a7sim.files import csv_text
 from a7sim.mistakes import Mistake
 from a7sim.session.folder import RESULTS, write_whole
+from a7sim.study import checkpoint
 from a7sim.study.loading import Laid
 from a7sim.study.page import page_of
 from a7sim.study.simulating import seed_of
 from a7sim.study.tally import Tally
 
-CHECKPOINT, CELLS, COMPARISONS, REPLICATES, PAGE = (
-    "checkpoint.npz",
+CELLS, COMPARISONS, REPLICATES, PAGE = (
     "cells.csv",
     "comparisons.csv",
     "replicates.csv",
     "study.html",
 )
-FILES = (CHECKPOINT, CELLS, COMPARISONS, REPLICATES, PAGE, RESULTS)
+FILES = (*checkpoint.KINDS, CELLS, COMPARISONS, REPLICATES, PAGE, RESULTS)
 
 
 def begun(laid: Laid, out: Path | None, force: bool) -> Tally:
@@ -33,13 +34,15 @@ def begun(laid: Laid, out: Path | None, force: bool) -> Tally:
     try:
         if out.exists() and not out.is_dir():
             raise Mistake(f"{out}: expected a folder, got a file")
-        checkpoint = out / CHECKPOINT
         if out.is_dir() and not force:
-            if checkpoint.exists():
-                return _not_beyond(Tally.load(checkpoint, laid.identity), laid, checkpoint)
+            left = checkpoint.newest_in(out)
+            if left is not None:
+                _see_that_it_can_be_written(out)
+                return _not_beyond(checkpoint.load(left, laid.identity), laid, left)
             if any(out.iterdir()):
                 raise Mistake(f"{out}: expected an empty folder or that of a study, got another (--force writes there)")
         out.mkdir(parents=True, exist_ok=True)
+        _see_that_it_can_be_written(out)
         for name in FILES:
             (out / name).unlink(missing_ok=True)
     except OSError as error:
@@ -47,12 +50,14 @@ def begun(laid: Laid, out: Path | None, force: bool) -> Tally:
     return empty
 
 
-def _not_beyond(tally: Tally, laid: Laid, checkpoint: Path) -> Tally:
+def _see_that_it_can_be_written(folder: Path) -> None:
+    TemporaryFile(dir=folder).close()
+
+
+def _not_beyond(tally: Tally, laid: Laid, path: Path) -> Tally:
     done = int(tally.done.max())
     if done > laid.replicates:
-        raise Mistake(
-            f"{checkpoint}: expected {done} replicates or more, since so many are done, got {laid.replicates}"
-        )
+        raise Mistake(f"{path}: expected {done} replicates or more, since so many are done, got {laid.replicates}")
     return tally
 
 

@@ -85,6 +85,8 @@ def load_study(name: str | Path, replicates: int | None = None) -> Laid:
 
 def study_of(raw: Mapping[str, Any], folder: Path, source: str = "study") -> Laid:
     """Return the study of raw tables whose scenario stands in `folder`, or comes with a7sim. Raises StudyError."""
+    if "scenario" not in raw and "photos" in raw:
+        raise StudyError(source, ["expected a study, got a scenario (`a7sim run` takes it)"])
     mistakes = [mistake.replace("the scenario", "the study") for mistake in mistakes_of_form(raw, _expected())]
     if mistakes:
         raise StudyError(source, mistakes)

@@ -2,8 +2,15 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from a7sim.geometry import GON, Array, mxm, mxv, rotation, transposed
 from a7sim.manual import VARIANTS, Variant
+from a7sim.operator import ModelJob
 from a7sim.scenario import Plan, Scenario
+from a7sim.scenario.schema import Model, Photo
+from a7sim.scene import RelativeTruth
+from a7sim.session.truth import Relative, true_elements
 
 
 def beyond_reach(scenario: Scenario) -> Iterator[str]:
@@ -17,6 +24,9 @@ def beyond_reach(scenario: Scenario) -> Iterator[str]:
         if not element.low <= value <= element.high:
             yield f"{path}: expected {element.low:g} to {element.high:g} mm, the range of {name}, got {value:g}"
     yield from _levels_beyond_reach(plan, variant)
+    photos = {photo.name: photo for photo in scenario.photos}
+    for model in scenario.models:
+        yield from _orientation_beyond_reach(model, photos[model.left], photos[model.right], plan, variant)
 
 
 def _levels_beyond_reach(plan: Plan, variant: Variant) -> Iterator[str]:
@@ -36,3 +46,28 @@ def _levels_beyond_reach(plan: Plan, variant: Variant) -> Iterator[str]:
                 f"plan.centre_levels: expected {low:.0f} to {high:.0f}, where the Z carriage of the {variant.name} "
                 f"can go from a projection height of {plan.projection_height:g} mm, got {level:g}"
             )
+
+
+def _orientation_beyond_reach(model: Model, left: Photo, right: Photo, plan: Plan, variant: Variant) -> Iterator[str]:
+    """Yield a sentence for every element that the photographs as they were flown would take beyond its range."""
+    if left.position is None or right.position is None or "upside down" in (left.laid, right.laid):
+        return
+    start = {name: element.zero for name, element in variant.elements.items()} | {"bx": plan.bx}
+    job = ModelJob(model.name, left.name, right.name, model.base, "", {})
+    for name, value in true_elements(_flown(left, right), plan.method, start, job, variant).items():
+        element = variant.elements.get(name)
+        if element is not None and not element.endless and not element.low <= value <= element.high:
+            yield (
+                f"photos: expected tilts and places of {left.name} and {right.name} that {name} of the "
+                f"{variant.name} can take ({element.low:g} to {element.high:g} {element.unit}), got {value:.2f}"
+            )
+
+
+def _flown(left: Photo, right: Photo) -> Relative:
+    to_left = transposed(_turned(left))
+    base = np.subtract(right.position or (), left.position or ())
+    return Relative.of_truth(RelativeTruth(mxm(to_left, _turned(right)), mxv(to_left, base), "the flight"))
+
+
+def _turned(photo: Photo) -> Array:
+    return rotation(photo.omega * GON, photo.phi * GON, photo.kappa * GON)

@@ -3,15 +3,15 @@
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
+from a7sim.study.checkpoint import save
 from a7sim.study.loading import Laid
 from a7sim.study.simulating import seed_of, together
 from a7sim.study.tally import Tally
@@ -52,7 +52,7 @@ def work(
     """Work a study on from where its tally stands until all replicates are done or its precision is reached.
 
     `at_once` chunks are under way beside as many that wait; results are added in the order in which they were asked
-    for. However it ends, the checkpoint holds what was added. Raises Mistake where a worker is lost.
+    for. However it ends, the checkpoint holds what was added.
     """
     pace = pace or Pace()
     saved_at = -np.inf
@@ -61,13 +61,11 @@ def work(
             tally.add(chunk.cell, values)
             tick(len(chunk.seeds))
             if checkpoint is not None and time.monotonic() - saved_at > pace.save_seconds:
-                tally.save(checkpoint, laid.identity)
+                save(tally, checkpoint, laid.identity)
                 saved_at = time.monotonic()
-    except BrokenExecutor as error:
-        raise Mistake("a worker of the study was lost (killed, or out of memory); the same command goes on") from error
     finally:
         if checkpoint is not None:
-            tally.save(checkpoint, laid.identity)
+            save(tally, checkpoint, laid.identity)
 
 
 def reached(laid: Laid, tally: Tally) -> bool:

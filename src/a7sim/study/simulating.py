@@ -1,4 +1,4 @@
-"""Working replicates of a cell: together on the batch bench, or one alone over the link."""
+"""Working replicates of a cell together on the batch bench."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
 from a7sim.session import results
 from a7sim.session.crowd import open_crowd
-from a7sim.session.ways import results_by_computing, run_all_ways
+from a7sim.session.ways import results_by_computing
 from a7sim.study.responses import Response, response_of
 
 _STREAM = 9
@@ -28,15 +28,11 @@ def together(scenario: Scenario, seeds: Sequence[int], responses: Sequence[str])
 
     Raises Mistake for a response that the results do not have.
     """
-    return _values(_documents(scenario, seeds), [response_of(name) for name in responses])
+    return _values(crowded(scenario, seeds), [response_of(name) for name in responses])
 
 
-def alone(scenario: Scenario, seed: int, responses: Sequence[str]) -> Array:
-    """Return responses ``(responses,)`` of one session worked over the link, as `a7sim run` does."""
-    return np.asarray(_values([run_all_ways(scenario, seed)], [response_of(name) for name in responses])[:, 0])
-
-
-def _documents(scenario: Scenario, seeds: Sequence[int]) -> list[Document]:
+def crowded(scenario: Scenario, seeds: Sequence[int]) -> list[Document]:
+    """Return the results of sessions worked at once on the batch bench."""
     if "plotter" in scenario.work:
         documents = open_crowd(scenario, seeds).documents()
     else:

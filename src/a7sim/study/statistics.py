@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import numpy.typing as npt
 
 from a7sim.geometry import Array
 
@@ -49,21 +50,29 @@ def sd_interval(values: Array, seed: int, key: Sequence[int]) -> Interval:
     return float(low), float(high)
 
 
-def quantile_with_interval(values: Array, share: float) -> tuple[float, Interval]:
+def quantile_with_interval(
+    values: Array, share: float, counts: npt.NDArray[np.int64] | None = None
+) -> tuple[float, Interval]:
     """Return a quantile of values ``(n,)`` and its bootstrap interval, that of infinitely many resamples.
 
-    The k-th of n in order is in a resample the value at place n B, where B is Beta(k, n - k + 1).
+    Each value stands for as many as `counts` says ``(n,)``, otherwise for itself. The k-th of n in order is in a
+    resample the value at place n B, where B is Beta(k, n - k + 1).
     """
-    n = values.size
-    if n == 0:
+    if values.size == 0:
         return math.nan, _UNKNOWN
     from scipy.stats import beta  # noqa: PLC0415
 
-    in_order = np.sort(values)
+    order = np.argsort(values, kind="stable")
+    through = np.cumsum(np.ones(values.size, dtype=np.int64) if counts is None else counts[order])
+    n = int(through[-1])
+
+    def at(place: int) -> float:
+        return float(values[order[np.searchsorted(through, place)]])
+
     k = min(n, max(1, math.ceil(share * n)))
     tail = (1.0 - CONFIDENCE) / 2.0
-    low, high = (min(n - 1, int(n * float(beta.ppf(each, k, n - k + 1)))) for each in (tail, 1.0 - tail))
-    return float(in_order[k - 1]), (float(in_order[low]), float(in_order[high]))
+    low, high = (min(n, int(n * float(beta.ppf(each, k, n - k + 1))) + 1) for each in (tail, 1.0 - tail))
+    return at(k), (at(low), at(high))
 
 
 @dataclass(frozen=True)

@@ -1,25 +1,19 @@
-"""What is kept of a study's replicates: moments of all of them and a sample, the same however they came in."""
+"""What is kept of a study's replicates: moments and quantiles of all, a sample one by one, however they came in."""
 
 from dataclasses import dataclass
-from io import BytesIO
-from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.study.sketch import Counts, Sketch
 
 SAMPLE = 10_000
 """Replicates of a cell that are kept one by one: the first, since replicates come in no order."""
 
-Counts = npt.NDArray[np.int64]
-_ARRAYS = ("done", "count", "mean", "squares", "low", "high")
-
 
 @dataclass
 class Tally:
-    """Running moments by cell and response ``(cells, responses)`` and the sample of each cell.
+    """Running moments by cell and response ``(cells, responses)``, the sample of each cell and sketches of the rest.
 
     Replicates of a cell are added in their order one by one, so that no sum depends on how they were cut in chunks.
     """
@@ -28,13 +22,18 @@ class Tally:
     """Replicates added, by cell ``(cells,)``."""
     count: Counts
     """Of them, those with a number: the others gave up."""
-    mean: Array
+    origin: Array
+    """The first number, from which deviations are taken."""
+    total: Array
+    """Sums of the deviations."""
     squares: Array
-    """Sums of the squared deviations from the mean."""
+    """Sums of their squares."""
     low: Array
     high: Array
     samples: list[list[Array]]
     """Blocks ``(responses, n)`` of the first replicates, by cell."""
+    sketches: list[list[Sketch]]
+    """Of the replicates beyond the sample, by cell and response."""
 
     @classmethod
     def empty(cls, cells: int, responses: int) -> "Tally":
@@ -45,24 +44,29 @@ class Tally:
             np.zeros(shape, dtype=np.int64),
             np.zeros(shape),
             np.zeros(shape),
+            np.zeros(shape),
             np.full(shape, np.inf),
             np.full(shape, -np.inf),
             [[] for _ in range(cells)],
+            [[Sketch() for _ in range(responses)] for _ in range(cells)],
         )
 
     def add(self, cell: int, values: Array) -> None:
-        """Add the next replicates ``(responses, n)`` of a cell; nan is one that gave up (Welford's recurrence)."""
+        """Add the next replicates ``(responses, n)`` of a cell; nan is one that gave up."""
         room = max(0, SAMPLE - int(self.done[cell]))
         if room:
             self.samples[cell].append(values[:, :room])
-        for one in values.T:
-            there = np.isfinite(one)
-            self.count[cell] += there
-            before = np.where(there, one - self.mean[cell], 0.0)
-            self.mean[cell] += before / np.maximum(self.count[cell], 1)
-            self.squares[cell] += before * np.where(there, one - self.mean[cell], 0.0)
-            self.low[cell] = np.fmin(self.low[cell], one)
-            self.high[cell] = np.fmax(self.high[cell], one)
+        there = np.isfinite(values)
+        for sketch, one, known in zip(self.sketches[cell], values[:, room:], there[:, room:], strict=True):
+            sketch.add(one[known])
+        begun = (self.count[cell] == 0) & there.any(axis=1)
+        self.origin[cell, begun] = values[begun, there[begun].argmax(axis=1)]
+        deviations = np.where(there, values - self.origin[cell][:, None], 0.0)
+        self.total[cell] = _one_by_one(self.total[cell], deviations)
+        self.squares[cell] = _one_by_one(self.squares[cell], deviations**2)
+        self.low[cell] = np.minimum(self.low[cell], np.where(there, values, np.inf).min(axis=1, initial=np.inf))
+        self.high[cell] = np.maximum(self.high[cell], np.where(there, values, -np.inf).max(axis=1, initial=-np.inf))
+        self.count[cell] += there.sum(axis=1)
         self.done[cell] += values.shape[1]
 
     def sample(self, cell: int) -> Array:
@@ -70,32 +74,30 @@ class Tally:
         blocks = self.samples[cell]
         return np.concatenate(blocks, axis=1) if blocks else np.zeros((self.mean.shape[1], 0))
 
+    def spread(self, cell: int, response: int) -> tuple[Array, Counts]:
+        """Return numbers of a response ``(n,)``, in no order, and for how many replicates each stands.
+
+        Up to `SAMPLE` replicates all, each for itself; of what is beyond, a rank is off by its sketch's `rank_error`.
+        """
+        first = self.sample(cell)[response]
+        first = first[np.isfinite(first)]
+        beyond = self.sketches[cell][response]
+        counts = np.concatenate([np.ones(first.size, dtype=np.int64), beyond.counts])
+        return np.concatenate([first, beyond.values]), counts
+
+    @property
+    def mean(self) -> Array:
+        """Means ``(cells, responses)``, 0 of no numbers."""
+        return np.asarray(self.origin + self.total / np.maximum(self.count, 1))
+
     @property
     def sd(self) -> Array:
         """Standard deviations ``(cells, responses)``, nan for fewer than two numbers."""
+        about_the_mean = self.squares - self.total**2 / np.maximum(self.count, 1)
         freedom = np.where(self.count > 1, self.count - 1, np.nan)
-        return np.asarray(np.sqrt(self.squares / freedom))
+        return np.asarray(np.sqrt(np.maximum(about_the_mean, 0.0) / freedom))
 
-    def save(self, path: Path, identity: str) -> None:
-        """Write all of it so that the file is there whole or not at all; the same tally gives the same bytes."""
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        samples = {f"sample{cell}": self.sample(cell) for cell in range(len(self.done))}
-        held = BytesIO()
-        np.savez(held, allow_pickle=False, identity=np.array(identity), **arrays, **samples)
-        temporary = path.with_name(path.name + ".part")
-        temporary.write_bytes(held.getvalue())
-        temporary.replace(path)
 
-    @classmethod
-    def load(cls, path: Path, identity: str) -> "Tally":
-        """Return what `save` wrote. Raises Mistake for a damaged file or one of another study."""
-        try:
-            with np.load(path, allow_pickle=False) as held:
-                whose = str(held["identity"])
-                arrays = {name: held[name] for name in _ARRAYS}
-                samples = [[held[f"sample{cell}"]] for cell in range(len(arrays["done"]))]
-        except (OSError, ValueError, KeyError, EOFError) as error:
-            raise Mistake(f"{path}: expected the checkpoint of a study, got a file that is none: {error}") from error
-        if whose != identity:
-            raise Mistake(f"{path}: expected the checkpoint of this study, got that of another (--force begins anew)")
-        return cls(**arrays, samples=samples)
+def _one_by_one(sums: Array, terms: Array) -> Array:
+    """Return sums ``(n,)`` after terms ``(n, k)``, each added to all before it."""
+    return np.asarray(np.add.accumulate(np.column_stack([sums, terms]), axis=1)[:, -1])

@@ -1,0 +1,109 @@
+"""The audit: a batch bench that is off by one least count, anywhere, is found out."""
+
+import numpy as np
+import pytest
+
+from a7sim.session import crowd
+from a7sim.session.fleet_hands import FleetHands
+from a7sim.study import auditing
+from a7sim.study.auditing import audited
+from a7sim.study.executors import InProcess
+from a7sim.study.loading import study_of
+from a7sim.study.running import work
+from a7sim.study.tally import Tally
+
+AT_THE_PLOTTER = {
+    "schema_version": 1,
+    "title": "As it stands",
+    "question": "What does a model come to?",
+    "scenario": "akwanga",
+    "replicates": 1,
+    "responses": ["hours"],
+    "settings": {"models": [{"name": "1", "left": "101", "right": "102"}], "plan.parallax_readings": 1},
+}
+
+
+@pytest.fixture(scope="module")
+def worked(tmp_path_factory):
+    """A study of one session, and its tally by the true batch bench; the link's results are worked once."""
+    laid = study_of(AT_THE_PLOTTER, tmp_path_factory.mktemp("study"))
+    tally = Tally.empty(1, 1)
+    work(laid, tally, InProcess())
+    linked = auditing.run_all_ways(laid.scenarios[0], auditing.seed_of(laid.study.seed, 0))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(auditing, "run_all_ways", lambda scenario, seed: linked)
+        yield laid, tally
+
+
+def test_the_true_batch_bench_passes(worked):
+    assert audited(*worked, 1) == []
+
+
+def _reads(name, off):
+    """Hands that read `off` more of an element, a counter axis or whatever the method gives."""
+
+    def perturbed(truly):
+        def method(self, who, *arguments):
+            found = truly(self, who, *arguments)
+            if isinstance(found, dict):
+                return {each: value + off * (each == name) for each, value in found.items()}
+            return found + off * (name in arguments)
+
+        return method
+
+    return perturbed
+
+
+def _moves(off, *names):
+    def perturbed(truly):
+        def method(self, who, element, values):
+            truly(self, who, element, values + off * (element in names))
+
+        return method
+
+    return perturbed
+
+
+def _gives(off):
+    return lambda truly: lambda self, who, *arguments: truly(self, who, *arguments) + off
+
+
+PERTURBED = {
+    "an element read": ("elements", _reads("by1", 0.01)),
+    "an element turned": ("turn_element", _moves(0.01, "by1", "by2")),
+    "an element set": ("set_element", _moves(0.01, "bx")),
+    "X of model and centres": ("counter", _reads("X", 0.01)),
+    "Y of model and centres": ("counter", _reads("Y", 0.01)),
+    "Z of model and centres": ("counter", _reads("Z", 0.01)),
+    "the picture in the eyepiece": ("seen", _gives(0.01)),
+}
+
+
+@pytest.mark.parametrize("name", list(PERTURBED))
+def test_a_least_count_too_much_anywhere_on_the_bench_is_found_out(worked, monkeypatch, name):
+    method, perturbed = PERTURBED[name]
+    monkeypatch.setattr(FleetHands, method, perturbed(getattr(FleetHands, method)))
+    (found,) = audited(*worked, 1)
+    assert (found.cell, found.replicate) == (1, 1)
+
+
+def test_a_strip_that_is_off_by_a_millimetre_on_the_bench_is_found_out(worked, monkeypatch):
+    truly = crowd.strip_of
+
+    def a_millimetre_off(scenario, ground, models):
+        document, strip = truly(scenario, ground, models)
+        x = document["residuals_m"]["C1"]["X"] + 0.001
+        residuals = document["residuals_m"] | {"C1": document["residuals_m"]["C1"] | {"X": x}}
+        return document | {"residuals_m": residuals}, strip
+
+    monkeypatch.setattr(crowd, "strip_of", a_millimetre_off)
+    (found,) = audited(*worked, 1)
+    assert (found.place, found.others) == ("strip.residuals_m.C1.X", 0)
+
+
+def test_a_response_that_the_study_did_not_keep_as_it_was_is_found_out(worked):
+    laid, _ = worked
+    other = Tally.empty(1, 1)
+    other.add(0, np.array([[1.0]]))
+    (found,) = audited(laid, other, 1)
+    assert (found.place, found.on_the_bench, found.others) == ("hours", 1.0, 0)

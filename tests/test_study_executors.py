@@ -1,0 +1,176 @@
+"""Whoever works a study, and whoever of them is lost: the same bytes, or one sentence."""
+
+import multiprocessing
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from a7sim.documents import as_json
+from a7sim.mistakes import Mistake
+from a7sim.study.checkpoint import checkpoint_in, save
+from a7sim.study.executors import opened
+from a7sim.study.findings import document_of
+from a7sim.study.folder import leave
+from a7sim.study.loading import study_of
+from a7sim.study.running import Pace, work
+from a7sim.study.tally import Tally
+from tests.processes import said_here
+from tests.served import PATIENCE
+from tests.test_study import BY_COMPARATOR
+
+RUN_BY_MPI = shutil.which("mpiexec", path=os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]]))  # noqa: PTH120
+NEEDS_MPI = pytest.mark.skipif(RUN_BY_MPI is None, reason="there is no mpiexec: MPI is not installed")
+
+
+def laid(tmp_path):
+    return study_of(BY_COMPARATOR, tmp_path)
+
+
+def worked(study, tally, kind, workers, tick=lambda _: None):
+    with opened(kind, workers) as (executor, at_once):
+        work(study, tally, executor, at_once, None, tick, Pace(largest_chunk=1))
+
+
+def left(study, tally, folder):
+    """Return all that a study says and leaves."""
+    folder.mkdir()
+    document = document_of(study, tally)
+    leave(folder, study, tally, document)
+    save(tally, checkpoint_in(folder), study.identity)
+    return {path.name: path.read_bytes() for path in folder.iterdir()} | {"--json": as_json(document)}
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """What the study leaves when this process works it without interruption."""
+    folder = tmp_path_factory.mktemp("alone")
+    study = laid(folder)
+    tally = Tally.empty(2, 2)
+    worked(study, tally, "process", None)
+    return left(study, tally, folder / "out")
+
+
+class OneLost:
+    """Kills a worker at the first result."""
+
+    def __init__(self):
+        self.pid = None
+
+    def __call__(self, _):
+        if self.pid is None:
+            self.pid = max(each.pid for each in multiprocessing.active_children())
+            os.kill(self.pid, signal.SIGKILL)
+
+
+@pytest.mark.slow
+def test_a_study_on_dask_gives_the_same_bytes_though_a_worker_is_killed(alone, tmp_path, capfd):
+    study, tally, killing = laid(tmp_path), Tally.empty(2, 2), OneLost()
+    worked(study, tally, "dask", 2, killing)
+    assert killing.pid is not None
+    assert left(study, tally, tmp_path / "out") == alone
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_pool_that_lost_a_worker_says_so_and_the_study_goes_on_to_the_same_bytes(alone, tmp_path):
+    study, tally = laid(tmp_path), Tally.empty(2, 2)
+    with pytest.raises(Mistake, match="a worker of the study was lost"):
+        worked(study, tally, "pool", 1, OneLost())
+    assert 0 < tally.done.sum() < 12
+    worked(study, tally, "process", None)
+    assert left(study, tally, tmp_path / "out") == alone
+
+
+def test_an_interrupted_pool_does_not_wait_for_what_its_workers_do():
+    with pytest.raises(KeyboardInterrupt), opened("pool", 1) as (executor, _):
+        worker = executor.submit(os.getpid).result()
+        executor.submit(time.sleep, 10 * PATIENCE)
+        began = time.monotonic()
+        raise KeyboardInterrupt
+    assert time.monotonic() - began < PATIENCE
+    with pytest.raises(ProcessLookupError):
+        os.kill(worker, 0)
+
+
+@pytest.mark.slow
+@NEEDS_MPI
+@pytest.mark.parametrize(("n", "started"), [(3, ("-m", "a7sim")), (2, ("-m", "mpi4py.futures", "-m", "a7sim"))])
+def test_a_study_over_mpi_prints_the_same_bytes(alone, tmp_path, n, started):
+    path = tmp_path / "study.toml"
+    path.write_text(AS_A_FILE)
+    command = [RUN_BY_MPI, "-n", str(n), sys.executable, *started, "study", str(path), "--executor", "mpi", "--json"]
+    told = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (told.returncode, told.stderr) == (0, "")
+    assert told.stdout == alone["--json"]
+
+
+AS_A_FILE = """
+schema_version = 1
+title = "Pointings"
+question = "Do two pointings help?"
+scenario = "a8-strip"
+settings = { work = ["comparator"] }
+responses = ["strip_plan_at_checks_m", "ways.comparator.accuracy_m.checks.height"]
+replicates = 6
+seed = 5
+[[factor]]
+name = "pointings"
+path = "comparator.pointings"
+levels = [1, 4]
+"""
+
+
+@pytest.fixture
+def nobody():
+    """The URL of a door behind which nobody answers."""
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        yield f"tcp://127.0.0.1:{bound.getsockname()[1]}"
+
+
+WRONG = {
+    "no URL": (("--executor", "dask", "--scheduler", "here"), "--scheduler: expected a URL such as tcp://"),
+    "a scheduler of a pool": (("--scheduler", "tcp://h:1"), "expected it beside --executor dask"),
+    "workers of a scheduler": (("--executor", "dask", "--scheduler", "tcp://h:1", "--workers", "2"), "--workers: exp"),
+    "workers of one process": (("--executor", "process", "--workers", "2"), "--workers: expected it for a pool"),
+}
+
+
+@pytest.mark.parametrize("name", list(WRONG))
+def test_a_wrong_executor_is_one_sentence_and_exit_code_2(capsys, name):
+    arguments, words = WRONG[name]
+    told = said_here(capsys, "study", "levels", *arguments)
+    assert (told.returncode, told.stdout, len(told.stderr.splitlines())) == (2, "", 1)
+    assert words in told.stderr
+
+
+def test_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch, capsys, nobody):
+    monkeypatch.setattr("a7sim.study.by_dask.PATIENCE_S", 0.5)
+    told = said_here(capsys, "study", "levels", "--executor", "dask", "--scheduler", nobody)
+    assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
+    assert f"--scheduler: expected one that answers at {nobody}" in told.stderr
+
+
+@pytest.mark.parametrize(
+    ("kind", "module", "words"),
+    [("dask", "distributed", "pip install 'a7sim[dask]'"), ("mpi", "mpi4py", "pip install 'a7sim[mpi]'")],
+)
+def test_what_is_not_installed_is_one_sentence_with_how_to_get_it(monkeypatch, capsys, kind, module, words):
+    monkeypatch.setitem(sys.modules, module, None)
+    told = said_here(capsys, "study", "levels", "--executor", kind)
+    assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
+    assert words in told.stderr
+
+
+@NEEDS_MPI
+def test_mpi_alone_is_one_sentence_that_says_how_to_start_it():
+    code = "from a7sim.cli import main; main()"
+    command = [sys.executable, "-c", code, "study", "levels", "--executor", "mpi"]
+    told = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
+    assert "expected two processes or more (mpiexec -n 5 a7sim study" in told.stderr
