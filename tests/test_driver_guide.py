@@ -12,7 +12,7 @@ from tests.served import PATIENCE
 
 
 class Room:
-    """The terminals of somebody who follows the guide: what is served, and where it listens in place of the page's ports."""
+    """The terminals of somebody who follows the guide: what is served, and where it listens in place of the page."""
 
     def __init__(self):
         self.places, self.running = {}, []

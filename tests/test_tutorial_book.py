@@ -4,8 +4,8 @@ import asyncio
 import math
 
 import pytest
-
 from docs.make_tutorial_pictures import POINTS, afternoon, with_book
+
 from tests.guides import page
 
 

@@ -66,7 +66,7 @@ def _row(option, context):
     default = str(extra.get("default", ""))
     meaning = f"{told} ({limits})" if limits else told
     words = words.replace(" RANGE", "")
-    return f"| `{_celled(words)}` | {_celled(_escaped(meaning))} | {default} |"
+    return f"| <code>{_celled(words)}</code> | {_celled(_escaped(meaning))} | {default} |"
 
 
 def _escaped(text):
@@ -74,4 +74,4 @@ def _escaped(text):
 
 
 def _celled(text):
-    return text.replace("|", "\\|")
+    return text.replace("|", "&#124;")
