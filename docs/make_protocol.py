@@ -7,6 +7,7 @@ python docs/make_protocol.py --check    # says whether they are fresh, exit code
 import re
 import sys
 from functools import cache
+from html import escape
 from itertools import groupby
 from pathlib import Path
 
@@ -317,13 +318,18 @@ def _row(command: Command):
     shown = reply if len(reply) <= LONGEST_SHOWN else reply[:LONGEST_SHOWN] + " ..."
     example = f"`{line}`" + (f" gives `{shown}`" if reply else "")
     cells = (
-        f"`{command.written()}`",
+        _code(command.written()),
         _about(command),
         *(ranges_of(command, variant) for variant in SCENARIOS),
         example,
         " ".join(map(str, errors_of(command))),
     )
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _code(text):
+    """Return code for a cell of a table; a bar in backticks is not told alike by all that read Markdown."""
+    return f"<code>{escape(text, quote=False).replace('|', '&#124;')}</code>" if "|" in text else f"`{text}`"
 
 
 def _about(command):

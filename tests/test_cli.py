@@ -256,12 +256,13 @@ def test_a_full_disk_is_said_in_a_sentence():
     assert "Traceback" not in done.stderr
 
 
-def test_the_readme_shows_what_a_run_prints():
+def test_pages_show_what_a_run_prints():
     printed = " ".join(a7sim("run", "scenarios/akwanga.toml").stdout.split())
-    shown = (ROOT / "README.md").read_text(encoding="utf-8").split("## What `make run` shows")[1].split("##")[0]
-    sample = [line[4:] for line in shown.splitlines() if line.startswith("    ") and "..." not in line]
-    assert len(sample) > 5
-    assert [line for line in sample if " ".join(line.split()) not in printed] == []
+    for page, heading in (("README.md", "## What `make run` shows"), ("docs/running.md", "## What it shows")):
+        shown = (ROOT / page).read_text(encoding="utf-8").split(heading)[1].split("\n## ")[0]
+        sample = [line[4:] for line in shown.splitlines() if line.startswith("    ") and "..." not in line]
+        assert len(sample) > 5
+        assert [line for line in sample if " ".join(line.split()) not in printed] == []
 
 
 def test_debug_shows_the_traceback():

@@ -13,7 +13,10 @@ from tests.test_language import REFUSED
 from tests.wires import everywhere, new_desk
 
 ROOT = Path(__file__).parents[1]
-PAGES = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("docs/protocol.md", "README.md")}
+PAGES = {
+    name: (ROOT / name).read_text(encoding="utf-8")
+    for name in ("docs/protocol.md", "docs/driver-guide.md", "README.md")
+}
 EXAMPLES = [
     (name, code) for name, page in PAGES.items() for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL)
 ]

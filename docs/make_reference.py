@@ -1,0 +1,61 @@
+"""Write the pages of docs/reference, the list of decisions and the picture of the house, each from the thing itself.
+
+python docs/make_reference.py            # writes them
+python docs/make_reference.py --check    # says whether they are fresh, exit code 1 if not
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from makers import commands, files, house, schemas
+
+DOCS = Path(__file__).parent
+
+
+def decisions_page():
+    """Return the list of decisions, by their titles."""
+    lines = ["# Decisions", "", "Why things are as they are, and every assumption that has no source.", ""]
+    for path in sorted((DOCS / "decisions").glob("0*.md")):
+        title = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
+        lines.append(f"- [{title.replace('. ', ' ', 1)}]({path.name})")
+    return "\n".join(lines) + "\n"
+
+
+def pages(session):
+    """Return every page by its path in docs; `session` is the folder of Akwanga's session with seed 7."""
+    return {
+        "reference/commands.md": commands.page(),
+        "reference/scenario.md": schemas.scenario_page(),
+        "reference/exercise.md": schemas.exercise_page(),
+        "reference/study.md": schemas.study_page(),
+        "reference/files.md": files.page(session),
+        "decisions/index.md": decisions_page(),
+        "figures/house.svg": house.picture(),
+    }
+
+
+def stale(session):
+    """Return the pages that are not what they would be made."""
+    made = pages(session)
+    return [
+        name for name, text in made.items() if not (DOCS / name).is_file() or (DOCS / name).read_text("utf-8") != text
+    ]
+
+
+def main():
+    with tempfile.TemporaryDirectory() as place:
+        session = Path(place) / "akwanga"
+        run = [sys.executable, "-m", "a7sim", "run", "akwanga", "--seed", "7", "--quiet", "--out", str(session)]
+        subprocess.run(run, check=True)
+        if "--check" in sys.argv[1:]:
+            found = stale(session)
+            sys.exit(f"not fresh: {', '.join(found)}: run python docs/make_reference.py" if found else 0)
+        for name, text in pages(session).items():
+            (DOCS / name).parent.mkdir(exist_ok=True)
+            (DOCS / name).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

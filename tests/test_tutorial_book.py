@@ -1,0 +1,19 @@
+"""The tutorial's book of six points is what its keys leave (issue 10)."""
+
+import asyncio
+import math
+
+import pytest
+from docs.make_tutorial_pictures import POINTS, afternoon, with_book
+
+from tests.guides import page
+
+
+@pytest.mark.slow
+def test_the_keys_of_the_tutorial_leave_the_book_that_stands_in_it():
+    text = page("tutorial")
+    book = asyncio.run(afternoon())
+    assert with_book(text, book) == text, "run python -m docs.make_tutorial_pictures"
+    assert [row[0] for row in book] == list(POINTS)
+    rms = math.sqrt(sum(float(row[4]) ** 2 for row in book) / len(book))
+    assert f"an rms of {rms:.2f} mm" in text
