@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from a7sim.cli.links import TOKEN_VARIABLE, token_from
+from a7sim.cli.names import a_scenario
 from a7sim.cli.options import Above, chosen, of_a_folder, of_a_journal, of_a_scenario, resumed_alone
 from a7sim.documents import Document, as_json, head
 from a7sim.instrument import build_autograph
@@ -41,7 +42,7 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
 
 @click.command("serve")
-@click.argument("scenario", required=False)
+@click.argument("scenario", required=False, shell_complete=a_scenario)
 @click.option("--tcp", multiple=True, metavar="HOST:PORT", help="Listen on a bare socket  [default: 127.0.0.1:5025]")
 @click.option("--rfc2217", multiple=True, metavar="HOST:PORT", help="Listen as a serial port over telnet.")
 @click.option("--pty", multiple=True, type=click.Path(path_type=Path), help="Make a link to a pseudo-terminal.")
@@ -49,12 +50,20 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 @click.option("--realtime", is_flag=True, help="Movement lasts as long on the wall as on the simulated clock.")
 @click.option("--listen-anyway", is_flag=True, help="Let other machines in; clients must log in with a token.")
 @click.option(
-    "--token-file", type=click.Path(path_type=Path), help=f"The token; or in the environment as {TOKEN_VARIABLE}."
+    "--token-file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help=f"File with the token; without it, the token is {TOKEN_VARIABLE}'s.",
 )
-@click.option("--clients", type=click.IntRange(min=1), default=64, show_default=True, help="Most at a time.")
-@click.option("--idle", type=Above(), default=3600.0, show_default=True, help="Drop who is silent for so many s.")
+@click.option(
+    "--clients", type=click.IntRange(min=1), metavar="N", default=64, show_default=True, help="Most at a time."
+)
+@click.option(
+    "--idle", type=Above(), default=3600.0, show_default=True, metavar="SECONDS", help="Drop who is silent for so long."
+)
 @click.option("--fault", metavar="FAULTS", help=f"Fail now and then: {EXAMPLE}")
-@click.option("--fault-seed", type=click.IntRange(min=0), default=0, show_default=True, help="Draws the faults.")
+@click.option(
+    "--fault-seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Draws the faults."
+)
 @of_a_scenario
 @of_a_folder
 @of_a_journal
