@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from a7sim.cli.browser import drawn_by_a_browser, in_a_browser, served_instead
-from a7sim.cli.names import a_scenario
+from a7sim.cli.names import OneOf, a_scenario
 from a7sim.cli.prompt import data_folder
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.words import ACUITY_UM
@@ -26,9 +26,7 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 @click.argument("scenario", required=False, shell_complete=a_scenario)
 @click.option("--connect", metavar="URL", help="Sit down at a served instrument; SCENARIO is then the job sheet.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draws film and instrument.")
-@click.option(
-    "--variant", type=click.Choice(["A7", "A8"], case_sensitive=False), metavar="[A7|A8]", help="Another plotter."
-)
+@click.option("--variant", type=OneOf(["A7", "A8"]), help="Another plotter.")
 @click.option("--theme", type=click.Choice(THEMES), help="Colours  [default: enamel]")
 @click.option(
     "--drawing",

@@ -1,4 +1,4 @@
-"""What a shell completes an argument with: the names of what comes with a7sim, else files."""
+"""What arguments and options name: what comes with a7sim, which shells complete (else files), and plain choices."""
 
 from collections.abc import Callable, Iterable
 
@@ -22,6 +22,21 @@ def _or_files(names: Callable[[], Iterable[str]]) -> Completer:
 
 def _scripts() -> list[str]:
     return sorted({file.stem for shelf in shelves_of("scenarios") for file in shelf.glob("scripts/*.a7s")})
+
+
+class OneOf(click.Choice[str]):
+    """A choice that takes small letters for capitals, and is shown and completed in its own."""
+
+    def __init__(self, choices: Iterable[str]) -> None:
+        super().__init__(list(choices), case_sensitive=False)
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        """Return the choices as help shows them."""
+        return f"[{'|'.join(self.choices)}]"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Return the choices that begin so."""
+        return [CompletionItem(each) for each in self.choices if each.lower().startswith(incomplete.lower())]
 
 
 a_scenario = _or_files(lambda: names_of("scenarios"))

@@ -13,6 +13,7 @@ import msgspec
 from click.core import ParameterSource
 
 from a7sim.cli import EXIT_DOES_NOT_FIT
+from a7sim.cli.names import OneOf
 from a7sim.mistakes import Mistake
 from a7sim.scenario import PROFILES, Observer, Request, Scenario, bare_name, load_scenario, requested
 from a7sim.session.durable import DURABILITIES
@@ -54,8 +55,7 @@ _OF_A_SCENARIO = (
 _OF_AN_ORIENTATION = (
     click.option(
         "--case",
-        type=click.Choice(list("ABCDE"), case_sensitive=False),
-        metavar="[A|B|C|D|E]",
+        type=OneOf("ABCDE"),
         help="Standard points used (thesis).",
     ),
     click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one."),

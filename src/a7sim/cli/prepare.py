@@ -7,6 +7,7 @@ import msgspec
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
+from a7sim.cli.names import OneOf
 from a7sim.cli.options import Above
 from a7sim.documents import as_json, head
 from a7sim.manual import VARIANTS
@@ -23,8 +24,7 @@ from a7sim.sheets import sheet
 @click.option("--map-scale", type=Above(), help="Scale number of the map that is drawn.")
 @click.option(
     "--variant",
-    type=click.Choice(list(VARIANTS), case_sensitive=False),
-    metavar="[A7|A8]",
+    type=OneOf(VARIANTS),
     default="A7",
     show_default=True,
     help="Of which plotter.",

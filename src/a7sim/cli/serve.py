@@ -13,7 +13,7 @@ from a7sim.cli.links import TOKEN_VARIABLE, token_from
 from a7sim.cli.names import a_scenario
 from a7sim.cli.options import Above, chosen, of_a_folder, of_a_journal, of_a_scenario, resumed_alone
 from a7sim.documents import Document, as_json, head
-from a7sim.instrument import build_autograph
+from a7sim.instrument import Autograph
 from a7sim.instrument.language import Desk
 from a7sim.instrument.language.desk import POLL_TAKES
 from a7sim.link.addresses import Address, address_of
@@ -24,7 +24,6 @@ from a7sim.link.loops import run
 from a7sim.link.serving import Doors, Server
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
-from a7sim.scene import build_scene
 from a7sim.session.durable import Durability, JournalStopped
 from a7sim.session.folder import prepare_folder
 from a7sim.session.journal import Journal, Keeping, header_of
@@ -130,7 +129,7 @@ class Served:
 def _served_anew(
     scenario: Scenario, seed: int, token: str | None, realtime: bool, out: Path | None, keeping: Keeping
 ) -> Served:
-    autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
+    autograph = Autograph.of_scenario(scenario, seed)
     journal = Journal(keeping)
     desk = Desk(autograph, journal.heard if out else None, token, 0.0 if realtime else POLL_TAKES)
     header = header_of("serve", scenario, seed, realtime=realtime, login=token is not None)
