@@ -165,7 +165,7 @@ def test_no_command_imports_scipy_textual_or_matplotlib_to_say_its_options():
 
 # --- completion ---------------------------------------------------------------------------------------------
 
-IN_A_SHELL = ("a7sim ser", "a7sim run akwanga-", "a7sim train start 04")
+IN_A_SHELL = ("a7sim ser", "a7sim run akwanga-", "a7sim train ve")
 COMPLETED = [
     ("a7sim ser", {"serve"}),
     ("a7sim train ve", {"verify"}),
