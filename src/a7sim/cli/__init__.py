@@ -4,32 +4,36 @@ import io
 import sys
 
 import click
+from click.exceptions import NoArgsIsHelpError
 
 import a7sim
-from a7sim.cli.verbs import Verbs
+from a7sim.cli.complaints import in_one_sentence
+from a7sim.cli.verbs import Verb, Verbs
 from a7sim.mistakes import Mistake
 
 EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_DIFFERS, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 _VERBS = {
-    "run": "a7sim.cli.run:command",
-    "operate": "a7sim.cli.operate:command",
-    "send": "a7sim.cli.send:command",
-    "compile": "a7sim.cli.compile:command",
-    "calibrate": "a7sim.cli.calibrate:command",
-    "reduce": "a7sim.cli.reduce:command",
-    "scenario": "a7sim.cli.scenario:command",
-    "prepare": "a7sim.cli.prepare:command",
-    "bridge": "a7sim.cli.bridge:command",
-    "serve": "a7sim.cli.serve:command",
-    "replay": "a7sim.cli.replay:command",
-    "record": "a7sim.cli.record:command",
-    "report": "a7sim.cli.report:command",
-    "export": "a7sim.cli.export:command",
-    "compare": "a7sim.cli.compare:command",
-    "console": "a7sim.cli.console:command",
-    "train": "a7sim.cli.train:command",
-    "study": "a7sim.cli.study:command",
+    "run": Verb("a7sim.cli.run:command", "Let the operator work through a scenario, up to the strip."),
+    "operate": Verb("a7sim.cli.operate:command", "Let the operator work an instrument that is served."),
+    "compile": Verb("a7sim.cli.compile:command", "Let the operator draw contours and lines of a model."),
+    "calibrate": Verb("a7sim.cli.calibrate:command", "Test both projectors with a grid plate."),
+    "bridge": Verb("a7sim.cli.bridge:command", "Carry a strip on at the instrument (aeropolygon)."),
+    "prepare": Verb("a7sim.cli.prepare:command", "Choose scales, gears, projection height and bx for a flight."),
+    "reduce": Verb("a7sim.cli.reduce:command", "Compute orientations, strips and blocks from files."),
+    "scenario": Verb("a7sim.cli.scenario:command", "Check scenario files and describe them."),
+    "serve": Verb("a7sim.cli.serve:command", "Serve an instrument on TCP, RFC 2217 and ptys."),
+    "send": Verb("a7sim.cli.send:command", "Say lines to an instrument and print its replies."),
+    "console": Verb("a7sim.cli.console:command", "Sit down at the instrument yourself, on a terminal."),
+    "record": Verb("a7sim.cli.record:command", "Journal what a client and an instrument say."),
+    "replay": Verb("a7sim.cli.replay:command", "Say a session or a script again to a fresh instrument."),
+    "report": Verb("a7sim.cli.report:command", "Write the report of a session on one page."),
+    "export": Verb("a7sim.cli.export:command", "Write a session as film, book, forms or cards."),
+    "compare": Verb("a7sim.cli.compare:command", "Lay the results of sessions beside each other."),
+    "train": Verb("a7sim.cli.train:command", "Learn to work it: exercises with hints and grades."),
+    "study": Verb("a7sim.cli.study:command", "Work a scenario as often as a question needs."),
+    "doctor": Verb("a7sim.cli.doctor:command", "Say what is installed, what is missing, how to get it."),
+    "completion": Verb("a7sim.cli.completion:command", "Print the script that lets a shell complete commands."),
 }
 
 
@@ -52,9 +56,14 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     try:
         code = cli.main(arguments, prog_name="a7sim", standalone_mode=False)
-    except click.ClickException as error:
+    except NoArgsIsHelpError as error:
         error.show()
-        code = error.exit_code
+        code = EXIT_MISTAKE
+    except click.ClickException as error:
+        if debug:
+            raise
+        click.echo(f"a7sim: {in_one_sentence(error)}", err=True)
+        code = EXIT_MISTAKE
     except (click.Abort, KeyboardInterrupt):
         if debug:
             raise

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli.names import a_scenario
 from a7sim.cli.options import chosen, ended, of_a_folder, of_a_scenario, of_results, watched
-from a7sim.session.bridge import run_bridge, tables_of
 
 _POINTS_A_MODEL = 260
 """About how many points an operator works on in a model in both ways."""
 
 
 @click.command("bridge")
-@click.argument("scenario")
+@click.argument("scenario", shell_complete=a_scenario)
 @of_a_scenario
 @of_a_folder
 @of_results
@@ -31,6 +31,8 @@ def command(
 
     Example: a7sim bridge bridge --seed 7 --out runs/bridge
     """
+    from a7sim.session.bridge import run_bridge, tables_of
+
     loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
     with watched(_POINTS_A_MODEL * len(loaded.models), as_document, quiet) as watcher:
         document = run_bridge(loaded, seed, out, watcher, force)

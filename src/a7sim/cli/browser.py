@@ -47,7 +47,7 @@ def served_instead(context: click.Context) -> bool:
         _refuse_without_browser(context)
         return False
     try:
-        from a7sim.console.browser import serve  # noqa: PLC0415 # only a browser's console needs the server
+        from a7sim.console.browser import serve  # only a browser's console needs the server
     except ImportError as error:
         raise Mistake("--browser: expected textual-serve to be installed: pip install 'a7sim[browser]'") from error
     minutes = f"{context.params['idle_exit']:g} min"

@@ -4,16 +4,15 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli.names import a_scenario
 from a7sim.cli.options import chosen, ended, of_a_folder, of_a_scenario, of_results, watched
 from a7sim.mistakes import Mistake
-from a7sim.operator.grid_test import GridTestOrder
-from a7sim.session.grid_test import run_grid_test, sheet_of
 
 PROJECTORS = 2
 
 
 @click.command("calibrate")
-@click.argument("scenario")
+@click.argument("scenario", shell_complete=a_scenario)
 @click.option("--points", type=int, default=25, show_default=True, help="Crosses of the plate, evenly spaced.")
 @click.option("--levels", type=click.IntRange(1, 5), default=2, show_default=True, help="Levels of Z.")
 @click.option("--pointings", type=click.IntRange(1, 20), default=2, show_default=True, help="At each cross and level.")
@@ -38,6 +37,9 @@ def command(
 
     Example: a7sim calibrate grid-test --points 25 --out runs/grid-test
     """
+    from a7sim.operator.grid_test import GridTestOrder
+    from a7sim.session.grid_test import run_grid_test, sheet_of
+
     loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
     if points not in loaded.grid_plate.even_counts:
         known = ", ".join(map(str, loaded.grid_plate.even_counts))

@@ -3,12 +3,8 @@
 from pathlib import Path
 
 import click
-from rich.console import Console
 
-from a7sim.documents import as_json
 from a7sim.mistakes import Mistake
-from a7sim.report.comparison import compared, of_comparison, table_of
-from a7sim.report.kept import read_session
 
 
 @click.command("compare")
@@ -20,6 +16,12 @@ def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> N
 
     Example: a7sim compare runs/akwanga runs/akwanga-e
     """
+    from rich.console import Console
+
+    from a7sim.documents import as_json
+    from a7sim.report.comparison import compared, of_comparison, table_of
+    from a7sim.report.kept import read_session
+
     if len(folders) < 2:
         raise Mistake(f"compare: expected two folders of sessions or more, got one: {folders[0]}")
     sessions = [read_session(folder) for folder in folders]

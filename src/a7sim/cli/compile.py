@@ -4,16 +4,15 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli.names import a_scenario
 from a7sim.cli.options import Above, chosen, ended, of_a_folder, of_a_scenario, of_results, watched
-from a7sim.session.compiled_tables import of_compilation
-from a7sim.session.compiling import Wanted, compile_model
 
 _POINTS = 400
 """About how many points and vertices an operator works on; the bar only needs the order of it."""
 
 
 @click.command("compile")
-@click.argument("scenario")
+@click.argument("scenario", shell_complete=a_scenario)
 @click.option("--model", "name", default="1", show_default=True, help="Model to be compiled.")
 @click.option("--contour", "contours", multiple=True, type=Above(-1e6), metavar="M", help="Height of a contour in m.")
 @click.option("--interval", type=Above(), metavar="M", help="All contours whose height is a multiple of this.")
@@ -44,6 +43,9 @@ def command(
 
     Example: a7sim compile akwanga --model 1 --contour 460 --interval 10 --line road1 --out runs/sheet
     """
+    from a7sim.session.compiled_tables import of_compilation
+    from a7sim.session.compiling import Wanted, compile_model
+
     loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
     wanted = Wanted(name, contours, interval, lines, map_scale, tremor)
     with watched(_POINTS, as_document, quiet) as watcher:

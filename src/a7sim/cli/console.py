@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from a7sim.cli.browser import drawn_by_a_browser, in_a_browser, served_instead
+from a7sim.cli.names import OneOf, a_scenario
 from a7sim.cli.prompt import data_folder
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.words import ACUITY_UM
@@ -22,10 +23,10 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 
 
 @click.command("console")
-@click.argument("scenario", required=False)
+@click.argument("scenario", required=False, shell_complete=a_scenario)
 @click.option("--connect", metavar="URL", help="Sit down at a served instrument; SCENARIO is then the job sheet.")
-@click.option("--seed", type=click.IntRange(min=0), help="Draws film and instrument.")
-@click.option("--variant", type=click.Choice(["A7", "A8"], case_sensitive=False), help="Another plotter.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draws film and instrument.")
+@click.option("--variant", type=OneOf(["A7", "A8"]), help="Another plotter.")
 @click.option("--theme", type=click.Choice(THEMES), help="Colours  [default: enamel]")
 @click.option(
     "--drawing",
@@ -43,7 +44,12 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 )
 @click.option("--keymap", type=click.Path(path_type=Path, dir_okay=False), help="File with keys of your own.")
 @click.option("--write-keymap", is_flag=True, help="Write all keys to --keymap, or to the usual file, and end.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder of the session  [default: one among your data]")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder of the session  [default: one among your data]",
+)
 @click.option(
     "--go-on/--anew",
     "go_on",
@@ -84,10 +90,10 @@ def command(
     Example: a7sim console akwanga
     """
     _see_that_textual_is_there()
-    from a7sim.cli.seats import InProcess, at_a_line, before_a_film, is_url  # noqa: PLC0415 # only who sits down
-    from a7sim.console.app import Console  # noqa: PLC0415
-    from a7sim.console.keymap import default_keymap, load_keymap, sample  # noqa: PLC0415
-    from a7sim.console.sheet import JobSheet  # noqa: PLC0415
+    from a7sim.cli.seats import InProcess, at_a_line, before_a_film, is_url  # only who sits down
+    from a7sim.console.app import Console
+    from a7sim.console.keymap import default_keymap, load_keymap, sample
+    from a7sim.console.sheet import JobSheet
 
     _refuse_beside("--watch", watch, connect=connect, seed=seed, variant=variant, out=out, go_on=go_on)
     _refuse_beside("--connect", connect, seed=seed, variant=variant, out=out, go_on=go_on)
@@ -139,7 +145,7 @@ def _refuse_beside(option: str, given: str | None, **others: object) -> None:
 
 def _see_that_textual_is_there() -> None:
     try:
-        import textual  # noqa: F401, PLC0415
+        import textual  # noqa: F401
     except ImportError as error:
         raise Mistake("console: expected textual to be installed: pip install 'a7sim[console]'") from error
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from a7sim.cli.links import of_a_link, token_from
+from a7sim.cli.names import a_scenario
 from a7sim.cli.options import (
     POINTS_A_MODEL,
     chosen,
@@ -15,14 +16,10 @@ from a7sim.cli.options import (
     of_results,
     watched,
 )
-from a7sim.link.twin import BesideTwin, served_at
-from a7sim.mistakes import Mistake
-from a7sim.session.tables import of_session
-from a7sim.session.ways import run_all_ways
 
 
 @click.command("operate")
-@click.argument("scenario")
+@click.argument("scenario", shell_complete=a_scenario)
 @click.option("--link", "url", required=True, metavar="URL", help="Where the instrument is served.")
 @of_a_link
 @of_an_orientation
@@ -52,12 +49,12 @@ def command(
 
     Example: a7sim operate akwanga --link tcp://127.0.0.1:5025
     """
+    from a7sim.scripting import Operator
+    from a7sim.session.tables import of_session
+
     loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer, {"plan.case": case, "plan.method": method})
-    if "plotter" not in loaded.work:
-        raise Mistake(f"{scenario}: expected work at the plotter for the operator, got {', '.join(loaded.work)}")
-    with (
-        served_at(url, timeout, token_from(token_file)) as served,
-        watched(POINTS_A_MODEL * len(loaded.models), as_document, quiet) as watcher,
-    ):
-        document = run_all_ways(loaded, seed, out, watcher, force, lambda twin: BesideTwin(served, twin, url))
+    token = token_from(token_file)
+    with watched(POINTS_A_MODEL * len(loaded.models), as_document, quiet) as watcher:
+        operator = Operator(loaded, seed)
+        document = operator.work(url, out, force=force, timeout=timeout, token=token, watcher=watcher)
     ended(document, as_document, quiet, of_session)

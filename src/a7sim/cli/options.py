@@ -6,20 +6,23 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 import msgspec
 from click.core import ParameterSource
-from rich.console import Console, RenderableType
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from a7sim.cli import EXIT_DOES_NOT_FIT
-from a7sim.documents import Document, as_json
+from a7sim.cli.names import OneOf
 from a7sim.mistakes import Mistake
 from a7sim.scenario import PROFILES, Observer, Request, Scenario, bare_name, load_scenario, requested
-from a7sim.session import Watcher
 from a7sim.session.durable import DURABILITIES
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from a7sim.documents import Document
+    from a7sim.session import Watcher
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -44,19 +47,23 @@ class Above(click.ParamType[float]):
 
 
 _OF_A_SCENARIO = (
-    click.option("--seed", type=click.IntRange(min=0), help="Draws film, instrument and operator."),
+    click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draws film, instrument and operator."),
     click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario."),
     click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
     click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error."),
 )
 _OF_AN_ORIENTATION = (
     click.option(
-        "--case", type=click.Choice(list("ABCDE"), case_sensitive=False), help="Standard points used (thesis)."
+        "--case",
+        type=OneOf("ABCDE"),
+        help="Standard points used (thesis).",
     ),
     click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one."),
 )
 _OF_A_FOLDER = (
-    click.option("--out", type=click.Path(path_type=Path), help="Folder for journal, book, tables and results."),
+    click.option(
+        "--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for journal, book, tables and results."
+    ),
     click.option("--force", is_flag=True, help="Write into a folder that exists."),
 )
 DURABILITY_OPTION = click.option(
@@ -168,8 +175,13 @@ POINTS_A_MODEL = 130
 
 
 @contextmanager
-def watched(points: int, as_document: bool, quiet: bool) -> Iterator[Watcher]:
+def watched(points: int, as_document: bool, quiet: bool) -> "Iterator[Watcher]":
     """Show on a terminal how the operator gets on with about so many points."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from a7sim.session import Watcher
+
     columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
     unwatched = quiet or as_document or not sys.stderr.isatty()
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
@@ -180,8 +192,12 @@ def watched(points: int, as_document: bool, quiet: bool) -> Iterator[Watcher]:
         )
 
 
-def ended(document: Document, as_document: bool, quiet: bool, tables: Callable[[Document], RenderableType]) -> None:
+def ended(document: "Document", as_document: bool, quiet: bool, tables: "Callable[[Document], RenderableType]") -> None:
     """Show the results, and end with exit code 1 where the operator gave up."""
+    from rich.console import Console
+
+    from a7sim.documents import as_json
+
     if as_document:
         click.echo(as_json(document), nl=False)
     elif not quiet:

@@ -7,6 +7,7 @@ import msgspec
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
+from a7sim.cli.names import OneOf
 from a7sim.cli.options import Above
 from a7sim.documents import as_json, head
 from a7sim.manual import VARIANTS
@@ -21,7 +22,13 @@ from a7sim.sheets import sheet
 @click.option("--photo-base", type=Above(), required=True, help="Base in the photograph, mm.")
 @click.option("--heights", type=Above(-1e6), nargs=2, required=True, help="Lowest and highest ground, m.")
 @click.option("--map-scale", type=Above(), help="Scale number of the map that is drawn.")
-@click.option("--variant", type=click.Choice(list(VARIANTS)), default="A7", show_default=True)
+@click.option(
+    "--variant",
+    type=OneOf(VARIANTS),
+    default="A7",
+    show_default=True,
+    help="Of which plotter.",
+)
 @click.option("--json", "as_document", is_flag=True, help="Print the sheet as one JSON document.")
 def command(
     c: float,

@@ -62,7 +62,7 @@ def _headers(client: Client) -> list[str]:
 def _editing(headers: list[str]) -> Iterator[None]:
     """Give `input` completion and a history that lasts, where the platform has readline."""
     try:
-        import readline  # noqa: PLC0415 # not on every platform
+        import readline  # not on every platform
     except ImportError:
         yield
         return

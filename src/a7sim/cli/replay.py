@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from a7sim.cli import EXIT_DIFFERS
+from a7sim.cli.names import a_scenario, a_session
 from a7sim.cli.options import of_a_folder
 from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
@@ -25,7 +26,7 @@ _MOST_PARTS = 20
 
 
 @click.command("replay")
-@click.argument("session")
+@click.argument("session", shell_complete=a_session)
 @click.option("--verify", is_flag=True, help="Stop at the first difference, with exit code 3.")
 @click.option(
     "--speed",
@@ -40,7 +41,12 @@ _MOST_PARTS = 20
     metavar="T|@LINE|TEXT",
     help="Tell from a time on (s, or h:mm:ss), a line, or the first note with a text, such as the name of a form.",
 )
-@click.option("--scenario", metavar="SCENARIO", help="What the session was of, where it does not stand beside it.")
+@click.option(
+    "--scenario",
+    metavar="SCENARIO",
+    shell_complete=a_scenario,
+    help="What the session was of, where it does not stand beside it.",
+)
 @of_a_folder
 @click.option("--json", "as_document", is_flag=True, help="Print how it ended as one JSON document.")
 @click.option("--quiet", is_flag=True, help="Do not print the conversation.")

@@ -5,10 +5,6 @@ from pathlib import Path
 
 import click
 
-from a7sim.report.kept import read_session
-from a7sim.report.writing import report_of
-from a7sim.session.folder import REPORT, write_whole
-
 
 @click.command("report")
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
@@ -19,6 +15,10 @@ def command(folder: Path, out: Path | None, shown: bool) -> None:
 
     Example: a7sim report runs/akwanga --open
     """
+    from a7sim.report.kept import read_session
+    from a7sim.report.writing import report_of
+    from a7sim.session.folder import REPORT, write_whole
+
     out = out or folder / REPORT
     write_whole(out, report_of(read_session(folder)))
     click.echo(str(out))

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli.names import a_scenario
 from a7sim.cli.options import (
     POINTS_A_MODEL,
     chosen,
@@ -17,17 +18,12 @@ from a7sim.cli.options import (
     watched,
 )
 from a7sim.mistakes import Mistake
-from a7sim.session.combinations import run_combinations
 from a7sim.session.durable import Durability
-from a7sim.session.journal import Keeping
-from a7sim.session.resuming import begun_in
-from a7sim.session.tables import of_session, of_strips
-from a7sim.session.ways import run_all_ways
 from a7sim.standard_points import CASES
 
 
 @click.command("run")
-@click.argument("scenario", required=False)
+@click.argument("scenario", required=False, shell_complete=a_scenario)
 @of_an_orientation
 @click.option(
     "--strips",
@@ -62,6 +58,12 @@ def command(
 
     Example: a7sim run akwanga --case E --seed 7 --out runs/akwanga-e
     """
+    from a7sim.session.combinations import run_combinations
+    from a7sim.session.journal import Keeping
+    from a7sim.session.resuming import begun_in
+    from a7sim.session.tables import of_session, of_strips
+    from a7sim.session.ways import run_all_ways
+
     every_case = strips == "all"
     if resume is not None:
         resumed_alone("durability")

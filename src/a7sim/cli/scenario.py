@@ -1,9 +1,10 @@
 """`a7sim scenario`: is a scenario file right, and what may it say?"""
 
 import click
-import msgspec
 
 from a7sim.cli import EXIT_MISTAKE
+from a7sim.cli.names import a_scenario
+from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
 from a7sim.scenario import ScenarioError, load_scenario, scenario_schema
 from a7sim.scene import build_scene
@@ -11,14 +12,17 @@ from a7sim.scene import build_scene
 
 @click.group("scenario")
 def command() -> None:
-    """Check scenario files and describe them."""
+    """Check scenario files and describe them.
+
+    Example: a7sim scenario validate akwanga
+    """
 
 
 @command.command("validate")
-@click.argument("file")
+@click.argument("file", metavar="SCENARIO", shell_complete=a_scenario)
 @click.option("--json", "as_document", is_flag=True, help="Print the mistakes as one JSON document.")
 def validate(file: str, as_document: bool) -> None:
-    """Name every mistake of a scenario FILE and of the files it names; exit code 2 if there is any.
+    """Name every mistake of a SCENARIO and of the files it names; exit code 2 if there is any.
 
     Example: a7sim scenario validate scenarios/akwanga.toml
     """
@@ -31,8 +35,7 @@ def validate(file: str, as_document: bool) -> None:
     except Mistake as mistake:
         mistakes = str(mistake).splitlines()
     if as_document:
-        document = {"schema_version": 1, "command": "scenario validate", "file": file, "mistakes": mistakes}
-        click.echo(msgspec.json.encode(document))
+        click.echo(as_json(head("scenario validate") | {"file": file, "mistakes": mistakes}), nl=False)
     elif mistakes:
         for mistake_text in mistakes:
             click.echo(f"a7sim: {file}: {mistake_text}", err=True)
@@ -50,6 +53,4 @@ def schema(as_document: bool) -> None:
     Example: a7sim scenario schema > scenario.schema.json
     """
     described = scenario_schema()
-    if as_document:
-        described = {"schema_version": 1, "command": "scenario schema", "schema": described}
-    click.echo(msgspec.json.format(msgspec.json.encode(described), indent=2))
+    click.echo(as_json(head("scenario schema") | {"schema": described} if as_document else described), nl=False)

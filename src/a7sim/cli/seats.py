@@ -69,7 +69,7 @@ class InProcess:
     def _last(self) -> "Left | None":
         if not self._folder.exists():
             return None
-        from a7sim.session.shelf import last_session  # noqa: PLC0415 # only where there may be one
+        from a7sim.session.shelf import last_session  # only where there may be one
 
         return last_session(self._folder, self._scenario, self._seed)
 
@@ -99,7 +99,7 @@ class InProcess:
     def _opened(self) -> Client:
         """Sit down in the chair, which is built when the instrument is first spoken to."""
         if self._chair is None:
-            from a7sim.session.chair import Chair  # noqa: PLC0415 # beside the first paint of the screen
+            from a7sim.session.chair import Chair  # beside the first paint of the screen
 
             begun = self._left.begun if self._left else None
             self._chair = Chair(self._scenario, self._seed, self._folder, self._clock, begun)
@@ -142,7 +142,7 @@ def _watching_now(url: str) -> Callable[[], str]:
 
 def before_a_film(session: str) -> Seat:
     """Return a seat from which a session that is over is watched. Raises Mistake where there is none."""
-    from a7sim.session.film import film_of  # noqa: PLC0415 # only for who watches one
+    from a7sim.session.film import film_of  # only for who watches one
 
     film = film_of(session)
     title = str(film.journalled.header.get("title", ""))

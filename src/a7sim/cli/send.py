@@ -34,7 +34,7 @@ def command(
     """
     with told(url), Client.open(url, timeout, token_from(token_file)) as client:
         if not lines and not as_document and sys.stdin.isatty():
-            from a7sim.cli.prompt import prompted  # noqa: PLC0415 # readline takes hold of the terminal
+            from a7sim.cli.prompt import prompted  # readline takes hold of the terminal
 
             prompted(url, client)
             return

@@ -10,9 +10,10 @@ from typing import Any
 import click
 
 from a7sim.cli.links import TOKEN_VARIABLE, token_from
+from a7sim.cli.names import a_scenario
 from a7sim.cli.options import Above, chosen, of_a_folder, of_a_journal, of_a_scenario, resumed_alone
 from a7sim.documents import Document, as_json, head
-from a7sim.instrument import build_autograph
+from a7sim.instrument import Autograph
 from a7sim.instrument.language import Desk
 from a7sim.instrument.language.desk import POLL_TAKES
 from a7sim.link.addresses import Address, address_of
@@ -23,7 +24,6 @@ from a7sim.link.loops import run
 from a7sim.link.serving import Doors, Server
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
-from a7sim.scene import build_scene
 from a7sim.session.durable import Durability, JournalStopped
 from a7sim.session.folder import prepare_folder
 from a7sim.session.journal import Journal, Keeping, header_of
@@ -41,7 +41,7 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
 
 @click.command("serve")
-@click.argument("scenario", required=False)
+@click.argument("scenario", required=False, shell_complete=a_scenario)
 @click.option("--tcp", multiple=True, metavar="HOST:PORT", help="Listen on a bare socket  [default: 127.0.0.1:5025]")
 @click.option("--rfc2217", multiple=True, metavar="HOST:PORT", help="Listen as a serial port over telnet.")
 @click.option("--pty", multiple=True, type=click.Path(path_type=Path), help="Make a link to a pseudo-terminal.")
@@ -49,12 +49,20 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 @click.option("--realtime", is_flag=True, help="Movement lasts as long on the wall as on the simulated clock.")
 @click.option("--listen-anyway", is_flag=True, help="Let other machines in; clients must log in with a token.")
 @click.option(
-    "--token-file", type=click.Path(path_type=Path), help=f"The token; or in the environment as {TOKEN_VARIABLE}."
+    "--token-file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help=f"File with the token; without it, the token is {TOKEN_VARIABLE}'s.",
 )
-@click.option("--clients", type=click.IntRange(min=1), default=64, show_default=True, help="Most at a time.")
-@click.option("--idle", type=Above(), default=3600.0, show_default=True, help="Drop who is silent for so many s.")
+@click.option(
+    "--clients", type=click.IntRange(min=1), metavar="N", default=64, show_default=True, help="Most at a time."
+)
+@click.option(
+    "--idle", type=Above(), default=3600.0, show_default=True, metavar="SECONDS", help="Drop who is silent for so long."
+)
 @click.option("--fault", metavar="FAULTS", help=f"Fail now and then: {EXAMPLE}")
-@click.option("--fault-seed", type=click.IntRange(min=0), default=0, show_default=True, help="Draws the faults.")
+@click.option(
+    "--fault-seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Draws the faults."
+)
 @of_a_scenario
 @of_a_folder
 @of_a_journal
@@ -121,7 +129,7 @@ class Served:
 def _served_anew(
     scenario: Scenario, seed: int, token: str | None, realtime: bool, out: Path | None, keeping: Keeping
 ) -> Served:
-    autograph = build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed)
+    autograph = Autograph.of_scenario(scenario, seed)
     journal = Journal(keeping)
     desk = Desk(autograph, journal.heard if out else None, token, 0.0 if realtime else POLL_TAKES)
     header = header_of("serve", scenario, seed, realtime=realtime, login=token is not None)

@@ -20,6 +20,7 @@ from rich.progress import (
 from rich.text import Text
 
 from a7sim.cli import EXIT_DIFFERS
+from a7sim.cli.names import a_study
 from a7sim.cli.options import of_a_folder, of_results
 from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
@@ -35,7 +36,7 @@ from a7sim.study.tally import Tally
 
 
 @click.command("study")
-@click.argument("study")
+@click.argument("study", shell_complete=a_study)
 @click.option("--replicates", type=int, metavar="N", help="Sessions in every cell, instead of what STUDY says.")
 @click.option(
     "--executor",

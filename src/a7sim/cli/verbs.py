@@ -2,15 +2,23 @@
 
 import importlib
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
+from click.shell_completion import CompletionItem
+
+
+class Verb(NamedTuple):
+    """Where a command stands, as `module:name`, and what a list of commands says of it."""
+
+    where: str
+    about: str
 
 
 class Verbs(click.Group):
-    """A group whose commands stand in modules, as `module:name` by verb, and are imported when they are asked for."""
+    """A group whose commands are imported when they are asked for; to list them nothing is imported."""
 
-    def __init__(self, *args: Any, verbs: Mapping[str, str], **kwargs: Any) -> None:
+    def __init__(self, *args: Any, verbs: Mapping[str, Verb], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._verbs = verbs
 
@@ -22,6 +30,17 @@ class Verbs(click.Group):
         """Import and return a verb's command."""
         if cmd_name not in self._verbs:
             return None
-        module, _, name = self._verbs[cmd_name].partition(":")
+        module, _, name = self._verbs[cmd_name].where.partition(":")
         command = getattr(importlib.import_module(module), name)
         return command if isinstance(command, click.Command) else None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write what the verbs are about."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, verb.about) for name, verb in self._verbs.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Return the verbs that begin so, and the group's own options."""
+        named = ((name, verb) for name, verb in self._verbs.items() if name.startswith(incomplete))
+        own = click.Command.shell_complete(self, ctx, incomplete)
+        return [*(CompletionItem(name, help=verb.about) for name, verb in named), *own]

@@ -17,7 +17,8 @@ from a7sim.instrument.recorder import Recorder, Registration
 from a7sim.instrument.refusals import OutOfRange, SettingsConflict, UnknownName
 from a7sim.instrument.spindles import Counter, Runout, Spindle
 from a7sim.manual import LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element, Fittings, Gear, Variant
-from a7sim.scenario.schema import FORMAT_MM, Condition, Instrument, ProjectorCondition
+from a7sim.scenario.schema import FORMAT_MM, Condition, Instrument, ProjectorCondition, Scenario
+from a7sim.scene import build_scene
 from a7sim.scene.photograph import Photograph
 
 MARK_RADIUS_MM = 0.02
@@ -34,7 +35,15 @@ State = dict[str, Any]
 class Autograph:
     """A plotter worked by its handles. Lengths in mm, angles in gon, all as its counters count them.
 
-    Every method that moves something raises a Refusal and moves nothing when the instrument cannot do it.
+    Every method that moves something raises a Refusal and moves nothing when the instrument cannot do it. Who works at
+    the plotter itself, without the line of text, can do and see more than an operator can.
+
+    >>> from a7sim import Autograph, Scenario
+    >>> plotter = Autograph.of_scenario(Scenario.load("akwanga"), seed=7)
+    >>> plotter.load(1, "101")
+    >>> plotter.set_element("bx", 194.994)
+    >>> plotter.element("bx")
+    194.99
     """
 
     def __init__(
@@ -92,6 +101,11 @@ class Autograph:
             (instrument.laying_sigma_mm, instrument.laying_sigma_gon),
             np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM,))),
         )
+
+    @classmethod
+    def of_scenario(cls, scenario: Scenario, seed: int) -> Self:
+        """Return the instrument of a scenario, with the photographs and faults that a seed draws. Raises Mistake."""
+        return cls.of(scenario.instrument, build_scene(scenario, seed).drawer, seed)
 
     def _element_spindle(self, name: str, element: Element) -> Spindle:
         condition = self._condition

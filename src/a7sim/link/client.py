@@ -41,7 +41,7 @@ class Identity(NamedTuple):
 class Client:
     """A conversation in lines of text.
 
-    >>> from a7sim.link.client import Client
+    >>> from a7sim import Client
     >>> with Client.open("a7sim://akwanga") as client:
     ...     client.send("BASE:BX 194.99")
     ...     client.numbers("BASE:BX?;:PROJ1:KAPP?")

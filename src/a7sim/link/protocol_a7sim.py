@@ -10,12 +10,11 @@ from urllib.parse import unquote
 
 from serial import SerialException
 
-from a7sim.instrument import build_autograph
+from a7sim.instrument import Autograph
 from a7sim.instrument.language import Desk
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.mistakes import Mistake
 from a7sim.scenario import load_scenario
-from a7sim.scene import build_scene
 
 _EXAMPLE = "a7sim://scenarios/akwanga.toml?seed=7"
 
@@ -39,10 +38,10 @@ def _described_by(url: str) -> Desk:
     try:
         scenario = load_scenario(scenario_name)
         chosen = scenario.seed if seed is None else seed
-        drawer = build_scene(scenario, chosen).drawer
+        autograph = Autograph.of_scenario(scenario, chosen)
     except (Mistake, OSError) as mistake:
         raise SerialException("; ".join(str(mistake).splitlines())) from mistake
-    return Desk(build_autograph(scenario.instrument, drawer, chosen))
+    return Desk(autograph)
 
 
 def _taken_apart(url: str) -> tuple[str, int | None]:

@@ -15,8 +15,9 @@ from a7sim.scenario.references import mistakes_of_reference
 from a7sim.scenario.schema import Scenario
 from a7sim.scenario.skills import PROFILES
 from a7sim.scenario.validation import mistakes_of_form
+from a7sim.shelves import names_of, shelves_of
 
-SHELVES = (Path(__file__).parents[1] / "scenarios", Path(__file__).parents[3] / "scenarios")
+SHELVES = shelves_of("scenarios")
 """Where the scenarios are that come with a7sim."""
 
 
@@ -44,8 +45,8 @@ def find_scenario(name: str | Path) -> Path:
         found = shelf / f"{path.name.removesuffix('.toml')}.toml"
         if path.parent in (Path(), Path("scenarios")) and found.is_file():
             return found
-    known = sorted({file.stem for shelf in SHELVES for file in shelf.glob("*.toml")})
-    raise ScenarioError(str(name), [f"expected a scenario file or one of {', '.join(known)}, found no such file"])
+    known = ", ".join(names_of("scenarios"))
+    raise ScenarioError(str(name), [f"expected a scenario file or one of {known}, found no such file"])
 
 
 def bare_name(name: str | Path) -> str:

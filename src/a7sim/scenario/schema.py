@@ -3,7 +3,10 @@
 Every description completes the sentence "expected ...": validation and the JSON Schema both read it.
 """
 
-from typing import Annotated, Literal, get_args
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
 
 from msgspec import Meta, Struct, field
 from msgspec.structs import replace
@@ -520,6 +523,21 @@ class Scenario(_Data, frozen=True, kw_only=True):
     comparator: Comparator = Comparator()
     strip: StripPlan = StripPlan()
     seed: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] = 1
+
+    @classmethod
+    def load(cls, name: str | PathLike[str], settings: Mapping[str, Any] | None = None) -> "Scenario":
+        """Return the scenario of a file, or one that comes with a7sim, with other values by their paths.
+
+        Raises ScenarioError, a Mistake that names every mistake at once.
+
+        >>> from a7sim import Scenario
+        >>> scenario = Scenario.load("akwanga", {"plan.case": "E", "observer.parallax_um": 12})
+        >>> scenario.plan.case, [model.name for model in scenario.models]
+        ('E', ['1', '2'])
+        """
+        from a7sim.scenario.loading import load_scenario  # noqa: PLC0415 # loading reads all that stands here
+
+        return load_scenario(Path(name), settings=settings)
 
     @property
     def plan(self) -> Plan:

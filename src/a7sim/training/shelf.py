@@ -9,12 +9,13 @@ import msgspec
 
 from a7sim.mistakes import Mistake
 from a7sim.scenario.validation import mistakes_of_form
+from a7sim.shelves import shelves_of
 from a7sim.training.exercise import Exercise, Measured, Shelved
 from a7sim.training.handouts import HANDOUTS
 from a7sim.training.measures import MEASURES, measure_of
 from a7sim.training.procedures import PROCEDURES
 
-SHELVES = (Path(__file__).parents[1] / "exercises", Path(__file__).parents[3] / "exercises")
+SHELVES = shelves_of("exercises")
 """Where the exercises are that come with a7sim."""
 
 FILE = "exercise.toml"

@@ -26,6 +26,8 @@ def command() -> None:
     Tables are CSV with a header line, or TOML with the columns as keys of an array of tables [[rows]]; decimal
     points, UTF-8, # begins a comment. Strips are read from N.R.C. cards too (.crd, .cards, or by their look).
     With --out DIR the results go to results.json and CSV files there.
+
+    Example: a7sim reduce relative scenarios/dewitt-pair.csv --c 152.113
     """
 
 
@@ -37,7 +39,13 @@ def command() -> None:
     required=True,
     help="TOML with c, fiducials (name, x, y in mm), principal_point and distortion; a scenario's [camera] will do.",
 )
-@click.option("--method", type=click.Choice(["conformal", "affine", "projective"]), default="affine", show_default=True)
+@click.option(
+    "--method",
+    type=click.Choice(["conformal", "affine", "projective"]),
+    default="affine",
+    show_default=True,
+    help="How counts become mm: turned and scaled, with a scale in each axis and a shear, or in perspective.",
+)
 @click.option(
     "--count-mm",
     type=options.Number(min=0.0, min_open=True, max=10.0),
@@ -50,7 +58,9 @@ def command() -> None:
     help="Correct the points and bring them to the principal point; may be given several times.",
 )
 @click.option("--flying-height", type=options.Number(1.0, 30000.0), help="Of the camera above the sea, m.")
-@click.option("--ground-height", type=options.Number(-500.0, 9000.0), default=0.0, help="Above the sea, m.")
+@click.option(
+    "--ground-height", type=options.Number(-500.0, 9000.0), default=0.0, show_default=True, help="Above the sea, m."
+)
 @options.documented
 def interior(
     counts: Path,
@@ -81,7 +91,13 @@ def interior(
 @options.principal_distance(required=True)
 @options.principal_point
 @click.option("--bx", type=options.LENGTH, default=92.0, show_default=True, help="Length of the base, mm.")
-@click.option("--unknowns", type=click.Choice(["independent", "dependent"]), default="dependent", show_default=True)
+@click.option(
+    "--unknowns",
+    type=click.Choice(["independent", "dependent"]),
+    default="dependent",
+    show_default=True,
+    help="Photographs turned: both, or the right one alone.",
+)
 @click.option(
     "--method",
     type=click.Choice(computing.RELATIVE_METHODS),

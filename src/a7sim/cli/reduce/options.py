@@ -37,13 +37,15 @@ def _with(*options: Callable[[Any], Any]) -> Callable[[Command], Command]:
 
 
 documented = _with(
-    click.option("--out", type=FILE, help="Folder for results.json and the tables as CSV; may be there already."),
+    click.option(
+        "--out", type=FILE, metavar="DIR", help="Folder for results.json and the tables as CSV; may be there already."
+    ),
     click.option("--json", "as_document", is_flag=True, help="Print the results as one JSON document."),
 )
 
 principal_point = _with(
-    click.option("--x0", type=Number(-1e3, 1e3), default=0.0, help="Principal point, mm."),
-    click.option("--y0", type=Number(-1e3, 1e3), default=0.0, help="Principal point, mm."),
+    click.option("--x0", type=Number(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
+    click.option("--y0", type=Number(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
 )
 
 

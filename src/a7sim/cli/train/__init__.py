@@ -2,19 +2,19 @@
 
 import click
 
-from a7sim.cli.verbs import Verbs
+from a7sim.cli.verbs import Verb, Verbs
 
 _VERBS = {
-    "list": "a7sim.cli.train.sheets:list_",
-    "start": "a7sim.cli.train.starting:start_",
-    "hint": "a7sim.cli.train.working:hint_",
-    "answer": "a7sim.cli.train.working:answer_",
-    "verify": "a7sim.cli.train.judging:verify_",
-    "watch": "a7sim.cli.train.judging:watch_",
-    "report": "a7sim.cli.train.sheets:report_",
-    "reset": "a7sim.cli.train.working:reset_",
-    "check": "a7sim.cli.train.authoring:check_",
-    "new": "a7sim.cli.train.authoring:new_",
+    "list": Verb("a7sim.cli.train.sheets:list_", "List the exercises and how far they are done."),
+    "start": Verb("a7sim.cli.train.starting:start_", "Sit down at an exercise: console, script or client."),
+    "hint": Verb("a7sim.cli.train.working:hint_", "Give the next hint, which costs points."),
+    "answer": Verb("a7sim.cli.train.working:answer_", "Hand in values that are asked for."),
+    "verify": Verb("a7sim.cli.train.judging:verify_", "Grade the last attempt, with reasons."),
+    "watch": Verb("a7sim.cli.train.judging:watch_", "Grade again whenever something was done."),
+    "report": Verb("a7sim.cli.train.sheets:report_", "Write the sheet of a student or of the class."),
+    "reset": Verb("a7sim.cli.train.working:reset_", "Forget the attempts at an exercise."),
+    "check": Verb("a7sim.cli.train.authoring:check_", "See that exercises hold, for who writes them."),
+    "new": Verb("a7sim.cli.train.authoring:new_", "Write the skeleton of an exercise."),
 }
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli.names import an_exercise
 from a7sim.documents import as_json, head
 from a7sim.training.checking import checked
 from a7sim.training.shelf import all_exercises, find_exercise
@@ -13,7 +14,7 @@ EXIT_FAULTY = 1
 
 
 @click.command("check")
-@click.argument("exercises", nargs=-1)
+@click.argument("exercises", nargs=-1, metavar="[EXERCISE]...", shell_complete=an_exercise)
 @click.option("--json", "as_document", is_flag=True, help="Print what was found as one JSON document.")
 def check_(exercises: tuple[str, ...], as_document: bool) -> None:
     """See that exercises hold: the reference passes, each faulty one fails for its reason, no criterion is dead.

@@ -7,6 +7,7 @@ import click
 import msgspec
 
 from a7sim.cli import EXIT_DIFFERS
+from a7sim.cli.names import an_exercise
 from a7sim.cli.train.options import last_attempt, named, of_a_student, progress_in
 from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
@@ -22,7 +23,7 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
 
 
 @click.command("verify")
-@click.argument("exercise", required=False)
+@click.argument("exercise", required=False, shell_complete=an_exercise)
 @click.option(
     "--journal",
     "folders",
@@ -30,7 +31,9 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
     multiple=True,
     help="Grade the attempts handed in as a folder, or in its folders; nothing is recorded. May be repeated.",
 )
-@click.option("--seed", type=click.IntRange(min=0), help="Of attempts handed in that were started with a --seed.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), metavar="N", help="Of attempts handed in that were started with a --seed."
+)
 @click.option("--json", "as_document", is_flag=True, help="Print the grade as one JSON document.")
 @of_a_student
 def verify_(
@@ -85,8 +88,15 @@ def _graded(progress: Progress, attempt: Attempt) -> Grade:
 
 
 @click.command("watch")
-@click.argument("exercise", required=False)
-@click.option("--every", type=click.FloatRange(min=0.1, max=3600.0), default=1.0, show_default=True, metavar="SECONDS")
+@click.argument("exercise", required=False, shell_complete=an_exercise)
+@click.option(
+    "--every",
+    type=click.FloatRange(min=0.1, max=3600.0),
+    default=1.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How often it is looked whether the journal has grown.",
+)
 @of_a_student
 def watch_(exercise: str | None, every: float, home: Path | None, student: str | None) -> None:
     """Grade the attempt under way again whenever its journal has grown, until it passes or Ctrl-C. Not in an exam.

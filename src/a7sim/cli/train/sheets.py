@@ -5,8 +5,9 @@ from pathlib import Path
 import click
 from rich.console import Console
 
+from a7sim.cli.names import an_exercise
 from a7sim.cli.train.options import named, of_a_student, progress_in
-from a7sim.documents import as_json, head
+from a7sim.documents import Document, as_json, head
 from a7sim.mistakes import Mistake
 from a7sim.session.folder import write_whole
 from a7sim.sheets import sheet
@@ -16,8 +17,8 @@ from a7sim.training.shelf import all_exercises, find_exercise
 
 
 @click.command("list")
-@click.argument("exercise", required=False)
-@click.option("--json", "as_json_", is_flag=True, help="Print the exercises as one JSON document.")
+@click.argument("exercise", required=False, shell_complete=an_exercise)
+@click.option("--json", "as_json_", is_flag=True, help="Print what is listed as one JSON document.")
 @of_a_student
 def list_(exercise: str | None, as_json_: bool, home: Path | None, student: str | None) -> None:
     """List the exercises and how far they are done; or show what EXERCISE is about.
@@ -25,7 +26,8 @@ def list_(exercise: str | None, as_json_: bool, home: Path | None, student: str 
     Example: a7sim train list 4
     """
     if exercise is not None:
-        click.echo(_shown(find_exercise(exercise)))
+        shelved = find_exercise(exercise)
+        click.echo(as_json(_of_exercise(shelved)) if as_json_ else f"{_shown(shelved)}\n", nl=False)
         return
     name = named(student)
     with progress_in(home) as progress:
@@ -49,6 +51,21 @@ def list_(exercise: str | None, as_json_: bool, home: Path | None, student: str 
     Console().print(table)
 
 
+def _of_exercise(shelved: Shelved) -> Document:
+    exercise = shelved.exercise
+    return head("train list") | {
+        "exercise": shelved.name,
+        "number": exercise.number,
+        "title": exercise.title,
+        "text": shelved.text.strip(),
+        "minutes": exercise.minutes,
+        "pass_points": exercise.pass_points,
+        "hints": len(exercise.hints),
+        "steps": [each.text for each in exercise.steps],
+        "criteria": [{"title": each.title, "points": each.weight} for each in exercise.criteria],
+    }
+
+
 def _shown(shelved: Shelved) -> str:
     exercise = shelved.exercise
     steps = [f"  - {each.text}" for each in exercise.steps]
@@ -59,7 +76,13 @@ def _shown(shelved: Shelved) -> str:
 
 @click.command("report")
 @click.option("--class", "whole_class", is_flag=True, help="Of all students; otherwise of one.")
-@click.option("--to", type=click.Choice(["html", "csv", "json", "xapi"]), default="html", show_default=True)
+@click.option(
+    "--to",
+    type=click.Choice(["html", "csv", "json", "xapi"]),
+    default="html",
+    show_default=True,
+    help="A page, nbgrader's table, a document, or statements for a learning record store.",
+)
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File  [default: standard output]")
 @click.option("--home-page", default=HOME_PAGE, show_default=True, help="Of the students' accounts, for xapi.")
 @of_a_student
@@ -82,7 +105,7 @@ def report_(
     elif to == "xapi":
         text = as_xapi(graded, home_page)
     else:
-        from a7sim.training.pages import class_sheet, student_sheet  # noqa: PLC0415 # only pages need figures
+        from a7sim.training.pages import class_sheet, student_sheet  # only pages need figures
 
         shelf = all_exercises()
         text = class_sheet(shelf, best, attempts) if whose is None else student_sheet(whose, shelf, best, graded)

@@ -27,14 +27,14 @@ def sit_down(room: Room, checklist: Checklist, plain: bool) -> None:
     The simulated clock goes with the wall's while somebody sits there.
     """
     try:
-        from a7sim.console.app import Console  # noqa: PLC0415 # only who sits down loads the screen
+        from a7sim.console.app import Console  # only who sits down loads the screen
     except ImportError as error:
         raise Mistake("start: expected textual to be installed: pip install 'a7sim[console]'") from error
-    from a7sim.console.eyepiece import Drawing  # noqa: PLC0415
-    from a7sim.console.keymap import default_keymap, load_keymap  # noqa: PLC0415
-    from a7sim.console.recalling import Said  # noqa: PLC0415
-    from a7sim.console.seat import Seat  # noqa: PLC0415
-    from a7sim.console.sheet import JobSheet  # noqa: PLC0415
+    from a7sim.console.eyepiece import Drawing
+    from a7sim.console.keymap import default_keymap, load_keymap
+    from a7sim.console.recalling import Said
+    from a7sim.console.seat import Seat
+    from a7sim.console.sheet import JobSheet
 
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise Mistake("start: expected a terminal to sit at, got a file or a pipe (--script and --link need none)")

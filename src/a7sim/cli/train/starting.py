@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli.names import an_exercise
 from a7sim.cli.serve import USUAL, Served, Told, serve
 from a7sim.cli.train.options import named, of_a_student, progress_in
 from a7sim.cli.train.sitting_down import sit_down
@@ -29,14 +30,14 @@ EXAMINATION = "exam"
 
 
 @click.command("start")
-@click.argument("exercise", required=False)
+@click.argument("exercise", required=False, shell_complete=an_exercise)
 @click.option(
     "--exam",
     is_flag=True,
     help="No hints, nothing ticks, one grading; another seed than for practice. Without EXERCISE, the examination.",
 )
 @click.option("--anew", is_flag=True, help="Begin anew where an attempt is under way; that one is kept.")
-@click.option("--seed", type=click.IntRange(min=0), help="Draw other photographs than the student's own.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draws other photographs than your own.")
 @click.option("--script", type=click.Path(path_type=Path, dir_okay=False), help="Do it by a script (.a7s).")
 @click.option("--link", metavar="tcp:HOST:PORT", help="Serve it there for any client instead of opening the console.")
 @click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp:{USUAL}.")

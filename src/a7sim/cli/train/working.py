@@ -4,7 +4,9 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli.names import an_exercise
 from a7sim.cli.train.options import last_attempt, named, of_a_student, progress_in
+from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
 from a7sim.training.account import answers_in
 from a7sim.training.attempts import write_answers, write_hint
@@ -12,9 +14,10 @@ from a7sim.training.shelf import find_exercise
 
 
 @click.command("hint")
-@click.argument("exercise", required=False)
+@click.argument("exercise", required=False, shell_complete=an_exercise)
+@click.option("--json", "as_document", is_flag=True, help="Print the hint as one JSON document.")
 @of_a_student
-def hint_(exercise: str | None, home: Path | None, student: str | None) -> None:
+def hint_(exercise: str | None, as_document: bool, home: Path | None, student: str | None) -> None:
     """Give the next hint of the attempt under way; it costs points and is recorded.
 
     Example: a7sim train hint 4
@@ -25,14 +28,26 @@ def hint_(exercise: str | None, home: Path | None, student: str | None) -> None:
             raise Mistake(f"{attempt.exercise}: expected an attempt that is open, got one that is closed")
         number, hint = progress.next_hint(attempt, find_exercise(attempt.exercise).exercise)
         write_hint(attempt.folder, number, hint.cost)
+    if as_document:
+        told = {"exercise": attempt.exercise, "hint": number, "cost": hint.cost, "text": hint.text}
+        click.echo(as_json(head("train hint") | told), nl=False)
+    else:
         click.echo(f"hint {number} (-{hint.cost:g} points): {hint.text}")
 
 
 @click.command("answer")
 @click.argument("answers", nargs=-1, required=True, metavar="KEY=VALUE...")
-@click.option("--exercise", help="Of which exercise  [default: the last one started]")
+@click.option(
+    "--exercise",
+    metavar="EXERCISE",
+    shell_complete=an_exercise,
+    help="Of which exercise  [default: the last one started]",
+)
+@click.option("--json", "as_document", is_flag=True, help="Print all answers as one JSON document.")
 @of_a_student
-def answer_(answers: tuple[str, ...], exercise: str | None, home: Path | None, student: str | None) -> None:
+def answer_(
+    answers: tuple[str, ...], exercise: str | None, as_document: bool, home: Path | None, student: str | None
+) -> None:
     """Write answers down beside the journal of the attempt under way; a later one takes the place of an earlier.
 
     Example: a7sim train answer play=0.05
@@ -48,11 +63,15 @@ def answer_(answers: tuple[str, ...], exercise: str | None, home: Path | None, s
             known = ", ".join(f"{key}=... ({about})" for key, about in asked.items()) or "no answers at all"
             raise Mistake(f"{attempt.exercise}: expected {known}, got {word!r}")
     written = write_answers(attempt.folder, answers_in(answers))
-    click.echo(", ".join(f"{key}={value}" for key, value in written.items()))
+    if as_document:
+        told = {"exercise": attempt.exercise, "answers": dict(written)}
+        click.echo(as_json(head("train answer") | told), nl=False)
+    else:
+        click.echo(", ".join(f"{key}={value}" for key, value in written.items()))
 
 
 @click.command("reset")
-@click.argument("exercise")
+@click.argument("exercise", shell_complete=an_exercise)
 @of_a_student
 def reset_(exercise: str, home: Path | None, student: str | None) -> None:
     """Close the attempt under way at EXERCISE; it is kept, and the next start begins anew.

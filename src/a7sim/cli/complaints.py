@@ -1,0 +1,87 @@
+"""What click complains of, in the words of the house: what was expected, what came, where."""
+
+import re
+from difflib import get_close_matches
+
+import click
+
+_WORDS = (
+    (
+        r"(?P<got>.+) is not in the range (?P<low>[^<>=]+)<=?x<=?(?P<known>[^<>=]+)",
+        "expected {low} to {known}, got {got}",
+    ),
+    (r"(?P<got>.+) is not a valid integer( range)?", "expected a whole number, got {got}"),
+    (r"(?P<got>.+) is not a valid float( range)?", "expected a number, got {got}"),
+    (r"(?:File|Path|Directory) (?P<got>.+) does not exist", "expected one that exists, got {got}"),
+    (r"(?:File|Directory) (?P<got>.+) is a (?P<known>file|directory)", "expected no {known}, got {got}"),
+    (r"Option (?P<got>.+) requires an argument", "expected a value after {got}, got none"),
+    (r"Option (?P<got>.+) requires (?P<known>\d+) arguments", "expected {known} values after {got}, got fewer"),
+    (r"Got unexpected extra arguments? \((?P<got>.+)\)", "expected nothing more, got {got}"),
+)
+
+
+def in_one_sentence(error: click.ClickException) -> str:
+    """Return the sentence for whoever typed a command, without a line end."""
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    more = f" ({context.command_path} --help says more)" if context else ""
+    return f"{_said(error, context)}{more}"
+
+
+def _said(error: click.ClickException, context: click.Context | None) -> str:
+    verb = context.command_path.removeprefix("a7sim").strip() if context else ""
+    told = f"{verb}: " if verb else ""
+    unknown = re.match(r"No such command '(.*)'", error.message, re.DOTALL)
+    if unknown and context and isinstance(context.command, click.Group):
+        return f"{told}expected a command, got {unknown[1]!r}{_or_like(unknown[1], context)}"
+    if isinstance(error, click.NoSuchOption):
+        meant = f"; did you mean {', '.join(sorted(error.possibilities))}?" if error.possibilities else ""
+        return f"{told}expected an option of this command, got {error.option_name}{meant}"
+    if isinstance(error, click.MissingParameter) and error.param is not None:
+        return f"{told}expected {_name_of(error.param)}, got none"
+    if isinstance(error, click.BadParameter) and error.param is not None:
+        return f"{_name_of(error.param)}: {_of_bounds(error) or _reworded(error.message)}"
+    return f"{told}{_reworded(error.format_message())}"
+
+
+def _of_bounds(error: click.BadParameter) -> str | None:
+    """Return what a choice or a range expected and got, None for a complaint of another kind."""
+    kind = error.param.type if error.param is not None else None
+    got, refused, _ = error.message.partition(" is not ")
+    if not refused or " is not a valid" in error.message:
+        return None
+    if isinstance(kind, click.Choice):
+        return f"expected one of {', '.join(map(str, kind.choices))}, got {got}"
+    if isinstance(kind, click.IntRange | click.FloatRange):
+        return f"expected {_in_words(kind)}, got {got}"
+    return None
+
+
+def _in_words(bounds: click.IntRange | click.FloatRange) -> str:
+    low, high = bounds.min, bounds.max
+    if low is not None and high is not None and not bounds.min_open:
+        return f"{low:g} to {high:g}"
+    above = "" if low is None else f"more than {low:g}" if bounds.min_open else f"{low:g} or more"
+    below = "" if high is None else f"{high:g} at the most"
+    return ", ".join(filter(None, (above, below)))
+
+
+def _or_like(word: str, context: click.Context) -> str:
+    assert isinstance(context.command, click.Group)
+    like = get_close_matches(word, context.command.list_commands(context), 1)
+    return f"; did you mean {like[0]}?" if like else ""
+
+
+def _name_of(parameter: click.Parameter) -> str:
+    if isinstance(parameter, click.Option):
+        return max(parameter.opts, key=len)
+    return parameter.metavar or parameter.human_readable_name.upper()
+
+
+def _reworded(message: str) -> str:
+    plain = message.strip().removesuffix(".")
+    for pattern, words in _WORDS:
+        found = re.fullmatch(pattern, plain, re.DOTALL)
+        if found:
+            parts = found.groupdict()
+            return words.format(**parts | {"known": parts.get("known", "").replace("'", "")})
+    return plain[:1].lower() + plain[1:] if plain[1:2].islower() else plain

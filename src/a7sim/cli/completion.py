@@ -1,0 +1,35 @@
+"""`a7sim completion`: what a shell needs to complete commands, options and names."""
+
+import os
+import sys
+from pathlib import Path
+
+import click
+from click.shell_completion import get_completion_class
+
+from a7sim.mistakes import Mistake
+
+SHELLS = ("bash", "zsh", "fish")
+VARIABLE = "_A7SIM_COMPLETE"
+"""Set by the script when it asks a7sim what goes on a line."""
+
+
+@click.command("completion")
+@click.argument("shell", type=click.Choice(SHELLS), required=False)
+def command(shell: str | None) -> None:
+    """Print the script by which SHELL (the one that runs, if none is named) completes what is typed for a7sim.
+
+    \b
+    bash    eval "$(a7sim completion bash)"           in ~/.bashrc
+    zsh     eval "$(a7sim completion zsh)"            in ~/.zshrc, after compinit
+    fish    a7sim completion fish | source            in ~/.config/fish/config.fish
+
+    Example: a7sim completion bash
+    """
+    shell = shell or Path(os.environ.get("SHELL", "")).name
+    if shell not in SHELLS:
+        raise Mistake(f"completion: expected one of {', '.join(SHELLS)}, got {shell or 'no shell'}")
+    script = get_completion_class(shell)
+    if script is None:
+        raise Mistake(f"completion: expected a click that knows {shell}, got {sys.modules['click'].__name__}")
+    click.echo(script(click.get_current_context().find_root().command, {}, "a7sim", VARIABLE).source())

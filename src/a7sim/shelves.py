@@ -1,0 +1,20 @@
+"""Where scenarios, exercises and studies stand that come with a7sim: in an installed package, and in a checkout."""
+
+from pathlib import Path
+from typing import Literal
+
+Kind = Literal["scenarios", "exercises", "studies"]
+
+_PACKAGE = Path(__file__).parent
+
+
+def shelves_of(kind: Kind) -> tuple[Path, Path]:
+    """Return the folders in which those of a kind may stand."""
+    return _PACKAGE / kind, _PACKAGE.parents[1] / kind
+
+
+def names_of(kind: Kind) -> list[str]:
+    """Return the names of all of a kind that come with a7sim, in alphabetical order."""
+    files = "*/exercise.toml" if kind == "exercises" else "*.toml"
+    found = {file for shelf in shelves_of(kind) for file in shelf.glob(files)}
+    return sorted({file.parent.name if kind == "exercises" else file.stem for file in found})

@@ -1,0 +1,369 @@
+"""One grammar over all commands, light to start, completed by shells; doctor (issue 10)."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import click
+import pytest
+from click.shell_completion import BashComplete
+
+from a7sim.cli import cli, doctor
+from a7sim.cli.verbs import Verbs
+from a7sim.shelves import names_of
+
+ROOT = Path(__file__).parents[1]
+BIN = Path(sys.executable).parent
+
+NO_DOCUMENT = {
+    "console": "a screen",
+    "report": "writes a page",
+    "export": "writes what --to says",
+    "completion": "a script for a shell",
+    "train start": "a checklist, and the instrument",
+    "train watch": "a screen",
+    "train report": "--to json",
+    "train reset": "does what it says",
+    "train new": "writes a folder",
+}
+"""Commands that print no document, and why."""
+
+LIGHT = ("run", "operate", "compile", "calibrate", "bridge", "report", "compare", "train", "doctor", "completion")
+"""Commands whose --help imports neither numpy nor rich."""
+
+
+def all_commands():
+    def below(command, words):
+        if isinstance(command, click.Group):
+            context = click.Context(command)
+            for name in command.list_commands(context):
+                yield from below(command.get_command(context, name), (*words, name))
+        yield words, command
+
+    return {" ".join(words): command for words, command in below(cli, ())}
+
+
+COMMANDS = all_commands()
+VERBS = {name: command for name, command in COMMANDS.items() if not isinstance(command, click.Group)}
+
+
+def options_of(command):
+    return {name: option for option in command.params if isinstance(option, click.Option) for name in option.opts}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_says_what_it_does_with_an_example_of_its_own(name):
+    first, *_ = COMMANDS[name].help.split("\n\n")
+    assert " ".join(first.split()).endswith(".")
+    example = re.search(r"Example: (a7sim .*)", COMMANDS[name].help)
+    assert example, f"{name} has no example"
+    assert example[1].startswith(f"a7sim {name}".strip())
+
+
+@pytest.mark.parametrize("name", [*VERBS])
+def test_every_example_is_taken_by_the_command(name):
+    words = re.search(r"Example: a7sim (.*)", COMMANDS[name].help)[1].partition(" > ")[0]
+    given = [word.strip("'") for word in re.findall(r"'[^']*'|\S+", words)][len(name.split()) :]
+    assert VERBS[name].make_context(name, list(given)).params
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_options_have_help_and_speak_of_the_same_by_the_same_name(name):
+    options = options_of(VERBS[name])
+    for option, parameter in options.items():
+        assert parameter.help, f"{name} {option} has no help"
+        assert "  " not in parameter.help.replace("  [default", "")
+    context = click.Context(VERBS[name])
+    metavars = {option: parameter.make_metavar(context) for option, parameter in options.items()}
+    assert metavars.get("--seed", "N") == "N"
+    assert metavars.get("--out", "DIR") in ("DIR", "FILE")
+    assert metavars.get("--token-file", "FILE") == "FILE"
+    for document in ("--json", "--quiet", "--force"):
+        assert document not in options or options[document].is_flag
+
+
+def test_every_command_that_has_a_document_prints_it_as_json():
+    assert {name for name in VERBS if "--json" not in options_of(VERBS[name])} == set(NO_DOCUMENT)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["stereo"], "expected a command, got 'stereo'"),
+        (["reduce", "strap"], "reduce: expected a command, got 'strap'; did you mean strip?"),
+        (["run", "akwanga", "--sed", "1"], "run: expected an option of this command, got --sed; did you mean"),
+        (["run", "akwanga", "--case", "F"], "--case: expected one of A, B, C, D, E, got 'F'"),
+        (["run", "akwanga", "--seed", "-1"], "--seed: expected 0 or more, got -1"),
+        (["run", "akwanga", "--seed", "x"], "--seed: expected a whole number, got 'x'"),
+        (["calibrate", "grid-test", "--levels", "9"], "--levels: expected 1 to 5, got 9"),
+        (["console", "--acuity", "0"], "--acuity: expected more than 0, 10000 at the most, got 0.0"),
+        (["operate"], "operate: expected SCENARIO, got none"),
+        (["operate", "akwanga"], "operate: expected --link, got none"),
+        (["run", "a", "b"], "run: expected nothing more, got b"),
+        (["run", "--out"], "expected a value after '--out', got none"),
+        (["prepare", "--heights", "1"], "expected 2 values after '--heights', got fewer"),
+        (["completion", "tcsh"], "SHELL: expected one of bash, zsh, fish, got 'tcsh'"),
+    ],
+)
+def test_what_cannot_be_read_is_said_in_one_sentence(typed, words, sentence):
+    code, out, err = typed(*words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"a7sim: {sentence}")
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_an_option_that_no_command_has_is_refused_by_all(typed, name):
+    code, out, err = typed(*name.split(), "--nonsense")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("a7sim: ")
+
+
+@pytest.mark.parametrize("group", [name for name, each in COMMANDS.items() if isinstance(each, Verbs)])
+def test_what_a_list_says_of_a_command_fits_a_line(typed, group):
+    _, listed, _ = typed(*group.split(), "--help")
+    lines = listed.partition("Commands:\n")[2].splitlines()
+    assert len(lines) == len(COMMANDS[group].list_commands(click.Context(COMMANDS[group])))
+    assert all(line.endswith(".") and len(line) <= 80 for line in lines)
+
+
+def modules_of(*words):
+    """Return the modules that a command has imported when it ends."""
+    program = f"import atexit, sys; atexit.register(lambda: print(*sorted(sys.modules), file=sys.stderr)); \
+sys.argv = {['a7sim', *words]!r}; from a7sim.cli import main; main()"
+    return set(
+        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stderr.split()
+    )
+
+
+def test_listing_the_commands_imports_none_of_them():
+    imported = {name for name in modules_of("--help") if name.startswith("a7sim")}
+    assert imported == {"a7sim", "a7sim.cli", "a7sim.cli.verbs", "a7sim.cli.complaints", "a7sim.mistakes"}
+
+
+@pytest.mark.parametrize("verb", LIGHT)
+def test_a_light_command_says_its_options_without_what_works(verb):
+    assert not {"numpy", "scipy", "rich", "textual", "matplotlib"} & modules_of(verb, "--help")
+
+
+HEAVY_HELP = """
+import sys
+from a7sim.cli import cli
+from tests.test_command_line import all_commands
+print(sorted(set(sys.modules) & {"scipy", "textual", "matplotlib"}))
+"""
+
+
+def test_no_command_imports_scipy_textual_or_matplotlib_to_say_its_options():
+    done = subprocess.run([sys.executable, "-c", HEAVY_HELP], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+# --- completion ---------------------------------------------------------------------------------------------
+
+IN_A_SHELL = ("a7sim ser", "a7sim run akwanga-", "a7sim train ve")
+COMPLETED = [
+    ("a7sim ser", {"serve"}),
+    ("a7sim train ve", {"verify"}),
+    ("a7sim run --ca", {"--case"}),
+    ("a7sim run --case ", {"A", "B", "C", "D", "E"}),
+    ("a7sim run akwanga-", {"akwanga-a8", "akwanga-lake"}),
+    ("a7sim train start 04", {"04-parallax"}),
+    ("a7sim study lev", {"levels"}),
+    ("a7sim replay cle", {"clearing"}),
+    ("a7sim reduce str", {"strip"}),
+]
+IN_FISH = """
+a7sim completion fish | source
+for line in $argv
+    echo (complete -C $line | cut -f1)
+end
+"""
+
+IN_ZSH = """
+autoload -Uz compinit
+compinit -D
+eval "$(a7sim completion zsh)"
+[[ $_comps[a7sim] == _a7sim_completion ]] || echo no completion
+compadd() { shift; print -r -- $completions }
+_describe() { print -r -- ${${(P)3}%%:*} }
+for line in "$@"; do
+    words=(${=line}) CURRENT=$#words
+    _a7sim_completion
+done
+"""
+
+ENVIRONMENT = os.environ | {"PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
+
+IN_BASH = """
+eval "$(a7sim completion bash)"
+for line in "$@"; do
+    COMP_LINE=$line COMP_POINT=${#line}
+    read -ra COMP_WORDS <<< "$line"
+    [[ $line == *" " ]] && COMP_WORDS+=("")
+    COMP_CWORD=$((${#COMP_WORDS[@]} - 1)) COMPREPLY=()
+    compopt() { :; }
+    _a7sim_completion a7sim
+    echo "${COMPREPLY[*]}"
+done
+"""
+
+
+def asked(shell, script):
+    """Return what a shell prints when it completes the lines that go through all that can be completed."""
+    lines = [line for line, _ in COMPLETED if line in IN_A_SHELL]
+    done = subprocess.run(
+        [shell, "-c", script, *([shell] if shell != "fish" else []), *lines],
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""
+    return [set(reply.split()) for reply in done.stdout.splitlines()]
+
+
+WANTED = [wanted for line, wanted in COMPLETED if line in IN_A_SHELL]
+
+
+@pytest.mark.parametrize(("line", "wanted"), COMPLETED)
+def test_verbs_options_choices_and_names_are_completed(line, wanted):
+    words = line.split()[1:]
+    incomplete = "" if line.endswith(" ") else words.pop()
+    found = BashComplete(cli, {}, "a7sim", "_A7SIM_COMPLETE").get_completions(words, incomplete)
+    assert {each.value for each in found} == wanted
+
+
+def test_what_is_no_name_is_completed_as_a_file():
+    found = BashComplete(cli, {}, "a7sim", "_A7SIM_COMPLETE").get_completions(["run"], "./mine")
+    assert [(each.type, each.value) for each in found] == [("file", "./mine")]
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not here")
+def test_bash_completes():
+    assert asked("bash", IN_BASH) == WANTED
+
+
+@pytest.mark.skipif(shutil.which("fish") is None, reason="fish is not here")
+def test_fish_completes():
+    assert asked("fish", IN_FISH) == WANTED
+
+
+@pytest.mark.skipif(shutil.which("zsh") is None, reason="zsh is not here")
+def test_zsh_completes():
+    assert asked("zsh", IN_ZSH) == WANTED
+
+
+@pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
+def test_each_script_speaks_of_a7sim(typed, name):
+    code, script, _ = typed("completion", name)
+    assert code == 0
+    assert f"_A7SIM_COMPLETE={name}_complete" in script
+
+
+def test_the_shell_that_runs_is_taken_where_none_is_named(typed, monkeypatch):
+    monkeypatch.setenv("SHELL", "/usr/bin/fish")
+    assert "fish_complete" in typed("completion")[1]
+    monkeypatch.setenv("SHELL", "/bin/tcsh")
+    assert typed("completion")[0] == 2
+
+
+# --- doctor -------------------------------------------------------------------------------------------------
+
+
+def test_doctor_tells_what_is_here(typed):
+    code, out, err = typed("doctor", "--json")
+    found = json.loads(out)
+    assert (code, err, found["healthy"]) == (0, "", True)
+    installed = {each["name"]: each["installed"] for each in found["libraries"]}
+    assert installed["click"] == metadata.version("click")
+    assert {"console", "browser", "report"} <= set(found["extras"])
+    assert found["comes_with"] == {kind: names_of(kind) for kind in ("scenarios", "exercises", "studies")}
+    assert all(found["comes_with"].values())
+    assert "Extra console: ready" in typed("doctor")[1]
+
+
+REQUIRED = [
+    "click>=8.1",
+    "uvloop>=0.21; sys_platform != 'nowhere'",
+    "winonly>=1; sys_platform == 'nowhere'",
+    "textual<9,>=8.2; extra == 'console'",
+    "a7sim[console]; extra == 'browser'",
+    "no-such-library; extra == 'browser'",
+    "a7sim[browser,console]; extra == 'all'",
+]
+
+
+@pytest.fixture
+def with_versions(monkeypatch):
+    versions = {"click": "8.5.1", "uvloop": "0.21.0", "textual": "8.2.8"}
+
+    def version(name):
+        if name not in versions:
+            raise metadata.PackageNotFoundError(name)
+        return versions[name]
+
+    monkeypatch.setattr(doctor.metadata, "requires", lambda _: REQUIRED)
+    monkeypatch.setattr(doctor.metadata, "version", version)
+    return versions
+
+
+def test_doctor_says_what_is_missing_and_how_to_get_it(typed, with_versions):
+    code, out, _ = typed("doctor")
+    assert code == 0
+    assert "Extra console: ready" in out
+    assert "Extra browser: missing, pip install 'a7sim[browser]'" in out
+    assert "winonly" not in out
+    assert "Extra all" not in out
+
+
+def test_doctor_ends_with_1_where_every_command_lacks_something(typed, with_versions):
+    with_versions["click"] = "8.0.4"
+    code, out, _ = typed("doctor")
+    assert code == 1
+    assert re.search(r"click +8\.0\.4 +>=8\.1 +does not fit", out)
+
+
+@pytest.mark.parametrize(
+    ("version", "asked_for", "fits"),
+    [
+        ("8.2.8", "<9,>=8.2", True),
+        ("9.0.0a1", "<9,>=8.2", False),
+        ("8.1", "<9,>=8.2", False),
+        ("8.10", ">=8.2", True),
+        ("8.2", ">=8.2.0", True),
+        ("1.1.3", "==1.1.3", True),
+        ("1.1.3", "!=1.1.3", False),
+        ("2.0", "", True),
+    ],
+)
+def test_versions_are_compared_number_by_number(version, asked_for, fits):
+    assert doctor.satisfies(version, asked_for) is fits
+
+
+def test_doctor_needs_nothing_of_what_it_looks_for():
+    assert not {"numpy", "scipy", "rich", "msgspec", "textual"} & modules_of("doctor")
+
+
+@pytest.mark.parametrize(
+    ("environment", "colours"),
+    [
+        ({"TERM": "xterm-256color"}, 256),
+        ({"TERM": "xterm", "COLORTERM": "truecolor"}, 1 << 24),
+        ({"TERM": "xterm"}, 16),
+        ({"TERM": "dumb"}, 0),
+        ({"TERM": "xterm-256color", "NO_COLOR": "1"}, 0),
+    ],
+)
+def test_doctor_tells_what_the_terminal_can_do(typed, monkeypatch, environment, colours):
+    for name in ("TERM", "COLORTERM", "NO_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in (environment | {"COLUMNS": "79", "LINES": "24"}).items():
+        monkeypatch.setenv(name, value)
+    terminal = json.loads(typed("doctor", "--json")[1])["terminal"]
+    assert (terminal["columns"], terminal["lines"], terminal["room_for_console"]) == (79, 24, False)
+    assert terminal["colours"] == colours
