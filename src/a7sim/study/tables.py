@@ -1,5 +1,6 @@
 """What a study found, as tables for a terminal."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from rich.console import Group, RenderableType
@@ -28,6 +29,9 @@ def _parts(document: Document) -> Iterator[RenderableType]:
         analyses = [each["sources"] for each in document["variance"] if each["response"] == name]
         if analyses:
             yield Padding(_variance([source for sources in analyses for source in sources]), (1, 0, 0, 2))
+        for hypercube in document["main_effects"]:
+            if hypercube["response"] == name:
+                yield Padding(_main_effects(hypercube), (1, 0, 0, 2))
     yield Text(
         "\nn sessions; +- half the 95 % interval of the mean; minus 1: minus cell 1, pair by pair; p after Holm.\n"
     )
@@ -57,6 +61,15 @@ def _difference(comparison: Document | None) -> Sequence[str]:
     if comparison is None:
         return ("", "")
     return f"{comparison['difference']:+.3g}", f"{comparison['p_adjusted']:.3f}"
+
+
+def _main_effects(hypercube: Document) -> Table:
+    table = sheet("factor", "share of variance", "from", "to", "p", "slope of ranks", "from", "to", left=(0,))
+    for each in hypercube["factors"]:
+        numbers = (each["share"], *each["interval"], each["p"], each["slope"], *each["slope_interval"])
+        table.add_row(each["factor"], *("" if math.isnan(value) else f"{value:.3f}" for value in numbers))
+    table.add_row("of that, chance", f"{hypercube['chance']:.3f}")
+    return table
 
 
 def _variance(sources: Sequence[Document]) -> Table:
