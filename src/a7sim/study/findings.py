@@ -26,6 +26,7 @@ from a7sim.study.statistics import (
     variance_by_factor,
 )
 from a7sim.study.tally import Tally
+from a7sim.study.theory import beside_theory, of_theory
 
 SIGNIFICANT = 1.0 - CONFIDENCE
 
@@ -52,7 +53,7 @@ def document_of(laid: Laid, tally: Tally) -> Document:
     }
     if study.precision is not None:
         document["precision_reached"] = reached(laid, tally)
-    return document | {"answer": list(_answer(document))}
+    return document | of_theory(document, laid.scenarios) | {"answer": list(_answer(document))}
 
 
 def _cell(laid: Laid, tally: Tally, i: int, cell: Cell) -> Document:
@@ -85,7 +86,7 @@ def _spread(laid: Laid, tally: Tally, at: tuple[int, int], sample: Array) -> Doc
         "least": float(tally.low[at]),
         "largest": float(tally.high[at]),
         "quantiles": {f"{share:g}": {"value": v, "interval": interval} for share, (v, interval) in quantiles.items()},
-    }
+    } | beside_theory(laid.scenarios[at[0]], laid.responses[at[1]].name, mean, sd)
 
 
 def _comparisons(laid: Laid, tally: Tally) -> Iterator[Document]:

@@ -55,6 +55,8 @@ def _response(document: Document, response: Document) -> Iterator[Part]:
     if len(there) <= MOST_CELLS_DRAWN:
         yield _intervals(there, response)
     yield _spreads(there, name)
+    if "theory" in document and any("theory" in cell["responses"][name] for cell in there):
+        yield Paragraph(document["theory"])
     beside = [each for each in document["comparisons"] if each["response"] == name]
     if beside:
         yield _comparisons(beside, {cell["cell"]: in_words(cell) for cell in document["cells"]})
@@ -95,6 +97,12 @@ def _spreads(cells: Sequence[Document], name: str) -> Sheet:
     quantiles = list(cells[0]["responses"][name]["quantiles"])
     rows = [_spread(cell, name) for cell in cells]
     header = (*columns, *(f"{100.0 * float(share):.0f} %" for share in quantiles))
+    if any("theory" in cell["responses"][name] for cell in cells):
+        header = (*header, "Theory", "Ratio")
+        of_theory = [[cell["responses"][name].get(each, math.nan) for each in ("theory", "ratio")] for cell in cells]
+        rows = [
+            [*row, *("" if math.isnan(v) else _short(v) for v in two)] for row, two in zip(rows, of_theory, strict=True)
+        ]
     return Sheet("Means, standard deviations and quantiles", header, rows)
 
 

@@ -35,6 +35,8 @@ def _parts(document: Document) -> Iterator[RenderableType]:
     yield Text(
         "\nn sessions; +- half the 95 % interval of the mean; minus 1: minus cell 1, pair by pair; p after Holm.\n"
     )
+    if "theory" in document:
+        yield Text(f"{document['theory']}\n")
     for sentence in document["answer"]:
         yield Text(sentence)
     if document.get("precision_reached") is False:
@@ -42,7 +44,10 @@ def _parts(document: Document) -> Iterator[RenderableType]:
 
 
 def _cells(document: Document, name: str) -> Table:
-    table = sheet("cell", "levels", "n", "mean", "+-", "sd", "median", "minus 1", "p", left=(0, 1), fold=(1,))
+    spreads = [cell["responses"][name] for cell in document["cells"]]
+    theory = ("theory", "ratio") if any("theory" in each for each in spreads) else ()
+    columns = ("cell", "levels", "n", "mean", "+-", "sd", "median", "minus 1", "p", *theory)
+    table = sheet(*columns, left=(0, 1), fold=(1,))
     beside = {each["cell"]: each for each in document["comparisons"] if each["response"] == name}
     for cell in document["cells"]:
         spread = cell["responses"][name]
@@ -53,7 +58,8 @@ def _cells(document: Document, name: str) -> Table:
         half = spread["mean_interval"][1] - spread["mean"]
         median = spread["quantiles"]["0.5"]["value"]
         numbers = (f"{spread['mean']:.4g}", f"{half:.2g}", f"{spread['sd']:.3g}", f"{median:.4g}")
-        table.add_row(*first, *numbers, *_difference(beside.get(cell["cell"])))
+        propagated = [f"{spread[each]:.3g}" if each in spread else "" for each in theory]
+        table.add_row(*first, *numbers, *_difference(beside.get(cell["cell"])), *propagated)
     return table
 
 
