@@ -11,12 +11,15 @@ from a7sim.mistakes import Mistake
 from a7sim.operator import bridging
 from a7sim.operator.bench import Bench, Parallaxes
 from a7sim.operator.bridging import bridged
+from a7sim.operator.crew import NobodyGoesOn
 from a7sim.reduction import similarity_by_quaternion
 from a7sim.report.kept import read_session
 from a7sim.report.writing import report_of
-from a7sim.scenario import load_scenario
+from a7sim.scenario import ScenarioError, load_scenario
 from a7sim.session.bridge import bridged_strip, run_bridge, tables_of
 from a7sim.session.crowd import open_crowd
+from a7sim.session.ways import documents_of_all_ways, run_all_ways
+from a7sim.study.loading import load_study
 from tests.pages import Page
 from tests.sessions import without_errors
 
@@ -108,6 +111,41 @@ def test_models_that_do_not_go_on_are_refused():
     assert "does not go on from model 1" in crowd.bench.crew.reasons[0]
 
 
+@pytest.mark.slow
+def test_a_scenario_that_asks_for_a_bridge_gets_it_over_the_link_and_in_a_crowd():
+    """`work = ["bridge"]`: the strip on the ground to the digit, and the hours, as a study reads them."""
+    settings = load_study("bridging").cells[5].settings
+    scenario = without_errors(load_scenario("bridge", settings=settings))
+    assert scenario.work == ["bridge"]
+    alone = run_all_ways(scenario, 1)
+    (together,) = documents_of_all_ways(scenario, [1])
+    assert alone["status"] == together["status"] == "complete"
+    assert alone["operator"] == together["operator"]
+    assert alone["ways"] == together["ways"]
+    assert alone["ways"]["bridge"]["accuracy_m"]["checks"]["plan"] < 0.05
+    assert alone["ways"]["bridge"]["joins"] == []
+
+
+@pytest.mark.slow
+def test_a_bridge_that_does_not_close_says_why_in_both(monkeypatch):
+    """Whoever gives up has no strip, and the document says so."""
+    monkeypatch.setattr(bridging, "carry_scale_on", _gives_up)
+    scenario = msgspec.structs.replace(scenario_of(2), work=["bridge"])
+    for document in (run_all_ways(scenario, 1), *documents_of_all_ways(scenario, [1])):
+        assert (document["status"], document["message"]) == ("does not fit", "no scale")
+        assert "ways" not in document
+
+
+def _gives_up(bench, who, model, before):
+    bench.crew.give_up(who, "no scale")
+    raise NobodyGoesOn
+
+
+def test_a_scenario_without_base_out_cannot_ask_for_a_bridge():
+    with pytest.raises(ScenarioError, match="base inside and outside in turn"):
+        load_scenario("a8-strip", {"work": '["bridge"]'})
+
+
 @pytest.fixture(scope="module")
 def shipped(tmp_path_factory):
     """The strip of ten models that comes with a7sim, bridged and worked as independent models, and its folder."""
@@ -194,3 +232,13 @@ def test_a_model_without_a_common_point_on_its_left_is_refused(monkeypatch):
     crowd, models = worked(scenario)
     assert len(models) == 1
     assert "none of its points 1, 3 and 5 was measured before" in crowd.bench.crew.reasons[0]
+
+
+@pytest.mark.slow
+def test_of_two_readings_that_contradict_each_other_either_may_be_the_wrong_one():
+    """One reading of by' and one of by": a slip in by" is made again too, and nobody gives up for it."""
+    settings = {"plan.parallax_readings": 1, "plan.centre_method": "scales", "observer.blunder_rate": 0.02}
+    scenario = load_scenario("akwanga", settings=settings)
+    crowd = open_crowd(msgspec.structs.replace(scenario, models=scenario.models[:1]), range(12))
+    assert len(list(crowd.worked())) == 1
+    assert not any("do not agree" in why for why in crowd.bench.crew.reasons.values()), crowd.bench.crew.reasons

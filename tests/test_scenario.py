@@ -111,11 +111,14 @@ def test_a_mistake_of_each_kind_is_one_sentence(change, mistake):
         (
             lambda raw: raw.update(work=["plotter", "theodolite", "plotter"]),
             [
-                "work[1]: expected 'comparator' or 'plotter' or 'readings', got \"theodolite\"",
+                "work[1]: expected 'bridge' or 'comparator' or 'plotter' or 'readings', got \"theodolite\"",
                 "work[2]: expected every way once, got 'plotter' twice",
             ],
         ),
-        (lambda raw: raw.update(work=[]), ["work: expected 'plotter', 'comparator' or 'readings', or several, got 0"]),
+        (
+            lambda raw: raw.update(work=[]),
+            ["work: expected 'plotter', 'comparator', 'readings' or 'bridge', or several, got 0"],
+        ),
         (
             lambda raw: raw.pop("plan"),
             ["plan: expected the settings of the plotter, got nothing (work = ['comparator'] needs none)"],

@@ -53,9 +53,8 @@ def _changes_of_y(r: Array, angles: Array) -> Array:
     about_omega = np.array([1.0, 0.0, 0.0])
 
     def turn(axis: Array) -> Array:
-        axis = axis.reshape((3, *(1,) * (r.ndim - axis.ndim), *axis.shape[1:]))
-        moved = np.cross(np.broadcast_to(axis, r.shape), r, axis=0)
-        return np.asarray(moved[1] - slope * moved[2])
+        x, y, z = axis.reshape((3, *(1,) * (r.ndim - axis.ndim), *axis.shape[1:]))
+        return np.asarray((z * r[0] - x * r[2]) - slope * (x * r[1] - y * r[0]))
 
     return np.array([turn(about_kappa), turn(about_phi), turn(about_omega), np.full_like(slope, -1.0), -slope])
 

@@ -289,15 +289,18 @@ class Bench:
         values: Array,
         numbers: Numbers,
     ) -> Who:
-        """Strike out readings that their fellows contradict and make them again, in place."""
+        """Strike out readings that their fellows contradict and make them again, in place.
+
+        Of two that contradict each other nobody knows which is wrong: they are made again in turn.
+        """
         crew, observer = self.crew, self.crew.observer
         tolerance = FAINTEST_SLIP_MM + 5e-3 * observer.parallax_um * self.seat.z / self.seat.c
         doubtful, lost = who, who[:0]
         bys = " and ".join("by'" if projector == 1 else 'by"' for projector in projectors)
-        for _ in range(MOST_POINTINGS):
+        for number in range(MOST_POINTINGS):
             flat = values.reshape(-1, crew.sessions)[:, doubtful]
             deviations = np.abs(flat - np.median(flat, axis=0))
-            worst = deviations.argmax(axis=0)
+            worst = deviations.argmax(axis=0) if len(flat) > 2 else np.full(doubtful.size, number % len(flat))
             off = deviations.max(axis=0) > tolerance[doubtful]
             doubtful, worst = doubtful[off], worst[off]
             if not doubtful.size:

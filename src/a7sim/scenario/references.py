@@ -79,7 +79,9 @@ def _mistakes_in_work(raw: Mapping[str, Any]) -> Iterator[str]:
     for index, way in enumerate(ways):
         if way in ways[:index]:
             yield f"work[{index}]: expected every way once, got {way!r} twice"
-    if ("plotter" in ways or "readings" in ways) and "plan" not in raw:
+    if "bridge" in ways and {model.get("base", "inside") for model in _tables(raw, "models")} != {"inside", "outside"}:
+        yield "models: expected base inside and outside in turn, as bridging needs, got one of them alone"
+    if {"plotter", "readings", "bridge"} & {*map(str, ways)} and "plan" not in raw:
         yield "plan: expected the settings of the plotter, got nothing (work = ['comparator'] needs none)"
 
 

@@ -491,8 +491,9 @@ class StripPlan(_Data, frozen=True, kw_only=True):
     """Degree of the adjustment on the control after absolute orientation; none when absent."""
 
 
-Way = Literal["plotter", "comparator", "readings"]
-"""How a strip is measured: by an operator at a plotter, in a comparator, or as an A8's readings on arrays."""
+Way = Literal["plotter", "comparator", "readings", "bridge"]
+"""How a strip is measured: by an operator at a plotter, in a comparator, as an A8's readings on arrays, or by an
+operator who bridges it, base in and base out in turn."""
 
 
 class Scenario(_Data, frozen=True, kw_only=True):
@@ -511,9 +512,9 @@ class Scenario(_Data, frozen=True, kw_only=True):
     """Roads and tracks, shown by the photographs."""
     models: Annotated[list[Model], Meta(min_length=1, description="one model or more")] = []
     """When absent, each photograph and the next, numbered from 1."""
-    work: Annotated[list[Way], Meta(min_length=1, description="'plotter', 'comparator' or 'readings', or several")] = (
-        field(default_factory=lambda: ["plotter"])
-    )
+    work: Annotated[
+        list[Way], Meta(min_length=1, description="'plotter', 'comparator', 'readings' or 'bridge', or several")
+    ] = field(default_factory=lambda: ["plotter"])
     """Who measures the strip."""
     instrument: Instrument = Instrument()
     grid_plate: GridPlate = GridPlate()

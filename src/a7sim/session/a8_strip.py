@@ -3,6 +3,7 @@
 Errors and their sources: docs/decisions/0005-a8-strip.md.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from a7sim.geometry import Array, plane_rotation
 from a7sim.instrument.condition import INSTRUMENT_STREAM
 from a7sim.operator.dice import OPERATOR_STREAM
-from a7sim.reduction import Model, a8_centres, a8_model_coordinates, picture_lie
+from a7sim.reduction import Model, Undetermined, a8_centres, a8_model_coordinates, picture_lie
 from a7sim.scenario import ModelPlan, Observer, Scenario
 from a7sim.scene import Photograph, Scene
 from a7sim.session.analytical import (
@@ -21,7 +22,7 @@ from a7sim.session.analytical import (
     measured_points,
     on_the_ground,
     places_of,
-    pointed_at,
+    pointing_errors,
     rounded,
     with_centres,
 )
@@ -74,8 +75,8 @@ class A8:
     readings_of_parallax: int
     rng: np.random.Generator
 
-    def set_up(self, model: ModelPlan, scene: Scene, wanted: frozenset[str], standard: frozenset[str]) -> Model:
-        """Orient a model on its standard points and return it with all wanted points, measured, mm at its scale."""
+    def set_up(self, model: ModelPlan, scene: Scene, wanted: frozenset[str], standard: frozenset[str]) -> "Shown":
+        """Lay the photographs of a model on their carriers; draw how they are shown, and all that is seen wrongly."""
         photographs = scene.photographs[model.left], scene.photographs[model.right]
         names = common_points(photographs[0].points, photographs[1].points, wanted)
         pictures = tuple(laid(each, names, self.observer, self.rng) for each in photographs)
@@ -90,23 +91,65 @@ class A8:
         oriented_on = [i for i, name in enumerate(names) if name in standard]
         sigma = 1e-3 * self.observer.parallax_um / np.sqrt(self.readings_of_parallax)
         errors = sigma * self.rng.standard_normal(len(oriented_on))
-        with blamed_on_model(model.name):
-            stand = cleared(left[:, oriented_on], right[:, oriented_on], (c[0], c[1]), self.bx, errors)
-        readings = self._read(stand.seen(left, right)[0], stand)
+        pointing = pointing_errors((3, len(names)), self.observer.repeat_share, POINTINGS, self.rng)
+        return Shown(model, names, left, right, (c[0], c[1]), oriented_on, errors, pointing)
+
+    def cleared(self, models: Sequence["Shown"]) -> list[Cleared]:
+        """Clear the parallaxes of models, all at once where they have as many points to do it on."""
+        if len({len(each.oriented_on) for each in models}) == 1:
+            left, right = (np.stack([each.at_standard_points[side] for each in models], axis=-1) for side in range(2))
+            c1, c2 = np.array([each.c for each in models]).T
+            try:
+                stands = cleared(left, right, (c1, c2), self.bx, np.stack([each.errors for each in models], axis=-1))
+            except Undetermined:
+                pass
+            else:
+                return [stands.of(i) for i in range(len(models))]
+        alone = []
+        for each in models:
+            with blamed_on_model(each.model.name):
+                alone.append(cleared(*each.at_standard_points, each.c, self.bx, each.errors))
+        return alone
+
+    def measured(self, shown: "Shown", stand: Cleared) -> Model:
+        """Return a model with all its points, mm at its scale."""
+        readings = self._read(stand.seen(shown.left, shown.right)[0], stand, shown.pointing)
         centres = np.array(a8_centres(self.bx, COLUMN_MM, REFERENCE_MM)).T
         points, ends = (a8_model_coordinates(each, self.bx, COLUMN_MM, REFERENCE_MM) for each in (readings, centres))
-        return with_centres(model, names, points, ends)
+        return with_centres(shown.model, shown.names, points, ends)
 
-    def _read(self, points: Array, stand: Cleared) -> Array:
+    def _read(self, points: Array, stand: Cleared, pointing: Array) -> Array:
         """Return the scales' readings ``(3, n)`` for points ``(3, n)`` from the left centre, as pointed at."""
         observer = self.observer
         enlargement = -points[2] / stand.c[0]
         plan = 1e-3 * observer.stereo_um * enlargement
         height = 1e-3 * observer.height_um * enlargement * -points[2] / self.bx
-        pointed = pointed_at(points, np.array([plan, plan, height]), observer.repeat_share, POINTINGS, self.rng)
-        x, y, z = pointed
+        x, y, z = points[..., None] + np.array([plan, plan, height])[..., None] * pointing
         readings = np.array([x / 2.0 + 200.0 - self.bx / 4.0, y / 2.0 + 200.0, z + COLUMN_MM + REFERENCE_MM])
         return np.asarray(rounded(readings, SCALE_STEP).mean(axis=-1))
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A model's photographs as the projectors show them, and how wrongly they are going to be seen."""
+
+    model: ModelPlan
+    names: tuple[str, ...]
+    left: Array
+    right: Array
+    """Image points ``(2, n)`` about the principal points, mm."""
+    c: tuple[float, float]
+    oriented_on: list[int]
+    """The standard points among them."""
+    errors: Array
+    """With which their parallaxes are cleared, mm in the picture."""
+    pointing: Array
+    """Errors ``(3, n, pointings)`` in units of their standard deviations."""
+
+    @property
+    def at_standard_points(self) -> tuple[Array, Array]:
+        """Image points of both photographs on which the model is oriented."""
+        return self.left[:, self.oriented_on], self.right[:, self.oriented_on]
 
 
 def strip_on_a8(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
@@ -130,9 +173,10 @@ def strip_on_a8(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
         person,
     )
     wanted = measured_points(scenario, scene, plan.case)
-    models = tuple(
+    shown = [
         a8.set_up(model, scene, wanted, frozenset(positions[label] for label in CASES[plan.case] if label in positions))
         for model in scenario.models
         for positions in [scene.standard_points[model.name]]
-    )
+    ]
+    models = tuple(a8.measured(each, stand) for each, stand in zip(shown, a8.cleared(shown), strict=True))
     return on_the_ground(models, scenario, scene)

@@ -181,10 +181,14 @@ def pointed_at(places: Array, sigma: Array | float, share: float, pointings: int
 
     `share` of the error is new when the pointing is repeated at once; the rest is how the point itself is seen.
     """
-    seen = np.sqrt(1.0 - share**2) * rng.standard_normal(places.shape)
-    anew = share * rng.standard_normal((*places.shape, pointings))
     sigmas = np.broadcast_to(sigma, places.shape)[..., None]
-    return np.asarray(places[..., None] + sigmas * (seen[..., None] + anew))
+    return np.asarray(places[..., None] + sigmas * pointing_errors(places.shape, share, pointings, rng))
+
+
+def pointing_errors(shape: tuple[int, ...], share: float, pointings: int, rng: np.random.Generator) -> Array:
+    """Return the errors ``(*shape, pointings)`` of `pointed_at` in units of their standard deviations."""
+    seen = np.sqrt(1.0 - share**2) * rng.standard_normal(shape)
+    return np.asarray(seen[..., None] + share * rng.standard_normal((*shape, pointings)))
 
 
 def rounded(values: Array, least_count: float) -> Array:

@@ -1,6 +1,7 @@
 """A strip bridged at the instrument beside the same strip of independent models, both on the ground."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,15 +11,19 @@ from rich.text import Text
 import a7sim
 from a7sim.documents import Document, as_json, head, of_absolute, of_adjustment
 from a7sim.mistakes import Mistake
-from a7sim.operator.bridging import BridgedModels, bridge
-from a7sim.reduction import Ground, Model, Undetermined, absolute_orientation, strip_adjustment
+from a7sim.operator import DoesNotFit
+from a7sim.operator.bridging import BridgedModels, bridge, bridged
+from a7sim.reduction import Ground, Model, Strip, Undetermined, absolute_orientation, strip_adjustment
 from a7sim.scenario import Scenario, rephrased
+from a7sim.scene import Scene
+from a7sim.session.analytical import StripResult
+from a7sim.session.crowd import open_crowd
 from a7sim.session.folder import MODELS, RESULTS, prepare_folder, write_whole
 from a7sim.session.journal import Journal, header_of
-from a7sim.session.results import models_csv, of_request
+from a7sim.session.results import models_csv, of_hours, of_request
 from a7sim.session.running import Watcher, open_session, run
 from a7sim.session.sitting import sitting
-from a7sim.session.strips import ground_of
+from a7sim.session.strips import GroundedStrip, ground_of
 from a7sim.sheets import sheet
 
 INDEPENDENT = "independent"
@@ -75,11 +80,72 @@ def run_bridge(
     return document
 
 
+@dataclass(frozen=True)
+class Bridging:
+    """What came of bridging a strip: the strip, or why there is none, and where the hours went."""
+
+    result: StripResult | None
+    message: str
+    operator: Document
+
+
+def bridged_alone(scenario: Scenario, seed: int) -> Bridging:
+    """Bridge the strip of a scenario over the link."""
+    session = open_session(scenario, seed)
+    models: list[Model] = []
+    message = ""
+    try:
+        for each in bridge(session.person, session.job):
+            models.append(_as_model(each.model.name, each.places_of(0)))
+    except (DoesNotFit, Undetermined) as trouble:
+        message = str(trouble)
+    operator = of_hours(session.person.clock.now, session.person.timesheet)
+    return _bridging(models, message, operator, scenario, session.scene)
+
+
+def bridged_together(scenario: Scenario, seeds: Sequence[int]) -> list[Bridging]:
+    """Bridge the strip once a seed, all sessions at once, each to the digit what `bridged_alone` gives."""
+    crowd = open_crowd(scenario, seeds)
+    models: list[list[Model]] = [[] for _ in seeds]
+    for each in bridged(crowd.bench):
+        for session in each.who.tolist():
+            models[session].append(_as_model(each.model.name, each.places_of(session)))
+    crew = crowd.bench.crew
+    return [
+        _bridging(
+            models[session],
+            crew.reasons.get(session, ""),
+            of_hours(float(crew.seconds[session]), crew.timesheet, session),
+            scenario,
+            scene,
+        )
+        for session, scene in enumerate(crowd.scenes)
+    ]
+
+
+def _bridging(models: Sequence[Model], message: str, operator: Document, scenario: Scenario, scene: Scene) -> Bridging:
+    if message:
+        return Bridging(None, message, operator)
+    ground, degree = ground_of(scenario, scene), scenario.strip.polynomial
+    strip = averaged(models)
+    try:
+        oriented = absolute_orientation(strip, ground)
+        adjusted = strip_adjustment(oriented.model, ground, degree) if degree else None
+    except Undetermined as undetermined:
+        return Bridging(None, f"the bridged strip: {undetermined}", operator)
+    return Bridging(StripResult(tuple(models), GroundedStrip(Strip((strip,), ()), oriented, adjusted)), "", operator)
+
+
 def _as_model(name: str, places: Places) -> Model:
     return Model(name, tuple(places), np.array([*places.values()]).T)
 
 
-def bridged_strip(places: Sequence[Places]) -> Model:
+def averaged(models: Iterable[Model]) -> Model:
+    """Return all points of the models of a bridged strip, those of several models averaged."""
+    return bridged_strip([dict(zip(each.points, each.coordinates.T.tolist(), strict=True)) for each in models])
+
+
+def bridged_strip(places: Iterable[Places]) -> Model:
     """Return all points of a bridged strip in mm, those of several models averaged."""
     found: dict[str, list[tuple[float, float, float]]] = {}
     for model in places:

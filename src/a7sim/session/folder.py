@@ -14,7 +14,7 @@ GEOJSON, SVG = "map.geojson", "map.svg"
 RESIDUALS = "residuals.csv"
 REPORT = "report.html"
 MODELS_OF_WAY, STRIP_OF_WAY = "{}-models.csv", "{}-strip.csv"
-WAYS = ("comparator", "A8")
+WAYS = ("comparator", "A8", "bridge")
 FILES = (
     JOURNAL,
     Path(JOURNAL).with_suffix(SCENARIO_SUFFIX).name,

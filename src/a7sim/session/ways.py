@@ -1,6 +1,6 @@
-"""Every way in which a scenario asks for its strip: an operator at the plotter, the comparator, or both (P)."""
+"""Every way in which a scenario asks for its strip: at the plotter, bridged there, by comparator, on an A8 (P)."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from a7sim.documents import Document, as_json, of_differences
@@ -11,6 +11,8 @@ from a7sim.scene import Scene, build_scene
 from a7sim.session import results
 from a7sim.session.a8_strip import strip_on_a8
 from a7sim.session.analytical import StripResult, strip_by_comparator
+from a7sim.session.bridge import Bridging, bridged_alone, bridged_together
+from a7sim.session.crowd import open_crowd
 from a7sim.session.folder import MODELS_OF_WAY, RESULTS, STRIP_OF_WAY, prepare_folder, write_whole
 from a7sim.session.journal import Keeping
 from a7sim.session.running import Cable, Watcher, run, straight
@@ -30,7 +32,8 @@ def run_all_ways(
     """Measure the strip of a scenario in every way it asks for and return the document of results.
 
     A plotter is worked by an operator over the link (`run`). What the comparator gives, and readings of an A8 simulated
-    as arrays, its elements standing where a hand leaves them and not on counts, stands under `ways`.
+    as arrays, its elements standing where a hand leaves them and not on counts, stands under `ways`, as does a strip
+    that was bridged over the link (`a7sim bridge` also leaves the journal and the book of bridging).
     Raises Mistake for what does not make a strip.
     """
     if "plotter" in scenario.work:
@@ -39,8 +42,8 @@ def run_all_ways(
         document = results.header(scenario, seed) | {"status": "complete", "message": ""}
         if out is not None:
             prepare_folder(out, force)
-    strips = _computed(scenario, build_scene(scenario, seed), seed)
-    document |= _of_ways(strips)
+    strips, said = _measured(scenario, build_scene(scenario, seed), seed, bridged_alone)
+    _add(document, strips, said)
     if out is not None and strips:
         for name, each in strips.items():
             write_whole(out / MODELS_OF_WAY.format(name.lower()), results.models_csv(each.models))
@@ -49,27 +52,47 @@ def run_all_ways(
     return document
 
 
-def results_by_computing(scenario: Scenario, scene: Scene, seed: int) -> Document:
-    """Return what `run_all_ways` says of the ways that need no operator; nothing where the scenario asks for none."""
-    return _of_ways(_computed(scenario, scene, seed))
+def documents_of_all_ways(scenario: Scenario, seeds: Sequence[int]) -> list[Document]:
+    """Return what `run_all_ways` says of each seed, all sessions at once, without what is told of line and book."""
+    if "plotter" in scenario.work:
+        documents = open_crowd(scenario, seeds).documents()
+    else:
+        documents = [results.header(scenario, seed) | {"status": "complete", "message": ""} for seed in seeds]
+    if scenario.work == ["plotter"]:
+        return documents
+    bridgings = dict(zip(seeds, bridged_together(scenario, seeds), strict=True)) if "bridge" in scenario.work else {}
+    for document, seed in zip(documents, seeds, strict=True):
+        _add(document, *_measured(scenario, build_scene(scenario, seed), seed, lambda _, seed: bridgings[seed]))
+    return documents
 
 
-def _of_ways(strips: Mapping[str, StripResult]) -> Document:
-    document: Document = {}
+def _add(document: Document, strips: Mapping[str, StripResult], bridging: Bridging | None) -> None:
+    """Add to a document what the ways beside the plotter came to."""
     if strips:
         document["ways"] = {name: of_grounded(each.strip) for name, each in strips.items()}
-    if len(strips) > 1:
+    if bridging is not None:
+        document.setdefault("operator", bridging.operator)
+        if bridging.message and document["status"] == "complete":
+            document |= {"status": "does not fit", "message": bridging.message}
+    if "comparator" in strips and "A8" in strips:
         document["a8_minus_comparator_m"] = of_differences(differences(strips["comparator"], strips["A8"]))
-    return document
 
 
-def _computed(scenario: Scenario, scene: Scene, seed: int) -> dict[str, StripResult]:
+def _measured(
+    scenario: Scenario, scene: Scene, seed: int, bridge: Callable[[Scenario, int], Bridging]
+) -> tuple[dict[str, StripResult], Bridging | None]:
+    """Return the strips of all ways but the plotter's, by their names, and how bridging went where it is asked for."""
     ways = {}
+    bridging = None
     try:
         if "comparator" in scenario.work:
             ways["comparator"] = strip_by_comparator(scenario, scene, seed)
         if "readings" in scenario.work:
             ways["A8"] = strip_on_a8(scenario, scene, seed)
+        if "bridge" in scenario.work:
+            bridging = bridge(scenario, seed)
+            if bridging.result is not None:
+                ways["bridge"] = bridging.result
     except Undetermined as undetermined:
         raise Mistake(f"{scenario.title}: {undetermined}") from undetermined
-    return ways
+    return ways, bridging

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from a7sim.session.ways import run_all_ways
+from a7sim.session.ways import documents_of_all_ways, run_all_ways
 from a7sim.study.loading import Laid
 from a7sim.study.responses import SIGNIFICANT
-from a7sim.study.simulating import crowded, seed_of
+from a7sim.study.simulating import seed_of
 from a7sim.study.tally import Tally
 
 _STREAM = 11
@@ -54,7 +54,8 @@ def audited(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] = lam
     for i, replicates in picked.items():
         seeds = [seed_of(laid.study.seed, replicate) for replicate in replicates]
         sample = tally.sample(i)
-        for replicate, seed, on_the_bench in zip(replicates, seeds, crowded(laid.scenarios[i], seeds), strict=True):
+        together = documents_of_all_ways(laid.scenarios[i], seeds)
+        for replicate, seed, on_the_bench in zip(replicates, seeds, together, strict=True):
             linked = run_all_ways(laid.scenarios[i], seed)
             kept = zip(laid.responses, sample[:, replicate].tolist(), strict=True)
             differences = [

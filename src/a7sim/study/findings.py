@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import a7sim
 from a7sim.documents import Document, head
 from a7sim.geometry import Array
 from a7sim.study.cells import Cell, levels_of
+from a7sim.study.latin import main_effects, share_of_chance
 from a7sim.study.loading import Laid
 from a7sim.study.running import reached
 from a7sim.study.statistics import (
@@ -24,6 +26,7 @@ from a7sim.study.statistics import (
     variance_by_factor,
 )
 from a7sim.study.tally import Tally
+from a7sim.study.theory import beside_theory, of_theory
 
 SIGNIFICANT = 1.0 - CONFIDENCE
 
@@ -46,10 +49,11 @@ def document_of(laid: Laid, tally: Tally) -> Document:
         "cells": [_cell(laid, tally, i, cell) for i, cell in enumerate(laid.cells)],
         "comparisons": list(_comparisons(laid, tally)),
         "variance": list(_variance(laid, tally)),
+        "main_effects": list(_main_effects(laid, tally)),
     }
     if study.precision is not None:
         document["precision_reached"] = reached(laid, tally)
-    return document | {"answer": list(_answer(document))}
+    return document | of_theory(document, laid.scenarios) | {"answer": list(_answer(document))}
 
 
 def _cell(laid: Laid, tally: Tally, i: int, cell: Cell) -> Document:
@@ -83,7 +87,7 @@ def _spread(laid: Laid, tally: Tally, at: tuple[int, int], sample: Array) -> Doc
         "least": float(tally.low[at]),
         "largest": float(tally.high[at]),
         "quantiles": {f"{share:g}": {"value": v, "interval": interval} for share, (v, interval) in quantiles.items()},
-    }
+    } | beside_theory(laid.scenarios[at[0]], laid.responses[at[1]].name, mean, sd)
 
 
 def _comparisons(laid: Laid, tally: Tally) -> Iterator[Document]:
@@ -131,6 +135,25 @@ def _analyses(laid: Laid, tally: Tally, response: int) -> Iterator[Sequence[Effe
         of_factor = [0, *range(begin, begin + count - 1)]
         yield variance_by_factor(values[of_factor], [factor.name])
         begin += count - 1
+
+
+def _main_effects(laid: Laid, tally: Tally) -> Iterator[Document]:
+    """Yield what the factors of a Latin hypercube weigh, response by response; nothing of another design."""
+    if laid.study.design != "latin-hypercube":
+        return
+    values = {
+        factor.name: np.array([float(cell.settings[factor.path or ""]) for cell in laid.cells])
+        if factor.range
+        else [cell.levels[factor.name] for cell in laid.cells]
+        for factor in laid.study.factor
+    }
+    n = min(tally.sample(i).shape[1] for i in range(len(laid.cells)))
+    for j, response in enumerate(laid.responses):
+        means = np.where(tally.count[:, j] > 0, tally.mean[:, j], np.nan)
+        effects = main_effects(means, values)
+        if effects:
+            chance = share_of_chance(np.array([tally.sample(i)[j, :n] for i in range(len(laid.cells))]))
+            yield {"response": response.name, "chance": chance, "factors": [asdict(each) for each in effects]}
 
 
 def _effect(effect: Effect) -> Document:
@@ -184,6 +207,9 @@ def _dependence(document: Document, response: str) -> str:
         for source in analysis["sources"]
         if source["source"] != "remaining"
     ]
+    for hypercube in document["main_effects"]:
+        if hypercube["response"] == response:
+            return _weighed(hypercube["factors"])
     matters = [each for each in sources if each["p"] < SIGNIFICANT]
     if not sources:
         return ""
@@ -191,6 +217,23 @@ def _dependence(document: Document, response: str) -> str:
         return "; no factor was seen to matter"
     listed = [f"{each['source']} ({_chance(each['p'])}, {_share(each)})" for each in matters]
     return f"; it depends on {', '.join(listed)}"
+
+
+def _weighed(factors: Sequence[Document]) -> str:
+    """Return which factors of a Latin hypercube matter, the heaviest first, and which way."""
+    matters = sorted((each for each in factors if each["p"] < SIGNIFICANT), key=lambda each: -each["share"])
+    if not matters:
+        return "; no factor was seen to matter"
+    listed = [
+        f"{each['factor']} ({100.0 * each['share']:.0f} % of the variance between cells{_way(each['slope_interval'])})"
+        for each in matters
+    ]
+    return f"; alone it follows {', '.join(listed)}"
+
+
+def _way(interval: Sequence[float]) -> str:
+    low, high = interval
+    return ", growing with it" if low > 0.0 else ", falling with it" if high < 0.0 else ""
 
 
 def _share(source: Document) -> str:

@@ -1,5 +1,6 @@
 """A study on one page: what was asked, how, the answer in words, and every response in figures and tables."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from a7sim.documents import Document
@@ -54,12 +55,17 @@ def _response(document: Document, response: Document) -> Iterator[Part]:
     if len(there) <= MOST_CELLS_DRAWN:
         yield _intervals(there, response)
     yield _spreads(there, name)
+    if "theory" in document and any("theory" in cell["responses"][name] for cell in there):
+        yield Paragraph(document["theory"])
     beside = [each for each in document["comparisons"] if each["response"] == name]
     if beside:
         yield _comparisons(beside, {cell["cell"]: in_words(cell) for cell in document["cells"]})
     for analysis in document["variance"]:
         if analysis["response"] == name:
             yield _variance(analysis["sources"])
+    for hypercube in document["main_effects"]:
+        if hypercube["response"] == name:
+            yield from _main_effects(hypercube)
 
 
 def _intervals(cells: Sequence[Document], response: Document) -> Picture:
@@ -91,6 +97,12 @@ def _spreads(cells: Sequence[Document], name: str) -> Sheet:
     quantiles = list(cells[0]["responses"][name]["quantiles"])
     rows = [_spread(cell, name) for cell in cells]
     header = (*columns, *(f"{100.0 * float(share):.0f} %" for share in quantiles))
+    if any("theory" in cell["responses"][name] for cell in cells):
+        header = (*header, "Theory", "Ratio")
+        of_theory = [[cell["responses"][name].get(each, math.nan) for each in ("theory", "ratio")] for cell in cells]
+        rows = [
+            [*row, *("" if math.isnan(v) else _short(v) for v in two)] for row, two in zip(rows, of_theory, strict=True)
+        ]
     return Sheet("Means, standard deviations and quantiles", header, rows)
 
 
@@ -136,6 +148,23 @@ def _variance(sources: Sequence[Document]) -> Sheet:
     ]
     columns = ("Source", "Squares", "Freedom", "F", "p", "Partial eta²")
     return Sheet("Analysis of variance, replicates as blocks", columns, rows)
+
+
+def _main_effects(hypercube: Document) -> Iterator[Part]:
+    rows = [
+        (
+            *(each["factor"], f"{each['share']:.3f}", _between(each["interval"]), f"{each['p']:.3f}"),
+            *(("", "") if math.isnan(each["slope"]) else (f"{each['slope']:+.3f}", _between(each["slope_interval"]))),
+        )
+        for each in hypercube["factors"]
+    ]
+    yield Sheet("What each factor weighs alone", ("Factor", "Share", "95 %", "p", "Slope of ranks", "95 %"), rows)
+    yield Paragraph(
+        "Share: of the variance between the means of cells, that of the curve fitted along a factor, the curves of all "
+        "factors together, and what chance adds to it taken off; p by the F test of the curve; slope: standardised "
+        "regression of ranks on the ranks of all factors; intervals by the jackknife over cells. Chance makes "
+        f"{100.0 * hypercube['chance']:.1f} % of the variance between cells."
+    )
 
 
 def _between(interval: Sequence[float]) -> str:

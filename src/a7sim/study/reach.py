@@ -15,7 +15,7 @@ from a7sim.session.truth import Relative, true_elements
 
 def beyond_reach(scenario: Scenario) -> Iterator[str]:
     """Yield a sentence for every planned setting outside the range of its element or carriage."""
-    if "plotter" not in scenario.work or scenario.plotting is None:
+    if not {"plotter", "bridge"} & {*scenario.work} or scenario.plotting is None:
         return
     variant, plan = VARIANTS[scenario.instrument.variant], scenario.plan
     planned = {"plan.bx": ("bx", plan.bx), "camera.c": ("c1", scenario.camera.c)}

@@ -86,10 +86,23 @@ def _centre_difference(axis: str) -> Reader:
 
 def _accuracy(on: str, what: str) -> Reader:
     def read(document: Document) -> float:
-        strip = document["strip"] if "strip" in document else next(iter(document["ways"].values()))
-        if "message" in strip:
-            raise ValueError(strip["message"])
-        return float(strip["accuracy_m"][on][what])
+        return float(_only_strip(document)["accuracy_m"][on][what])
+
+    return read
+
+
+def _only_strip(document: Document) -> Document:
+    """Return the strip of a session, or of the first of its ways."""
+    strip: Document = document["strip"] if "strip" in document else next(iter(document["ways"].values()))
+    if "message" in strip:
+        raise ValueError(strip["message"])
+    return strip
+
+
+def _at_checks(what: str, axis: str) -> Reader:
+    def read(document: Document) -> float:
+        strip = _only_strip(document)
+        return float(strip.get("polynomial", strip)["accuracy_m"]["checks"][what][axis])
 
     return read
 
@@ -133,6 +146,12 @@ _LISTED = (
         Response(f"strip_{what}_at_{on}_m", "m", f"rms residual of the strip in {what} at {on}", _accuracy(on, what))
         for on in ("control", "checks")
         for what in ("plan", "height")
+    ),
+    *(
+        Response(f"{name}_{axis}_at_checks_m", "m", f"{words} residual in {axis} at checks, as adjusted", read)
+        for name, what, words in (("adjusted", "rms", "rms"), ("largest", "largest", "largest"))
+        for axis in "XYZ"
+        for read in [_at_checks(what, axis)]
     ),
     Response("hours", "h", "hours at the instrument", lambda document: float(document["operator"]["hours"])),
 )

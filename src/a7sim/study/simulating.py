@@ -7,10 +7,7 @@ import numpy as np
 from a7sim.documents import Document
 from a7sim.geometry import Array
 from a7sim.scenario import Scenario
-from a7sim.scene import build_scene
-from a7sim.session import results
-from a7sim.session.crowd import open_crowd
-from a7sim.session.ways import results_by_computing
+from a7sim.session.ways import documents_of_all_ways
 from a7sim.study.responses import Response, response_of
 
 _STREAM = 9
@@ -28,19 +25,7 @@ def together(scenario: Scenario, seeds: Sequence[int], responses: Sequence[str])
 
     Raises Mistake for a response that the results do not have.
     """
-    return _values(crowded(scenario, seeds), [response_of(name) for name in responses])
-
-
-def crowded(scenario: Scenario, seeds: Sequence[int]) -> list[Document]:
-    """Return the results of sessions worked at once on the batch bench."""
-    if "plotter" in scenario.work:
-        documents = open_crowd(scenario, seeds).documents()
-    else:
-        documents = [results.header(scenario, seed) | {"status": "complete", "message": ""} for seed in seeds]
-    if scenario.work != ["plotter"]:
-        computed = [results_by_computing(scenario, build_scene(scenario, seed), seed) for seed in seeds]
-        documents = [one | other for one, other in zip(documents, computed, strict=True)]
-    return documents
+    return _values(documents_of_all_ways(scenario, seeds), [response_of(name) for name in responses])
 
 
 def _values(documents: Sequence[Document], responses: Sequence[Response]) -> Array:

@@ -1,5 +1,6 @@
 """What a study found, as tables for a terminal."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from rich.console import Group, RenderableType
@@ -28,9 +29,14 @@ def _parts(document: Document) -> Iterator[RenderableType]:
         analyses = [each["sources"] for each in document["variance"] if each["response"] == name]
         if analyses:
             yield Padding(_variance([source for sources in analyses for source in sources]), (1, 0, 0, 2))
+        for hypercube in document["main_effects"]:
+            if hypercube["response"] == name:
+                yield Padding(_main_effects(hypercube), (1, 0, 0, 2))
     yield Text(
         "\nn sessions; +- half the 95 % interval of the mean; minus 1: minus cell 1, pair by pair; p after Holm.\n"
     )
+    if "theory" in document:
+        yield Text(f"{document['theory']}\n")
     for sentence in document["answer"]:
         yield Text(sentence)
     if document.get("precision_reached") is False:
@@ -38,7 +44,10 @@ def _parts(document: Document) -> Iterator[RenderableType]:
 
 
 def _cells(document: Document, name: str) -> Table:
-    table = sheet("cell", "levels", "n", "mean", "+-", "sd", "median", "minus 1", "p", left=(0, 1), fold=(1,))
+    spreads = [cell["responses"][name] for cell in document["cells"]]
+    theory = ("theory", "ratio") if any("theory" in each for each in spreads) else ()
+    columns = ("cell", "levels", "n", "mean", "+-", "sd", "median", "minus 1", "p", *theory)
+    table = sheet(*columns, left=(0, 1), fold=(1,))
     beside = {each["cell"]: each for each in document["comparisons"] if each["response"] == name}
     for cell in document["cells"]:
         spread = cell["responses"][name]
@@ -49,7 +58,8 @@ def _cells(document: Document, name: str) -> Table:
         half = spread["mean_interval"][1] - spread["mean"]
         median = spread["quantiles"]["0.5"]["value"]
         numbers = (f"{spread['mean']:.4g}", f"{half:.2g}", f"{spread['sd']:.3g}", f"{median:.4g}")
-        table.add_row(*first, *numbers, *_difference(beside.get(cell["cell"])))
+        propagated = [f"{spread[each]:.3g}" if each in spread else "" for each in theory]
+        table.add_row(*first, *numbers, *_difference(beside.get(cell["cell"])), *propagated)
     return table
 
 
@@ -57,6 +67,15 @@ def _difference(comparison: Document | None) -> Sequence[str]:
     if comparison is None:
         return ("", "")
     return f"{comparison['difference']:+.3g}", f"{comparison['p_adjusted']:.3f}"
+
+
+def _main_effects(hypercube: Document) -> Table:
+    table = sheet("factor", "share of variance", "from", "to", "p", "slope of ranks", "from", "to", left=(0,))
+    for each in hypercube["factors"]:
+        numbers = (each["share"], *each["interval"], each["p"], each["slope"], *each["slope_interval"])
+        table.add_row(each["factor"], *("" if math.isnan(value) else f"{value:.3f}" for value in numbers))
+    table.add_row("of that, chance", f"{hypercube['chance']:.3f}")
+    return table
 
 
 def _variance(sources: Sequence[Document]) -> Table:
