@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.study.loading import Laid
-from a7sim.study.simulating import alone, seed_of
+from a7sim.study.simulating import seed_of
 from a7sim.study.tally import Tally
 
 _STREAM = 11
@@ -44,7 +44,8 @@ def audited(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] = lam
     for pick in rng.permutation(len(there))[:picks].tolist():
         i, replicate = there[pick]
         seed = seed_of(laid.study.seed, replicate)
-        again = alone(laid.scenarios[i], seed, laid.study.responses)
+        task, cell = laid.task_of(i)
+        again = task.alone(cell, seed)
         for name, one, other in zip(laid.study.responses, samples[i][:, replicate].tolist(), again, strict=True):
             if not np.array_equal(one, other, equal_nan=True):
                 found.append(Difference(laid.cells[i].number, replicate + 1, seed, name, one, float(other)))

@@ -1,6 +1,7 @@
 """Working replicates of a cell: together on the batch bench, or one alone over the link."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,9 +10,13 @@ from a7sim.geometry import Array
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
 from a7sim.session import results
+from a7sim.session.combinations import in_case
+from a7sim.session.crossing import Replicate, cases_of_strips, crossed
 from a7sim.session.crowd import open_crowd
+from a7sim.session.strips import ground_of
 from a7sim.session.ways import results_by_computing, run_all_ways
-from a7sim.study.responses import Response, response_of
+from a7sim.standard_points import CASES
+from a7sim.study.responses import response_of
 
 _STREAM = 9
 """Spawns the seeds of a study's replicates."""
@@ -23,17 +28,49 @@ def seed_of(study_seed: int, replicate: int) -> int:
     return int(state[0] >> np.uint64(11))
 
 
-def together(scenario: Scenario, seeds: Sequence[int], responses: Sequence[str]) -> Array:
-    """Return responses ``(responses, seeds)`` of sessions worked at once; nan where a session gave up.
+@dataclass(frozen=True)
+class Task:
+    """What a worker does with some seeds: sessions of a scenario that give the numbers of one cell, or of several."""
 
-    Raises Mistake for a response that the results do not have.
-    """
-    return _values(_documents(scenario, seeds), [response_of(name) for name in responses])
+    scenario: Scenario
+    responses: tuple[str, ...]
+    strips: bool = False
+    """Sessions are worked in every case, and cells are the strips of all combinations of their models."""
 
+    @property
+    def cells(self) -> int:
+        """How many cells get their numbers from it."""
+        return len(cases_of_strips(tuple(CASES), len(self.scenario.models))) if self.strips else 1
 
-def alone(scenario: Scenario, seed: int, responses: Sequence[str]) -> Array:
-    """Return responses ``(responses,)`` of one session worked over the link, as `a7sim run` does."""
-    return np.asarray(_values([run_all_ways(scenario, seed)], [response_of(name) for name in responses])[:, 0])
+    def together(self, seeds: Sequence[int]) -> Array:
+        """Return responses ``(cells, responses, seeds)`` of sessions worked at once; nan where one gave up.
+
+        Raises Mistake for a response that the results do not have.
+        """
+        if not self.strips:
+            return self._values([[each] for each in _documents(self.scenario, seeds)])
+        by_case = {case: _documents(in_case(self.scenario, case), seeds) for case in CASES}
+        return self._of_strips([{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))], seeds)
+
+    def alone(self, cell: int, seed: int) -> Array:
+        """Return responses ``(responses,)`` of one cell, its sessions worked over the link as `a7sim run` does."""
+        if self.strips:
+            by_case = {case: run_all_ways(in_case(self.scenario, case), seed) for case in CASES}
+            values = self._of_strips([by_case], [seed])
+        else:
+            values = self._values([[run_all_ways(self.scenario, seed)]])
+        return np.asarray(values[cell, :, 0])
+
+    def _of_strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> Array:
+        scenario = self.scenario
+        ground = ground_of(scenario, build_scene(scenario, seeds[0]))
+        return self._values(crossed(replicates, len(scenario.models), ground, scenario.strip))
+
+    def _values(self, replicates: Sequence[Sequence[Document]]) -> Array:
+        """Return responses ``(cells, responses, replicates)`` of documents by replicate and cell."""
+        responses = [response_of(name) for name in self.responses]
+        read = [[[response.of(each) for each in cells] for cells in replicates] for response in responses]
+        return np.moveaxis(np.array(read), 2, 0)
 
 
 def _documents(scenario: Scenario, seeds: Sequence[int]) -> list[Document]:
@@ -45,7 +82,3 @@ def _documents(scenario: Scenario, seeds: Sequence[int]) -> list[Document]:
         computed = [results_by_computing(scenario, build_scene(scenario, seed), seed) for seed in seeds]
         documents = [one | other for one, other in zip(documents, computed, strict=True)]
     return documents
-
-
-def _values(documents: Sequence[Document], responses: Sequence[Response]) -> Array:
-    return np.array([[response.of(document) for document in documents] for response in responses])

@@ -31,6 +31,12 @@ def _parts(document: Document) -> Iterator[RenderableType]:
     yield Text(
         "\nn sessions; +- half the 95 % interval of the mean; minus 1: minus cell 1, pair by pair; p after Holm.\n"
     )
+    for claim in document["claims"]:
+        yield Text(f"{claim['about']} {claim['verdict']}", style="bold")
+        yield Text(f"Claim: {claim['says']}")
+        for sentence in claim["answer"]:
+            yield Padding(Text(sentence), (0, 0, 0, 2))
+        yield Text()
     for sentence in document["answer"]:
         yield Text(sentence)
     if document.get("precision_reached") is False:
