@@ -21,6 +21,8 @@ _SIGNS = ((LEFT, "-"), (RIGHT, "-"), (TRUE, "-"), (LEFT, "--"), (RIGHT, "--"), (
 _MARKS = "osD^vPX*"
 MOST_CELLS_DRAWN = 60
 """More than these cannot be told apart in a figure; tables have all."""
+_STEEP = 10.0
+"""Ratio of the farthest places from which an axis is logarithmic."""
 _UNITS = ("m", "mm", "gon")
 _MOST_IN_A_MAP, _MOST_BESIDE = 10, 3
 
@@ -44,7 +46,7 @@ def of_claims(document: Document) -> Iterator[Picture]:
     tests = [(claim, test) for claim in document["claims"] for test in claim["tests"]]
     effects = [(c, t) for c, t in tests if "on" not in t and isfinite(t["effect_interval"][0])]
     if effects:
-        yield _forest(effects, "effect", SMALL_EFFECT, "standardised effect d (standard deviations of one replicate)")
+        yield _forest(effects, "effect", SMALL_EFFECT, "standardised effect d")
     correlations = [(c, t) for c, t in tests if "on" in t and isfinite(t["correlation_interval"][0])]
     if correlations:
         yield _forest(correlations, "correlation", SMALL_CORRELATION, "correlation r")
@@ -134,8 +136,8 @@ def heat_map(document: Document, response: Document) -> Picture:
             axes.add_patch(Rectangle(place, 1, 1, facecolor=LEFT, alpha=shade, edgecolor="none"))
             half = cell["responses"][name]["mean_interval"][1] - mean
             colour = PANEL if shade > 0.72 else INK
-            axes.text(x, y - 0.13, f"{mean:.3g}", ha="center", va="center", color=colour)
-            axes.text(x, y + 0.2, f"± {half:.1g}", ha="center", va="center", color=colour, fontsize=9.5)
+            axes.text(x, y - 0.13, f"{mean:#.3g}", ha="center", va="center", color=colour)
+            axes.text(x, y + 0.2, f"± {half:#.2g}", ha="center", va="center", color=colour, fontsize=9.5)
         axes.set_xlim(-0.5, len(columns) - 0.5)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_xticks(range(len(columns)), columns)
@@ -166,14 +168,18 @@ def against_places(document: Document, response: Document, factors: Sequence[str
         for axes in drawn.axes:
             axes.set_ylim(low, high)
         drawn.axes[0].set_ylabel(with_unit(response))
-        drawn.legend = "Means with 95 % intervals, the other factors at all their levels"
+        drawn.legend = (
+            "Means with 95 % intervals, the other factors at all their levels; a single mark is the first level"
+        )
     return drawn.picture
 
 
 def _against(axes: "Axes", document: Document, name: str, factor: str) -> None:
     at = document["places"][factor]["at"]
     found = _levels(document, name, factor)
-    beside = 0.02 * (max(at.values()) - min(at.values()))
+    lowest, highest = min(at.values()), max(at.values())
+    steep = lowest > 0.0 and highest >= _STEEP * lowest
+    beside = 0.0 if steep else 0.02 * (highest - lowest)
     together = {place: [each for each in found if at[each["level"]] == place] for place in sorted(set(at.values()))}
     means = [sum(each["mean"] for each in those) / len(those) for those in together.values()]
     axes.plot(list(together), means, color=FAINT, linewidth=1.4, zorder=1)
@@ -182,10 +188,13 @@ def _against(axes: "Axes", document: Document, name: str, factor: str) -> None:
             x = place + beside * (2 * i - len(those) + 1)
             axes.vlines(x, *each["interval"], color=LEFT, linewidth=2.2)
             axes.plot(x, each["mean"], "o", color=LEFT, markersize=5.0)
-            label = each["level"] if len(those) > 1 or document["strips"] else ""
+            label = each["level"] if len(those) > 1 or document["strips"] or each is found[0] else ""
             axes.annotate(label, (x, each["interval"][1]), (0, 4), textcoords="offset points", ha="center", color=SOFT)
     axes.set_xlabel(document["places"][factor]["counts"])
-    axes.set_xticks(sorted(together))
+    if steep:
+        axes.set_xscale("log")
+        axes.minorticks_off()
+    axes.set_xticks(sorted(together), [f"{place:g}" for place in sorted(together)])
     axes.margins(x=0.08, y=0.16)
     axes.grid(axis="y", linewidth=0.6)
 
@@ -204,7 +213,10 @@ def _forest(tests: Sequence[tuple[Document, Document]], size_of: str, small: flo
         axes.set_yticks(range(len(tests)), rows)
         axes.set_ylim(len(tests) - 0.4, -0.6)
         axes.set_xlabel(label)
-        drawn.legend = f"Dots with 95 % intervals; in the band, below {small:g}, is what is too small to matter"
+        drawn.legend = (
+            f"Dots with 95 % intervals; in the band, below {small:g}, is what is too small to matter. Effects are in "
+            "standard deviations of one replicate"
+        )
     return drawn.picture
 
 
@@ -243,7 +255,7 @@ def _dependences(document: Document, tests: Sequence[Document]) -> Iterator[Pict
             for axes in drawn.axes:
                 axes.set_ylim(low, high)
             drawn.axes[0].set_ylabel(words)
-            drawn.legend = "Means of ten shares of all strips, equal in number, with 95 % intervals"
+            drawn.legend = "Means of ten shares, equal in number, with 95 % intervals as if all were independent"
         yield drawn.picture
 
 

@@ -32,7 +32,7 @@ def _of_factor(factor: Factor) -> Document:
         return {"counts": factor.name, "at": dict(zip(labels, factor.levels, strict=True))}
     if factor.levels and all(isinstance(each, list) and _numbers(each) for each in factor.levels):
         apart = [float(max(each) - min(each)) for each in factor.levels]
-        return {"counts": f"{factor.name}: separation", "at": dict(zip(labels, apart, strict=True))}
+        return {"counts": f"separation of {factor.name}", "at": dict(zip(labels, apart, strict=True))}
     return {}
 
 
