@@ -47,24 +47,29 @@ class Task:
 
         Raises Mistake for a response that the results do not have.
         """
-        if not self.strips:
-            return self._values([[each] for each in _documents(self.scenario, seeds)])
-        by_case = {case: _documents(in_case(self.scenario, case), seeds) for case in CASES}
-        return self._of_strips([{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))], seeds)
+        return self._values(self.crowded(seeds))
 
     def alone(self, cell: int, seed: int) -> Array:
         """Return responses ``(responses,)`` of one cell, its sessions worked over the link as `a7sim run` does."""
-        if self.strips:
-            by_case = {case: run_all_ways(in_case(self.scenario, case), seed) for case in CASES}
-            values = self._of_strips([by_case], [seed])
-        else:
-            values = self._values([[run_all_ways(self.scenario, seed)]])
-        return np.asarray(values[cell, :, 0])
+        return np.asarray(self._values([self.linked(seed)])[cell, :, 0])
 
-    def _of_strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> Array:
+    def crowded(self, seeds: Sequence[int]) -> list[list[Document]]:
+        """Return documents by seed and cell, of sessions worked at once."""
+        if not self.strips:
+            return [[each] for each in _documents(self.scenario, seeds)]
+        by_case = {case: _documents(in_case(self.scenario, case), seeds) for case in CASES}
+        return self._strips([{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))], seeds)
+
+    def linked(self, seed: int) -> list[Document]:
+        """Return a document a cell, of sessions worked over the link."""
+        if not self.strips:
+            return [run_all_ways(self.scenario, seed)]
+        return self._strips([{case: run_all_ways(in_case(self.scenario, case), seed) for case in CASES}], [seed])[0]
+
+    def _strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> list[list[Document]]:
         scenario = self.scenario
         ground = ground_of(scenario, build_scene(scenario, seeds[0]))
-        return self._values(crossed(replicates, len(scenario.models), ground, scenario.strip))
+        return crossed(replicates, len(scenario.models), ground, scenario.strip)
 
     def _values(self, replicates: Sequence[Sequence[Document]]) -> Array:
         """Return responses ``(cells, responses, replicates)`` of documents by replicate and cell."""
