@@ -6,6 +6,8 @@ from scipy import stats
 
 from a7sim.study.statistics import (
     compared,
+    densities,
+    dependence,
     holm,
     mean_interval,
     quantile_with_interval,
@@ -97,3 +99,68 @@ def test_the_bootstrap_is_the_same_for_the_same_seed_and_key():
 
 def test_holm_by_hand():
     assert holm([0.01, 0.04, 0.03, float("nan")]) == pytest.approx([0.03, 0.06, 0.06, float("nan")], nan_ok=True)
+
+
+def test_an_effect_does_not_count_cells_twice_that_share_their_sessions():
+    """The F of a factor is the same when every cell is doubled over a factor that changes nothing."""
+    values = RNG.normal(size=(3, 30))
+    (alone, *_), (crossed, nothing, both, _) = (
+        variance_by_factor(values, ["f"]),
+        variance_by_factor(np.stack([values] * 4, axis=1), ["f", "g"]),
+    )
+    assert pytest.approx(alone.F) == crossed.F
+    assert crossed.p == pytest.approx(alone.p)
+    assert (nothing.squares, both.squares) == (0.0, 0.0)
+
+
+def test_the_freedom_of_an_effect_is_cut_where_its_levels_go_together():
+    """Greenhouse's and Geisser's epsilon is 1 / freedom where all differences are one number times another."""
+    base = RNG.normal(size=40)
+    one_direction = np.outer([0.0, 1.0, 2.0, 3.0], base) + RNG.normal(size=40)
+    effect = variance_by_factor(one_direction, ["f"])[0]
+    assert effect.epsilon == pytest.approx(1.0 / 3.0)
+    assert effect.p == pytest.approx(stats.ttest_1samp(base, 0.0).pvalue)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.6])
+def test_the_interval_of_an_effect_holds_the_truth_as_often_as_it_says(shift):
+    rng = np.random.default_rng(int(10 * shift))
+    held = 0
+    for _ in range(300):
+        common = rng.normal(0.0, 0.8, 60)
+        found = compared(common + rng.normal(shift, 0.6, 60), common + rng.normal(0.0, 0.6, 60))
+        low, high = found.effect_interval
+        held += low <= shift <= high
+    assert 270 <= held <= 297
+
+
+def test_a_contrast_of_cells_is_that_of_their_means_in_deviations_of_one_replicate():
+    values, against = RNG.normal(1.0, 1.0, (3, 2000)), RNG.normal(0.0, 1.0, (2, 2000))
+    found = compared(values, against)
+    assert found.difference == pytest.approx(values.mean() - against.mean())
+    assert found.effect == pytest.approx(1.0, abs=0.1)
+
+
+def test_dependence_in_one_cell_is_the_regression_of_scipy():
+    x = RNG.normal(size=400)
+    y = 0.5 * x + RNG.normal(size=400)
+    found, expected = dependence(y[None], x[None]), stats.linregress(x, y)
+    assert (found.slope, found.correlation) == pytest.approx((expected.slope, expected.rvalue))
+    interval = stats.pearsonr(x, y).confidence_interval()
+    assert found.correlation_interval == pytest.approx(tuple(interval), abs=0.03)
+
+
+def test_dependence_takes_off_what_differs_between_cells_and_counts_replicates_once():
+    x = RNG.normal(size=(1, 300))
+    y = 0.2 * x + RNG.normal(size=(1, 300))
+    one, same_twice = dependence(y, x), dependence(np.vstack([y, y + 7.0]), np.vstack([x, x - 5.0]))
+    assert same_twice.slope == pytest.approx(one.slope)
+    assert same_twice.interval == pytest.approx(one.interval)
+    assert same_twice.correlation_interval == pytest.approx(one.correlation_interval)
+
+
+def test_a_density_holds_nearly_all_and_is_nothing_where_nothing_varies():
+    found = densities({"f": RNG.normal(5.0, 1.0, 3000), "same": np.full(3000, 2.0)})
+    assert list(found["densities"]) == ["f"]
+    assert np.trapezoid(found["densities"]["f"], found["places"]) == pytest.approx(1.0, abs=0.02)
+    assert densities({"same": np.full(10, 2.0)}) == {}

@@ -16,9 +16,10 @@ from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
 from a7sim.session import Watcher
 from a7sim.session.ways import run_all_ways
+from a7sim.study.checkpoint import checkpoint_in
 from a7sim.study.executors import opened
 from a7sim.study.findings import document_of
-from a7sim.study.folder import CHECKPOINT, begun, leave
+from a7sim.study.folder import begun, leave
 from a7sim.study.loading import Laid, load_study
 from a7sim.study.running import work
 
@@ -100,7 +101,7 @@ class Study:
     >>> from a7sim import Study
     >>> study = Study.load("levels", replicates=2)
     >>> study.laid.study.design, len(study.laid.cells)
-    ('full', 6)
+    ('full', 7)
     """
 
     laid: Laid
@@ -119,7 +120,7 @@ class Study:
         folder = None if out is None else Path(out)
         tally = begun(self.laid, folder, force)
         with opened("process" if workers == 1 else "pool", workers) as (executor, at_once):
-            work(self.laid, tally, executor, at_once, folder / CHECKPOINT if folder is not None else None)
+            work(self.laid, tally, executor, at_once, checkpoint_in(folder) if folder is not None else None)
         document = document_of(self.laid, tally)
         if folder is not None:
             leave(folder, self.laid, tally, document)

@@ -137,6 +137,19 @@ def absolute_orientation(model: Model | Strip, ground: Ground) -> AbsoluteOrient
     that the model has not. Raises Undetermined for too little control or control in a line.
     """
     model = model.as_model if isinstance(model, Strip) else model
+    similarity, fit = fitted_to_ground(model, ground)
+    oriented = Model(model.name, model.points, similarity.applied_to(model.coordinates))
+    points = model.at(fit.ground.points)
+    said = [
+        *_missing(ground, fit.ground),
+        *_in_a_line(points, fit.ground),
+        *_left_handed(model, similarity, points, fit),
+    ]
+    return AbsoluteOrientation(similarity, fit, oriented, tuple(said))
+
+
+def fitted_to_ground(model: Model, ground: Ground) -> tuple[Similarity, GroundFit]:
+    """Return the similarity of a model to its ground control and how it fits, as `absolute_orientation` finds them."""
     known = ground.among(model.points)
     plan, heights = int(known.used[0].sum()), int(known.used[2].sum())
     if plan < FEWEST_PLAN or heights < FEWEST_HEIGHTS:
@@ -146,10 +159,7 @@ def absolute_orientation(model: Model | Strip, ground: Ground) -> AbsoluteOrient
         )
     points = model.at(known.points)
     similarity = _fitted(points, known.coordinates, known.used)
-    oriented = Model(model.name, model.points, similarity.applied_to(model.coordinates))
-    fit = GroundFit(known, oriented.at(known.points))
-    said = [*_missing(ground, known), *_in_a_line(points, known), *_left_handed(model, similarity, points, fit)]
-    return AbsoluteOrientation(similarity, fit, oriented, tuple(said))
+    return similarity, GroundFit(known, similarity.applied_to(points))
 
 
 def _fitted(points: Array, given: Array, used: Array) -> Similarity:

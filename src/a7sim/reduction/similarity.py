@@ -329,7 +329,8 @@ def _symmetric_4x4(h: Array) -> Array:
 def _largest_eigenvector(n: Array, h: Array) -> Array:
     """Return the eigenvectors ``(4, ...)`` of the largest eigenvalues of traceless ``(4, 4, ...)``.
 
-    A batch by Newton on the characteristic equation, from above the largest root, and by the cofactors.
+    A batch by Newton on the characteristic equation, from above the largest root, and by the cofactors; each member
+    stops for itself, so that its digits do not depend on who is beside it.
     """
     if n.ndim == 2:
         return np.asarray(np.linalg.eigh(n)[1][:, 3])
@@ -341,14 +342,15 @@ def _largest_eigenvector(n: Array, h: Array) -> Array:
     c2, c1 = -2.0 * (h * h).sum(axis=(0, 1)), -8.0 * det_h
     adjoint = _cofactors_4x4(n)
     c0 = sum((n[0, i] * adjoint[0, i] for i in range(1, 4)), n[0, 0] * adjoint[0, 0])
-    root = np.ones_like(c0)
+    root, moving = np.ones_like(c0), np.ones(c0.shape, dtype=bool)
     for _ in range(60):
         square = root * root
         slope = 4.0 * square * root + 2.0 * c2 * root + c1
         value = (square + c2) * square + c1 * root + c0
         step = np.where(slope > 0.0, value / np.where(slope > 0.0, slope, 1.0), 0.0)
-        root = root - step
-        if np.abs(step).max() < 1e-13:
+        root = root - np.where(moving, step, 0.0)
+        moving &= np.abs(step) >= 1e-13
+        if not moving.any():
             break
     shifted = n.copy()
     for i in range(4):

@@ -136,6 +136,17 @@ def _inline(svg: str, name: str, title: str, description: str) -> str:
     return re.sub(r"<svg([^>]*)>", rf"{named}\1>{_safe(said)}", svg, count=1)
 
 
+def standalone(picture: Picture) -> tuple[str, str]:
+    """Return the name of a figure and its SVG as a file of its own: light colours, on a ground of its own."""
+    svg = picture.markup
+    for colour, variable in _VARIABLES.items():
+        svg = svg.replace(f"var(--{variable})", colour)
+    found = re.search(r'aria-labelledby="(.*?)-title ', svg)
+    name = found.group(1) if found else "figure"
+    opened = f'<svg xmlns="http://www.w3.org/2000/svg" style="background: {PANEL}"'
+    return name, svg.replace("<svg", opened, 1).strip() + "\n"
+
+
 def _safe(text: str) -> str:
     return text.replace("\\", r"\\")
 

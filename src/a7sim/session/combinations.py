@@ -48,7 +48,7 @@ def run_combinations(
     does not fit ends the work. Raises Mistake for a scenario without ground control or of too many models.
     """
     watcher = watcher or Watcher()
-    _see_that_strips_can_be_made(scenario)
+    see_that_strips_can_be_made(scenario)
     keeping = keeping or Keeping()
     if out is not None and not keeping.resumes:
         prepare_folder(out, force)
@@ -59,7 +59,7 @@ def run_combinations(
         folder = out / f"case-{case}" if out is not None else None
         begun = folder is not None and (folder / JOURNAL).exists()
         sessions[case] = run(
-            _in_case(scenario, case),
+            in_case(scenario, case),
             seed,
             folder,
             watcher,
@@ -77,12 +77,14 @@ def run_combinations(
     return document
 
 
-def _in_case(scenario: Scenario, case: str) -> Scenario:
+def in_case(scenario: Scenario, case: str) -> Scenario:
+    """Return a scenario whose models are all oriented on the points of a case."""
     of_case = msgspec.structs.replace(scenario, plotting=msgspec.structs.replace(scenario.plan, case=case))
     return rephrased(of_case, "--strips all", f"--case {case}", {"plan.case": f'"{case}"'})
 
 
-def _see_that_strips_can_be_made(scenario: Scenario) -> None:
+def see_that_strips_can_be_made(scenario: Scenario) -> None:
+    """Raise Mistake for a scenario of too many models or without ground control."""
     strips = len(CASES) ** len(scenario.models)
     if strips > MOST_STRIPS:
         raise Mistake(

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from a7sim.session.ways import documents_of_all_ways, run_all_ways
 from a7sim.study.loading import Laid
 from a7sim.study.responses import SIGNIFICANT
 from a7sim.study.simulating import seed_of
@@ -54,9 +53,9 @@ def audited(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] = lam
     for i, replicates in picked.items():
         seeds = [seed_of(laid.study.seed, replicate) for replicate in replicates]
         sample = tally.sample(i)
-        together = documents_of_all_ways(laid.scenarios[i], seeds)
-        for replicate, seed, on_the_bench in zip(replicates, seeds, together, strict=True):
-            linked = run_all_ways(laid.scenarios[i], seed)
+        task, cell = laid.task_of(i)
+        for replicate, seed, together in zip(replicates, seeds, task.crowded(seeds), strict=True):
+            on_the_bench, linked = together[cell], task.linked(seed)[cell]
             kept = zip(laid.responses, sample[:, replicate].tolist(), strict=True)
             differences = [
                 *((response.name, one, other) for response, one in kept if _off(one, other := response.of(linked))),

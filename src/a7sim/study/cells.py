@@ -6,6 +6,8 @@ from itertools import product
 from typing import Any
 
 from a7sim.mistakes import Mistake
+from a7sim.session.crossing import cases_of_strips
+from a7sim.standard_points import CASES
 from a7sim.study.schema import MOST_CELLS, Factor, Settings, Study
 
 
@@ -46,6 +48,22 @@ def cells_of(study: Study) -> list[Cell]:
             study.settings | {path: value for level in row for path, value in level.settings.items()},
         )
         for number, row in enumerate(rows, start=1)
+    ]
+
+
+def cells_of_strips(cells: Sequence[Cell], models: Sequence[str]) -> list[Cell]:
+    """Return cells of which each stands for all strips that its models, each in every case, make; numbered anew."""
+    combinations = cases_of_strips(tuple(CASES), len(models))
+    if len(cells) * len(combinations) > MOST_CELLS:
+        raise Mistake(f"strips: expected at most {MOST_CELLS} cells, got {len(cells) * len(combinations)}")
+    both = enumerate(product(cells, combinations), start=1)
+    return [
+        Cell(
+            number,
+            {**cell.levels, **{f"model {name}": case for name, case in zip(models, cases, strict=True)}},
+            cell.settings,
+        )
+        for number, (cell, cases) in both
     ]
 
 

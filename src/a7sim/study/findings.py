@@ -10,15 +10,18 @@ import numpy as np
 import a7sim
 from a7sim.documents import Document, head
 from a7sim.geometry import Array
-from a7sim.study.cells import Cell, levels_of
+from a7sim.study.cells import Cell
+from a7sim.study.claims import chance, tested
 from a7sim.study.latin import main_effects, share_of_chance
 from a7sim.study.loading import Laid
+from a7sim.study.places import places_of
 from a7sim.study.running import reached
 from a7sim.study.statistics import (
     CONFIDENCE,
     QUANTILES,
     Effect,
     compared,
+    densities,
     holm,
     mean_interval,
     quantile_with_interval,
@@ -29,6 +32,8 @@ from a7sim.study.tally import Tally
 from a7sim.study.theory import beside_theory, of_theory
 
 SIGNIFICANT = 1.0 - CONFIDENCE
+MOST_DENSITIES = 8
+"""Levels of a factor whose curves can be told apart."""
 
 
 def document_of(laid: Laid, tally: Tally) -> Document:
@@ -43,17 +48,23 @@ def document_of(laid: Laid, tally: Tally) -> Document:
         "design": study.design,
         "seed": study.seed,
         "replicates": int(tally.done.min()),
-        "factors": [factor.name for factor in study.factor],
+        "strips": study.strips is not None,
+        "factors": list(laid.factors),
+        "places": {name: places for name, places in places_of(laid).items() if places},
         "responses": [{"name": each.name, "unit": each.unit, "meaning": each.meaning} for each in laid.responses],
         "confidence": CONFIDENCE,
         "cells": [_cell(laid, tally, i, cell) for i, cell in enumerate(laid.cells)],
         "comparisons": list(_comparisons(laid, tally)),
         "variance": list(_variance(laid, tally)),
         "main_effects": list(_main_effects(laid, tally)),
+        "levels": list(_levels(laid, tally)),
+        "densities": list(_densities(laid, tally)),
     }
+    document["claims"] = _claims(laid, tally, document)
     if study.precision is not None:
         document["precision_reached"] = reached(laid, tally)
-    return document | of_theory(document, laid.scenarios) | {"answer": list(_answer(document))}
+    document |= of_theory(document, laid.scenarios)
+    return document | {"in_a_sentence": in_a_sentence(document), "answer": list(_answer(document))}
 
 
 def _cell(laid: Laid, tally: Tally, i: int, cell: Cell) -> Document:
@@ -87,7 +98,14 @@ def _spread(laid: Laid, tally: Tally, at: tuple[int, int], sample: Array) -> Doc
         "least": float(tally.low[at]),
         "largest": float(tally.high[at]),
         "quantiles": {f"{share:g}": {"value": v, "interval": interval} for share, (v, interval) in quantiles.items()},
-    } | beside_theory(laid.scenarios[at[0]], laid.responses[at[1]].name, mean, sd)
+    } | _theory(laid, at, mean, sd)
+
+
+def _theory(laid: Laid, at: tuple[int, int], mean: float, sd: float) -> Document:
+    """Return what theory says of a response in a cell; nothing of strips, whose models differ in their plans."""
+    if laid.study.strips is not None:
+        return {}
+    return beside_theory(laid.scenarios[at[0]], laid.responses[at[1]].name, mean, sd)
 
 
 def _comparisons(laid: Laid, tally: Tally) -> Iterator[Document]:
@@ -107,6 +125,7 @@ def _comparisons(laid: Laid, tally: Tally) -> Iterator[Document]:
                 "interval": each.interval,
                 "sd": each.sd,
                 "effect": each.effect,
+                "effect_interval": each.effect_interval,
                 "p": each.p,
                 "p_adjusted": p,
             }
@@ -121,19 +140,18 @@ def _variance(laid: Laid, tally: Tally) -> Iterator[Document]:
 
 def _analyses(laid: Laid, tally: Tally, response: int) -> Iterator[Sequence[Effect]]:
     """Yield one analysis of a full factorial, one a factor where factors were varied one at a time, none else."""
-    factors, design = laid.study.factor, laid.study.design
-    n = min(tally.sample(i).shape[1] for i in range(len(laid.cells)))
-    values = np.array([tally.sample(i)[response, :n] for i in range(len(laid.cells))])
+    factors, design = laid.factors, laid.study.design
     if not factors or design == "latin-hypercube":
         return
-    counts = [len(levels_of(factor)) for factor in factors]
+    values = _replicates(laid, tally, response)
+    counts = [len(levels) for levels in factors.values()]
     if design == "full":
-        yield variance_by_factor(values.reshape(*counts, n), [factor.name for factor in factors])
+        yield variance_by_factor(values.reshape(*counts, values.shape[1]), list(factors))
         return
     begin = 1
     for factor, count in zip(factors, counts, strict=True):
         of_factor = [0, *range(begin, begin + count - 1)]
-        yield variance_by_factor(values[of_factor], [factor.name])
+        yield variance_by_factor(values[of_factor], [factor])
         begin += count - 1
 
 
@@ -147,13 +165,58 @@ def _main_effects(laid: Laid, tally: Tally) -> Iterator[Document]:
         else [cell.levels[factor.name] for cell in laid.cells]
         for factor in laid.study.factor
     }
-    n = min(tally.sample(i).shape[1] for i in range(len(laid.cells)))
     for j, response in enumerate(laid.responses):
         means = np.where(tally.count[:, j] > 0, tally.mean[:, j], np.nan)
         effects = main_effects(means, values)
         if effects:
-            chance = share_of_chance(np.array([tally.sample(i)[j, :n] for i in range(len(laid.cells))]))
-            yield {"response": response.name, "chance": chance, "factors": [asdict(each) for each in effects]}
+            found = {
+                "chance": share_of_chance(_replicates(laid, tally, j)),
+                "factors": [asdict(each) for each in effects],
+            }
+            yield {"response": response.name} | found
+
+
+def _replicates(laid: Laid, tally: Tally, response: int) -> Array:
+    """Return the replicates ``(cells, n)`` of a response that every cell has."""
+    samples = [tally.sample(i)[response] for i in range(len(laid.cells))]
+    n = min(each.size for each in samples)
+    return np.array([each[:n] for each in samples])
+
+
+def _claims(laid: Laid, tally: Tally, document: Document) -> list[Document]:
+    responses = {each["name"]: each for each in document["responses"]}
+    names = laid.study.responses
+    return tested(laid.study.claim, laid.cells, responses, lambda name: _replicates(laid, tally, names.index(name)))
+
+
+def _levels(laid: Laid, tally: Tally) -> Iterator[Document]:
+    """Yield the mean of every level of a factor, replicate by replicate that of all its cells."""
+    for j, response in enumerate(laid.responses):
+        values = _replicates(laid, tally, j)
+        for factor, levels in laid.factors.items():
+            for level in levels if len(levels) < len(laid.cells) or len(laid.factors) == 1 else ():
+                means = values[[cell.levels[factor] == level for cell in laid.cells]].mean(axis=0)
+                known = means[np.isfinite(means)]
+                if known.size > 1:
+                    mean, sd = float(known.mean()), float(known.std(ddof=1))
+                    interval = mean_interval(mean, sd, known.size)
+                    found = {"mean": mean, "interval": interval, "sd": sd, "count": known.size}
+                    yield {"response": response.name, "factor": factor, "level": level} | found
+
+
+def _densities(laid: Laid, tally: Tally) -> Iterator[Document]:
+    """Yield how a response is distributed at each level of a factor, whatever those of the others."""
+    for j, response in enumerate(laid.responses):
+        values = _replicates(laid, tally, j)
+        for factor, levels in laid.factors.items():
+            if len(levels) > MOST_DENSITIES:
+                continue
+            of_levels = {
+                level: values[[i for i, cell in enumerate(laid.cells) if cell.levels[factor] == level]].ravel()
+                for level in levels
+            }
+            if curves := densities(of_levels):
+                yield {"response": response.name, "factor": factor} | curves
 
 
 def _effect(effect: Effect) -> Document:
@@ -161,10 +224,20 @@ def _effect(effect: Effect) -> Document:
         "source": " x ".join(effect.source) or "remaining",
         "squares": effect.squares,
         "freedom": effect.freedom,
+        "remaining": effect.remaining,
         "F": effect.F,
         "p": effect.p,
+        "epsilon": effect.epsilon,
         "partial_eta_squared": effect.partial_eta_squared,
     }
+
+
+def in_a_sentence(document: Document) -> str:
+    """Return the answer to the question of a study in one sentence: of its claims, or of its first response."""
+    if document["claims"]:
+        parts = "; ".join(each["short"] for each in document["claims"])
+        return f"{parts[0].upper()}{parts[1:]}."
+    return next(_answer(document))
 
 
 def _answer(document: Document) -> Iterator[str]:
@@ -215,7 +288,7 @@ def _dependence(document: Document, response: str) -> str:
         return ""
     if not matters:
         return "; no factor was seen to matter"
-    listed = [f"{each['source']} ({_chance(each['p'])}, {_share(each)})" for each in matters]
+    listed = [f"{each['source']} ({chance(each['p'])}, {_share(each)})" for each in matters]
     return f"; it depends on {', '.join(listed)}"
 
 
@@ -239,7 +312,3 @@ def _way(interval: Sequence[float]) -> str:
 def _share(source: Document) -> str:
     share = source["partial_eta_squared"]
     return "eta² unknown" if math.isnan(share) else f"partial eta² {share:.2f}"
-
-
-def _chance(p: float) -> str:
-    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"

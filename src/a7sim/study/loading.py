@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,16 @@ import a7sim
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
 from a7sim.scenario.validation import mistakes_of_form
-from a7sim.study.cells import Cell, cells_of
+from a7sim.session.combinations import see_that_strips_can_be_made
+from a7sim.shelves import shelves_of
+from a7sim.study.cells import Cell, cells_of, cells_of_strips
+from a7sim.study.claims import see_that_claims_can_be_tested
 from a7sim.study.reach import beyond_reach
 from a7sim.study.responses import Response, response_of
 from a7sim.study.schema import Study
+from a7sim.study.simulating import Task
 
-SHELVES = (Path(__file__).parents[1] / "studies", Path(__file__).parents[3] / "studies")
+SHELVES = shelves_of("studies")
 """Where the studies are that come with a7sim."""
 
 
@@ -32,7 +36,10 @@ class StudyError(Mistake):
 
 @dataclass(frozen=True)
 class Laid:
-    """A study with its cells, the scenario of each, and its responses, ready to be worked."""
+    """A study with its cells, the scenarios that give their numbers, and its responses, ready to be worked.
+
+    A scenario gives those of one cell, or of as many that follow each other as its `Task` says.
+    """
 
     study: Study
     cells: tuple[Cell, ...]
@@ -47,10 +54,28 @@ class Laid:
             raise StudyError(self.source, ["replicates: expected how often each cell is worked, got nothing"])
         return self.study.replicates
 
+    @cached_property
+    def tasks(self) -> tuple[Task, ...]:
+        """What workers do: a task a scenario, in the order of the cells."""
+        responses = tuple(self.study.responses)
+        return tuple(Task(each, responses, self.study.strips is not None) for each in self.scenarios)
+
+    def task_of(self, cell: int) -> tuple[Task, int]:
+        """Return the task that gives a cell, counted from 0, its numbers, and the cell's place in it."""
+        task, place = divmod(cell, self.tasks[0].cells)
+        return self.tasks[task], place
+
+    @property
+    def factors(self) -> dict[str, list[str]]:
+        """The levels that cells have, by factor, in the order of the cells."""
+        return {name: list(dict.fromkeys(cell.levels[name] for cell in self.cells)) for name in self.cells[0].levels}
+
     @property
     def identity(self) -> str:
         """A hash of all that decides what a replicate gives; words, and how many are worked, do not."""
-        asked = msgspec.structs.replace(self.study, title="study", question="", replicates=None, precision=None)
+        asked = msgspec.structs.replace(
+            self.study, title="study", question="", claim=[], replicates=None, precision=None
+        )
         return sha256(msgspec.json.encode([a7sim.__version__, asked, self.scenarios])).hexdigest()
 
 
@@ -99,6 +124,12 @@ def study_of(raw: Mapping[str, Any], folder: Path, source: str = "study") -> Lai
     if mistakes:
         raise StudyError(source, mistakes)
     scenarios = _scenarios(study, cells, folder, source)
+    try:
+        if study.strips is not None:
+            cells = cells_of_strips(cells, _models_of_strips(study, scenarios))
+        see_that_claims_can_be_tested(study, cells)
+    except Mistake as mistake:
+        raise StudyError(source, [str(mistake)]) from mistake
     return Laid(study, tuple(cells), scenarios, tuple(responses), source)
 
 
@@ -115,6 +146,19 @@ def _mistakes_between(study: Study) -> list[str]:
         known = ", ".join(study.responses)
         mistakes.append(f"precision.response: expected one of {known}, got {study.precision.response!r}")
     return mistakes
+
+
+def _models_of_strips(study: Study, scenarios: Sequence[Scenario]) -> list[str]:
+    """Return the names of the models whose cases are combined. Raises Mistake where that cannot be done."""
+    paths = [*study.settings, *(path for cell in cells_of(study) for path in cell.settings)]
+    if "plan.case" in paths or study.design != "full":
+        raise Mistake("strips = 'all': expected a full design without plan.case, since every case is worked")
+    names = {tuple(model.name for model in scenario.models) for scenario in scenarios}
+    if len(names) != 1 or any(scenario.work != ["plotter"] for scenario in scenarios):
+        raise Mistake("strips = 'all': expected the same models in every cell and work at the plotter alone")
+    for scenario in scenarios:
+        see_that_strips_can_be_made(scenario)
+    return list(names.pop())
 
 
 def _scenarios(study: Study, cells: Sequence[Cell], folder: Path, source: str) -> tuple[Scenario, ...]:

@@ -4,27 +4,58 @@ import math
 from collections.abc import Iterator, Sequence
 
 from a7sim.documents import Document
-from a7sim.report.drawing import FILL, LEFT, RIGHT, drawing
-from a7sim.report.page import Chapter, Paragraph, Part, Picture, Sheet, page
+from a7sim.report.markdown import markdown
+from a7sim.report.page import Chapter, Folded, Heading, Paragraph, Part, Sheet, page
+from a7sim.study import figures
 from a7sim.study.findings import in_words
 
-_INCHES_A_CELL, _INCHES_BESIDE, _WIDTH_IN = 0.42, 1.3, 9.0
-MOST_CELLS_DRAWN = 60
-"""More than these cannot be told apart in a figure; tables have all."""
+_MOST_OPEN = 12
+"""Cells beyond which their table is folded."""
+_MOST_QUOTED = 3
+"""Responses with figures in a short form, where no claim names any."""
 
 
 def page_of(document: Document) -> str:
     """Return the page of a study's document as HTML. Raises Mistake where matplotlib is not installed."""
+    return page(document["study"], _lead(document), _chapters(document, document["responses"]))
+
+
+def markdown_of(document: Document, figures_at: str) -> tuple[str, dict[str, str]]:
+    """Return the short form of the page as Markdown, and its figures as SVG by the names of their files.
+
+    Of the responses it shows those that claims name, or the first. `figures_at` is where the Markdown finds them.
+    """
+    named = {name for claim in document["claims"] for test in claim["tests"] for name in (test["response"],)}
+    shown = [each for each in document["responses"] if each["name"] in named] or document["responses"][:_MOST_QUOTED]
+    return markdown(document["study"], _lead(document), _chapters(document, shown), figures_at)
+
+
+def _lead(document: Document) -> list[Part]:
     facts = (document["software"], f"seed {document['seed']}", f"{document['replicates']} replicates in every cell")
     lead: list[Part] = [Paragraph(document["question"]), Paragraph(" · ".join(facts))]
     if document.get("precision_reached") is False:
         lead.append(Paragraph("The precision asked for is not reached.", loud=True))
-    chapters = [
-        Chapter("The answer", [Paragraph("\n".join(document["answer"]))]),
+    return lead
+
+
+def _chapters(document: Document, responses: Sequence[Document]) -> list[Chapter]:
+    return [
+        Chapter("The answer", list(_answer(document))),
         Chapter("How it was asked", list(_how(document))),
-        *(Chapter(each["name"], list(_response(document, each))) for each in document["responses"]),
+        *(Chapter(figures.with_unit(each), list(_response(document, each))) for each in responses),
     ]
-    return page(document["study"], lead, chapters)
+
+
+def _answer(document: Document) -> Iterator[Part]:
+    yield Paragraph(document["in_a_sentence"])
+    for claim in document["claims"]:
+        yield Heading(f"{figures.sentence(claim['about'])} {claim['verdict']}")
+        yield Paragraph(f"Claim: {claim['says']}")
+        yield Paragraph("\n".join(claim["answer"]))
+    yield from figures.of_claims(document)
+    if document["claims"]:
+        yield Heading("Response by response")
+    yield Paragraph("\n".join(document["answer"]))
 
 
 def _how(document: Document) -> Iterator[Part]:
@@ -32,13 +63,22 @@ def _how(document: Document) -> Iterator[Part]:
         f"Scenario {document['scenario']}, design {document['design']}. Cells share their random numbers: replicates "
         "of the same number have the same film, instrument and person, so that cells are compared replicate by "
         "replicate. Intervals are of 95 %: of means by Student's t, of standard deviations and quantiles by the "
-        "bootstrap. Probabilities of comparisons are adjusted for their number (Holm)."
+        "bootstrap. Probabilities of comparisons, and of all tests of claims together, are adjusted for their number "
+        "(Holm). Effects are standardised by the spread of one replicate; below 0.2, and correlations below 0.1, they "
+        "are taken for too small to matter (Cohen). In the analysis of variance replicates are blocks: each effect is "
+        "tested against its own interaction with them, with the freedom of Greenhouse and Geisser."
     )
+    if document["strips"]:
+        yield Paragraph(
+            "A replicate is worked once in every case, each model with its own two perspective centres; its cells are "
+            "the strips of all combinations of the cases of its models, and share these sessions."
+        )
     rows = [
         (str(cell["cell"]), in_words(cell), _settings(cell["settings"]), str(cell["replicates"]), str(cell["gave_up"]))
         for cell in document["cells"]
     ]
-    yield Sheet("Cells", ("Cell", "Levels", "Settings", "Sessions", "Gave up"), rows, frozenset({0, 1, 2}))
+    cells = Sheet("Cells", ("Cell", "Levels", "Settings", "Sessions", "Gave up"), rows, frozenset({0, 1, 2}))
+    yield Folded(f"The {len(rows)} cells", [cells]) if len(rows) > _MOST_OPEN else cells
 
 
 def _settings(settings: Document) -> str:
@@ -52,44 +92,20 @@ def _response(document: Document, response: Document) -> Iterator[Part]:
     if not there:
         yield Paragraph("Every session gave up.", loud=True)
         return
-    if len(there) <= MOST_CELLS_DRAWN:
-        yield _intervals(there, response)
-    yield _spreads(there, name)
-    if "theory" in document and any("theory" in cell["responses"][name] for cell in there):
-        yield Paragraph(document["theory"])
-    beside = [each for each in document["comparisons"] if each["response"] == name]
-    if beside:
-        yield _comparisons(beside, {cell["cell"]: in_words(cell) for cell in document["cells"]})
+    yield from figures.of_response(document, response)
     for analysis in document["variance"]:
         if analysis["response"] == name:
             yield _variance(analysis["sources"])
     for hypercube in document["main_effects"]:
         if hypercube["response"] == name:
             yield from _main_effects(hypercube)
-
-
-def _intervals(cells: Sequence[Document], response: Document) -> Picture:
-    name = response["name"]
-    spreads = [cell["responses"][name] for cell in cells]
-    means = "; ".join(f"{in_words(c)} {s['mean']:.4g}" for c, s in zip(cells, spreads, strict=True))
-    size = (_WIDTH_IN, _INCHES_BESIDE + _INCHES_A_CELL * len(cells))
-    figure_name = "".join(each if each.isalnum() else "-" for each in name)
-    with drawing(figure_name, f"{name} by cell", f"Means: {means}.", size, wide=True) as drawn:
-        (axes,) = drawn.axes
-        places = range(len(cells))
-        low, high = ([s["quantiles"][share]["value"] for s in spreads] for share in ("0.05", "0.95"))
-        axes.hlines(places, low, high, color=FILL, linewidth=7.0)
-        axes.plot([s["quantiles"]["0.5"]["value"] for s in spreads], places, "|", color=RIGHT, markersize=11.0)
-        low, high = ([s["mean_interval"][end] for s in spreads] for end in (0, 1))
-        axes.hlines(places, low, high, color=LEFT, linewidth=2.5)
-        axes.plot([s["mean"] for s in spreads], places, "o", color=LEFT, markersize=5.0)
-        axes.set_yticks(places, [in_words(cell) for cell in cells])
-        axes.invert_yaxis()
-        axes.set_xlabel(f"{name}{', ' if response['unit'] else ''}{response['unit']}")
-        drawn.legend = (
-            "Bars hold 90 % of the sessions, strokes across are medians, dots means with their 95 % intervals"
-        )
-    return drawn.picture
+    if any("theory" in cell["responses"][name] for cell in there):
+        yield Paragraph(document["theory"])
+    sheets: list[Part] = [_spreads(there, name)]
+    beside = [each for each in document["comparisons"] if each["response"] == name]
+    if beside:
+        sheets.append(_comparisons(beside, {cell["cell"]: in_words(cell) for cell in document["cells"]}))
+    yield Folded("Cells in numbers", sheets)
 
 
 def _spreads(cells: Sequence[Document], name: str) -> Sheet:
@@ -124,11 +140,14 @@ def _comparisons(beside: Sequence[Document], labels: dict[int, str]) -> Sheet:
             f"{each['difference']:+.4g}",
             _between(each["interval"]),
             f"{each['effect']:+.2f}",
+            _between(each["effect_interval"]),
             f"{each['p_adjusted']:.4f}",
         )
         for each in beside
     ]
-    return Sheet(f"Minus {labels[1]}, in pairs", ("Cell", "Pairs", "Difference", "95 %", "Cohen's d", "p"), rows)
+    return Sheet(
+        f"Minus {labels[1]}, in pairs", ("Cell", "Pairs", "Difference", "95 %", "Cohen's d", "95 %", "p"), rows
+    )
 
 
 def _variance(sources: Sequence[Document]) -> Sheet:
@@ -138,15 +157,18 @@ def _variance(sources: Sequence[Document]) -> Sheet:
             _short(each["squares"]),
             str(each["freedom"]),
             *(
-                (_short(each["F"]), f"{each['p']:.4f}", f"{each['partial_eta_squared']:.3f}")
+                (
+                    *(_short(each["remaining"]), _short(each["F"]), f"{each['epsilon']:.2f}"),
+                    *(f"{each['p']:.4f}", f"{each['partial_eta_squared']:.3f}"),
+                )
                 if tested
-                else ("", "", "")
+                else ("",) * 5
             ),
         )
         for each in sources
         for tested in [each["source"] != "remaining"]
     ]
-    columns = ("Source", "Squares", "Freedom", "F", "p", "Partial eta²")
+    columns = ("Source", "Squares", "Freedom", "Against", "F", "Epsilon", "p", "Partial eta²")
     return Sheet("Analysis of variance, replicates as blocks", columns, rows)
 
 

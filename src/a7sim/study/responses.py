@@ -15,6 +15,11 @@ Reader = Callable[[Document], float]
 SIGNIFICANT = 10
 """Digits of a response; the last bits of a sum depend on who sits beside a session."""
 
+OF_MODEL = "@"
+"""Before the number of a model, of which alone a response is read."""
+OF_ALL = (", rms of the models", " of the models", ", rms of all")
+"""Ends of the meaning of a response that is of all models."""
+
 BRANCHES = ("models", "strip", "ways", "operator", "a8_minus_comparator_m")
 """Where the paths of responses begin."""
 
@@ -42,15 +47,37 @@ class Response:
 
 
 def response_of(name: str) -> Response:
-    """Return a response by its name or its path. Raises Mistake for neither."""
+    """Return a response by its name, its name in one model such as `base_error_gon@2`, or its path.
+
+    Raises Mistake for none of these.
+    """
     if name in RESPONSES:
         return RESPONSES[name]
+    whole, at, model = name.partition(OF_MODEL)
+    if at and whole in RESPONSES and model.isdecimal() and int(model) > 0:
+        return _in_one_model(RESPONSES[whole], int(model))
     parts = name.split(".")
     if len(parts) > 1 and parts[0] in BRANCHES:
         return Response(name, "", f"{name} in results.json", lambda document: _at(document, parts))
     near = get_close_matches(name, RESPONSES, n=1)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(RESPONSES)}"
     raise Mistake(f"responses: expected a response or a path that begins with models., got {name!r}; {hint}")
+
+
+def _in_one_model(response: Response, model: int) -> Response:
+    """Return a response of the models read in one of them, counted from 1. Raises Mistake for one of the strip."""
+    of_all = next((each for each in OF_ALL if response.meaning.endswith(each)), None)
+    if of_all is None:
+        raise Mistake(f"responses: expected a response of models before {OF_MODEL}, got {response.name!r}")
+
+    def read(document: Document) -> float:
+        models = document["models"][model - 1 : model]
+        if not models:
+            raise IndexError(f"there are {len(document['models'])} models")
+        return response.read({**document, "models": models})
+
+    meaning = f"{response.meaning.removesuffix(of_all)} of model {model}"
+    return Response(f"{response.name}{OF_MODEL}{model}", response.unit, meaning, read)
 
 
 def _at(document: Document, parts: list[str]) -> float:
@@ -112,7 +139,7 @@ _LISTED = (
     Response(
         "residual_parallax_mm",
         "mm",
-        "rms residual y-parallax of the models, at model scale",
+        "rms residual y-parallax at model scale, rms of the models",
         _of_models(lambda model: float(model["relative_orientation"]["rms_parallax_mm"])),
     ),
     Response(

@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.scenario import Scenario
 from a7sim.study.checkpoint import save
 from a7sim.study.loading import Laid
-from a7sim.study.simulating import seed_of, together
+from a7sim.study.simulating import Task, seed_of
 from a7sim.study.tally import Tally
 
 STEP = 100
@@ -36,7 +35,10 @@ class Pace:
 
 @dataclass(frozen=True)
 class _Chunk:
-    cell: int
+    cells: range
+    """That its task gives numbers of."""
+    first: int
+    """Its first replicate."""
     seeds: tuple[int, ...]
 
 
@@ -58,8 +60,9 @@ def work(
     saved_at = -np.inf
     try:
         for chunk, values in _results(laid, tally, executor, 2 * at_once, pace):
-            tally.add(chunk.cell, values)
-            tick(len(chunk.seeds))
+            for cell, each in zip(chunk.cells, values, strict=True):
+                tally.add(cell, each[:, int(tally.done[cell]) - chunk.first :])
+            tick(len(chunk.seeds) * len(chunk.cells))
             if checkpoint is not None and time.monotonic() - saved_at > pace.save_seconds:
                 save(tally, checkpoint, laid.identity)
                 saved_at = time.monotonic()
@@ -104,18 +107,19 @@ def _stops(laid: Laid) -> Iterator[int]:
 def _up_to(
     stop: int, laid: Laid, tally: Tally, executor: Executor, most_waiting: int, pace: Pace
 ) -> Iterator[tuple[_Chunk, Array]]:
-    asked = tally.done.copy()
+    asked = tally.done.reshape(len(laid.tasks), -1).min(axis=1)
     size = min(_FIRST_CHUNK, pace.largest_chunk)
     waiting: deque[tuple[_Chunk, Future[tuple[Array, float]]]] = deque()
     try:
         while waiting or int(asked.min()) < stop:
             while int(asked.min()) < stop and len(waiting) < most_waiting:
-                cell = int(asked.argmin())
-                first, last = int(asked[cell]), min(int(asked[cell]) + size, stop)
-                chunk = _Chunk(cell, tuple(seed_of(laid.study.seed, each) for each in range(first, last)))
-                responses = laid.study.responses
-                waiting.append((chunk, executor.submit(_timed, laid.scenarios[cell], chunk.seeds, responses)))
-                asked[cell] = last
+                at = int(asked.argmin())
+                first, last = int(asked[at]), min(int(asked[at]) + size, stop)
+                task = laid.tasks[at]
+                cells = range(at * task.cells, (at + 1) * task.cells)
+                chunk = _Chunk(cells, first, tuple(seed_of(laid.study.seed, each) for each in range(first, last)))
+                waiting.append((chunk, executor.submit(_timed, task, chunk.seeds)))
+                asked[at] = last
             chunk, future = waiting.popleft()
             values, seconds = future.result()
             grown = len(chunk.seeds) * min(pace.chunk_seconds / max(seconds, 1e-3), _FASTEST_GROWTH)
@@ -126,7 +130,7 @@ def _up_to(
             future.cancel()
 
 
-def _timed(scenario: Scenario, seeds: Sequence[int], responses: Sequence[str]) -> tuple[Array, float]:
-    """Return the responses of replicates and the seconds that they took."""
+def _timed(task: Task, seeds: Sequence[int]) -> tuple[Array, float]:
+    """Return the responses ``(cells, responses, seeds)`` of replicates and the seconds that they took."""
     began = time.monotonic()
-    return together(scenario, seeds, responses), time.monotonic() - began
+    return task.together(seeds), time.monotonic() - began

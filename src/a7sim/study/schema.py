@@ -40,6 +40,27 @@ class Precision(_Data, frozen=True, kw_only=True):
     """Of the 95 % interval of its mean."""
 
 
+class Claim(_Data, frozen=True, kw_only=True):
+    """What somebody holds to be so, and the cells or responses that tell whether it is.
+
+    `differ`, two groups of levels of a factor that are said to differ; `alike`, levels that are said to give the same;
+    or `depends_on`, responses on which others are said to depend.
+    """
+
+    says: Annotated[str, Meta(min_length=1, max_length=400, description="a sentence of at most 400 characters")]
+    """In words; a page quotes it and answers it."""
+    about: Text
+    """What is said to matter, as the subject of a sentence: "the number of points"."""
+    responses: Annotated[list[str], Meta(min_length=1, description="1 response of the study or more")]
+    """On which it is tested."""
+    factor: Name | None = None
+    differ: Annotated[list[list[str]], Meta(min_length=2, max_length=2, description="two groups of levels")] | None = (
+        None
+    )
+    alike: Annotated[list[str], Meta(min_length=2, description="two levels or more")] | None = None
+    depends_on: Annotated[list[str], Meta(min_length=1, description="1 response of the study or more")] | None = None
+
+
 class Study(_Data, frozen=True, kw_only=True):
     """A question, the scenario that is asked, and how often."""
 
@@ -51,11 +72,14 @@ class Study(_Data, frozen=True, kw_only=True):
     settings: Settings = {}
     """Changes to the scenario in every cell."""
     factor: list[Factor] = []
+    strips: Literal["all"] | None = None
+    """All: every replicate is worked once in every case, and its cells are the strips of all their combinations."""
     design: Design = "full"
     samples: Annotated[int, Meta(ge=2, le=MOST_CELLS, description="2 to 2000 cells")] | None = None
     """Cells of a Latin hypercube."""
     responses: Annotated[list[str], Meta(min_length=1, max_length=100, description="1 to 100 responses")]
     """Names that `study.responses` lists, or paths in a document of results such as models.0.truth.centres.left.Z0."""
+    claim: list[Claim] = []
     replicates: Count | None = None
     """In every cell; with a precision to reach, at most so many."""
     precision: Precision | None = None

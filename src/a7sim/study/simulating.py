@@ -1,14 +1,20 @@
 """Working replicates of a cell together on the batch bench."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from a7sim.documents import Document
 from a7sim.geometry import Array
 from a7sim.scenario import Scenario
-from a7sim.session.ways import documents_of_all_ways
-from a7sim.study.responses import Response, response_of
+from a7sim.scene import build_scene
+from a7sim.session.combinations import in_case
+from a7sim.session.crossing import Replicate, cases_of_strips, crossed
+from a7sim.session.strips import ground_of
+from a7sim.session.ways import documents_of_all_ways, run_all_ways
+from a7sim.standard_points import CASES
+from a7sim.study.responses import response_of
 
 _STREAM = 9
 """Spawns the seeds of a study's replicates."""
@@ -20,13 +26,51 @@ def seed_of(study_seed: int, replicate: int) -> int:
     return int(state[0] >> np.uint64(11))
 
 
-def together(scenario: Scenario, seeds: Sequence[int], responses: Sequence[str]) -> Array:
-    """Return responses ``(responses, seeds)`` of sessions worked at once; nan where a session gave up.
+@dataclass(frozen=True)
+class Task:
+    """What a worker does with some seeds: sessions of a scenario that give the numbers of one cell, or of several."""
 
-    Raises Mistake for a response that the results do not have.
-    """
-    return _values(documents_of_all_ways(scenario, seeds), [response_of(name) for name in responses])
+    scenario: Scenario
+    responses: tuple[str, ...]
+    strips: bool = False
+    """Sessions are worked in every case, and cells are the strips of all combinations of their models."""
 
+    @property
+    def cells(self) -> int:
+        """How many cells get their numbers from it."""
+        return len(cases_of_strips(tuple(CASES), len(self.scenario.models))) if self.strips else 1
 
-def _values(documents: Sequence[Document], responses: Sequence[Response]) -> Array:
-    return np.array([[response.of(document) for document in documents] for response in responses])
+    def together(self, seeds: Sequence[int]) -> Array:
+        """Return responses ``(cells, responses, seeds)`` of sessions worked at once; nan where one gave up.
+
+        Raises Mistake for a response that the results do not have.
+        """
+        return self._values(self.crowded(seeds))
+
+    def alone(self, cell: int, seed: int) -> Array:
+        """Return responses ``(responses,)`` of one cell, its sessions worked over the link as `a7sim run` does."""
+        return np.asarray(self._values([self.linked(seed)])[cell, :, 0])
+
+    def crowded(self, seeds: Sequence[int]) -> list[list[Document]]:
+        """Return documents by seed and cell, of sessions worked at once."""
+        if not self.strips:
+            return [[each] for each in documents_of_all_ways(self.scenario, seeds)]
+        by_case = {case: documents_of_all_ways(in_case(self.scenario, case), seeds) for case in CASES}
+        return self._strips([{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))], seeds)
+
+    def linked(self, seed: int) -> list[Document]:
+        """Return a document a cell, of sessions worked over the link."""
+        if not self.strips:
+            return [run_all_ways(self.scenario, seed)]
+        return self._strips([{case: run_all_ways(in_case(self.scenario, case), seed) for case in CASES}], [seed])[0]
+
+    def _strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> list[list[Document]]:
+        scenario = self.scenario
+        ground = ground_of(scenario, build_scene(scenario, seeds[0]))
+        return crossed(replicates, len(scenario.models), ground, scenario.strip)
+
+    def _values(self, replicates: Sequence[Sequence[Document]]) -> Array:
+        """Return responses ``(cells, responses, replicates)`` of documents by replicate and cell."""
+        responses = [response_of(name) for name in self.responses]
+        read = [[[response.of(each) for each in cells] for cells in replicates] for response in responses]
+        return np.moveaxis(np.array(read), 2, 0)

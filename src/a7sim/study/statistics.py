@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,8 @@ CONFIDENCE = 0.95
 QUANTILES = (0.05, 0.5, 0.95)
 RESAMPLES = 999
 _DRAWN_AT_ONCE = 1_000_000
+_NOTHING = 1e-24
+_PLACES, _MOST_IN_A_DENSITY = 121, 20_000
 _STREAM = 10
 """Spawns the resamples of the bootstrap."""
 
@@ -75,6 +78,51 @@ def quantile_with_interval(
     return at(k), (at(low), at(high))
 
 
+def densities(values: Mapping[str, Array]) -> dict[str, Any]:
+    """Return Gaussian kernel densities of values ``(n,)`` by name on places in common; nothing where none varies.
+
+    Bandwidths are Scott's. Places hold all but the outermost 0.2 % on either side.
+    """
+    known = {name: each[np.isfinite(each)] for name, each in values.items()}
+    varying = {name: each for name, each in known.items() if each.size > 2 and np.ptp(each) > 0.0}
+    if not varying:
+        return {}
+    from scipy.stats import gaussian_kde  # noqa: PLC0415
+
+    low, high = np.quantile(np.concatenate(list(varying.values())), (0.002, 0.998))
+    margin = 0.1 * (high - low)
+    places = np.linspace(low - margin, high + margin, _PLACES)
+    if min(float(each.min()) for each in varying.values()) >= 0.0:
+        places = np.linspace(max(0.0, low - margin), high + margin, _PLACES)
+    return {
+        "places": _rounded(places),
+        "densities": {
+            name: _rounded(gaussian_kde(each[:_MOST_IN_A_DENSITY])(places)) for name, each in varying.items()
+        },
+    }
+
+
+def _rounded(values: Array) -> list[float]:
+    return [float(f"{each:.6g}") for each in values.tolist()]
+
+
+def binned(values: Array, on: Array, bins: int = 10) -> dict[str, list[float]]:
+    """Return means of values ``(cells, n)`` and of those that they depend on, by shares of the latter equal in number.
+
+    With the intervals of the means as if values were independent, for a figure.
+    """
+    both = np.isfinite(values) & np.isfinite(on)
+    y, x = values[both], on[both]
+    parts = [part for part in np.array_split(np.argsort(x, kind="stable"), bins) if part.size > 1]
+    intervals = [mean_interval(float(y[part].mean()), float(y[part].std(ddof=1)), part.size) for part in parts]
+    return {
+        "on": _rounded(np.array([x[part].mean() for part in parts])),
+        "mean": _rounded(np.array([y[part].mean() for part in parts])),
+        "low": _rounded(np.array([low for low, _ in intervals])),
+        "high": _rounded(np.array([high for _, high in intervals])),
+    }
+
+
 @dataclass(frozen=True)
 class Comparison:
     """A cell's replicates minus those of another, pair by pair."""
@@ -86,26 +134,82 @@ class Comparison:
     """Of the differences."""
     effect: float
     """The difference in standard deviations of one replicate, both cells pooled (Cohen's d)."""
+    effect_interval: Interval
     p: float
     """Of no difference, by the paired t test."""
 
 
 def compared(values: Array, against: Array) -> Comparison:
-    """Compare replicates ``(n,)`` with those of the same numbers in another cell; who gave up in either is left out."""
-    n = min(values.size, against.size)
-    both = np.isfinite(values[:n]) & np.isfinite(against[:n])
-    one, other = values[:n][both], against[:n][both]
-    pairs = int(both.sum())
+    """Compare replicates ``(n,)`` with those of the same numbers in another cell, or ``(cells, n)`` in several.
+
+    Several cells are averaged replicate by replicate. Who gave up in any is left out. The interval of the effect is by
+    its influence function, replicates being independent: it asks for no normal distribution.
+    """
+    values, against = np.atleast_2d(values), np.atleast_2d(against)
+    n = min(values.shape[1], against.shape[1])
+    values, against = values[:, :n], against[:, :n]
+    whole = np.isfinite(values).all(axis=0) & np.isfinite(against).all(axis=0)
+    values, against = values[:, whole], against[:, whole]
+    pairs = values.shape[1]
     if pairs < 2:
-        return Comparison(pairs, math.nan, _UNKNOWN, math.nan, math.nan, math.nan)
+        return Comparison(pairs, math.nan, _UNKNOWN, math.nan, math.nan, _UNKNOWN, math.nan)
     from scipy.stats import t  # noqa: PLC0415
 
-    differences = one - other
+    differences = values.mean(axis=0) - against.mean(axis=0)
     mean, sd = float(differences.mean()), float(differences.std(ddof=1))
-    pooled = math.sqrt((float(one.var(ddof=1)) + float(other.var(ddof=1))) / 2.0)
+    squares = (_squares(values) + _squares(against)) / 2.0
+    variance = float(squares.sum()) / (pairs - 1)
+    effect = _ratio(mean, math.sqrt(variance))
     deviations = _ratio(mean, sd) * math.sqrt(pairs)
     p = 2.0 * float(t.sf(abs(deviations), pairs - 1))
-    return Comparison(pairs, mean, mean_interval(mean, sd, pairs), sd, _ratio(mean, pooled), p)
+    influence = (differences - mean) / math.sqrt(variance) - effect / 2.0 * (squares / variance) if variance else None
+    spread = mean_interval(effect, float(influence.std(ddof=1)), pairs) if influence is not None else _UNKNOWN
+    return Comparison(pairs, mean, mean_interval(mean, sd, pairs), sd, effect, spread, p)
+
+
+def _squares(values: Array) -> Array:
+    """Return the squared deviations ``(n,)`` of values ``(cells, n)`` from their cells' means, averaged over cells."""
+    return np.asarray(((values - values.mean(axis=1, keepdims=True)) ** 2).mean(axis=0))
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How one response goes with another in the same cells, what differs between cells taken off."""
+
+    replicates: int
+    slope: float
+    """Of the first for a unit of the other."""
+    interval: Interval
+    correlation: float
+    correlation_interval: Interval
+    p: float
+    """Of no dependence; cells share their replicates, so that these are counted once (cluster-robust)."""
+
+
+def dependence(values: Array, on: Array) -> Dependence:
+    """Regress values ``(cells, n)`` on those of another response ``(cells, n)``.
+
+    The interval of the correlation is by its influence function and Fisher's transformation.
+    """
+    whole = np.isfinite(values).all(axis=0) & np.isfinite(on).all(axis=0)
+    y, x = (each[:, whole] for each in (values, on))
+    n = y.shape[1]
+    if n < 3:
+        return Dependence(n, math.nan, _UNKNOWN, math.nan, _UNKNOWN, math.nan)
+    x, y = (each - each.mean(axis=1, keepdims=True) for each in (x, y))
+    xx, xy, yy = ((one * other).sum(axis=0) for one, other in ((x, x), (x, y), (y, y)))
+    if not (xx.sum() > 0.0 and yy.sum() > 0.0):
+        return Dependence(n, math.nan, _UNKNOWN, math.nan, _UNKNOWN, math.nan)
+    from scipy.stats import t  # noqa: PLC0415
+
+    slope = float(xy.sum() / xx.sum())
+    spread = float((xy - slope * xx).std(ddof=1)) * n / float(xx.sum())
+    p = 2.0 * float(t.sf(abs(_ratio(slope, spread)) * math.sqrt(n), n - 1))
+    r = float(xy.sum() / math.sqrt(xx.sum() * yy.sum()))
+    influence = xy / math.sqrt(xx.mean() * yy.mean()) - r / 2.0 * (xx / xx.mean() + yy / yy.mean())
+    within = max(1.0 - r * r, 1e-12)
+    low, high = mean_interval(math.atanh(min(max(r, -1.0 + 1e-12), 1.0 - 1e-12)), float(influence.std()) / within, n)
+    return Dependence(n, slope, mean_interval(slope, spread, n), r, (math.tanh(low), math.tanh(high)), p)
 
 
 def _ratio(mean: float, sd: float) -> float:
@@ -131,57 +235,74 @@ class Effect:
     """A line of an analysis of variance."""
 
     source: tuple[str, ...]
-    """The factors, several for an interaction; empty for what remains."""
+    """The factors, several for an interaction; empty for all that remains."""
     squares: float
     freedom: int
+    remaining: float
+    """Squares of its interaction with the replicates, against which it is tested."""
     F: float
     p: float
+    """By Greenhouse's and Geisser's freedom, since what replicates add to two levels may be alike or not."""
+    epsilon: float
+    """By which both freedoms are multiplied for p."""
     partial_eta_squared: float
-    """Its share of its own and the remaining squares."""
+    """Its share of its own and its remaining squares."""
 
 
 def variance_by_factor(values: Array, factors: Sequence[str]) -> list[Effect]:
     """Return the analysis of variance of values ``(levels of factor 1, levels of factor 2, ..., replicates)``.
 
-    A fixed-effects full factorial whose blocks are the replicates; every factor and interaction, and last what remains.
-    Replicates that lack a value in any cell are left out; nothing is returned where fewer than two are whole.
+    A fixed-effects full factorial with replicates as blocks (repeated measures): every factor and interaction against
+    its own interaction with the replicates, so that cells that share a session do not count twice; last all that
+    remains. Replicates that lack a value in any cell are left out; nothing is returned where fewer than two are whole.
     """
     whole = np.isfinite(values).all(axis=tuple(range(values.ndim - 1)))
     values = values[..., whole]
-    n = values.shape[-1]
-    if n < 2:
+    if values.shape[-1] < 2:
         return []
+    size = float((values**2).mean(axis=-1).sum()) * values.shape[-1]
+    effects = [
+        _effect(tuple(factors[axis] for axis in axes), part, values.shape[:-1], size)
+        for axes, part in _parts(values).items()
+    ]
+    left = math.fsum(each.remaining for each in effects)
+    freedom = (math.prod(values.shape[:-1]) - 1) * (values.shape[-1] - 1)
+    return [*effects, Effect((), left, freedom, math.nan, math.nan, math.nan, math.nan, math.nan)]
+
+
+def _effect(source: tuple[str, ...], part: Array, shape: Sequence[int], size_of_all: float) -> Effect:
+    """Return the line of an effect from what it adds to every replicate ``(levels or 1, ..., replicates)``.
+
+    What is as small as the last bits of all squares `size_of_all` leave it is nothing.
+    """
     from scipy.stats import f  # noqa: PLC0415
 
-    cell_means = values.mean(axis=-1)
-    parts = _parts(cell_means)
-    total = float(((values - values.mean()) ** 2).sum())
-    cells = int(np.prod(cell_means.shape))
-    blocks = values.mean(axis=tuple(range(values.ndim - 1)))
-    between = cells * float(((blocks - blocks.mean()) ** 2).sum())
-    squares = {axes: n * float((np.broadcast_to(part, cell_means.shape) ** 2).sum()) for axes, part in parts.items()}
-    freedom = {axes: math.prod(cell_means.shape[axis] - 1 for axis in axes) for axes in parts}
-    left = max(0.0, total - between - math.fsum(squares.values()))
-    left_freedom = (cells - 1) * (n - 1)
-    noise = left / left_freedom
-    effects = []
-    for axes in parts:
-        ratio = squares[axes] / freedom[axes] / noise if noise > 0.0 else math.inf if squares[axes] > 0.0 else math.nan
-        p = float(f.sf(ratio, freedom[axes], left_freedom))
-        own = squares[axes] + left
-        share = squares[axes] / own if own > 0.0 else math.nan
-        effects.append(Effect(tuple(factors[axis] for axis in axes), squares[axes], freedom[axes], ratio, p, share))
-    return [*effects, Effect((), left, left_freedom, math.nan, math.nan, math.nan)]
+    n = part.shape[-1]
+    freedom = math.prod(levels - 1 for levels in part.shape[:-1] if levels > 1)
+    cells = math.prod(shape) // math.prod(part.shape[:-1])
+    mean = part.mean(axis=-1)
+    off = (part - mean[..., None]).reshape(-1, n)
+    squares, left = cells * n * float((mean**2).sum()), cells * float((off**2).sum())
+    if squares + left <= _NOTHING * size_of_all:
+        return Effect(source, 0.0, freedom, 0.0, math.nan, math.nan, 1.0, math.nan)
+    together = off @ off.T
+    size = float((together**2).sum())
+    epsilon = min(1.0, max(1.0 / freedom, float(np.trace(together)) ** 2 / (freedom * size))) if size > 0.0 else 1.0
+    noise = left / (freedom * (n - 1))
+    ratio = squares / freedom / noise if noise > 0.0 else math.inf if squares > 0.0 else math.nan
+    p = float(f.sf(ratio, epsilon * freedom, epsilon * freedom * (n - 1)))
+    share = squares / (squares + left) if squares + left > 0.0 else math.nan
+    return Effect(source, squares, freedom, left, ratio, p, epsilon, share)
 
 
-def _parts(means: Array) -> Mapping[tuple[int, ...], Array]:
-    """Return what every factor and interaction adds to cell means, by its axes, each broadcastable to them."""
-    axes = range(means.ndim)
-    parts: dict[tuple[int, ...], Array] = {(): means.mean(keepdims=True)}
-    for order in range(1, means.ndim + 1):
+def _parts(values: Array) -> Mapping[tuple[int, ...], Array]:
+    """Return what every factor and interaction adds to every replicate, by its axes, each broadcastable to them all."""
+    axes = range(values.ndim - 1)
+    parts: dict[tuple[int, ...], Array] = {(): values.mean(axis=tuple(axes), keepdims=True)}
+    for order in range(1, len(axes) + 1):
         for chosen in combinations(axes, order):
             others = tuple(axis for axis in axes if axis not in chosen)
-            below = sum((part for of, part in parts.items() if set(of) < set(chosen)), np.zeros_like(means[:1]) * 0.0)
-            parts[chosen] = means.mean(axis=others, keepdims=True) - below if others else means - below
+            mean = values.mean(axis=others, keepdims=True) if others else values
+            parts[chosen] = mean - sum((part for of, part in parts.items() if set(of) < set(chosen)), np.zeros(()))
     del parts[()]
     return parts

@@ -37,6 +37,12 @@ def _parts(document: Document) -> Iterator[RenderableType]:
     )
     if "theory" in document:
         yield Text(f"{document['theory']}\n")
+    for claim in document["claims"]:
+        yield Text(f"{claim['about']} {claim['verdict']}", style="bold")
+        yield Text(f"Claim: {claim['says']}")
+        for sentence in claim["answer"]:
+            yield Padding(Text(sentence), (0, 0, 0, 2))
+        yield Text()
     for sentence in document["answer"]:
         yield Text(sentence)
     if document.get("precision_reached") is False:
