@@ -11,7 +11,7 @@ from a7sim.operator.crew import Crew
 from a7sim.operator.dice import Dice
 from a7sim.operator.work import ModelRecords, worked
 from a7sim.scenario import Scenario
-from a7sim.scene import Scene, build_scene
+from a7sim.scene import Flight, Scene
 from a7sim.session import results
 from a7sim.session.fleet_hands import FleetHands
 from a7sim.session.running import job_of, strip_of
@@ -60,7 +60,8 @@ class Crowd:
 
 def open_crowd(scenario: Scenario, seeds: Sequence[int]) -> Crowd:
     """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
-    scenes = tuple(build_scene(scenario, seed) for seed in seeds)
+    flight = Flight.of(scenario)
+    scenes = tuple(flight.scene(seed) for seed in seeds)
     fleet = build_fleet(scenario.instrument, [scene.drawer for scene in scenes], seeds)
     crew = Crew(scenario.observer, [Dice(scenario.observer, seed) for seed in seeds])
     job = job_of(scenario, scenes[0])

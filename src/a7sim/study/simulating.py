@@ -7,7 +7,7 @@ import numpy as np
 from a7sim.documents import Document
 from a7sim.geometry import Array
 from a7sim.scenario import Scenario
-from a7sim.scene import build_scene
+from a7sim.scene import Flight
 from a7sim.session import results
 from a7sim.session.crowd import open_crowd
 from a7sim.session.ways import results_by_computing, run_all_ways
@@ -42,7 +42,8 @@ def _documents(scenario: Scenario, seeds: Sequence[int]) -> list[Document]:
     else:
         documents = [results.header(scenario, seed) | {"status": "complete", "message": ""} for seed in seeds]
     if scenario.work != ["plotter"]:
-        computed = [results_by_computing(scenario, build_scene(scenario, seed), seed) for seed in seeds]
+        flight = Flight.of(scenario)
+        computed = [results_by_computing(scenario, flight.scene(seed), seed) for seed in seeds]
         documents = [one | other for one, other in zip(documents, computed, strict=True)]
     return documents
 
