@@ -21,6 +21,15 @@ Who = npt.NDArray[np.intp]
 Asked = TypeVar("Asked", int, tuple[int, ...])
 
 
+def without(who: Who, others: Who) -> Who:
+    """Return those of some sessions that are not among others, in their order."""
+    if not who.size or not others.size:
+        return who
+    stays = np.ones(max(int(who.max()), int(others.max())) + 1, dtype=bool)
+    stays[others] = False
+    return np.asarray(who[stays[who]])
+
+
 class NobodyGoesOn(Exception):
     """All of a crew have given up."""
 
