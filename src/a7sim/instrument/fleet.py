@@ -510,10 +510,6 @@ class Fleet:
         """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
         return of(self._centres[projector], who), of(self._turned[projector], who)
 
-    def one(self, session: int) -> "OneOfFleet":
-        """Return one of the instruments, to compare it with the truth."""
-        return OneOfFleet(self, np.array([session]))
-
     def readings_at(self, who: Who, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
         guides = np.moveaxis(self._guides[:, :, who], -1, 0)
@@ -567,23 +563,6 @@ class Fleet:
             right = np.where(inside, _RIGHT[polarity, "inside"][name], _RIGHT[polarity, "outside"][name])
             signs[row, self._fittings[name][who] != right] = -1.0
         return signs
-
-
-class OneOfFleet:
-    """One instrument of a fleet as the truth sees it; nothing here is ever told to an operator."""
-
-    def __init__(self, fleet: Fleet, who: Who) -> None:
-        self.variant = fleet.variant
-        self._fleet, self._who = fleet, who
-
-    def pose(self, projector: int) -> tuple[Array, Array]:
-        """Return where a projector really stands: centre ``(3,)`` in mm and rotation ``(3, 3)``."""
-        centre, turned = self._fleet.pose(self._who, projector)
-        return centre[..., 0], turned[..., 0]
-
-    def readings_at(self, place: Array) -> dict[str, float]:
-        """Return what the counters would show, unrounded, with the mark at a place ``(3,)``."""
-        return {axis: float(each[0]) for axis, each in self._fleet.readings_at(self._who, place[:, None]).items()}
 
 
 def build_fleet(instrument: Instrument, photographs: Sequence[Mapping[str, Photograph]], seeds: Sequence[int]) -> Fleet:

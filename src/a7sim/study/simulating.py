@@ -28,7 +28,8 @@ def together(scenario: Scenario, seeds: Sequence[int], responses: Sequence[str])
 
     Raises Mistake for a response that the results do not have.
     """
-    return _values(_documents(scenario, seeds), [response_of(name) for name in responses])
+    of_strips = any(name.startswith("strip") for name in responses)
+    return _values(_documents(scenario, seeds, of_strips), [response_of(name) for name in responses])
 
 
 def alone(scenario: Scenario, seed: int, responses: Sequence[str]) -> Array:
@@ -36,9 +37,9 @@ def alone(scenario: Scenario, seed: int, responses: Sequence[str]) -> Array:
     return np.asarray(_values([run_all_ways(scenario, seed)], [response_of(name) for name in responses])[:, 0])
 
 
-def _documents(scenario: Scenario, seeds: Sequence[int]) -> list[Document]:
+def _documents(scenario: Scenario, seeds: Sequence[int], strips: bool = True) -> list[Document]:
     if "plotter" in scenario.work:
-        documents = open_crowd(scenario, seeds).documents()
+        documents = open_crowd(scenario, seeds).documents(strips)
     else:
         documents = [results.header(scenario, seed) | {"status": "complete", "message": ""} for seed in seeds]
     if scenario.work != ["plotter"]:
