@@ -168,10 +168,10 @@ def grain(emulsion, size, side=60):
 
 
 def test_grain_belongs_to_a_film_and_stays_where_it_is():
-    drawn = Emulsion.drawn(7, (1, 0))
+    drawn = Emulsion(7, (1, 0))
     pattern = grain(drawn, FINE)
-    np.testing.assert_array_equal(pattern, grain(Emulsion.drawn(7, (1, 0)), FINE))
-    for other in (Emulsion.drawn(8, (1, 0)), Emulsion.drawn(7, (1, 1))):
+    np.testing.assert_array_equal(pattern, grain(Emulsion(7, (1, 0)), FINE))
+    for other in (Emulsion(8, (1, 0)), Emulsion(7, (1, 1))):
         assert abs(np.corrcoef(pattern.ravel(), grain(other, FINE).ravel())[0, 1]) < 0.1
     xy = elements(40, FINE)
     light = np.full(xy.shape[1:], 0.5)
@@ -181,7 +181,7 @@ def test_grain_belongs_to_a_film_and_stays_where_it_is():
 
 def test_grain_is_a_few_greys_and_averages_out_in_large_elements():
     """The spread of a mean over so many clumps falls with the side of the element."""
-    drawn = Emulsion.drawn(7, (1, 0))
+    drawn = Emulsion(7, (1, 0))
     spread = {size: grain(drawn, size).std() for size in (0.015, 0.03, 0.06, 0.24)}
     assert 1.0 < 255.0 * spread[0.015] < 5.0
     for size in (0.03, 0.06, 0.24):

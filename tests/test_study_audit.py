@@ -5,11 +5,11 @@ import pytest
 
 from a7sim.session import crowd
 from a7sim.session.fleet_hands import FleetHands
-from a7sim.study import auditing
 from a7sim.study.auditing import audited
 from a7sim.study.executors import InProcess
 from a7sim.study.loading import study_of
 from a7sim.study.running import work
+from a7sim.study.simulating import Task, seed_of
 from a7sim.study.tally import Tally
 
 AT_THE_PLOTTER = {
@@ -29,9 +29,9 @@ def worked(tmp_path_factory):
     laid = study_of(AT_THE_PLOTTER, tmp_path_factory.mktemp("study"))
     tally = Tally.empty(1, 1)
     work(laid, tally, InProcess())
-    linked = auditing.run_all_ways(laid.scenarios[0], auditing.seed_of(laid.study.seed, 0))
+    linked = laid.tasks[0].linked(seed_of(laid.study.seed, 0))
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(auditing, "run_all_ways", lambda scenario, seed: linked)
+        patched.setattr(Task, "linked", lambda task, seed: linked)
         yield laid, tally
 
 

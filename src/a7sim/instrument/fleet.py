@@ -36,6 +36,11 @@ _RIGHT = {
 """Which of its two positions each fitting has by rights, by polarity and base."""
 
 
+def of(values: Array, who: Who) -> Array:
+    """Return the values ``(..., m)`` of some instruments, laid out as those of all: indexing would transpose them."""
+    return values.take(who, axis=-1)
+
+
 def rounded(values: Array, decimals: int) -> Array:
     """Return values rounded as the counters of one instrument round them: a tie by what the number exactly is.
 
@@ -148,8 +153,9 @@ class Carriers:
         if film is None:
             nowhere = np.full(2, np.nan)
             places = [photograph.points.get(name) for photograph in self.photographs]
-            film = self._films[name] = np.array([nowhere if place is None else place for place in places]).T
-        return np.asarray(mxv(self._turn[:, :, who], film[:, who]) + self._shift[:, who])
+            columns = np.array([nowhere if place is None else place for place in places]).T
+            film = self._films[name] = np.ascontiguousarray(columns)
+        return np.asarray(mxv(of(self._turn, who), of(film, who)) + of(self._shift, who))
 
     def fiducial_displacements(self, who: Who) -> tuple[tuple[str, ...], Array]:
         """Return names and displacements ``(2, n, m)`` of the fiducials from their collimating marks."""
@@ -224,6 +230,8 @@ class Fleet:
         self._put_right_fittings(everywhere)
         self._centres = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
         self._turned = {n: np.zeros((3, 3, self.instruments)) for n in (1, 2)}
+        self._swung = {n: np.zeros((2, 2, self.instruments)) for n in (1, 2)}
+        """By the swing of a projector, which its picture is seen with."""
         for n in (1, 2):
             self._stand(everywhere, n)
 
@@ -413,21 +421,30 @@ class Fleet:
         """Return where a change brings no rod beyond its limit, nor further beyond it."""
         able = np.ones(who.size, dtype=bool)
         for n in (1, 2):
-            then = self._rod_inclinations(who, n, carriages or {}, elements or {}, base_inside)
+            beside, below = self._rods_reach(who, n, carriages or {}, elements or {}, base_inside)
+            if (beside < self._surely_within * below).all():
+                continue
+            then = np.arctan2(beside, below) / GON
             beyond = then > self.variant.rod_limit_gon
             if beyond.any():
-                able &= ~beyond | (then <= self._rod_inclinations(who, n, {}, {}, None))
+                able &= ~beyond | (then <= np.arctan2(*self._rods_reach(who, n, {}, {}, None)) / GON)
         return able
 
-    def _rod_inclinations(
+    @property
+    def _surely_within(self) -> float:
+        """How far to the side a rod may reach for all the depth, well within its limit."""
+        return 0.99 * math.tan(self.variant.rod_limit_gon * GON)
+
+    def _rods_reach(
         self,
         who: Who,
         n: int,
         carriages: Mapping[str, Array],
         elements: Mapping[str, Array],
         base_inside: bool | None,
-    ) -> Array:
-        at = {axis: drums.at[who] for axis, drums in self._carriages.items()} | dict(carriages)
+    ) -> tuple[Array, Array]:
+        """Return how far the mark lies beside the centre of a projector and below it ``(m,)``, as the drums tell."""
+        at = {axis: drums.at[who] for axis, drums in self._carriages.items() if axis not in carriages} | dict(carriages)
         inside = self._base_inside[who] if base_inside is None else np.full(who.size, base_inside)
 
         def drum(name: str) -> Array:
@@ -439,7 +456,7 @@ class Fleet:
         if "common_phi" in self._drums:
             tilt = (drum("common_phi") - self.variant.elements["common_phi"].zero) * GON
             x, z = x * np.cos(tilt) + z * np.sin(tilt), z * np.cos(tilt) - x * np.sin(tilt)
-        return np.asarray(np.arctan2(np.hypot(at["X"] - x, at["Y"] - y), z - at["Z"]) / GON)
+        return np.hypot(at["X"] - x, at["Y"] - y), z - at["Z"]
 
     def _shares(self, n: int, inside: Truths) -> Array:
         """Return where projectors stand along X ``(m,)``, as shares of bx."""
@@ -479,8 +496,9 @@ class Fleet:
         base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
         place = place_of_centre(self._shares(n, self._base_inside[who]), *base)
         common_phi = self._really(who, "common_phi") * GON if "common_phi" in self._drums else None
-        centre, turned = pose(omega, phi, kappa, place, self._axes[n][:, who], common_phi)
+        centre, turned = pose(omega, phi, kappa, place, of(self._axes[n], who), common_phi)
         self._centres[n][:, who], self._turned[n][:, :, who] = centre, turned
+        self._swung[n][:, :, who] = plane_rotation(kappa)
 
     def _really(self, who: Who, name: str) -> Array:
         if name not in self._drums:
@@ -490,11 +508,7 @@ class Fleet:
 
     def pose(self, who: Who, projector: int) -> tuple[Array, Array]:
         """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
-        return self._centres[projector][:, who], self._turned[projector][:, :, who]
-
-    def one(self, session: int) -> "OneOfFleet":
-        """Return one of the instruments, to compare it with the truth."""
-        return OneOfFleet(self, np.array([session]))
+        return of(self._centres[projector], who), of(self._turned[projector], who)
 
     def readings_at(self, who: Who, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
@@ -511,12 +525,12 @@ class Fleet:
         carriage = np.array([self._carriages[axis].position(who) for axis in _AXES])
         local, rods = self._local[projector], self._rods[projector]
         return place_on_carrier(
-            mxv(self._guides[:, :, who], carriage),
+            mxv(of(self._guides, who), carriage),
             *self.pose(who, projector),
             self._drums[f"c{projector}"].position(who),
-            self._principal_points[projector][:, who],
-            None if local is None else local[:, :, who],
-            None if rods is None else rods[:, who],
+            of(self._principal_points[projector], who),
+            None if local is None else of(local, who),
+            None if rods is None else of(rods, who),
         )
 
     def eyepiece(self, who: Who, eye: int, name: str) -> Array:
@@ -527,6 +541,8 @@ class Fleet:
         seen = np.full((2, who.size), np.nan)
         for projector in (1, 2):
             looking = straight == (projector == eye)
+            if looking.all() and projector in self._carriers:
+                return self._seen_in(who, projector, name)
             if looking.any() and projector in self._carriers:
                 seen[:, looking] = self._seen_in(who[looking], projector, name)
         return seen
@@ -534,7 +550,7 @@ class Fleet:
     def _seen_in(self, who: Who, projector: int, name: str) -> Array:
         carriers = self._carriers[projector]
         displacement = carriers.point(who, name) - self.mark_on_carrier(who, projector)
-        turned = mxv(plane_rotation(self._drums[f"kappa{projector}"].position(who) * GON), displacement)
+        turned = mxv(of(self._swung[projector], who), displacement)
         shown = 1e3 * self._mirrored(who, carriers.polarity) * turned
         return np.where(length_of(displacement) <= self.variant.field_radius_mm, shown, np.nan)
 
@@ -547,23 +563,6 @@ class Fleet:
             right = np.where(inside, _RIGHT[polarity, "inside"][name], _RIGHT[polarity, "outside"][name])
             signs[row, self._fittings[name][who] != right] = -1.0
         return signs
-
-
-class OneOfFleet:
-    """One instrument of a fleet as the truth sees it; nothing here is ever told to an operator."""
-
-    def __init__(self, fleet: Fleet, who: Who) -> None:
-        self.variant = fleet.variant
-        self._fleet, self._who = fleet, who
-
-    def pose(self, projector: int) -> tuple[Array, Array]:
-        """Return where a projector really stands: centre ``(3,)`` in mm and rotation ``(3, 3)``."""
-        centre, turned = self._fleet.pose(self._who, projector)
-        return centre[..., 0], turned[..., 0]
-
-    def readings_at(self, place: Array) -> dict[str, float]:
-        """Return what the counters would show, unrounded, with the mark at a place ``(3,)``."""
-        return {axis: float(each[0]) for axis, each in self._fleet.readings_at(self._who, place[:, None]).items()}
 
 
 def build_fleet(instrument: Instrument, photographs: Sequence[Mapping[str, Photograph]], seeds: Sequence[int]) -> Fleet:

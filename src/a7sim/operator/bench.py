@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array
-from a7sim.operator.crew import Crew, Who
+from a7sim.operator.crew import Crew, Who, without
 from a7sim.operator.eyes import Eyes
 from a7sim.operator.floating_mark import Clearing, FloatingMark, Judgement
 from a7sim.operator.hands import Hands, Truths
@@ -205,7 +205,7 @@ class Bench:
             places[:, i, fused] = self.seat.place(fused, readings_there)
             self.eyes.learn_straying(fused, 1, point, readings_there) if fused.size else None
             cleared = self._parallax(fused, point, judgement, projectors, rest, errors[i], slips[i], p[i])
-            lost = np.setdiff1d(crew.still(measuring), cleared)
+            lost = without(crew.still(measuring), cleared)
             apart[lost] = point
             if lost.size:
                 self._turn_back(lost, ("by1", "by2"), rest)
@@ -304,7 +304,7 @@ class Bench:
             off = deviations.max(axis=0) > tolerance[doubtful]
             doubtful, worst = doubtful[off], worst[off]
             if not doubtful.size:
-                return np.setdiff1d(crew.still(who), lost)
+                return without(crew.still(who), lost)
             for place in np.unique(worst):
                 again = doubtful[worst == place]
                 i, k = divmod(int(place), values.shape[1])
@@ -315,12 +315,12 @@ class Bench:
                 found = self._clear_with_by(
                     again, projectors[i], point, judgement, errors, slips, rest, values[i, k], numbers[i, k]
                 )
-                lost = np.concatenate([lost, np.setdiff1d(again, found)])
+                lost = np.concatenate([lost, without(again, found)])
                 if found.size:
                     self._turn_back(found, (by,), rest)
-            doubtful = np.setdiff1d(doubtful, lost)
+            doubtful = without(doubtful, lost)
         crew.give_up(doubtful, f"{self.seat.model.name}: the readings of {bys} at {point} do not agree")
-        return np.setdiff1d(crew.still(who), lost)
+        return without(crew.still(who), lost)
 
     # --- clearing -------------------------------------------------------------------------------------
 
@@ -342,14 +342,14 @@ class Bench:
         found, turn, gain = np.zeros((3, crew.sessions))
         place = np.zeros((3, crew.sessions))
         fused = self._arrive(who, point, judgement, error, place, found)
-        apart = np.setdiff1d(crew.still(who), fused)
+        apart = without(crew.still(who), fused)
         if not fused.size:
             return Cleared(fused, apart, found, place, turn)
         gain[fused] = gain_at(fused, place[:, fused])
         turning = fused[np.abs(found[fused]) > unless_within]
         turned = self._turn_until_clear(turning, point, judgement, Clearing(element, gain, error), turn)
         self._tick()
-        return Cleared(np.setdiff1d(fused, np.setdiff1d(turning, turned)), apart, found, place, turn)
+        return Cleared(without(fused, without(turning, turned)), apart, found, place, turn)
 
     def parallaxes_seen(self, who: Who, points: Sequence[str]) -> Parallaxes:
         """Look at what y-parallax is left at points, without turning anything but the handwheels."""
@@ -359,7 +359,7 @@ class Bench:
         for i, point in enumerate(points):
             judgement, error = self._judgement(who)
             fused = self._arrive(who, point, judgement, error, places[:, i], p[i])
-            apart[np.setdiff1d(crew.still(who), fused)] = point
+            apart[without(crew.still(who), fused)] = point
             who = fused
             if not who.size:
                 break
@@ -447,7 +447,7 @@ class Bench:
                 slip = crew.slips_again(repeating, 3)
             readings = np.full((3, crew.sessions), np.nan)
             found, numbers = self._pointing(repeating, point, sigmas * (at_point + error), slip, readings)
-            apart = np.setdiff1d(crew.still(repeating), found)
+            apart = without(crew.still(repeating), found)
             crew.remark(apart, f"point {point}: its two images cannot be fused, not measured")
             pointings.append(readings)
             entries.append(numbers)
@@ -455,7 +455,7 @@ class Bench:
             if k:
                 agreed = found[self._agree(pointings[-2][:, found], readings[:, found])]
                 into[:, agreed] = (pointings[-2][:, agreed] + readings[:, agreed]) / 2.0
-                repeating = np.setdiff1d(found, agreed)
+                repeating = without(found, agreed)
         if repeating.size:
             into[:, repeating] = np.median([each[:, repeating] for each in pointings], axis=0)
         crew.remark(repeating, f"point {point}: no two of {MOST_POINTINGS} pointings agree, median taken")

@@ -12,7 +12,7 @@ import numpy as np
 
 from a7sim.geometry import Array
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Crew, NobodyGoesOn, Who
+from a7sim.operator.crew import Crew, NobodyGoesOn, Who, without
 from a7sim.operator.interior import InteriorOrientations
 from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.line_hands import LineHands
@@ -235,7 +235,7 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
         bench.begin_round(who, number)
         seen = bench.parallaxes_seen(who, points)
         who = crew.still(who)
-        who = np.setdiff1d(who, seen.parted(who))
+        who = without(who, seen.parted(who))
         rms = np.sqrt((seen.p**2).mean(axis=0))
         now = spread(seat.standing(who, unknowns), who, crew.sessions)
         better = who[rms[who] < least[who]]

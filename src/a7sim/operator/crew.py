@@ -1,13 +1,14 @@
 """The people at a batch of instruments, one a session: what they get wrong, how long they take, what they write."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array
 from a7sim.manual import POSITIONS_OF
-from a7sim.operator.dice import Dice
+from a7sim.operator.dice import Dice, misread
 from a7sim.operator.person import Person
 from a7sim.operator.skill import MINUTE, acuity_factor, needs_a_break, slip_factor
 from a7sim.operator.slips import OF_READINGS, Occasion, Slips
@@ -16,6 +17,17 @@ from a7sim.scenario import Observer
 
 Who = npt.NDArray[np.intp]
 """Indices ``(m,)`` of the sessions that act."""
+
+Asked = TypeVar("Asked", int, tuple[int, ...])
+
+
+def without(who: Who, others: Who) -> Who:
+    """Return those of some sessions that are not among others, in their order."""
+    if not who.size or not others.size:
+        return who
+    stays = np.ones(max(int(who.max()), int(others.max())) + 1, dtype=bool)
+    stays[others] = False
+    return np.asarray(who[stays[who]])
 
 
 class NobodyGoesOn(Exception):
@@ -98,35 +110,37 @@ class Crew:
 
     def errors(self, who: Who, sigma: float, shape: tuple[int, ...]) -> Array:
         """Return the errors of planned settings ``(*shape, sessions)``, zero for those who do not act."""
-        factors = self._acuity_factors
-        return self._drawn(who, shape, lambda session: self._dice[session].errors(sigma * factors[session], shape))
+        return self._among_all(who, self._acuity_factors(who, sigma) * self._drawn(who, shape, Dice.errors, shape))
 
     def slips(self, who: Who, shape: tuple[int, ...]) -> Array:
         """Return what is misread at planned readings ``(*shape, sessions)``, in counter units."""
-        factors = self._slip_factors
-        return self._drawn(who, shape, lambda session: self._dice[session].slips(shape, factors[session]))
+        luck = self._drawn(who, (3, *shape), Dice.luck, shape)
+        return self._among_all(who, misread(self.observer, luck, self._slip_factors[who]))
 
     def errors_again(self, who: Who, sigma: float, count: int) -> Array:
         """Return the errors ``(count, sessions)`` of settings made once more."""
-        factors = self._acuity_factors
-        return self._drawn(
-            who, (count,), lambda session: self._dice[session].errors_again(sigma * factors[session], count)
-        )
+        drawn = self._drawn(who, (count,), Dice.errors_again, count)
+        return self._among_all(who, self._acuity_factors(who, sigma) * drawn)
 
     def slips_again(self, who: Who, count: int) -> Array:
         """Return what is misread ``(count, sessions)`` at readings made once more."""
-        factors = self._slip_factors
-        return self._drawn(who, (count,), lambda session: self._dice[session].slips_again(count, factors[session]))
+        luck = self._drawn(who, (3, count), Dice.luck_again, count)
+        return self._among_all(who, misread(self.observer, luck, self._slip_factors[who]))
 
-    def _drawn(self, who: Who, shape: tuple[int, ...], draw: Callable[[int], Array]) -> Array:
-        drawn = np.zeros((self.sessions, *shape))
-        for session in who:
-            drawn[session] = draw(int(session))
+    def _drawn(self, who: Who, shape: tuple[int, ...], draw: Callable[[Dice, Asked], Array], asked: Asked) -> Array:
+        """Return what the dice of those who act draw ``(*shape, m)``."""
+        drawn = np.empty((who.size, *shape))
+        for i, session in enumerate(who.tolist()):
+            drawn[i] = draw(self._dice[session], asked)
         return np.ascontiguousarray(np.moveaxis(drawn, 0, -1))
 
-    @property
-    def _acuity_factors(self) -> Array:
-        return acuity_factor(self.observer, self.seconds, self._since_rest)
+    def _among_all(self, who: Who, values: Array) -> Array:
+        among = np.zeros((*values.shape[:-1], self.sessions))
+        among[..., who] = values
+        return among
+
+    def _acuity_factors(self, who: Who, sigma: float) -> Array:
+        return np.asarray(sigma * acuity_factor(self.observer, self.seconds, self._since_rest)[who])
 
     @property
     def _slip_factors(self) -> Array:

@@ -8,7 +8,8 @@ from a7sim.scenario import Observer
 OPERATOR_STREAM = 4
 """Spawn key of the operator's random numbers."""
 
-_GROSS_SLIPS = (-1.0, -0.5, -0.1, 0.1, 0.5, 1.0)
+_LAST_DIGITS = 0.01 * np.array([-1.0, 1.0])
+_GROSS_SLIPS = np.array([-1.0, -0.5, -0.1, 0.1, 0.5, 1.0])
 """A digit read wrong further up, in counter units."""
 
 
@@ -27,24 +28,21 @@ class Dice:
         self._again = np.random.default_rng(again)
         self._lapses = np.random.default_rng(lapses)
 
-    def errors(self, sigma: float, shape: tuple[int, ...]) -> Array:
-        """Return the errors of planned settings, in the unit of sigma."""
-        return sigma * self._planned.standard_normal(shape)
+    def errors(self, shape: tuple[int, ...]) -> Array:
+        """Return the errors of planned settings, in units of their standard deviation."""
+        return self._planned.standard_normal(shape)
 
-    def errors_again(self, sigma: float, count: int) -> Array:
-        """Return the errors ``(count,)`` of settings that have to be made once more."""
-        return np.array([sigma * float(self._again.standard_normal()) for _ in range(count)])
+    def errors_again(self, count: int) -> Array:
+        """Return the errors ``(count,)`` of settings that have to be made once more, in the same unit."""
+        return self._again.standard_normal(count)
 
-    def slips(self, shape: tuple[int, ...], factor: float = 1.0) -> Array:
-        """Return what the person misreads at planned readings, in counter units; zero for most.
+    def luck(self, shape: tuple[int, ...]) -> Array:
+        """Return the luck ``(3, *shape)`` with which planned readings are read, for `misread`."""
+        return _luck(self._planned, shape)
 
-        Slips are so many times as frequent as the observer's rates say.
-        """
-        return _slips(self._planned, self.observer, shape, factor)
-
-    def slips_again(self, count: int, factor: float = 1.0) -> Array:
-        """Return what the person misreads at readings ``(count,)`` made once more."""
-        return np.array([float(_slips(self._again, self.observer, (1,), factor)[0]) for _ in range(count)])
+    def luck_again(self, count: int) -> Array:
+        """Return the luck ``(3, count)`` with which readings are made once more."""
+        return np.concatenate([_luck(self._again, (1,)) for _ in range(count)], axis=1)
 
     def lapses(self, rate: float) -> bool:
         """Return whether something happens that does so with this rate."""
@@ -55,10 +53,20 @@ class Dice:
         return int(self._lapses.integers(count))
 
 
-def _slips(rng: np.random.Generator, observer: Observer, shape: tuple[int, ...], factor: float) -> Array:
-    luck = rng.random(shape)
-    last_digit = 0.01 * rng.choice((-1.0, 1.0), shape)
-    gross = rng.choice(_GROSS_SLIPS, shape)
+def _luck(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
+    luck = np.empty((3, *shape))
+    luck[0] = rng.random(shape)
+    luck[1] = rng.integers(len(_LAST_DIGITS), size=shape)
+    luck[2] = rng.integers(len(_GROSS_SLIPS), size=shape)
+    return luck
+
+
+def misread(observer: Observer, luck: Array, factor: Array) -> Array:
+    """Return what is misread ``(*shape, m)``, in counter units, with a luck ``(3, *shape, m)``; zero mostly.
+
+    Slips are so many times as frequent ``(m,)`` as the observer's rates say.
+    """
+    chance, (last_digit, gross) = luck[0], luck[1:].astype(np.intp)
     blunders = factor * observer.blunder_rate
-    slipped = np.where(luck < blunders + factor * observer.last_digit_slip, last_digit, 0.0)
-    return np.where(luck < blunders, gross, slipped)
+    slipped = np.where(chance < blunders + factor * observer.last_digit_slip, _LAST_DIGITS[last_digit], 0.0)
+    return np.where(chance < blunders, _GROSS_SLIPS[gross], slipped)

@@ -16,7 +16,7 @@ import numpy as np
 
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, parallax_coefficients, rotation
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Who
+from a7sim.operator.crew import Who, without
 from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import RelativeOrientations, Rounds, assessed, merged, spread, stand_of, unknowns_of
 from a7sim.reduction import Stand
@@ -265,7 +265,7 @@ class _Clearing:
             if len(self.rounds) == MOST_ROUNDS:
                 ended = np.union1d(ended, self._clear_first_four(turning))
                 turning = turning[:0]
-            ended = np.union1d(ended, np.setdiff1d(who, np.flatnonzero(n)))
+            ended = np.union1d(ended, without(who, np.flatnonzero(n)))
             who = self._going(turning)
         return self._going(ended)
 
@@ -279,7 +279,7 @@ class _Clearing:
     def _going(self, who: Who) -> Who:
         who = self.crew.still(np.asarray(who, dtype=np.intp))
         for lost, _ in self.lost:
-            who = np.setdiff1d(who, lost)
+            who = without(who, lost)
         return who
 
     # --- a round --------------------------------------------------------------------------------------
@@ -356,8 +356,8 @@ class _Clearing:
             if turn is not None:
                 turn[done.who] = done.turn[done.who]
             cleared = np.union1d(cleared, done.who)
-            who = np.setdiff1d(self.crew.still(who), done.who)
-            parted = np.setdiff1d(who, done.apart)
+            who = without(self.crew.still(who), done.who)
+            parted = without(who, done.apart)
             if tries_left:
                 for session in np.intersect1d(who, done.apart):
                     self._bring_together(np.array([session]), point, step)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.operator.crew import Who
+from a7sim.operator.crew import Who, without
 from a7sim.operator.hands import Truths
 from a7sim.operator.levers import put_levers_right
 from a7sim.operator.seat import Seat, side
@@ -66,7 +66,7 @@ class Eyes:
             went = looking[seat.drive(who[looking], {"X": x, "Y": y})]
             found = went[~np.isnan(self.seen(who[went], hand, point)[0])] if went.size else went
             self._seen_from[:, who[found]] = places[:, found]
-            looking = np.setdiff1d(looking, found)
+            looking = without(looking, found)
             if not looking.size:
                 return
         looking_on = who[looking]

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array
-from a7sim.operator.crew import Who
+from a7sim.operator.crew import Who, without
 from a7sim.operator.eyes import MOST_LOOKS, Eyes, Watch
 from a7sim.operator.hands import Truths
 from a7sim.operator.levers import put_levers_right
@@ -69,7 +69,7 @@ class FloatingMark:
             seen = there[~np.isnan(eyes.seen(there, 2, point)[0])]
             if seen.size:
                 fused.append(self.settle(seen, point, judgement))
-            who = np.setdiff1d(crew.still(who), seen)
+            who = without(crew.still(who), seen)
             if not who.size:
                 return _together(fused)
         seat.drive_z_to(who, height[who])
@@ -88,14 +88,15 @@ class FloatingMark:
         for looks in range(MOST_LOOKS):
             seen = self.looked(who, point)
             vanished = watch.growing(who) & np.isnan(seen).any(axis=0)
-            running_away = watch.running_away(who, np.nan_to_num(seen))
+            running_away = watch.running_away(who, np.where(np.isnan(seen), 0.0, seen))
             running_away[3] &= clearing is not None
             mended = self._look_again_with_levers_right(who, point, seen, (vanished | running_away)[2:], begun)
             running_away[:, mended] = False
             lost = np.isnan(seen).any(axis=0)
             self._see_that_it_fuses(who, point, running_away, clearing)
             keep = ~lost & crew.goes_on(who)
-            who, seen = who[keep], seen[:, keep]
+            if not keep.all():
+                who, seen = who[keep], seen.compress(keep, axis=-1)
             if not who.size:
                 return _together(settled)
             readings = seat.counters(who)
@@ -114,14 +115,15 @@ class FloatingMark:
                 amounts, at_end = drum.to_turn(who, seen[3] * scale, scale, at_rest)
                 moving |= amounts != 0.0
                 on = ~at_end
-                who, wheels, amounts, moving = who[on], wheels[:, on], amounts[on], moving[on]
+                if not on.all():
+                    who, wheels, amounts, moving = who[on], wheels.compress(on, axis=-1), amounts[on], moving[on]
             settled.append(who[~moving])
             who = who[moving]
             if not who.size:
                 return _together(settled)
             seat.turn(
                 who,
-                wheels[:, moving],
+                wheels.compress(moving, axis=-1),
                 clearing.element if clearing else None,
                 amounts[moving] if amounts is not None else None,
             )

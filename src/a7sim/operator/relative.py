@@ -9,7 +9,7 @@ import numpy.typing as npt
 from a7sim.geometry import GON, Array
 from a7sim.manual import TILTS
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import NobodyGoesOn, Who
+from a7sim.operator.crew import NobodyGoesOn, Who, without
 from a7sim.operator.hands import Truths
 from a7sim.operator.job import ModelJob
 from a7sim.operator.seat import wrapped
@@ -201,7 +201,7 @@ def _oriented(
         seen = bench.parallaxes(measuring, points, readings, measured_with)
         measuring = crew.still(measuring)
         apart = seen.parted(measuring)
-        together = np.setdiff1d(measuring, apart)
+        together = without(measuring, apart)
         rough_rounds[apart] += 1
         _bring_together(bench, apart, model, points, unknowns, base, seen.apart, rough_rounds)
         done[together] += 1

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from a7sim.scenario.schema import Camera
 from a7sim.scene.camera import fall_off
 from a7sim.scene.coverage import within_band
 from a7sim.scene.emulsion import Emulsion
-from a7sim.scene.houses import Houses
+from a7sim.scene.houses import NOWHERE, Houses, houses_along
 from a7sim.scene.lines import GroundLine, distance_from, with_lines
 from a7sim.scene.noise import value_noise
 from a7sim.scene.photograph import Content, Marks
@@ -60,7 +61,13 @@ class Depicted:
 
     ground: Ground
     lines: Sequence[GroundLine]
-    houses: Houses
+    houses_seed: int | None
+    """Draws the houses along the lines; without it there are none."""
+
+    @cached_property
+    def houses(self) -> Houses:
+        """The houses, laid out when somebody first looks."""
+        return NOWHERE if self.houses_seed is None else houses_along(self.lines, self.ground, self.houses_seed)
 
     def grey(self, plan: Array, element: float) -> Array:
         """Return the grey ``(...)`` of places ``(2, ...)`` in m, in picture elements that are so wide on the ground."""
@@ -78,37 +85,43 @@ class Depicted:
         return np.asarray(np.clip(0.5 + np.where(wet, off, -off), 0.0, 1.0))
 
 
-def picture_of_ground(
-    depicted: Depicted,
-    centre: Array,
-    rotation: Array,
-    camera: Camera,
-    to_film: Array,
-    points: Marks,
-    imaging: Callable[[Array], Array],
-    emulsion: Emulsion | None,
-) -> Content:
-    """Return the picture of the ground from a station.
+@dataclass(frozen=True)
+class PictureOfGround:
+    """The picture of the ground from a station.
 
     `to_film` is the film's affine deformation ``(2, 2)``, `imaging` what air and lens make of perspective images.
     Without an emulsion nothing resolves or grains it, and the light is even.
     """
-    from_film = np.linalg.inv(to_film)
-    covered = signals(points)
-    scale = (centre[2] - depicted.ground.mean_height) / camera.c
 
-    def content(xy: Array, element: float) -> Array:
-        edge = emulsion.resolved(element) if emulsion else element
-        perspective = _undone(imaging, np.einsum("ij,j...->i...", from_film, xy))
-        met = depicted.ground.met_by(centre, ray_of(perspective, rotation, camera.c))
-        grey = depicted.grey(met[:2], scale * edge)
-        cover = covered(xy, edge)
-        if emulsion is None:
-            return np.maximum(grey, cover)
-        light = fall_off(camera, perspective) * (grey + cover * (1.0 - grey))
-        return emulsion.exposed(xy, light, element)
+    depicted: Depicted
+    centre: Array
+    rotation: Array
+    camera: Camera
+    to_film: Array
+    points: Marks
+    imaging: Callable[[Array], Array]
+    emulsion: Emulsion | None
 
-    return content
+    @cached_property
+    def _from_film(self) -> Array:
+        return np.asarray(np.linalg.inv(self.to_film))
+
+    @cached_property
+    def _covered(self) -> Content:
+        return signals(self.points)
+
+    def __call__(self, xy: Array, element: float) -> Array:
+        """Return the greys 0..1 ``(...)`` of picture elements at film places ``(2, ...)``, so many mm wide."""
+        edge = self.emulsion.resolved(element) if self.emulsion else element
+        perspective = _undone(self.imaging, np.einsum("ij,j...->i...", self._from_film, xy))
+        met = self.depicted.ground.met_by(self.centre, ray_of(perspective, self.rotation, self.camera.c))
+        scale = (self.centre[2] - self.depicted.ground.mean_height) / self.camera.c
+        grey = self.depicted.grey(met[:2], scale * edge)
+        cover = self._covered(xy, edge)
+        if self.emulsion is None:
+            return np.asarray(np.maximum(grey, cover))
+        light = fall_off(self.camera, perspective) * (grey + cover * (1.0 - grey))
+        return self.emulsion.exposed(xy, light, element)
 
 
 def _undone(imaging: Callable[[Array], Array], imaged: Array) -> Array:

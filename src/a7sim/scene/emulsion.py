@@ -1,6 +1,7 @@
 """The emulsion of a photograph: how fine it resolves, and its grain, which every film has of its own."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,15 +20,16 @@ _GRAIN_STREAM = 0
 
 @dataclass(frozen=True)
 class Emulsion:
-    """The emulsion of one photograph, known by the number that its grain is drawn with."""
+    """The emulsion of a photograph whose random numbers a seed draws under a spawn key."""
 
-    salt: int
+    seed: int
+    photograph: tuple[int, ...]
 
-    @classmethod
-    def drawn(cls, seed: int, photograph: tuple[int, ...]) -> "Emulsion":
-        """Return the emulsion of a photograph whose random numbers a seed draws under a spawn key."""
-        grain = np.random.SeedSequence(seed, spawn_key=(*photograph, _GRAIN_STREAM))
-        return cls(int(grain.generate_state(1)[0]))
+    @cached_property
+    def salt(self) -> int:
+        """The number that its grain is drawn with."""
+        grain = np.random.SeedSequence(self.seed, spawn_key=(*self.photograph, _GRAIN_STREAM))
+        return int(grain.generate_state(1)[0])
 
     def resolved(self, element: float) -> float:
         """Return how wide an edge is drawn in picture elements so wide, in mm on film."""

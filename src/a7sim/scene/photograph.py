@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from a7sim.geometry import Array
 from a7sim.scenario.schema import Camera, Film
@@ -77,12 +78,12 @@ class Deformation:
         return np.asarray(self.matrix @ xy + spread * rng.standard_normal(xy.shape))
 
 
-def within_format(xy: Array, half_width_mm: float = 107.0) -> Array:
+def within_format(xy: Array, half_width_mm: float = 107.0) -> npt.NDArray[np.bool_]:
     """Return which places ``(2, n)`` lie in the part of the format that shows a usable image."""
     return np.asarray((np.abs(xy) <= half_width_mm).all(axis=0))
 
 
-def chosen(marks: Marks, keep: Sequence[bool] | Array) -> Marks:
+def chosen(marks: Marks, keep: Sequence[bool] | npt.NDArray[np.bool_]) -> Marks:
     """Return the marks for which `keep` is true."""
     kept = np.asarray(keep, dtype=bool)
     return Marks(tuple(np.array(marks.names, dtype=object)[kept]), marks.xy[:, kept])

@@ -1,22 +1,21 @@
 """The scene of a scenario: the ground, the stations, the photographs, and the truth about them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from a7sim.geometry import GON, Array, image_of, length_of, mxm, mxv, rotation, transposed
 from a7sim.mistakes import Mistake
-from a7sim.scenario.schema import Model, Photo, Published, Scenario
+from a7sim.scenario.schema import Measured, Model, Photo, Published, Scenario
 from a7sim.scene.camera import distorted, fiducial_places, lowered_by_curvature, refracted
-from a7sim.scene.content import Depicted, picture_of_ground, picture_of_marks, sharply
+from a7sim.scene.content import Depicted, PictureOfGround, picture_of_marks, sharply
 from a7sim.scene.emulsion import Emulsion
 from a7sim.scene.grid_plate import grid_plate
-from a7sim.scene.houses import NOWHERE, houses_along
 from a7sim.scene.lines import GroundLine, lines_of
 from a7sim.scene.measured import measured_marks
-from a7sim.scene.photograph import Deformation, Marks, Photograph, chosen, sketched, within_format
-from a7sim.scene.terrain import Ground
+from a7sim.scene.photograph import Content, Deformation, Marks, Photograph, chosen, sketched, within_format
+from a7sim.scene.terrain import Ground, Truths
 from a7sim.standard_points import PLACES
 
 FILM_STREAM, SKETCH_STREAM = 1, 2
@@ -81,50 +80,135 @@ class Scene:
 
 def build_scene(scenario: Scenario, seed: int, pictures: int = PICTURES) -> Scene:
     """Return the scene of a scenario; the seed draws the film and the pricking. Raises Mistake for bad files."""
-    ground = Ground.of(scenario.terrain)
-    lines = lines_of(scenario.lines)
-    houses = NOWHERE if pictures < 2 else houses_along(lines.values(), ground, scenario.terrain.seed)
-    depicted = Depicted(ground, tuple(lines.values()), houses)
-    stations = {
-        photo.name: Station(
-            np.array(photo.position),
-            rotation(photo.omega * GON, photo.phi * GON, photo.kappa * GON),
+    return Flight.of(scenario, pictures).scene(seed)
+
+
+@dataclass(frozen=True)
+class _Exposure:
+    """A photograph before chance has its way with the film."""
+
+    photo: Photo
+    index: int
+    fiducials: Marks
+    points: Marks
+    """Where perfect film would show them; of measured photographs what was measured."""
+    visible: Truths
+    picture: Callable[[Array, Marks, Emulsion | None], Content] | None
+    """Of the ground, from the film's affine deformation, the points on it and its emulsion; none where measured."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What of a scenario's scenes no seed draws, and all of them share."""
+
+    scenario: Scenario
+    pictures: int
+    ground: Ground
+    lines: dict[str, GroundLine]
+    stations: dict[str, Station]
+    points: dict[str, Array]
+    standard_points: dict[str, dict[str, str]]
+    other_points: tuple[str, ...]
+    published: dict[str, RelativeTruth]
+    grid_plate: Photograph
+    exposures: tuple[_Exposure, ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario, pictures: int = PICTURES) -> "Flight":
+        """Return what the scenes of a scenario share. Raises Mistake for bad files."""
+        ground, lines = Ground.of(scenario.terrain), lines_of(scenario.lines)
+        depicted = Depicted(ground, tuple(lines.values()), None if pictures < 2 else scenario.terrain.seed)
+        stations = {
+            photo.name: Station(
+                np.array(photo.position),
+                rotation(photo.omega * GON, photo.phi * GON, photo.kappa * GON),
+            )
+            for photo in scenario.photos
+            if photo.position is not None
+        }
+        points = {
+            point.point: np.array(
+                [point.X, point.Y, _height_of(ground, point.X, point.Y) if point.Z is None else point.Z]
+            )
+            for point in scenario.ground
+        }
+        standard: dict[str, dict[str, str]] = {}
+        for model in scenario.models:
+            if model.standard_points is not None:
+                standard[model.name] = dict(model.standard_points)
+            else:
+                standard[model.name] = _lay_out_standard_points(scenario, model, stations, ground, points)
+        exposures = tuple(
+            _measured(scenario, photo, index, photo.measured)
+            if photo.measured is not None
+            else _exposed(scenario, photo, index, stations[photo.name], depicted, points)
+            for index, photo in enumerate(scenario.photos)
         )
-        for photo in scenario.photos
-        if photo.position is not None
-    }
-    signalised = {
-        point.point: np.array([point.X, point.Y, _height_of(ground, point.X, point.Y) if point.Z is None else point.Z])
-        for point in scenario.ground
-    }
-    standard: dict[str, dict[str, str]] = {}
-    for model in scenario.models:
-        if model.standard_points is not None:
-            standard[model.name] = dict(model.standard_points)
+        _see_that_positions_are_measured(scenario, exposures)
+        measured = [name for each in exposures if each.photo.measured is not None for name in each.points.names]
+        return cls(
+            scenario,
+            pictures,
+            ground,
+            lines,
+            stations,
+            points,
+            standard,
+            tuple(dict.fromkeys([*(point.point for point in scenario.ground), *measured])),
+            {model.name: _as_truth(model.published) for model in scenario.models if model.published is not None},
+            _sharp_before_2(grid_plate(scenario.grid_plate, scenario.camera, scenario.photos[0].polarity), pictures),
+            exposures,
+        )
+
+    def scene(self, seed: int) -> Scene:
+        """Return the scene that a seed draws."""
+        return Scene(
+            {each.photo.name: _sharp_before_2(self._developed(each, seed), self.pictures) for each in self.exposures},
+            self.stations,
+            self.points,
+            self.standard_points,
+            self.other_points,
+            self.published,
+            self.grid_plate,
+            self.ground,
+            self.lines,
+        )
+
+    def _developed(self, exposure: _Exposure, seed: int) -> Photograph:
+        photo = exposure.photo
+        sketching = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(SKETCH_STREAM, exposure.index)))
+        if exposure.picture is None:
+            fiducials, points = exposure.fiducials, exposure.points
+            content = picture_of_marks(points)
         else:
-            standard[model.name] = _lay_out_standard_points(scenario, model, stations, ground, signalised)
-    photographs = {
-        photo.name: _photograph(scenario, photo, index, seed, stations, depicted, signalised, pictures)
-        for index, photo in enumerate(scenario.photos)
-    }
-    published = {model.name: _as_truth(model.published) for model in scenario.models if model.published is not None}
-    _see_that_positions_are_measured(scenario, photographs)
-    measured = [photographs[photo.name].points.names for photo in scenario.photos if photo.measured is not None]
-    listed = dict.fromkeys([point.point for point in scenario.ground] + [name for names in measured for name in names])
-    plate = grid_plate(scenario.grid_plate, scenario.camera, scenario.photos[0].polarity)
-    if pictures < 2:
-        photographs, plate = {name: _sharp(photo) for name, photo in photographs.items()}, _sharp(plate)
-    return Scene(photographs, stations, signalised, standard, tuple(listed), published, plate, ground, lines)
+            stream = (FILM_STREAM, exposure.index)
+            filming = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=stream))
+            deformation = Deformation.drawn(self.scenario.film, filming)
+            fiducials = Marks(exposure.fiducials.names, deformation.of_fiducials(exposure.fiducials.xy, filming))
+            imaged = Marks(exposure.points.names, deformation.of_points(exposure.points.xy, filming))
+            points = chosen(imaged, within_format(imaged.xy) & exposure.visible)
+            emulsion = None if self.pictures < 2 else Emulsion(seed, stream)
+            content = exposure.picture(deformation.matrix, points, emulsion)
+        return Photograph(
+            photo.name,
+            self.scenario.camera,
+            fiducials,
+            points,
+            sketched(points, sketching),
+            photo.polarity,
+            photo.laid,
+            content,
+        )
 
 
-def _see_that_positions_are_measured(scenario: Scenario, photographs: dict[str, Photograph]) -> None:
-    measured = {photo.name for photo in scenario.photos if photo.measured is not None}
+def _see_that_positions_are_measured(scenario: Scenario, exposures: Sequence[_Exposure]) -> None:
+    measured = {each.photo.name: each.points for each in exposures if each.photo.measured is not None}
     mistakes = [
         f"models[{index}].standard_points.{label}: expected a point measured in {side}, got {name!r}"
         for index, model in enumerate(scenario.models)
         for label, name in (model.standard_points or {}).items()
         for side in (model.left, model.right)
-        if side in measured and photographs[side].points.get(name) is None
+        if side in measured and measured[side].get(name) is None
     ]
     if mistakes:
         raise Mistake("\n".join(mistakes))
@@ -173,63 +257,39 @@ def _standard_name(model: Model, label: str) -> str:
     return f"{model.name}{label}"
 
 
-def _photograph(
-    scenario: Scenario,
-    photo: Photo,
-    index: int,
-    seed: int,
-    stations: dict[str, Station],
-    depicted: Depicted,
-    signalised: dict[str, Array],
-    pictures: int,
-) -> Photograph:
+def _measured(scenario: Scenario, photo: Photo, index: int, measured: Measured) -> _Exposure:
+    fiducials, points = measured_marks(measured, photo.name, scenario.camera)
+    return _Exposure(photo, index, fiducials, points, np.ones(len(points.names), dtype=bool), None)
+
+
+def _exposed(
+    scenario: Scenario, photo: Photo, index: int, station: Station, depicted: Depicted, points: dict[str, Array]
+) -> _Exposure:
     camera, ground = scenario.camera, depicted.ground
-    sketching = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(SKETCH_STREAM, index)))
-    if photo.measured is not None:
-        fiducials, points = measured_marks(photo.measured, photo.name, camera)
-        content = picture_of_marks(points)
-    else:
-        filming = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(FILM_STREAM, index)))
-        deformation = Deformation.drawn(scenario.film, filming)
-        names, calibrated = fiducial_places(camera)
-        fiducials = Marks(names, deformation.of_fiducials(calibrated, filming))
-        station = stations[photo.name]
-        places = np.array(list(signalised.values())).T
-        imaged = Marks(tuple(signalised), _imaged(scenario, station, ground, places))
-        visible = (places[2] < station.centre[2]) & ~ground.under_water(places[:2])
-        imaged = Marks(imaged.names, deformation.of_points(imaged.xy, filming))
-        points = chosen(imaged, within_format(imaged.xy) & visible)
-        content = picture_of_ground(
-            depicted,
-            station.centre,
-            station.rotation,
-            camera,
-            deformation.matrix,
-            points,
-            _imaging(scenario, station, ground),
-            None if pictures < 2 else Emulsion.drawn(seed, (FILM_STREAM, index)),
+    places = np.array(list(points.values())).T
+    visible = (places[2] < station.centre[2]) & ~ground.under_water(places[:2])
+    imaging = _imaging(scenario, station, ground)
+
+    def picture(deformation: Array, on_film: Marks, emulsion: Emulsion | None) -> Content:
+        return PictureOfGround(
+            depicted, station.centre, station.rotation, camera, deformation, on_film, imaging, emulsion
         )
-    return Photograph(
-        photo.name,
-        camera,
-        fiducials,
-        points,
-        sketched(points, sketching),
-        photo.polarity,
-        photo.laid,
-        content,
-    )
+
+    imaged = Marks(tuple(points), _imaged(scenario, station, imaging, places))
+    return _Exposure(photo, index, Marks(*fiducial_places(camera)), imaged, visible, picture)
 
 
-def _sharp(photograph: Photograph) -> Photograph:
-    return replace(photograph, content=photograph.content and sharply(photograph.content))
+def _sharp_before_2(photograph: Photograph, pictures: int) -> Photograph:
+    if pictures >= 2 or photograph.content is None:
+        return photograph
+    return replace(photograph, content=sharply(photograph.content))
 
 
-def _imaged(scenario: Scenario, station: Station, ground: Ground, points: Array) -> Array:
+def _imaged(scenario: Scenario, station: Station, imaging: Callable[[Array], Array], points: Array) -> Array:
     if scenario.air.earth_curvature:
         points = lowered_by_curvature(points, station.centre)
     image = image_of(points, station.centre[:, None], station.rotation, scenario.camera.c)
-    return _imaging(scenario, station, ground)(image)
+    return imaging(image)
 
 
 def _imaging(scenario: Scenario, station: Station, ground: Ground) -> Callable[[Array], Array]:

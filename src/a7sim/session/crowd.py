@@ -11,11 +11,12 @@ from a7sim.operator.crew import Crew
 from a7sim.operator.dice import Dice
 from a7sim.operator.work import ModelRecords, worked
 from a7sim.scenario import Scenario
-from a7sim.scene import Scene, build_scene
+from a7sim.scene import Flight, RelativeTruth, Scene
 from a7sim.session import results
 from a7sim.session.fleet_hands import FleetHands
 from a7sim.session.running import job_of, strip_of
 from a7sim.session.strips import ground_of
+from a7sim.session.truth import Beside
 
 
 @dataclass(frozen=True)
@@ -33,18 +34,30 @@ class Crowd:
         """Yield the models as they are done; what a session gives up for stands in `bench.crew.reasons`."""
         return worked(self.bench)
 
-    def documents(self) -> list[Document]:
-        """Work to the end and return a document a seed, as `run` gives it, without what is told of line and book."""
+    def documents(self, strips: bool = True) -> list[Document]:
+        """Work to the end and return a document a seed, as `run` gives it, without what is told of line and book.
+
+        Without strips they say nothing of the strip on the ground either, which costs as much as the rest.
+        """
         found: list[list[Document]] = [[] for _ in self.seeds]
         for records in self.worked():
             plan = next(model for model in self.scenario.models if model.name == records.model.name)
-            for session in records.who:
-                truth = self.scenes[session].relative_truth(plan)
-                one = self.fleet.one(int(session))
-                found[session].append(results.of_model(records.of(int(session)), one, truth, plan.published))
-        return [self._document(session, models) for session, models in enumerate(found)]
+            beside = self._beside(records, self.scenes[0].relative_truth(plan))
+            for member, session in enumerate(records.who.tolist()):
+                found[session].append(results.of_model(records.of(session), beside, member, plan.published))
+        return [self._document(session, models, strips) for session, models in enumerate(found)]
 
-    def _document(self, session: int, models: list[Document]) -> Document:
+    def _beside(self, records: ModelRecords, truth: RelativeTruth | None) -> Beside:
+        """Return the truth about a model of those who did it; their instruments stand as they left them."""
+        who, model, fleet = records.who, records.model, self.fleet
+        centres = {
+            hand: {f"{axis}0": each for axis, each in fleet.readings_at(who, fleet.pose(who, projector)[0]).items()}
+            for hand, projector in ((1, model.left_projector), (2, model.right_projector))
+        }
+        elements = {name: counts[who] for name, counts in records.orientation.elements.items()}
+        return Beside.of(truth, centres, records.orientation.method, elements, model, fleet.variant)
+
+    def _document(self, session: int, models: list[Document], strips: bool) -> Document:
         crew, scenario = self.bench.crew, self.scenario
         why = crew.reasons.get(session)
         document: Document = results.header(scenario, self.seeds[session]) | {
@@ -53,14 +66,15 @@ class Crowd:
             "models": models,
             "operator": results.of_hours(float(crew.seconds[session]), crew.timesheet, session),
         }
-        if why is None:
+        if strips and why is None:
             document["strip"], _ = strip_of(scenario, ground_of(scenario, self.scenes[session]), models)
         return document
 
 
 def open_crowd(scenario: Scenario, seeds: Sequence[int]) -> Crowd:
     """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
-    scenes = tuple(build_scene(scenario, seed) for seed in seeds)
+    flight = Flight.of(scenario)
+    scenes = tuple(flight.scene(seed) for seed in seeds)
     fleet = build_fleet(scenario.instrument, [scene.drawer for scene in scenes], seeds)
     crew = Crew(scenario.observer, [Dice(scenario.observer, seed) for seed in seeds])
     job = job_of(scenario, scenes[0])

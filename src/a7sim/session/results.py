@@ -9,14 +9,14 @@ import msgspec
 import a7sim
 from a7sim.documents import Document, head
 from a7sim.files import csv_text
+from a7sim.geometry import Array
 from a7sim.operator import ModelRecord, Person
 from a7sim.operator.absolute import OnGround
 from a7sim.operator.timesheet import Timesheet
 from a7sim.reduction import Model, PerspectiveCentre
 from a7sim.scenario import RequestedScenario, Scenario
 from a7sim.scenario.schema import Published
-from a7sim.scene import RelativeTruth
-from a7sim.session.truth import Relative, Standing, true_centre, true_elements
+from a7sim.session.truth import Beside
 
 SIDES = {1: "left", 2: "right"}
 
@@ -46,9 +46,9 @@ def of_request(scenario: Scenario) -> dict[str, Any]:
 
 
 def of_model(
-    record: ModelRecord, autograph: Standing, truth: RelativeTruth | None, published: Published | None = None
+    record: ModelRecord, beside: Beside, member: int = 0, published: Published | None = None
 ) -> dict[str, Any]:
-    """Return the results of a model beside the truth; the instrument must stand as the operator left it."""
+    """Return the results of a model beside the truth, of which this session's is that of a member."""
     orientation = record.orientation
     model = record.model
     found = {hand: _centre(centre) for hand, centre in record.centres.items()}
@@ -97,7 +97,7 @@ def of_model(
         },
         "standard_points": dict(model.standard_points),
         **({"absolute_orientation": _on_ground(record.on_ground)} if record.on_ground else {}),
-        "truth": _beside_truth(record, autograph, truth, found) | _published_sigmas(published),
+        "truth": _beside_truth(record, beside, member, found) | _published_sigmas(published),
     }
 
 
@@ -180,38 +180,34 @@ def _rounded(values: Any) -> dict[str, float]:
 
 
 def _beside_truth(
-    record: ModelRecord, autograph: Standing, truth: RelativeTruth | None, found: dict[int, dict[str, float]]
+    record: ModelRecord, beside: Beside, member: int, found: dict[int, dict[str, float]]
 ) -> dict[str, Any]:
-    model = record.model
-    projectors = {1: model.left_projector, 2: model.right_projector}
-    centres = {hand: true_centre(autograph, projectors[hand]) for hand in found}
-    beside: dict[str, Any] = {
+    centres = {hand: {name: float(each[member]) for name, each in beside.centres[hand].items()} for hand in found}
+    document: dict[str, Any] = {
         "centres": {SIDES[hand]: {name: round(v, 5) for name, v in centre.items()} for hand, centre in centres.items()},
         "centre_differences": {
             SIDES[hand]: {name: round(found[hand][name] - value, 5) for name, value in centre.items()}
             for hand, centre in centres.items()
         },
     }
-    if truth is not None:
-        measured = Relative.of_counters(record.orientation.elements, model, autograph.variant)
-        true = Relative.of_truth(truth)
-        turn, swing = measured.differences_gon(true)
-        elements = record.orientation.elements
-        exact = true_elements(true, record.orientation.method, elements, model, autograph.variant)
-        beside |= {
-            "source": truth.source,
-            "relative_rotation": _matrix(true.rotation),
-            "base_direction": _vector(true.base),
-            "found_relative_rotation": _matrix(measured.rotation),
-            "found_base_direction": _vector(measured.base),
-            "rotation_difference_gon": round(turn, 5),
-            "base_difference_gon": round(swing, 5),
-            "elements": _rounded(exact),
-            "element_differences": {
-                name: round((elements[name] - value + 200.0) % 400.0 - 200.0, 6) for name, value in exact.items()
-            },
-        }
-    return beside
+    relative = beside.relative
+    if relative is None:
+        return document
+    exact = {name: float(each[member]) for name, each in relative.elements.items()}
+    elements = record.orientation.elements
+    return document | {
+        "source": relative.source,
+        "relative_rotation": _matrix(relative.true.rotation),
+        "base_direction": _vector(relative.true.base),
+        "found_relative_rotation": _matrix(relative.found.rotation[..., member]),
+        "found_base_direction": _vector(relative.found.base[..., member]),
+        "rotation_difference_gon": round(float(relative.rotation_gon[member]), 5),
+        "base_difference_gon": round(float(relative.base_gon[member]), 5),
+        "elements": _rounded(exact),
+        "element_differences": {
+            name: round((elements[name] - value + 200.0) % 400.0 - 200.0, 6) for name, value in exact.items()
+        },
+    }
 
 
 def _published_sigmas(published: Published | None) -> dict[str, Any]:
@@ -221,11 +217,11 @@ def _published_sigmas(published: Published | None) -> dict[str, Any]:
     return {"published_sigmas": {name: getattr(published, name) for name in names}}
 
 
-def _vector(values: Any) -> list[float]:
-    return [round(float(value), 9) for value in values]
+def _vector(values: Array) -> list[float]:
+    return [round(value, 9) for value in values.tolist()]
 
 
-def _matrix(values: Any) -> list[list[float]]:
+def _matrix(values: Array) -> list[list[float]]:
     return [_vector(row) for row in values]
 
 

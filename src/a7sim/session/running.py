@@ -31,6 +31,7 @@ from a7sim.session.folder import (
 from a7sim.session.journal import Journal, Keeping, header_of
 from a7sim.session.sitting import sitting
 from a7sim.session.strips import GroundedStrip, cards_of, given_control, ground_of, grounded, models_of, of_grounded
+from a7sim.session.truth import Beside
 
 Cable = Callable[[InProcessSerial], Port]
 """What lies between instrument and operator: it takes the instrument's end and returns the operator's."""
@@ -134,7 +135,8 @@ def run(
         for record in work(session.person, job, watcher.tick, watcher.begins):
             plan = next(model for model in scenario.models if model.name == record.model.name)
             truth = session.scene.relative_truth(plan)
-            done.append(results.of_model(record, session.autograph, truth, plan.published))
+            beside = Beside.of_record(record, session.autograph, truth)
+            done.append(results.of_model(record, beside, published=plan.published))
     return _concluded(session, document, out)
 
 

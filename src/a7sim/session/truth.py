@@ -2,26 +2,29 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from a7sim.geometry import GON, Array, angle_between, angles_of, length_of, mxm, mxv, rotation, transposed, turn_of
 from a7sim.manual import Variant
-from a7sim.operator import ModelJob
+from a7sim.operator import ModelJob, ModelRecord
 from a7sim.scene import RelativeTruth
+
+Elements = Mapping[str, Any]
+"""What counters show: of one session, or ``(m,)`` of many."""
 
 
 @dataclass(frozen=True)
 class Relative:
-    """The right-hand photograph in the left-hand one's frame: rotation ``(3, 3)`` and unit base ``(3,)``."""
+    """The right-hand photograph in the left-hand one's frame: rotation ``(3, 3, ...)`` and unit base ``(3, ...)``."""
 
     rotation: Array
     base: Array
 
     @classmethod
-    def of_counters(cls, elements: Mapping[str, float], model: ModelJob, variant: Variant) -> "Relative":
-        """Return the relative orientation that the counters of a model describe."""
+    def of_counters(cls, elements: Elements, model: ModelJob, variant: Variant) -> "Relative":
+        """Return the relative orientation that the counters ``(...)`` of a model describe."""
         left, right = model.left_projector, model.right_projector
 
         def turned(n: int) -> Array:
@@ -36,16 +39,20 @@ class Relative:
         """Return a true or published relative orientation."""
         return cls(truth.rotation, truth.base / length_of(truth.base))
 
-    def differences_gon(self, other: "Relative") -> tuple[float, float]:
-        """Return by what angles the rotations and the bases differ."""
-        turn = float(turn_of(mxm(transposed(self.rotation), other.rotation)))
-        return turn / GON, float(angle_between(self.base, other.base)) / GON
+    def of_many(self) -> "Relative":
+        """Return the same for any number of sessions, with an axis of theirs at the end."""
+        return Relative(self.rotation[..., None], self.base[..., None])
+
+    def differences_gon(self, other: "Relative") -> tuple[Array, Array]:
+        """Return by what angles ``(...)`` the rotations and the bases differ."""
+        turn = turn_of(mxm(transposed(self.rotation), other.rotation))
+        return turn / GON, angle_between(self.base, other.base) / GON
 
 
 def true_elements(
-    truth: Relative, method: str, elements: Mapping[str, float], model: ModelJob, variant: Variant
-) -> dict[str, float]:
-    """Return what the counters of the elements that a method turns would show if the truth were set.
+    truth: Relative, method: str, elements: Elements, model: ModelJob, variant: Variant
+) -> dict[str, Array]:
+    """Return what the counters ``(m,)`` of the elements that a method turns would show if the truth were set.
 
     The other elements stay as they are. Independent: the left-hand camera brings the true base onto the set one and
     is turned about it until omega" shows what it shows. Dependent: the left-hand camera stays, the right-hand one and
@@ -59,8 +66,8 @@ def true_elements(
         base = mxv(turned_left, truth.base)
         base *= elements["bx"] / base[0]
         true = {
-            f"by{right}": elements[f"by{left}"] - float(base[1]),
-            f"bz{right}": elements[f"bz{left}"] + float(base[2]),
+            f"by{right}": elements[f"by{left}"] - base[1],
+            f"bz{right}": elements[f"bz{left}"] + base[2],
         }
         cameras = {right: mxm(turned_left, truth.rotation)}
     else:
@@ -68,11 +75,11 @@ def true_elements(
         omega2 = variant.tilts(elements, 2)[0] * GON
         for _ in range(_MOST_TURNS):
             cameras = {left: turned_left, right: mxm(turned_left, truth.rotation)}
-            turned_left = mxm(_about(set_base, omega2 - float(angles_of(cameras[2])[0])), turned_left)
+            turned_left = mxm(_about(set_base, omega2 - angles_of(cameras[2])[0]), turned_left)
         true = {}
     for n, turned in cameras.items():
         for name, radians in zip(("omega", "phi", "kappa"), angles_of(turned), strict=True):
-            shown = float(radians) / GON + variant.elements[f"{name}{n}"].zero
+            shown = radians / GON + variant.elements[f"{name}{n}"].zero
             true[f"{name}{n}"] = shown % 400.0 if name == "kappa" else shown
     return true
 
@@ -80,29 +87,78 @@ def true_elements(
 _MOST_TURNS = 12
 
 
-def _base_of(elements: Mapping[str, float], model: ModelJob) -> Array:
+def _base_of(elements: Elements, model: ModelJob) -> Array:
     left, right = model.left_projector, model.right_projector
-    return np.array(
-        [
-            elements["bx"],
-            elements.get(f"by{left}", 0.0) - elements.get(f"by{right}", 0.0),
-            elements.get(f"bz{right}", 0.0) - elements.get(f"bz{left}", 0.0),
-        ]
-    )
+    across = elements.get(f"by{left}", 0.0) - elements.get(f"by{right}", 0.0)
+    rise = elements.get(f"bz{right}", 0.0) - elements.get(f"bz{left}", 0.0)
+    return np.array(np.broadcast_arrays(elements["bx"], across, rise), dtype=float)
 
 
-def _about(axis: Array, angle: float) -> Array:
-    """Return the rotation ``(3, 3)`` through an angle about an axis (Rodrigues)."""
-    x, y, z = axis / length_of(axis)
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew)
+def _about(axis: Array, angle: Array) -> Array:
+    """Return the rotations ``(3, 3, m)`` through angles about axes ``(3, m)`` (Rodrigues); none about no axis."""
+    length = length_of(axis)
+    x, y, z = axis / np.where(length > 0.0, length, 1.0)
+    zero = np.zeros_like(x)
+    skew = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
+    return np.asarray(np.eye(3)[:, :, None] + np.sin(angle) * skew + (1.0 - np.cos(angle)) * mxm(skew, skew))
 
 
 def _laid_onto(vector: Array, other: Array) -> Array:
-    """Return the smallest rotation ``(3, 3)`` that brings a vector into the direction of another."""
-    if not np.cross(vector, other).any():
-        return np.eye(3)
-    return _about(np.cross(vector, other), float(angle_between(vector, other)))
+    """Return the smallest rotations ``(3, 3, m)`` that bring vectors into the direction of others."""
+    return _about(np.cross(vector, other, axis=0), angle_between(vector, other))
+
+
+@dataclass(frozen=True)
+class RelativeBeside:
+    """The true relative orientation of m sessions beside that which their counters describe."""
+
+    source: str
+    true: Relative
+    """One for all."""
+    found: Relative
+    rotation_gon: Array
+    """By what angles ``(m,)`` the rotations differ."""
+    base_gon: Array
+    elements: Mapping[str, Array]
+    """What the counters ``(m,)`` would show if the truth were set."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """The truth about a model in m sessions; arrays have the sessions last."""
+
+    centres: Mapping[int, Mapping[str, Array]]
+    """Where the centres really stand ``(m,)``, in counter units, by hand (1 left, 2 right)."""
+    relative: RelativeBeside | None
+    """None where no truth is known."""
+
+    @classmethod
+    def of(
+        cls,
+        truth: RelativeTruth | None,
+        centres: Mapping[int, Mapping[str, Array]],
+        method: str,
+        elements: Mapping[str, Array],
+        model: ModelJob,
+        variant: Variant,
+    ) -> "Beside":
+        """Return the truth beside the elements ``(m,)`` of sessions that turned them by a method."""
+        if truth is None:
+            return cls(centres, None)
+        true, found = Relative.of_truth(truth), Relative.of_counters(elements, model, variant)
+        exact = true_elements(true.of_many(), method, elements, model, variant)
+        return cls(centres, RelativeBeside(truth.source, true, found, *found.differences_gon(true.of_many()), exact))
+
+    @classmethod
+    def of_record(cls, record: ModelRecord, standing: "Standing", truth: RelativeTruth | None) -> "Beside":
+        """Return the truth about one session, whose instrument stands as the operator left it."""
+        model = record.model
+        centres = {
+            hand: {name: np.array([value]) for name, value in true_centre(standing, projector).items()}
+            for hand, projector in ((1, model.left_projector), (2, model.right_projector))
+        }
+        elements = {name: np.array([value]) for name, value in record.orientation.elements.items()}
+        return cls.of(truth, centres, record.orientation.method, elements, model, standing.variant)
 
 
 class Standing(Protocol):

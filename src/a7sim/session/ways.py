@@ -7,7 +7,7 @@ from a7sim.documents import Document, as_json, of_differences
 from a7sim.mistakes import Mistake
 from a7sim.reduction import Undetermined
 from a7sim.scenario import Scenario
-from a7sim.scene import Scene, build_scene
+from a7sim.scene import Flight, Scene, build_scene
 from a7sim.session import results
 from a7sim.session.a8_strip import strip_on_a8
 from a7sim.session.analytical import StripResult, strip_by_comparator
@@ -52,17 +52,21 @@ def run_all_ways(
     return document
 
 
-def documents_of_all_ways(scenario: Scenario, seeds: Sequence[int]) -> list[Document]:
-    """Return what `run_all_ways` says of each seed, all sessions at once, without what is told of line and book."""
+def documents_of_all_ways(scenario: Scenario, seeds: Sequence[int], strips: bool = True) -> list[Document]:
+    """Return what `run_all_ways` says of each seed, all sessions at once, without what is told of line and book.
+
+    Without `strips` nothing is said of the strip on the ground that was measured at the plotter.
+    """
     if "plotter" in scenario.work:
-        documents = open_crowd(scenario, seeds).documents()
+        documents = open_crowd(scenario, seeds).documents(strips)
     else:
         documents = [results.header(scenario, seed) | {"status": "complete", "message": ""} for seed in seeds]
     if scenario.work == ["plotter"]:
         return documents
     bridgings = dict(zip(seeds, bridged_together(scenario, seeds), strict=True)) if "bridge" in scenario.work else {}
+    flight = Flight.of(scenario)
     for document, seed in zip(documents, seeds, strict=True):
-        _add(document, *_measured(scenario, build_scene(scenario, seed), seed, lambda _, seed: bridgings[seed]))
+        _add(document, *_measured(scenario, flight.scene(seed), seed, lambda _, seed: bridgings[seed]))
     return documents
 
 

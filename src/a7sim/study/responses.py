@@ -64,6 +64,11 @@ def response_of(name: str) -> Response:
     raise Mistake(f"responses: expected a response or a path that begins with models., got {name!r}; {hint}")
 
 
+def reads_strip(name: str) -> bool:
+    """Return whether a response is read from the strip on the ground of a session at the plotter."""
+    return "_at_" in name or name.startswith("strip.")
+
+
 def _in_one_model(response: Response, model: int) -> Response:
     """Return a response of the models read in one of them, counted from 1. Raises Mistake for one of the strip."""
     of_all = next((each for each in OF_ALL if response.meaning.endswith(each)), None)

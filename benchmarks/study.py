@@ -1,0 +1,168 @@
+"""Time the study of the thesis against drawing its random numbers alone, and how the time grows.
+
+A replicate is two models in five cases, three readings each of by' and by", twenty centres, and the twenty-five strips
+that the models make, with residuals at checks. Prints CPU seconds of one process and peak memory; the ratio is to be at
+most five. Slopes are those of time over replicates, points measured, and models, both on logarithms: 1 is linear, less
+where a part of the time does not grow. Works studies/thesis-1985.toml once that is there.
+Usage: python benchmarks/study.py [--replicates N] [--chunk N] [--growth N]
+"""
+
+import argparse
+import resource
+import time
+from itertools import product
+
+import msgspec
+import numpy as np
+from drawing import cpu_seconds_to_draw, recording
+
+from a7sim.reduction import Model, absolute_orientation, formed_strip
+from a7sim.scenario import load_scenario
+from a7sim.scene import build_scene
+from a7sim.session.crowd import open_crowd
+from a7sim.session.strips import ground_of, models_of
+from a7sim.standard_points import CASES
+from a7sim.study.loading import StudyError, load_study
+from a7sim.study.simulating import seed_of
+
+TARGET = 5.0
+RECORDED = 50
+"""Replicates whose draws are recorded and drawn again as often as there are replicates."""
+
+SETTINGS = {"plan.parallax_readings": 3, "plan.measure_with": "both", "plan.centre_levels": [4900, 5100]}
+
+
+def cpu_seconds(work):
+    """CPU seconds that some work takes in this process."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began
+
+
+def sessions(scenario, seeds):
+    """Documents of sessions without their own strips."""
+    return open_crowd(scenario, seeds).documents(strips=False)
+
+
+class Thesis:
+    """The whole work of the thesis, without a study's file: sessions in every case, strips of all combinations."""
+
+    def __init__(self):
+        self.scenarios = {case: load_scenario("akwanga", settings={**SETTINGS, "plan.case": case}) for case in CASES}
+
+    def replicates(self, seeds):
+        """Rms at checks ``(strips, 3, sessions that came to their end)``."""
+        by_case = {case: sessions(scenario, seeds) for case, scenario in self.scenarios.items()}
+        complete = [i for i in range(len(seeds)) if all(each[i]["status"] == "complete" for each in by_case.values())]
+        models = {case: [models_of(each[i]["models"]) for i in complete] for case, each in by_case.items()}
+        scenario = self.scenarios["A"]
+        ground = ground_of(scenario, build_scene(scenario, seeds[0]))
+        return np.array([self._strips(models, cases, ground) for cases in product(CASES, repeat=2)])
+
+    def _strips(self, models, cases, ground):
+        stacked = [
+            Model(one.name, one.points, np.stack([each[place].coordinates for each in models[case]], axis=-1))
+            for place, case in enumerate(cases)
+            for one in (models[case][0][place],)
+        ]
+        strip = formed_strip(stacked, self.scenarios[cases[0]].strip.join)
+        oriented = absolute_orientation(strip, ground)
+        return np.sqrt(np.nanmean(oriented.fit.at_checks**2, axis=1))
+
+
+def study_work():
+    """What works replicates: the study's file where it is there, else the same work put together here."""
+    try:
+        tasks = load_study("thesis-1985", replicates=1).tasks
+    except StudyError:
+        return Thesis().replicates, "the same work as studies/thesis-1985.toml, which is not there"
+    return lambda seeds: [task.together(seeds) for task in tasks], "studies/thesis-1985.toml"
+
+
+def the_whole(replicates, chunk):
+    """Print the time of all replicates and of drawing their random numbers."""
+    work, what = study_work()
+    seeds = [seed_of(1985, replicate) for replicate in range(replicates)]
+    work(seeds[:2])
+    with recording() as calls:
+        work(seeds[:RECORDED])
+    recorded = min(RECORDED, replicates)
+    took = drawing = 0.0
+    for first in range(0, replicates, chunk):
+        some = seeds[first : first + chunk]
+        took += cpu_seconds(lambda some=some: work(some))
+        drawing += sum(cpu_seconds_to_draw(calls) for _ in range(0, len(some), recorded)) * (
+            len(some) / (recorded * -(-len(some) // recorded))
+        )
+    ratio = took / drawing
+    print(f"{what}: {replicates} replicates, {chunk} at once")
+    print(f"study    {took:9.1f} s CPU  {1e3 * took / replicates:8.2f} ms a replicate")
+    print(
+        f"drawing  {drawing:9.1f} s CPU  {1e3 * drawing / replicates:8.2f} ms a replicate, {len(calls)} calls recorded"
+    )
+    print(f"ratio    {ratio:9.1f}  at most {TARGET:g} wanted: {'met' if ratio <= TARGET else 'missed'}")
+    print(f"memory   {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:9.0f} MB at most")
+
+
+def flight_of(models, points):
+    """A strip of so many models with so many signalised points in each to be measured."""
+    scenario = load_scenario("akwanga")
+    first = scenario.photos[0]
+    photos = [
+        msgspec.structs.replace(
+            scenario.photos[i % 3],
+            name=str(101 + i),
+            position=(first.position[0] - 728.0 * i, first.position[1], first.position[2]),
+        )
+        for i in range(models + 1)
+    ]
+    row = [
+        msgspec.structs.replace(scenario.models[i % 2], name=str(i + 1), left=photos[i].name, right=photos[i + 1].name)
+        for i in range(models)
+    ]
+    one = scenario.ground[0]
+    ground = [
+        msgspec.structs.replace(
+            one,
+            point=f"P{i}N{k}",
+            X=first.position[0] - 728.0 * (i + 0.2 + 0.6 * k / max(points - 1, 1)),
+            Y=first.position[1] + 300.0 * (-1) ** k,
+            Z=None,
+        )
+        for i in range(models)
+        for k in range(points)
+    ]
+    return msgspec.structs.replace(scenario, photos=photos, models=row, ground=ground)
+
+
+def growth(replicates):
+    """Print how time grows with replicates, points and models."""
+    plain = load_scenario("akwanga")
+    half, double = replicates // 2, 2 * replicates
+    grown = {
+        "replicates": [(n, plain, n) for n in (half, replicates, double)],
+        "points a model": [(n, flight_of(2, n), replicates) for n in (10, 20, 40)],
+        "models": [(n, flight_of(n, 10), replicates) for n in (1, 2, 4)],
+    }
+    for name, steps in grown.items():
+        counts = [count for count, _, _ in steps]
+        seconds = [cpu_seconds(lambda s=s, n=n: sessions(s, range(n))) for _, s, n in steps]
+        slope = np.polyfit(np.log(counts), np.log(seconds), 1)[0]
+        last = np.diff(seconds) / np.diff(counts)
+        listed = ", ".join(f"{count}: {each:.1f} s" for count, each in zip(counts, seconds, strict=True))
+        print(f"{name:15} {listed}; slope {slope:.2f}; one more costs {1e3 * last[0]:.1f}, then {1e3 * last[1]:.1f} ms")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--replicates", type=int, default=200)
+    parser.add_argument("--chunk", type=int, default=2000, help="replicates at once")
+    parser.add_argument("--growth", type=int, default=200, help="replicates of the slopes; 0 for none")
+    asked = parser.parse_args()
+    the_whole(asked.replicates, asked.chunk)
+    if asked.growth:
+        growth(asked.growth)
+
+
+if __name__ == "__main__":
+    main()
