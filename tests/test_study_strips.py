@@ -129,7 +129,9 @@ def test_cells_are_the_strips_and_a_model_does_not_know_with_which_it_is_combine
     study = laid(tmp_path)
     (task,) = study.tasks
     by_case = {case: [each[case] for each in replicates] for case in CASES}
-    monkeypatch.setattr("a7sim.study.simulating._documents", lambda scenario, _: by_case[scenario.plan.case])
+    monkeypatch.setattr(
+        "a7sim.study.simulating.documents_of_all_ways", lambda scenario, *_, **__: by_case[scenario.plan.case]
+    )
     values = task.together([1, 2, 3])
     assert [cell.label for cell in study.cells][:2] == ["model 1 A, model 2 A", "model 1 A, model 2 B"]
     rotation = values[:, 1, 0].reshape(5, 5)

@@ -52,9 +52,10 @@ def _orientation_beyond_reach(model: Model, left: Photo, right: Photo, plan: Pla
     """Yield a sentence for every element that the photographs as they were flown would take beyond its range."""
     if left.position is None or right.position is None or "upside down" in (left.laid, right.laid):
         return
-    start = {name: element.zero for name, element in variant.elements.items()} | {"bx": plan.bx}
+    counters = {name: element.zero for name, element in variant.elements.items()} | {"bx": plan.bx}
+    start = {name: np.array([shown]) for name, shown in counters.items()}
     job = ModelJob(model.name, left.name, right.name, model.base, "", {})
-    for name, value in true_elements(_flown(left, right), plan.method, start, job, variant).items():
+    for name, (value,) in true_elements(_flown(left, right).of_many(), plan.method, start, job, variant).items():
         element = variant.elements.get(name)
         if element is not None and not element.endless and not element.low <= value <= element.high:
             yield (

@@ -53,6 +53,8 @@ class Tally:
 
     def add(self, cell: int, values: Array) -> None:
         """Add the next replicates ``(responses, n)`` of a cell; nan is one that gave up."""
+        if not values.size:
+            return
         room = max(0, SAMPLE - int(self.done[cell]))
         if room:
             self.samples[cell].append(values[:, :room])

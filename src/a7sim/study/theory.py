@@ -201,11 +201,12 @@ def _fractions(scenario: Scenario, scene: Scene, number: int, names: Sequence[st
     if truth is None or number > 0:
         return np.full(len(names), np.nan)
     variant = VARIANTS[scenario.instrument.variant]
-    zeros = {name: element.zero for name, element in variant.elements.items()} | {"bx": scenario.plan.bx}
+    counters = {name: element.zero for name, element in variant.elements.items()} | {"bx": scenario.plan.bx}
+    zeros = {name: np.array([shown]) for name, shown in counters.items()}
     model = job_of(scenario, scene).models[number]
-    true = true_elements(Relative.of_truth(truth), scenario.plan.method, zeros, model, variant)
+    true = true_elements(Relative.of_truth(truth).of_many(), scenario.plan.method, zeros, model, variant)
     taking_the_mean = np.abs(to_mean) > 1e-6 * np.abs(to_mean).max()
-    return np.where(taking_the_mean, np.nan, [true[name] / LEAST_COUNT % 1.0 for name in names])
+    return np.where(taking_the_mean, np.nan, [true[name][0] / LEAST_COUNT % 1.0 for name in names])
 
 
 # --- perspective centres ----------------------------------------------------------------------------------------------
