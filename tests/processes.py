@@ -5,6 +5,8 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from io import BytesIO, TextIOWrapper
 from typing import NamedTuple
 
 from a7sim.cli import main
@@ -19,6 +21,19 @@ def a7sim(*arguments, **popen):
     """Return what a command ended with and said."""
     command = [*COMMAND, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120, **popen)
+
+
+def a7sim_here(*arguments, cwd="."):
+    """Return what a command ended with and said in a folder, without a process of its own."""
+    printed, complained = (TextIOWrapper(BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    before, sys.argv = sys.argv, ["a7sim", *map(str, arguments)]
+    try:
+        with chdir(cwd), redirect_stdout(printed), redirect_stderr(complained):
+            main()
+    except SystemExit as ended:
+        return Said(ended.code or 0, *(each.buffer.getvalue().decode("utf-8") for each in (printed, complained)))
+    finally:
+        sys.argv = before
 
 
 class Said(NamedTuple):

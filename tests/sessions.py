@@ -26,8 +26,13 @@ def tilted_flight(tilts, **overrides):
 
 
 def without_errors(scenario):
-    """Return a scenario with film and operator faultless; counters are still read to 0.01."""
-    return msgspec.structs.replace(scenario, film=Film(), observer=Observer.faultless())
+    """Return a scenario with film and operator faultless, who need not read twice; counters are still read to 0.01."""
+    return read_once(msgspec.structs.replace(scenario, film=Film(), observer=Observer.faultless()))
+
+
+def read_once(scenario):
+    """Return a scenario whose operator reads every parallax once: for tests of what more readings do not change."""
+    return msgspec.structs.replace(scenario, plotting=msgspec.structs.replace(scenario.plan, parallax_readings=1))
 
 
 def element_errors(model):

@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.processes import a7sim as in_a_process
+from tests.processes import a7sim_here
+
 ROOT = Path(__file__).parents[1]
 WORK_FILES = {
     "session.jsonl",
@@ -23,6 +26,9 @@ WORK_FILES = {
 STRIP_FILES = {"strip.csv", "strip.crd", "strip-output.crd", "strip-numbers.csv"}
 FILES = WORK_FILES | STRIP_FILES
 
+READ_ONCE = ("--set", "plan.parallax_readings=1")
+"""For what more readings of a parallax do not change."""
+
 HEEDING_CTRL_C = """
 import runpy, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -32,9 +38,7 @@ runpy.run_module("a7sim", run_name="__main__")
 
 
 def a7sim(*arguments, cwd=ROOT):
-    return subprocess.run(
-        [sys.executable, "-m", "a7sim", *map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False
-    )
+    return a7sim_here(*arguments, cwd=cwd)
 
 
 @pytest.fixture(scope="module")
@@ -144,8 +148,10 @@ def test_the_book_and_the_models_are_tables(akwanga_run):
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_gives_other_numbers(akwanga_run, tmp_path):
+    """Also in a process of its own, whose hashes are others."""
     _, out = akwanga_run
-    assert a7sim("run", ROOT / "scenarios/akwanga.toml", "--seed", 7, "--out", tmp_path / "again").returncode == 0
+    again = in_a_process("run", ROOT / "scenarios/akwanga.toml", "--seed", 7, "--out", tmp_path / "again")
+    assert again.returncode == 0
     for name in FILES:
         assert (tmp_path / "again" / name).read_bytes() == (out / name).read_bytes()
     assert a7sim("run", "akwanga", "--seed", 8, "--out", tmp_path / "other").returncode == 0
@@ -161,7 +167,7 @@ def test_json_prints_one_document_and_nothing_else(akwanga_run):
 
 
 def test_quiet_prints_nothing():
-    done = a7sim("run", "dewitt-pair", "--quiet")
+    done = a7sim("run", "dewitt-pair", *READ_ONCE, "--quiet")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
@@ -171,7 +177,7 @@ def test_options_reach_the_session():
     assert results["method"] == "dependent"
     assert results["models"][0]["relative_orientation"]["elements"]["bx"] == 190.0
     assert results["operator"]["struck_out"] == 0
-    assert json.loads(a7sim("run", "akwanga", "--case", "c", "--json").stdout)["case"] == "C"
+    assert json.loads(a7sim("run", "akwanga", "--case", "c", *READ_ONCE, "--json").stdout)["case"] == "C"
 
 
 def test_an_existing_folder_is_refused_unless_forced_and_nothing_in_it_is_lost(tmp_path):
@@ -182,7 +188,7 @@ def test_an_existing_folder_is_refused_unless_forced_and_nothing_in_it_is_lost(t
     assert refused.stderr.count("\n") == 1
     assert "--force" in refused.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"thesis.txt"}
-    assert a7sim("run", "dewitt-pair", "--out", tmp_path, "--force").returncode == 0
+    assert a7sim("run", "dewitt-pair", *READ_ONCE, "--out", tmp_path, "--force").returncode == 0
     assert {path.name for path in tmp_path.iterdir()} == WORK_FILES | {"thesis.txt"}
     assert mine.read_text(encoding="utf-8") == "mine"
 
@@ -216,7 +222,7 @@ def test_bad_input_gets_a_sentence_and_exit_code_2_without_traceback(arguments, 
 
 def test_bad_input_leaves_earlier_results_and_no_new_folder(tmp_path):
     out = tmp_path / "out"
-    assert a7sim("run", "dewitt-pair", "--out", out, "--quiet").returncode == 0
+    assert a7sim("run", "dewitt-pair", *READ_ONCE, "--out", out, "--quiet").returncode == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     (tmp_path / "dewitt-pair.csv").write_bytes("point,xl,yl,xr,yr\nä,1,2,3,4\n".encode("latin-1"))
     (tmp_path / "bad.toml").write_bytes((ROOT / "scenarios" / "dewitt-pair.toml").read_bytes())
@@ -230,14 +236,14 @@ def test_names_with_commas_are_names_like_any_other(tmp_path):
     scenario = (ROOT / "scenarios" / "akwanga.toml").read_text(encoding="utf-8")
     scenario = scenario.replace('"C1"', '"C,1"').replace('"101"', '"1,01"')
     (tmp_path / "commas.toml").write_text(scenario, encoding="utf-8")
-    results = json.loads(a7sim("run", tmp_path / "commas.toml", "--json").stdout)
+    results = json.loads(a7sim("run", tmp_path / "commas.toml", *READ_ONCE, "--json").stdout)
     assert results["status"] == "complete"
     assert "C,1" in results["models"][0]["points"]
 
 
 @pytest.mark.parametrize("environment", [{"PYTHONIOENCODING": "ascii"}, {"COLUMNS": "40"}, {"NO_COLOR": "1"}])
 def test_any_terminal_gets_its_tables(environment):
-    command = [sys.executable, "-m", "a7sim", "run", "dewitt-pair"]
+    command = [sys.executable, "-m", "a7sim", "run", "dewitt-pair", *READ_ONCE]
     done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -266,8 +272,8 @@ def test_pages_show_what_a_run_prints():
 
 
 def test_debug_shows_the_traceback():
-    assert "Traceback" in a7sim("run", "nowhere", "--debug").stderr
-    assert "Traceback" in a7sim("--debug", "run", "nowhere").stderr
+    assert "Traceback" in in_a_process("run", "nowhere", "--debug").stderr
+    assert "Traceback" in in_a_process("--debug", "run", "nowhere").stderr
 
 
 def test_a_session_that_does_not_fit_ends_with_1_and_says_why(tmp_path):

@@ -171,7 +171,7 @@ def test_clearing_the_last_point_and_no_more_takes_eight_rounds_where_the_over_c
     """From more than 2 mm at the last point."""
     computed = sweep()[: len(SEEDS)]
     gross = np.flatnonzero(computed[:, 3] > 2.0)[:6]
-    plain = _cleared(gross.tolist(), "independent", **{"plan.over_correction": "1"})
+    plain = _cleared(gross.tolist(), "independent", **{"plan.over_correction": "1", "plan.parallax_readings": "1"})
     np.testing.assert_array_equal(plain[:, 3], computed[gross, 3])
     assert 7 <= np.median(plain[:, 0]) <= 10
     assert np.median(computed[gross, 0]) <= 3
@@ -484,7 +484,7 @@ def test_a_plan_that_cannot_be_is_a_mistake(key, value):
 
 
 def test_hallerts_forms_are_for_six_and_nine_points_and_fifteen_go_by_least_squares():
-    plan = {"plan.solution": '"hallert"', "plan.case": '"E"'}
+    plan = {"plan.solution": '"hallert"', "plan.case": '"E"', "plan.parallax_readings": "1"}
     found, _ = orient(load_scenario("akwanga", plan), 2)
     by_squares, _ = orient(load_scenario("akwanga", plan | {"plan.solution": '"least squares"'}), 2)
     assert found.elements == by_squares.elements

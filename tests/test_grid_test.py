@@ -2,8 +2,6 @@
 
 import csv
 import json
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -28,7 +26,8 @@ from a7sim.session import open_session, run
 from a7sim.session.crowd import open_crowd
 from a7sim.session.grid_test import run_grid_test
 from tests.door import Door
-from tests.sessions import without_errors
+from tests.processes import a7sim_here
+from tests.sessions import read_once, without_errors
 
 ROOT = Path(__file__).parents[1]
 CROSSES = np.array(list(GridPlate().some_crosses(25).values())).T
@@ -362,7 +361,8 @@ def centres_by(method, seed):
 
 @cache
 def sessions_by(method):
-    crowd = open_crowd(load_scenario("akwanga", {"plan.centre_method": f'"{method}"', **METHODS[method]}), SEEDS)
+    plan = {"plan.centre_method": f'"{method}"', "plan.parallax_readings": "2"}
+    crowd = open_crowd(load_scenario("akwanga", plan | METHODS[method]), SEEDS)
     documents = crowd.documents()
     assert crowd.bench.crew.reasons == {}
     return documents, crowd.bench.crew.seconds / 3600.0
@@ -431,7 +431,7 @@ def test_more_levels_make_the_centre_more_exact_as_theory_says(levels):
 
 
 def test_the_picture_is_put_back_and_centred_again():
-    session = open_session(load_scenario("akwanga", {"plan.centre_method": '"grid plate"'}), 1)
+    session = open_session(read_once(load_scenario("akwanga", {"plan.centre_method": '"grid plate"'})), 1)
     record = next(iter(work(session.person, session.job)))
     elements = {name: session.autograph.element(name) for name in record.orientation.elements}
     assert elements == dict(record.orientation.elements)
@@ -443,9 +443,11 @@ def test_the_picture_is_put_back_and_centred_again():
 
 
 def test_a_plate_with_too_few_crosses_in_the_model_does_not_pass():
-    scenario = load_scenario(
-        "akwanga",
-        {"plan.centre_method": '"grid plate"', "grid_plate.lines": "3", "grid_plate.spacing_mm": "100.0"},
+    scenario = read_once(
+        load_scenario(
+            "akwanga",
+            {"plan.centre_method": '"grid plate"', "grid_plate.lines": "3", "grid_plate.spacing_mm": "100.0"},
+        )
     )
     document = run(scenario, 1)
     assert document["status"] == "does not fit"
@@ -456,9 +458,7 @@ def test_a_plate_with_too_few_crosses_in_the_model_does_not_pass():
 
 
 def a7sim(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "a7sim", *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    return a7sim_here(*arguments, cwd=ROOT)
 
 
 def test_calibrate_files_a_sheet(tmp_path):

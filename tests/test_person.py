@@ -2,8 +2,6 @@
 
 import dataclasses
 import json
-import subprocess
-import sys
 from functools import cache
 
 import msgspec
@@ -17,6 +15,8 @@ from a7sim.scenario import PROFILES, Observer, ScenarioError, load_scenario, obs
 from a7sim.scenario.schema import CertainSlip, Film
 from a7sim.session import open_session, run
 from a7sim.session.crowd import open_crowd
+from tests.processes import a7sim_here
+from tests.sessions import read_once
 
 WITHOUT_SLIPS = dict.fromkeys(
     (
@@ -91,10 +91,7 @@ def test_the_schema_takes_the_word_and_the_table():
 
 
 def test_the_command_line_knows_the_skills():
-    done = subprocess.run(
-        [sys.executable, "-m", "a7sim", "run", "akwanga", "--skill", "expert"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = a7sim_here("run", "akwanga", "--skill", "expert")
     assert done.returncode == 2
     assert all(skill in done.stderr for skill in PROFILES)
 
@@ -102,7 +99,8 @@ def test_the_command_line_knows_the_skills():
 @cache
 def crowd_of(skill):
     """Twelve persons of a skill on film without errors, none of whom slips."""
-    crowd = open_crowd(one_model(observer_of_skill(skill, **WITHOUT_SLIPS), film=Film()), range(12))
+    scenario = read_once(one_model(observer_of_skill(skill, **WITHOUT_SLIPS), film=Film()))
+    crowd = open_crowd(scenario, range(12))
     (records,) = crowd.worked()
     return crowd, records
 
@@ -125,6 +123,7 @@ def test_a_novice_in_a_crowd_is_the_novice_at_the_line():
     scenario, seeds = one_model(observer_of_skill("novice")), (4, 5)
     crowd = open_crowd(scenario, seeds)
     (records,) = crowd.worked()
+    assert all(crowd.bench.crew.slip_log[i] for i in range(len(seeds)))
     for i, seed in enumerate(seeds):
         session = open_session(scenario, seed)
         record = next(iter(work(session.person, session.job)))
@@ -172,7 +171,7 @@ def test_breaks_are_taken_by_those_who_are_due_only():
 
 @pytest.mark.parametrize("skill", ["trained", "novice"])
 def test_the_time_adds_up(skill):
-    session = open_session(one_model(observer_of_skill(skill, **WITHOUT_SLIPS)), 2)
+    session = open_session(read_once(one_model(observer_of_skill(skill, **WITHOUT_SLIPS))), 2)
     next(iter(work(session.person, session.job)))
     person = session.person
     for column in (person.timesheet.activities_of(0), person.timesheet.acts_of(0)):
@@ -322,7 +321,7 @@ def test_a_planted_slip_happens_once_and_one_that_fits_nowhere_not_at_all():
 def test_slips_are_told_in_the_results_and_in_no_entry_of_book_or_journal(tmp_path):
     slip = CertainSlip(kind="transposed digits", form="model coordinates", point="C1")
     observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=[slip])
-    document = run(one_model(observer), 1, tmp_path / "out")
+    document = run(read_once(one_model(observer)), 1, tmp_path / "out")
     (told,) = document["truth"]["slips"]
     assert (told["kind"], told["form"], told["point"]) == ("transposed digits", "model coordinates", "C1")
     assert told["struck"]

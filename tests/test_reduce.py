@@ -1,8 +1,6 @@
 """`a7sim reduce` on real measurements, as files.md promises it."""
 
 import json
-import subprocess
-import sys
 import tomllib
 from itertools import pairwise
 from pathlib import Path
@@ -13,18 +11,13 @@ import pytest
 from a7sim import computing
 from a7sim.geometry import GON, rotation
 from a7sim.mistakes import Mistake
+from tests.processes import a7sim_here
 
 ROOT = Path(__file__).parents[1]
 
 
 def reduce(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "a7sim", "reduce", *map(str, arguments)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return a7sim_here("reduce", *arguments, cwd=ROOT)
 
 
 def toml(path):

@@ -1,6 +1,7 @@
 """Training (issue 8): exercises hold what they promise, grades say why, and a journal that was edited is found."""
 
 import pytest
+from msgspec.structs import replace as changed
 
 from a7sim.session.lines import Chain, read_journal
 from a7sim.training.attempts import attempted, begun, gone_on, write_answers
@@ -21,6 +22,23 @@ def test_every_exercise_holds_what_check_asks(shelved):
     found = checked(shelved)
     assert found.faults == ()
     assert found.reference_points is not None and found.reference_points >= shelved.exercise.pass_points
+
+
+@pytest.mark.parametrize(
+    ("limits", "mutation"),
+    [
+        ({"excellent": 1e12, "passing": 1e12}, "its tolerances are without limit"),
+        ({"excellent": -1e12, "passing": -1e12}, "its tolerances are impossible"),
+    ],
+)
+def test_a_criterion_that_decides_nothing_is_found_out(parallax, limits, mutation):
+    """The time of exercise 4 with a limit that everybody reaches, or nobody."""
+    time = parallax.exercise.criteria[-1]
+    criteria = [*parallax.exercise.criteria[:-1], changed(time, **limits)]
+    found = checked(changed(parallax, exercise=changed(parallax.exercise, criteria=criteria)))
+    dead = [each for each in found.faults if "expected it to decide something" in each]
+    assert f"time: expected it to decide something, but nothing changes where {mutation}" in dead
+    assert {each.split(":")[0] for each in dead} == {"time"}
 
 
 def test_exercises_are_numbered_once():

@@ -25,7 +25,7 @@ from a7sim.session import open_session
 from a7sim.session.crowd import open_crowd
 from a7sim.session.strips import ground_of
 from a7sim.standard_points import CASES, determine_orientation
-from tests.sessions import without_errors
+from tests.sessions import read_once, without_errors
 from tests.test_crowd import same_to_the_digit
 
 LAKE = "akwanga-lake"
@@ -39,8 +39,8 @@ SHORES = {
 
 
 def flooded(name, **overrides):
-    """Akwanga's first model with a lake."""
-    scenario = load_scenario("akwanga", overrides)
+    """Akwanga's first model with a lake, every parallax read once."""
+    scenario = read_once(load_scenario("akwanga", overrides))
     terrain = msgspec.structs.replace(scenario.terrain, water=[Water(shore=SHORES[name])])
     return msgspec.structs.replace(scenario, terrain=terrain, models=scenario.models[:1])
 
@@ -151,16 +151,18 @@ def test_a_strip_with_a_corner_under_water_is_worked_to_its_end_at_the_door(proc
 
 @pytest.mark.parametrize("procedure", ["numerical", "empirical"])
 def test_a_crowd_does_without_the_same_points(procedure):
-    scenario = load_scenario(LAKE, {"plan.procedure": f'"{procedure}"'})
+    scenario = read_once(load_scenario(LAKE, {"plan.procedure": f'"{procedure}"'}))
     assert same_to_the_digit(msgspec.structs.replace(scenario, models=scenario.models[:1]), (2, 3), all_finish=True)
 
 
 @pytest.mark.parametrize("procedure", ["numerical", "empirical"])
 def test_a_point_that_only_some_of_a_crowd_find_on_their_prints_is_used_by_these(procedure):
     """At 101.25 mm point 5 lies on the edge of the picture: some films have shrunk so far that they show it."""
-    scenario = load_scenario(
-        "akwanga",
-        {"plan.half_width": "101.25", "film.shrinkage_sigma_ppm": "1000", "plan.procedure": f'"{procedure}"'},
+    scenario = read_once(
+        load_scenario(
+            "akwanga",
+            {"plan.half_width": "101.25", "film.shrinkage_sigma_ppm": "1000", "plan.procedure": f'"{procedure}"'},
+        )
     )
     scenario = msgspec.structs.replace(scenario, models=scenario.models[:1])
     shown = [
@@ -220,7 +222,7 @@ def test_the_points_in_between_determine_what_is_left_of_the_corners():
 
 
 def test_a_closed_form_that_lacks_a_point_says_so():
-    scenario = load_scenario(LAKE, {"plan.solution": '"hallert"'})
+    scenario = read_once(load_scenario(LAKE, {"plan.solution": '"hallert"'}))
     record, person = worked_alone(scenario)
     assert "1: no closed form for the points 1 2 3 4 5, so by least squares" in person.book.remarks
     assert record.orientation.rms < 0.03

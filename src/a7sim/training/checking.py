@@ -1,7 +1,7 @@
 """Checking exercises: the reference passes, every faulty one fails for its reason, no criterion is dead."""
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,9 +12,9 @@ from a7sim.scenario import Scenario
 from a7sim.session.scripts import Say, read_script
 from a7sim.training.account import Account
 from a7sim.training.attempts import attempted, hand_out, open_, played_script, seed_played
-from a7sim.training.exercise import FULL_MARKS, Criterion, Exercise, Played, Shelved
-from a7sim.training.grading import Grade, account_in, grade_of, graded
-from a7sim.training.measures import measure_of
+from a7sim.training.exercise import FULL_MARKS, Exercise, Played, Shelved
+from a7sim.training.grading import Grade, account_in, found_in, grade_by, graded
+from a7sim.training.measures import Found, measure_of
 from a7sim.training.room import entered
 from a7sim.training.variation import scenario_for
 
@@ -33,6 +33,22 @@ class Checked:
     reference_points: float | None = None
 
 
+@dataclass(frozen=True)
+class _Run:
+    """Something played: its account, and what every criterion's measure came to, which no change of a limit changes."""
+
+    account: Account
+    found: Sequence[Found]
+
+    @classmethod
+    def of(cls, account: Account) -> "_Run":
+        return cls(account, found_in(account))
+
+    def grade(self, exercise: Exercise) -> Grade:
+        """Grade it by the limits and weights of an exercise with the same measures."""
+        return grade_by(exercise, self.found, self.account.seconds)
+
+
 def checked(shelved: Shelved) -> Checked:
     """Check an exercise whole."""
     exercise = shelved.exercise
@@ -45,10 +61,10 @@ def checked(shelved: Shelved) -> Checked:
             accounts = _accounts(shelved, Path(place))
         except Mistake as mistake:
             return Checked(shelved.name, (*faults, str(mistake)))
-        reference = grade_of(accounts["reference"])
-        faults += _of_runs(exercise, accounts)
-        faults += dead_criteria(exercise, accounts)
-    return Checked(shelved.name, tuple(faults), reference.points)
+        runs = {name: _Run.of(account) for name, account in accounts.items()}
+        faults += _of_runs(exercise, runs)
+        faults += _dead_criteria(exercise, runs)
+    return Checked(shelved.name, tuple(faults), runs["reference"].grade(exercise).points)
 
 
 def _of_form(shelved: Shelved) -> Iterator[str]:
@@ -101,13 +117,17 @@ def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
             raise Mistake(f"{played.script}: {trouble}")
         accounts[name] = account_in(shelved, seed, place / name)
     seed = seed_played(shelved, exercise.reference)
+    scripted = bool(exercise.reference.script)
     for name, minutes in (("nothing", 0.0), ("slow", 10.0 * exercise.minutes), ("half", 0.0)):
+        if name == "half" and not scripted:
+            accounts[name] = accounts["nothing"]
+            continue
         folder = place / name
         folder.mkdir()
         hand_out(shelved, seed, folder)
         with entered(shelved, seed, folder, "somebody", "practice") as room:
             open_(room)
-            if name != "nothing" and exercise.reference.script:
+            if name != "nothing" and scripted:
                 script = read_script(shelved.folder / exercise.reference.script)
                 lines = [each for each in script.statements if isinstance(each, Say)]
                 kept = script.statements if name == "slow" else tuple(lines[: len(lines) // 2])
@@ -118,36 +138,37 @@ def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
     return accounts
 
 
-def _of_runs(exercise: Exercise, accounts: dict[str, Account]) -> Iterator[str]:
-    reference = grade_of(accounts["reference"])
+def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
+    reference = runs["reference"].grade(exercise)
     if not reference.passed:
         told = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or f"{reference.points:g} points"
         yield f"reference: expected it to pass, got {told}"
     for i, faulty in enumerate(exercise.faulty, start=1):
-        grade = grade_of(accounts[f"faulty {i}"])
+        grade = runs[f"faulty {i}"].grade(exercise)
         called = faulty.script or f"faulty {i} ({faulty.procedure})"
         if grade.passed:
             yield f"{called}: expected it to fail, got {grade.points:g} points"
         if faulty.fails not in [each.id for each in grade.failed]:
             got = ", ".join(each.id for each in grade.failed) or "nothing"
             yield f"{called}: expected {faulty.fails} to fail, got {got}"
-    if grade_of(accounts["nothing"]).passed:
+    if runs["nothing"].grade(exercise).passed:
         yield "expected who does nothing not to pass, got a pass"
     for step in exercise.steps:
         measure = measure_of(step)
-        found = measure.of(accounts["reference"])
+        found = measure.of(runs["reference"].account)
         if not measure.reached(found.value, step.done):
             yield f"step {step.text!r}: expected the reference to tick it, got {found.reason}"
-        if exercise.opening is not None and measure.reached(measure.of(accounts["nothing"]).value, step.done):
+        if exercise.opening is not None and measure.reached(measure.of(runs["nothing"].account).value, step.done):
             yield f"step {step.text!r}: expected it to be still to do after the opening, got it ticked"
 
 
-def dead_criteria(exercise: Exercise, accounts: dict[str, Account]) -> Iterator[str]:
+def _dead_criteria(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
     """Yield what of the criteria decides nothing: limits and weights that may be anything, and no verdict changes.
 
     Who does nothing at all is left out: they fail everything.
     """
-    runs = {name: account for name, account in accounts.items() if name != "nothing"}
+    done = [run for name, run in runs.items() if name != "nothing"]
+    verdicts = [_verdict(run, exercise) for run in done]
     for criterion in exercise.criteria:
         sense = -1.0 if measure_of(criterion).more_is_better else 1.0
         mutations = {
@@ -157,13 +178,14 @@ def dead_criteria(exercise: Exercise, accounts: dict[str, Account]) -> Iterator[
             "its weight is all": changed(criterion, weight=1e3),
         }
         for mutation, mutant in mutations.items():
-            if not any(_verdict(exercise, account) != _verdict(exercise, account, mutant) for account in runs.values()):
+            criteria = [mutant if each.id == mutant.id else each for each in exercise.criteria]
+            mutated = changed(exercise, criteria=criteria)
+            if [_verdict(run, mutated) for run in done] == verdicts:
                 yield f"{criterion.id}: expected it to decide something, but nothing changes where {mutation}"
 
 
-def _verdict(exercise: Exercise, account: Account, mutant: Criterion | None = None) -> tuple[bool, float]:
-    criteria = [mutant if mutant is not None and mutant.id == each.id else each for each in exercise.criteria]
-    grade = grade_of(replace(account, exercise=changed(exercise, criteria=criteria)))
+def _verdict(run: _Run, exercise: Exercise) -> tuple[bool, float]:
+    grade = run.grade(exercise)
     return grade.passed, grade.points
 
 

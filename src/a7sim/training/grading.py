@@ -11,7 +11,7 @@ from a7sim.session.folder import JOURNAL
 from a7sim.session.lines import read_journal
 from a7sim.training.account import Account
 from a7sim.training.attempts import written_answers
-from a7sim.training.exercise import FULL_MARKS, Criterion, Shelved
+from a7sim.training.exercise import FULL_MARKS, Criterion, Exercise, Shelved
 from a7sim.training.handouts import handed_out
 from a7sim.training.measures import Found, measure_of
 from a7sim.training.room import Room, Unreliable, seen_again
@@ -81,9 +81,24 @@ class HintsTaken:
 
 def grade_of(account: Account, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
     """Grade an account."""
+    return grade_by(account.exercise, found_in(account), account.seconds, hints, shelved_name)
+
+
+def found_in(account: Account) -> list[Found]:
+    """Return what the measure of every criterion comes to, in their order."""
+    return [measure_of(each).of(account) for each in account.exercise.criteria]
+
+
+def grade_by(
+    exercise: Exercise,
+    found: Sequence[Found],
+    seconds: float,
+    hints: HintsTaken | None = None,
+    shelved_name: str = "",
+) -> Grade:
+    """Grade what the measures of an exercise's criteria came to in an attempt of so many simulated s."""
     hints = hints or HintsTaken()
-    exercise = account.exercise
-    marks = [marked(each, measure_of(each).of(account)) for each in exercise.criteria]
+    marks = [marked(criterion, value) for criterion, value in zip(exercise.criteria, found, strict=True)]
     earned = round(max(0.0, sum(each.points for each in marks) - hints.cost), 1)
     missed = any(each.band == FAILED and each.required for each in marks)
     return Grade(
@@ -94,7 +109,7 @@ def grade_of(account: Account, hints: HintsTaken | None = None, shelved_name: st
         exercise.pass_points,
         hints.number,
         hints.cost,
-        round(account.seconds / 60.0, 1),
+        round(seconds / 60.0, 1),
         marks,
     )
 
