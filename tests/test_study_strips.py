@@ -15,6 +15,7 @@ from a7sim.standard_points import CASES
 from a7sim.study import claims
 from a7sim.study import figures as figures_of_study
 from a7sim.study.cells import Cell
+from a7sim.study.checkpoint import save
 from a7sim.study.executors import opened
 from a7sim.study.findings import document_of
 from a7sim.study.loading import load_study, study_of
@@ -155,7 +156,7 @@ def test_a_task_cut_off_between_its_cells_goes_on_to_the_same_numbers(tmp_path, 
         begun.add(cell, whole.sample(cell)[:, : 5 if cell < 7 else 2])
     again = _numbers(study, 2, begun)
     for tally, name in ((whole, "whole.npz"), (again, "again.npz")):
-        tally.save(tmp_path / name, study.identity)
+        save(tally, tmp_path / name, study.identity)
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "whole.npz").read_bytes()
 
 
