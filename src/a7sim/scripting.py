@@ -119,7 +119,7 @@ class Study:
         """
         folder = None if out is None else Path(out)
         tally = begun(self.laid, folder, force)
-        with opened("process" if workers == 1 else "pool", workers) as (executor, at_once):
+        with opened("process") if workers == 1 else opened("pool", workers) as (executor, at_once):
             work(self.laid, tally, executor, at_once, checkpoint_in(folder) if folder is not None else None)
         document = document_of(self.laid, tally)
         if folder is not None:

@@ -22,7 +22,7 @@ EXIT_MISSING = 1
 SMALLEST = (80, 24)
 """Columns and lines that the console needs."""
 
-NOT_FOR_USERS = ("all", "dev")
+NOT_FOR_USERS = ("all", "dev", "docs")
 """Extras that say nothing of their own."""
 
 _KINDS: tuple[Kind, ...] = ("scenarios", "exercises", "studies")
