@@ -16,14 +16,6 @@ from a7sim.training.variation import scenario_for, seed_of
 EXERCISES = all_exercises()
 
 
-@pytest.mark.parametrize("shelved", EXERCISES, ids=lambda each: each.name)
-def test_every_exercise_holds_what_check_asks(shelved):
-    """The reference passes, every faulty one fails for its reason, nothing is dead or below the floor."""
-    found = checked(shelved)
-    assert found.faults == ()
-    assert found.reference_points is not None and found.reference_points >= shelved.exercise.pass_points
-
-
 @pytest.mark.parametrize(
     ("limits", "mutation"),
     [
