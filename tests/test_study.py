@@ -8,7 +8,7 @@ from a7sim.study.cells import cells_of
 from a7sim.study.checkpoint import save
 from a7sim.study.executors import opened
 from a7sim.study.loading import SHELVES, load_study, study_of
-from a7sim.study.running import Pace, work
+from a7sim.study.running import Pace, _Size, work
 from a7sim.study.schema import Factor, Study
 from a7sim.study.tally import Tally
 
@@ -162,3 +162,15 @@ def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
     assert words in str(told.value)
     assert str(told.value).startswith("study: ")
     assert len(str(told.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("opening", "each", "settled"),
+    [(30.0, 0.1, range(2000, 2001)), (0.0, 0.02, range(990, 1001)), (0.0, 3.0, range(1, 8))],
+)
+def test_chunks_are_as_large_as_pays(opening, each, settled):
+    """Rule: what costs much to open is worked long, and what costs nothing to open for about twenty seconds."""
+    size = _Size(Pace())
+    for _ in range(8):
+        size.learn(size.best, opening + each * size.best)
+    assert size.best in settled

@@ -27,10 +27,40 @@ class Pace:
     """How a study is cut in chunks; what comes of it does not depend on this."""
 
     chunk_seconds: float = 20.0
-    """About how long a chunk takes."""
+    """About how long a chunk takes that is quick to open."""
+    times_opening: float = 9.0
+    """So many times as long as it takes to open a chunk, it is worked."""
     save_seconds: float = 5.0
     """A checkpoint is written no more often than this."""
     largest_chunk: int = 2000
+
+
+class _Size:
+    """How many replicates a chunk has, from the seconds that chunks of other sizes took."""
+
+    def __init__(self, pace: Pace) -> None:
+        self._pace = pace
+        self._seconds: dict[int, float] = {}
+        self.best = min(_FIRST_CHUNK, pace.largest_chunk)
+
+    def learn(self, replicates: int, seconds: float) -> None:
+        """Hear how long a chunk took."""
+        self._seconds[replicates] = seconds
+        opening, each = self._line()
+        grown = max(self._pace.chunk_seconds, self._pace.times_opening * opening) / each
+        self.best = max(1, min(int(grown), int(_FASTEST_GROWTH * replicates), self._pace.largest_chunk))
+
+    def _line(self) -> tuple[float, float]:
+        """Return the seconds of opening a chunk and of each replicate, by the smallest and the largest known.
+
+        Of chunks of one size it cannot be told, and most of the time is taken for that of opening.
+        """
+        few, many = min(self._seconds), max(self._seconds)
+        slowest = max(self._seconds[many] / many, 1e-6)
+        quickest = slowest / (1.0 + self._pace.times_opening)
+        seen = (self._seconds[many] - self._seconds[few]) / (many - few) if many > few else quickest
+        each = min(max(seen, quickest), slowest)
+        return self._seconds[many] - each * many, each
 
 
 @dataclass(frozen=True)
@@ -108,13 +138,13 @@ def _up_to(
     stop: int, laid: Laid, tally: Tally, executor: Executor, most_waiting: int, pace: Pace
 ) -> Iterator[tuple[_Chunk, Array]]:
     asked = tally.done.reshape(len(laid.tasks), -1).min(axis=1)
-    size = min(_FIRST_CHUNK, pace.largest_chunk)
+    size = _Size(pace)
     waiting: deque[tuple[_Chunk, Future[tuple[Array, float]]]] = deque()
     try:
         while waiting or int(asked.min()) < stop:
             while int(asked.min()) < stop and len(waiting) < most_waiting:
                 at = int(asked.argmin())
-                first, last = int(asked[at]), min(int(asked[at]) + size, stop)
+                first, last = int(asked[at]), min(int(asked[at]) + size.best, stop)
                 task = laid.tasks[at]
                 cells = range(at * task.cells, (at + 1) * task.cells)
                 chunk = _Chunk(cells, first, tuple(seed_of(laid.study.seed, each) for each in range(first, last)))
@@ -122,8 +152,7 @@ def _up_to(
                 asked[at] = last
             chunk, future = waiting.popleft()
             values, seconds = future.result()
-            grown = len(chunk.seeds) * min(pace.chunk_seconds / max(seconds, 1e-3), _FASTEST_GROWTH)
-            size = max(1, min(int(grown), pace.largest_chunk))
+            size.learn(len(chunk.seeds), seconds)
             yield chunk, values
     finally:
         for _, future in waiting:
@@ -131,6 +160,6 @@ def _up_to(
 
 
 def _timed(task: Task, seeds: Sequence[int]) -> tuple[Array, float]:
-    """Return the responses ``(cells, responses, seeds)`` of replicates and the seconds that they took."""
-    began = time.monotonic()
-    return task.together(seeds), time.monotonic() - began
+    """Return the responses ``(cells, responses, seeds)`` of replicates and the seconds that a processor took."""
+    began = time.process_time()
+    return task.together(seeds), time.process_time() - began
