@@ -10,9 +10,9 @@ import pytest
 from hypothesis import settings
 
 from a7sim.cli import main
+from tests.examples import PROFILE
 
-settings.register_profile("steady", derandomize=True, deadline=None)
-settings.load_profile("steady")
+settings.load_profile(PROFILE)
 
 BESIDE_THE_PROJECT = Path(__file__).parents[2] / "shared" / "reference"
 

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.mistakes import Mistake
 from a7sim.reduction.absolute import Ground, absolute_orientation
 from a7sim.reduction.cards import deck_lines, free_format_lines, is_deck, output_lines, read_cards, write_cards
 from a7sim.reduction.strips import Model, formed_strip, is_centre
+from tests.examples import examples
 
 DECK = """\
       101 1000.000 2000.000  100.000
@@ -84,7 +85,7 @@ def strip_of(rng, photographs):
     return models, Ground(names, ground, roles)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(st.integers(0, 2**32 - 1))
 def test_strips_of_any_length_go_through_cards_and_their_order_does_not_matter(tmp_path_factory, seed):
     rng = np.random.default_rng(seed)

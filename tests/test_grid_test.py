@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.geometry import GON, at_level, ray_of, rotation
@@ -26,6 +26,7 @@ from a7sim.session import open_session, run
 from a7sim.session.crowd import open_crowd
 from a7sim.session.grid_test import run_grid_test
 from tests.door import Door
+from tests.examples import examples
 from tests.processes import a7sim_here
 from tests.sessions import read_once, without_errors
 
@@ -90,7 +91,7 @@ def sheets_of(scenario, seed=1, **order):
 # --- the reduction ------------------------------------------------------------------------------------
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9),
     st.floats(100.0, 210.0),

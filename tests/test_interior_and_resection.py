@@ -4,7 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.geometry import image_of, length_of, mxv, rotation
@@ -21,6 +21,7 @@ from a7sim.reduction.interior import FEWEST_FIDUCIALS, UNKNOWNS, plane_fit, prin
 from a7sim.reduction.resection import resection
 from a7sim.scenario.schema import Camera, Fiducial
 from a7sim.scene.camera import distorted, lowered_by_curvature, refracted
+from tests.examples import examples
 
 KINDS = tuple(UNKNOWNS)
 EIGHT = np.array(
@@ -311,7 +312,7 @@ def test_three_points_give_a_camera_that_images_them_and_none_is_nearer_the_vert
     assert float(found.s0) == 0.0
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(SEEDS)
 def test_a_batch_of_resections_is_its_members_and_order_does_not_matter(seed):
     rng = np.random.default_rng(seed)

@@ -2,14 +2,15 @@
 
 import string
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.manual import LEAST_COUNT, VARIANTS
 from tests.door import Door
+from tests.examples import examples
 from tests.test_language import ELEMENTS, EXAMPLES, in_full, in_short
 
-quick = settings(deadline=None, max_examples=300)
+quick = examples(300)
 
 LINES = [f"{form(header)} {value}" for header, value in EXAMPLES.items() for form in (in_short, in_full)]
 """A good line of every header, short and long."""

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim import computing
@@ -18,6 +18,7 @@ from a7sim.mistakes import Mistake
 from a7sim.reduction.absolute import Ground
 from a7sim.reduction.cards import deck_lines, read_cards
 from a7sim.reduction.strips import Model
+from tests.examples import examples
 from tests.test_reduce import reduce
 
 C = 152.0
@@ -91,7 +92,7 @@ def largest_difference(one, other):
     return max(np.abs(each).max() for each in differences)
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["points", "centre", "heights"]))
 def test_the_order_of_rows_and_models_changes_nothing(tmp_path_factory, seed, method):
     rng, shuffle = np.random.default_rng(seed), np.random.default_rng(seed + 1)
@@ -106,7 +107,7 @@ def test_the_order_of_rows_and_models_changes_nothing(tmp_path_factory, seed, me
     assert largest_difference(*documents) < 1e-9
 
 
-@settings(max_examples=10, deadline=None)
+@examples(10)
 @given(st.integers(0, 2**32 - 1))
 def test_the_order_of_pairs_and_photographs_changes_nothing(tmp_path_factory, seed):
     folder = tmp_path_factory.mktemp("order")
@@ -119,7 +120,7 @@ def test_the_order_of_pairs_and_photographs_changes_nothing(tmp_path_factory, se
     assert documents[0] == documents[1]
 
 
-@settings(max_examples=10, deadline=None)
+@examples(10)
 @given(st.integers(0, 2**32 - 1))
 def test_the_order_of_cards_changes_nothing(tmp_path_factory, seed):
     rng = np.random.default_rng(seed)
@@ -143,7 +144,7 @@ def test_the_order_of_cards_changes_nothing(tmp_path_factory, seed):
     assert largest_difference(*documents) < 1e-9
 
 
-@settings(max_examples=10, deadline=None)
+@examples(10)
 @given(st.integers(0, 2**32 - 1))
 def test_a_strip_without_errors_comes_back_exactly(tmp_path_factory, seed):
     models, ground = flat_strip(np.random.default_rng(seed), 4)

@@ -6,7 +6,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
@@ -19,6 +19,7 @@ from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.polynomials import StripAxis, strip_adjustment, strip_axis
 from a7sim.reduction.similarity import similarity_by_iteration, similarity_by_quaternion
 from a7sim.reduction.strips import Model, formed_strip, in_order, is_centre
+from tests.examples import examples
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -279,7 +280,7 @@ def test_schuts_theoretical_strip_returns_its_ground_coordinates_to_a_millimetre
         assert found.warnings == ()
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(SEEDS)
 def test_any_strip_without_errors_comes_back_whatever_the_order(seed):
     rng = np.random.default_rng(seed)
@@ -413,7 +414,7 @@ def test_ground_points_the_model_has_not_are_named_and_wrong_roles_refused():
 # --- polynomials --------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(SEEDS, st.sampled_from([2, 3]), st.booleans())
 def test_any_polynomial_deformation_comes_back(seed, degree, batch):
     rng = np.random.default_rng(seed)
@@ -531,7 +532,7 @@ def block_of(rng, along, strips, noise=0.0):
     return models, grounded(places, lambda name: "control" if name in corners else "check")
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(SEEDS)
 def test_a_block_without_errors_comes_back_whatever_the_order(seed):
     rng = np.random.default_rng(seed)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.mistakes import Mistake
@@ -11,6 +11,7 @@ from a7sim.study.checkpoint import KINDS, checkpoint_in, load, newest_in, save
 from a7sim.study.sketch import CAPACITY, Sketch
 from a7sim.study.statistics import quantile_with_interval
 from a7sim.study.tally import Tally
+from tests.examples import examples
 
 RNG = np.random.default_rng(3)
 
@@ -55,7 +56,7 @@ ORDERS = {
 }
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     seed=st.integers(0, 2**32),
     n=st.integers(1, 60 * CAPACITY),
