@@ -10,6 +10,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from figures import Figure, Target, tell
+
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk
 from a7sim.scenario import load_scenario
@@ -25,6 +27,7 @@ EVENTS = 100_000
 SESSION_S = 8 * 3600.0
 SEEKS = 20
 SEED = 7
+TARGETS = {"none": Target("below", 15)}
 
 
 def seconds(scenario, folder, durability):
@@ -44,10 +47,14 @@ def cost(home):
     without = min(took[None])
     lines = len(read_journal(home / "run" / "session.jsonl"))
     print(f"akwanga, {lines} lines: {without:.2f} s without a journal")
+    figures = []
     for way in ways[1:]:
         more = min(took[way]) - without
         flush = " (flush: each line to the operating system)" if way == "none" else ""
         print(f"  --durability {way:<8} {more / without:+7.1%}  {1e6 * more / lines:6.1f} us a line{flush}")
+        name = f"a journal's cost with --durability {way}"
+        figures.append(Figure(name, 100.0 * more / without, "% of a session without", target=TARGETS.get(way)))
+    return figures
 
 
 def long_session(folder):
@@ -84,9 +91,15 @@ def seeking(home):
                 break
         took.append(time.perf_counter() - began)
     size = path.stat().st_size / 1e6
+    bare = floor(path)
     print(f"{len(journalled)} lines, {size:.1f} MB: any of {SEEKS} times sought")
     print(f"  in {statistics.median(took):.2f} s (median), {max(took):.2f} s (longest), reading and checking included")
-    print(f"  of that {floor(path):.2f} s to read the bytes and split them into lines")
+    print(f"  of that {bare:.2f} s to read the bytes and split them into lines")
+    middle, target = statistics.median(took), Target("below", 1)
+    return [
+        Figure(f"a time sought in {EVENTS} events, median", middle, "s", "reading its bytes", middle / bare),
+        Figure(f"the same, longest of {SEEKS}", max(took), "s", target=target),
+    ]
 
 
 def floor(path):
@@ -95,7 +108,10 @@ def floor(path):
     return time.perf_counter() - began
 
 
-if __name__ == "__main__":
+def main():
     with tempfile.TemporaryDirectory() as temporary:
-        cost(Path(temporary))
-        seeking(Path(temporary))
+        return cost(Path(temporary)) + seeking(Path(temporary))
+
+
+if __name__ == "__main__":
+    tell(main)
