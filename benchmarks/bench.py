@@ -71,12 +71,12 @@ SKILLS = f"5 6 7 8 9 10 11 --out {SCRATCH}"
 BENCHMARKS = (
     Benchmark("run", Settings("", 20), Settings("", 20)),
     Benchmark("crowd", Settings("1 50 200", 30), Settings("", 60)),
-    Benchmark("study", Settings("--replicates 200 --growth 50", 30), Settings("--replicates 10000", 600)),
-    Benchmark("a8_strip", Settings("40 0", 20), Settings("", 300)),
+    Benchmark("study", Settings("--replicates 200 --growth 20", 90), Settings("--replicates 10000", 900)),
+    Benchmark("a8_strip", Settings("200 0", 25), Settings("", 300)),
     Benchmark("reductions", Settings("", 60), Settings("", 60), peers="python"),
     Benchmark("links", Settings("--rounds 20", 20), Settings("", 60), peers="option"),
     Benchmark("clients", Settings("--seconds 10", 15), Settings("", 35)),
-    Benchmark("journal", Settings("", 60), Settings("", 60)),
+    Benchmark("journal", Settings("--repeats 2 --events 20000", 90), Settings("", 180)),
     Benchmark("killed", Settings("20", 40), Settings("", 400)),
     Benchmark("console", Settings("", 45), Settings("", 45)),
     Benchmark("training", Settings("", 40), Settings("", 40)),
@@ -146,7 +146,7 @@ def run_all(chosen: Sequence[tuple[Benchmark, Settings]], peers: Path | None) ->
     return outcomes
 
 
-def options() -> argparse.Namespace:
+def options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     how_long = parser.add_mutually_exclusive_group()
@@ -161,7 +161,7 @@ def options() -> argparse.Namespace:
         help="folder of the environments with the peers of links.py and reductions.py",
     )
     parser.add_argument("--out", type=Path, default=PAGE, metavar="PAGE", help="where to write the table")
-    return parser.parse_args()
+    return parser.parse_args(arguments)
 
 
 def chosen_by(given: argparse.Namespace) -> list[tuple[Benchmark, Settings]]:
@@ -173,6 +173,14 @@ def chosen_by(given: argparse.Namespace) -> list[tuple[Benchmark, Settings]]:
     ]
 
 
+def command_of(given: argparse.Namespace) -> str:
+    """Return what gives the page again, without a path of this machine."""
+    words = ["--full"] if given.full else []
+    words += ["--peers DIR"] if given.peers else []
+    words += ["--only", *given.only] if given.only else []
+    return f"make bench BENCH='{' '.join(words)}'" if words else "make bench"
+
+
 def main() -> int:
     given = options()
     chosen = chosen_by(given)
@@ -180,7 +188,7 @@ def main() -> int:
     print(f"benchmarks: {len(chosen)}, about {about}; the table goes to {given.out.name}", flush=True)
     surroundings = Surroundings.here()
     outcomes = run_all(chosen, given.peers)
-    given.out.write_text(page(outcomes, surroundings, given.full), encoding="utf-8")
+    given.out.write_text(page(outcomes, surroundings, command_of(given), given.full), encoding="utf-8")
     failed = [each.program for each in outcomes if each.failure]
     if failed:
         print(f"failed: {', '.join(failed)}")

@@ -98,10 +98,9 @@ class Surroundings:
         return "The machine did nothing else when it began."
 
 
-def page(outcomes: Iterable[Outcome], surroundings: Surroundings, full: bool) -> str:
-    """Return the page of what came of all benchmarks."""
+def page(outcomes: Iterable[Outcome], surroundings: Surroundings, command: str, full: bool) -> str:
+    """Return the page of what came of the benchmarks that a command ran."""
     outcomes = list(outcomes)
-    command = "make bench BENCH=--full" if full else "make bench"
     settings = (
         "With the settings that the targets ask for."
         if full

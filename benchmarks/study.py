@@ -110,7 +110,7 @@ def the_whole(replicates, chunk):
     name, target = f"a replicate of {replicates}, CPU", TARGET if replicates >= ASKED_OF else None
     return [
         Figure(name, 1e3 * took / replicates, "ms", "drawing its random numbers alone", ratio, target),
-        Figure(f"memory, {chunk} replicates at once", memory, "MB"),
+        Figure(f"memory, {min(chunk, replicates)} replicates at once", memory, "MB"),
     ]
 
 

@@ -36,7 +36,7 @@ HELPERS = {"echoes", "round_trips", "bench"}
 
 
 def page_of(*outcomes, load=0.1, full=False):
-    return bench_page.page(outcomes, bench_page.Surroundings(**SURROUNDINGS, load=load), full)
+    return bench_page.page(outcomes, bench_page.Surroundings(**SURROUNDINGS, load=load), "make bench", full)
 
 
 def rows_of(page):
@@ -92,12 +92,28 @@ def test_a_page_says_what_failed_and_what_was_not_there():
 def test_a_page_says_whether_other_work_went_on_and_with_which_settings():
     assert "Taken beside other work" in page_of(load=1.8)
     assert "Taken beside other work" not in page_of(load=0.1)
-    assert "`make bench`" in page_of()
-    assert "`make bench BENCH=--full`" in page_of(full=True)
+    assert "quick settings" in page_of()
+    assert "quick settings" not in page_of(full=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "command", "settings"),
+    [
+        ("", "make bench", "--seconds 10"),
+        ("--quick --only clients run", "make bench BENCH='--only clients run'", "--seconds 10"),
+        ("--full --peers /some/where", "make bench BENCH='--full --peers DIR'", ""),
+    ],
+)
+def test_a_page_says_the_command_that_gives_it_again(arguments, command, settings):
+    given = bench.options(arguments.split())
+    chosen = {each.program: used.arguments for each, used in bench.chosen_by(given)}
+    assert bench.command_of(given) == command
+    assert chosen["clients"] == settings
+    assert set(chosen) == set(given.only or [each.program for each in bench.BENCHMARKS])
 
 
 def test_a_page_names_neither_the_machine_nor_a_path_of_it():
-    page = bench_page.page([bench_page.Outcome("run", "")], bench_page.Surroundings.here(), False)
+    page = bench_page.page([bench_page.Outcome("run", "")], bench_page.Surroundings.here(), "make bench", False)
     assert os.uname().nodename not in page
     assert str(BENCHMARKS.parent) not in page
 
