@@ -29,8 +29,8 @@ lint: $(READY) ## check style, types and the direction of imports
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
-bench: $(READY) ## time a run against its floor, with the accuracy beside it
-	$(BIN)/python benchmarks/run.py
+bench: $(READY) ## run every benchmark, about ten minutes, into docs/benchmarks.md (BENCH=--full: an hour and more)
+	$(BIN)/python benchmarks/bench.py $(BENCH)
 
 docs: $(VENV)/.docs-ready ## build the documentation into site/; nothing in it asks the network
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet

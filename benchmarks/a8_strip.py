@@ -1,19 +1,23 @@
 """Print what a strip by comparator and on the A8 leaves at its checks, beside the table of paper P.
 
 Medians over seeds, each a flight's film, an A8 and its people; then, with fewer seeds, what single errors make of it.
-Usage: python benchmarks/a8_strip.py [SEEDS [SEEDS_OF_SINGLE_ERRORS]]; docs/a8-strip.md holds what it printed.
+docs/a8-strip.md holds what it printed.
+Usage: python benchmarks/a8_strip.py [SEEDS [SEEDS_OF_SINGLE_ERRORS]], where the latter may be 0
 """
 
 import sys
 import time
 
 import numpy as np
+from figures import Figure, Target, tell
 
 from a7sim.scenario import load_scenario
 from a7sim.session.two_ways import a8_and_comparator
 
 P_TABLE = {"comparator": ((7, 11, 15), (15, 28, 31)), "a8": ((15, 19, 22), (33, 43, 44))}
 """cm: mean square and largest residuals in x, y, z at 36 checks."""
+
+WITHIN_A_THIRD = Target("between", (2 / 3, 4 / 3), "ratio")
 
 P_DIFFERENCES = ((17, 19, 25), (29, 34, 45))
 P_CLOSING = (0.01, 0.02)
@@ -50,6 +54,8 @@ def row(name, values, numbers=3):
 
 
 def whole_table(comparison):
+    """Print how ours stands beside P's; return the rms as figures."""
+    figures = []
     print(f"cm, medians over {len(comparison.seeds)} seeds (5 to 95 %)          x               y               z")
     for way, (p_rms, p_largest) in P_TABLE.items():
         residuals = getattr(comparison, way)
@@ -60,11 +66,17 @@ def whole_table(comparison):
             print(f"{'  P':<28}" + "".join(f"{each:>6}{'':10}" for each in printed))
             ratios = median_cm(found) / printed
             print(f"{'  ratio':<28}" + "".join(f"{each:>6.2f}{'':10}" for each in ratios))
+            if what == "rms":
+                figures += [
+                    Figure(f"{way}, rms at checks in {axis}", median, "cm", "paper P", ratio, WITHIN_A_THIRD)
+                    for axis, median, ratio in zip("xyz", median_cm(found), ratios, strict=True)
+                ]
     print(row("A8 minus comparator, rms", median_cm(comparison.difference_rms)), " P", *P_DIFFERENCES[0])
     print(row("A8 minus comparator, largest", median_cm(comparison.difference_largest)), " P", *P_DIFFERENCES[1])
     for way in P_TABLE:
         plan, height = np.median(getattr(comparison, way).closing, axis=1)
         print(f"{way} closing differences, mm in the picture: plan {plan:.4f}, height {height:.4f}; P {P_CLOSING}")
+    return figures
 
 
 def single_errors(seeds):
@@ -79,10 +91,12 @@ def main():
     asked = [int(each) for each in sys.argv[1:]]
     seeds, fewer = (*asked, *(200, 100)[len(asked) :])
     began = time.perf_counter()
-    whole_table(a8_and_comparator(load_scenario("a8-strip"), range(1, seeds + 1)))
+    figures = whole_table(a8_and_comparator(load_scenario("a8-strip"), range(1, seeds + 1)))
     print(f"{time.perf_counter() - began:.1f} s")
-    single_errors(range(1, fewer + 1))
+    if fewer:
+        single_errors(range(1, fewer + 1))
+    return figures
 
 
 if __name__ == "__main__":
-    main()
+    tell(main)

@@ -20,6 +20,7 @@ from fcntl import ioctl
 from pathlib import Path
 
 import numpy as np
+from figures import Figure, Target, tell
 
 FLOOR = "--floor"
 KEYS = (b"\x1b[C", b"\x1b[D")
@@ -199,27 +200,49 @@ def measured(
     return paint, spent, frame, share, kilobytes, idle
 
 
-def main() -> None:
+def asked_of(name: str, console: tuple[float, ...], floor: tuple[float, ...]) -> list[Figure]:
+    """Return the console's figures beside the bare widget's."""
+    against = "bare Textual widget"
+    told = (
+        ("first paint", "s", 1.0, Target("below", 0.8)),
+        ("CPU until first paint", "s", 1.0, None),
+        ("key to frame", "ms", 1.0, Target("below", 60)),
+        ("CPU at 20 keys a second", "% of a core", 100.0, Target("below", 50)),
+        ("drawn at 20 keys a second", "kB/s", 1.0, None),
+    )
+    figures = [
+        Figure(f"{name}, {what}", scale * ours, unit, against, ours / bare if bare else None, target)
+        for (what, unit, scale, target), ours, bare in zip(told, console, floor, strict=False)
+    ]
+    return [*figures, Figure(f"{name}, drawn in 3 idle s", console[-1], "bytes", target=Target("at most", 0))]
+
+
+def main() -> list[Figure]:
     sizes = [int(each) for each in sys.argv[1:] if each.isdigit()] or [100, 30]
     columns, rows = sizes[0], sizes[1]
     if FLOOR in sys.argv:
         floor_app(columns, rows)
-        return
+        return []
+    figures = []
     print("frame of both eyes over the language, and drawn in half-blocks:")
     for across, down in ((25, 22), (29, 26), (53, 50)):
         rendered, drawn = frame_times(across, down)
         print(f"  {across:>3} x {down:<3} rendered {rendered:6.2f} ms   drawn {drawn:5.2f} ms")
+        figures.append(Figure(f"frame of both eyes, {across} x {down}", rendered, "ms", target=Target("below", 8)))
     console = [sys.executable, "-m", "a7sim", "console", "akwanga", "--seed", "7", "--theme", "enamel"]
     floor = [sys.executable, __file__, FLOOR, str(2 * 29), "13"]
     print(f"{'':<22}first paint   its CPU   key to frame   CPU at 20/s     drawn    idle 3 s")
+    seen = []
     for name, command, there, load in (
         ("console", console, b"elements", True),
         ("bare Textual widget", floor, "▀".encode(), False),
     ):
-        paint, spent, frame, share, kilobytes, idle = measured(command, columns, rows, there, load)
-        seen = f"{paint:9.2f} s {spent:7.2f} s {frame:11.0f} ms {share:11.0%} {kilobytes:7.0f} kB/s {idle:7d} B"
-        print(f"  {name:<20}{seen}")
+        paint, spent, frame, share, kilobytes, idle = numbers = measured(command, columns, rows, there, load)
+        told = f"{paint:9.2f} s {spent:7.2f} s {frame:11.0f} ms {share:11.0%} {kilobytes:7.0f} kB/s {idle:7d} B"
+        print(f"  {name:<20}{told}")
+        seen.append(numbers)
+    return figures + asked_of(f"{columns} x {rows}", *seen)
 
 
 if __name__ == "__main__":
-    main()
+    tell(main)

@@ -8,6 +8,7 @@ import sys
 import time
 
 from drawing import cpu_seconds_to_draw, recording
+from figures import Figure, Target, tell
 
 from a7sim.operator import work
 from a7sim.scenario import load_scenario
@@ -24,10 +25,12 @@ def main():
     session = open_session(scenario, 0)
     began = time.process_time()
     alone = list(work(session.person, session.job))
-    print(f"one session over the line: {time.process_time() - began:.2f} s CPU")
+    over_the_line = time.process_time() - began
+    print(f"one session over the line: {over_the_line:.2f} s CPU")
     with recording() as calls:
         list(open_crowd(scenario, range(RECORDED)).worked())
     print("sessions  open s  work s  ms a session  drawing s  ratio  same readings")
+    figures = []
     for sessions in counts:
         began = time.process_time()
         crowd = open_crowd(scenario, range(sessions))
@@ -41,7 +44,15 @@ def main():
             f"{sessions:8}  {opened - began:6.2f}  {took:6.2f}  {1e3 * took / sessions:12.1f}  {drawing:9.3f}  "
             f"{took / drawing:5.1f}  {same}"
         )
+        each, drawn = 1e3 * took / sessions, took / drawing
+        name = f"a session of {sessions} at once, CPU"
+        figures += [
+            Figure(name, each, "ms", "drawing its random numbers alone", drawn),
+            Figure(name, each, "ms", "one over the line", took / sessions / over_the_line),
+            Figure(f"{sessions} at once, first reads as over the line", float(same), target=Target("at least", 1)),
+        ]
+    return figures
 
 
 if __name__ == "__main__":
-    main()
+    tell(main)

@@ -18,6 +18,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from figures import Figure, Target, tell
+
 from a7sim.cli.run import command as run
 from a7sim.cli.serve import command as serve
 from a7sim.session.lines import read_journal
@@ -153,7 +155,12 @@ def served_whole(folder):
     return registered(folder), took
 
 
-def main(sessions=200, seed=1):
+ASKED_OF = 200
+"""Sessions that the target is asked of."""
+
+
+def main():
+    sessions, seed = (*map(int, sys.argv[1:]), *(ASKED_OF, 1)[len(sys.argv) - 1 :])
     dice = random.Random(seed)
     with tempfile.TemporaryDirectory() as temporary:
         home = Path(temporary)
@@ -174,7 +181,9 @@ def main(sessions=200, seed=1):
         within = sum(0.0 < share < 1.0 for share in each)
         print(f"{len(each)} {what} killed, {within} of them within their work, at {min(each):.0%} to {max(each):.0%}")
     print("all resumed: nothing acknowledged was lost, and what they left is the same to the byte")
+    target = Target("at most", 0) if sessions >= ASKED_OF else None
+    return [Figure(f"of {sessions} sessions killed and resumed, those that lost anything", 0, target=target)]
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    tell(main)

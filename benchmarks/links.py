@@ -25,16 +25,19 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+from figures import Figure, Target, tell
 from round_trips import by_pyserial, by_socket, timed
 
 import processes
 
 HERE = Path(__file__).parent
 PEERS = HERE / "peers"
-TARGET = 0.8
+TARGET = Target("at least", 0.8, "ratio")
+AHEAD = Target("above", 1, "ratio")
 FEW = 5
 """Round trips of even the shortest batch."""
 
+SINSTRUMENTS, PYVISA_SIM = "sinstruments==1.5.0", "pyvisa-sim==0.7.1"
 LEWIS = {"lewis==1.3.5": 0.1, "lewis==1.4.0": 0}
 """With the cycle delay in s at which each answers soonest: 1.3.5 wakes for a client, 1.4.0 looks once a cycle."""
 
@@ -77,24 +80,37 @@ def raced(contenders, rounds, seconds):
             contender.asked(seconds)
 
 
-def table(group, contenders, ours, floor, target=None):
-    """Print a group; say whether ours is as near to the floor, and as far ahead of the peers, as it shall be."""
-    floor_rates = next(each for each in contenders if each.name == floor).rates
+def table(group, contenders):
+    """Print a group."""
+    floor_rates = contenders[1].rates
     print(f"\n{group:44}round trips/s   ratio   p50 us   p99 us")
-    ratios = {}
     for each in contenders:
-        ratios[each.name] = statistics.median(rate / base for rate, base in zip(each.rates, floor_rates, strict=True))
+        ratio = ratio_of(each.rates, floor_rates)
         median, late = each.percentile_us(50), each.percentile_us(99)
         rate = statistics.median(each.rates)
-        print(f"  {each.name:42}{rate:13.0f}{ratios[each.name]:8.2f}{median:9.0f}{late:9.0f}")
-    if target is not None:
-        told = "met" if ratios[ours] >= target else "MISSED"
-        print(f"  {ours} at {ratios[ours]:.2f} of {floor}: target {target} {told}")
-    peers = {name: ratio for name, ratio in ratios.items() if "==" in name}
-    if peers:
-        best = max(peers, key=peers.get)
-        told = "ahead of every peer" if ratios[ours] > peers[best] else "BEHIND A PEER"
-        print(f"  {told}: {ratios[ours] / peers[best]:.2f} times {best}")
+        print(f"  {each.name:42}{rate:13.0f}{ratio:8.2f}{median:9.0f}{late:9.0f}")
+
+
+def ratio_of(rates, others):
+    return statistics.median(rate / other for rate, other in zip(rates, others, strict=True))
+
+
+def figures_of(group, contenders, peers, target):
+    """Return how near ours is to the floor, and how far ahead of the peers, those that are not there among them."""
+    ours, floor, *_ = contenders
+    rates = {each.name: each.rates for each in contenders}
+    name, rate = f"{group}: COUN:X?", statistics.median(ours.rates)
+    latest = ours.percentile_us(99)
+    return [
+        Figure(name, rate, "round trips/s", floor.name, ratio_of(ours.rates, floor.rates), target),
+        *(
+            Figure(
+                name, rate, "round trips/s", peer, ratio_of(ours.rates, rates[peer]) if peer in rates else None, AHEAD
+            )
+            for peer in peers
+        ),
+        Figure(f"{group}: p99", latest, "us", floor.name, latest / floor.percentile_us(99)),
+    ]
 
 
 class Environments:
@@ -167,7 +183,7 @@ def tcp(stack, environments, device, port, sinstruments):
             contenders.append(answering(requirement, processes.once(partial(by_socket, at)), process))
     if sinstruments:
         process, at, _ = sinstruments
-        contenders.append(answering("sinstruments==1.5.0", processes.once(partial(by_socket, at)), process))
+        contenders.append(answering(SINSTRUMENTS, processes.once(partial(by_socket, at)), process))
     return contenders
 
 
@@ -177,7 +193,7 @@ def pty(stack, device, link, sinstruments):
     contenders.append(answering("echo, pty", by_pyserial(echo), process))
     if sinstruments:
         process, _, link = sinstruments
-        contenders.append(answering("sinstruments==1.5.0", processes.once(partial(by_pyserial, link)), process))
+        contenders.append(answering(SINSTRUMENTS, processes.once(partial(by_pyserial, link)), process))
     return contenders
 
 
@@ -186,9 +202,9 @@ def visa(stack, environments):
         ("a7sim", sys.executable, "ASRLa7sim://akwanga::INSTR", "@py"),
         ("echo, loop://", sys.executable, "ASRLloop://::INSTR", "@py"),
     ]
-    python = environments.python("pyvisa-sim==0.7.1")
+    python = environments.python(PYVISA_SIM)
     if python:
-        clients.append(("pyvisa-sim==0.7.1", python, "ASRL1::INSTR", f"{PEERS / 'pyvisa_sim_counter.yaml'}@sim"))
+        clients.append((PYVISA_SIM, python, "ASRL1::INSTR", f"{PEERS / 'pyvisa_sim_counter.yaml'}@sim"))
     return [visa_client(stack, *client) for client in clients]
 
 
@@ -219,7 +235,7 @@ def main():
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         device, doors = instrument(stack, folder / "a7sim")
         sinstruments = None
-        python = environments.python("sinstruments==1.5.0")
+        python = environments.python(SINSTRUMENTS)
         if python:
             at, link = processes.free_port(), str(folder / "sinstruments")
             command = [python, PEERS / "sinstruments_counter.py", at, link]
@@ -227,17 +243,25 @@ def main():
         groups = [
             (
                 "TCP, bare socket",
-                "echo, asyncio",
+                [*LEWIS, SINSTRUMENTS],
                 TARGET,
                 tcp(stack, environments, device, doors["tcp"]["port"], sinstruments),
             ),
-            ("pseudo-terminal, pyserial", "echo, pty", TARGET, pty(stack, device, folder / "a7sim", sinstruments)),
-            ("VISA in process, pyvisa", "echo, loop://", None, visa(stack, environments)),
+            (
+                "pseudo-terminal, pyserial",
+                [SINSTRUMENTS],
+                TARGET,
+                pty(stack, device, folder / "a7sim", sinstruments),
+            ),
+            ("VISA in process, pyvisa", [PYVISA_SIM], None, visa(stack, environments)),
         ]
-        for group, floor, target, contenders in groups:
+        figures = []
+        for group, peers, target, contenders in groups:
             raced(contenders, chosen.rounds, chosen.batch)
-            table(group, contenders, "a7sim", floor, target)
+            table(group, contenders)
+            figures += figures_of(group, contenders, peers, target)
+        return figures
 
 
 if __name__ == "__main__":
-    main()
+    tell(main)

@@ -11,6 +11,7 @@ import sys
 import time
 
 import numpy as np
+from figures import Figure, Target, tell
 
 from a7sim.geometry import image_of, mxm, rotation, transposed, turn_of
 from a7sim.reduction.coplanarity import coplanarity, rays_of, relative_orientation
@@ -28,6 +29,15 @@ MANY = 1_000_000
 ROUNDS = 9
 TIMES_POSELIB = 10
 ONE_PAIR_US = 300
+ASKED_POINTS = (6, 9, 15)
+"""Points of the pairs that targets are asked of."""
+
+TARGETS = {
+    "batch": Target("at least", TIMES_POSELIB, "ratio"),
+    "one pair": Target("below", ONE_PAIR_US),
+    "memory": Target("below", 300),
+    "similarity": Target("at least", 4, "ratio"),
+}
 AIR_TO_VISION = np.diag([1.0, -1.0, -1.0])
 """Photogrammetry's camera looks along -z with y up, computer vision's along +z with y down."""
 
@@ -88,6 +98,7 @@ def relative():
     print(
         "points  program             us/pair   pairs/s  iterations  rms parallax um  theory um  times poselib  goal us"
     )
+    figures = []
     for n in POINTS:
         rng = np.random.default_rng(n)
         theory = 1000.0 * NOISE * np.sqrt(2.0 * (n - 5) / n)
@@ -107,6 +118,7 @@ def relative():
         if pycolmap:
             rows.append(("pycolmap", *_by_pycolmap(pycolmap, image1[..., :300], image2[..., :300])))
         base_line = next((took for label, took, *_ in rows if label == "poselib"), np.nan)
+        figures += relative_figures(n, {label: took for label, took, *_ in rows}, theory, rows[0][3])
         for label, took, iterations, rms in rows:
             speed = f"{1e6 * took:9.2f}{1.0 / took:10.0f}{iterations:12.2f}"
             if label == "a7sim batch":
@@ -114,7 +126,20 @@ def relative():
             else:
                 ours = f"{ONE_PAIR_US:26}" if label == "a7sim one pair" else ""
             print(f"{n:6}  {label:18}{speed}{rms:17.3f}{theory:11.3f}{ours}")
-    _many()
+    return [*figures, _many()]
+
+
+def relative_figures(n, took, theory, rms):
+    """Return how long a pair of n points took each program, and our rms beside what theory gives."""
+    name, ours = f"relative orientation, {n} points", took["a7sim batch"]
+    asked = TARGETS if n in ASKED_POINTS else {}
+    times = {peer: took[peer] / ours if peer in took else None for peer in ("poselib", "pycolmap")}
+    return [
+        Figure(f"{name}, a pair of many", 1e6 * ours, "us", "poselib", times["poselib"], asked.get("batch")),
+        Figure(f"{name}, a pair of many", 1e6 * ours, "us", "pycolmap", times["pycolmap"]),
+        Figure(f"{name}, one pair alone", 1e6 * took["a7sim one pair"], "us", target=asked.get("one pair")),
+        Figure(f"{name}, rms parallax", rms, "um", "theory", rms / theory),
+    ]
 
 
 def _many():
@@ -135,6 +160,7 @@ def _many():
         f"s0 {1000.0 * np.sqrt(squares / MANY):.3f} um, peak memory {whole / 1024.0:.0f} MB "
         f"({(whole - before) / 1024.0:.0f} MB more than before)"
     )
+    return Figure(f"memory of {MANY} pairs in blocks", whole / 1024.0, "MB", target=TARGETS["memory"])
 
 
 def _by_poselib(poselib, image1, image2):
@@ -218,6 +244,9 @@ def similarity():
         off = np.sqrt(np.mean(turn_of(mxm(transposed(turn), turns)) ** 2)) * 200_000.0 / np.pi
         accuracy = f"{np.sqrt(np.mean(residuals**2)):14.5f}{sigma * np.sqrt(11.0 / 18.0):8.5f}{off:26.3f}"
         print(f"{speed}{accuracy}{peers / took:16.1f}")
+    ours = rows[0][1]
+    times = peers / ours if pycolmap else None
+    return [Figure("similarity, a model of many", 1e6 * ours, "us", "pycolmap", times, TARGETS["similarity"])]
 
 
 def _similarity_by_pycolmap(pycolmap, models, targets):
@@ -236,12 +265,16 @@ def _similarity_by_pycolmap(pycolmap, models, targets):
 BENCHMARKS = {"relative": relative, "similarity": similarity}
 
 
-def main():
+def on_one_thread():
+    """Start this program again with libraries on one thread, where it is not so already."""
     if any(os.environ.get(name) != "1" for name in THREADS):  # libraries read it when they are loaded
         os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **dict.fromkeys(THREADS, "1")})
-    for each in sys.argv[1:] or BENCHMARKS:
-        BENCHMARKS[each]()
+
+
+def main():
+    return [figure for each in sys.argv[1:] or BENCHMARKS for figure in BENCHMARKS[each]()]
 
 
 if __name__ == "__main__":
-    main()
+    on_one_thread()
+    tell(main)

@@ -7,7 +7,6 @@ Usage: python benchmarks/skills.py [EXERCISE...] [--seeds 50] [--first-seed 1000
 import argparse
 import csv
 import os
-import sys
 import tempfile
 import time
 from collections import Counter
@@ -16,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 
+from figures import Figure, Target, tell
 from msgspec.structs import replace
 
 from a7sim.mistakes import Mistake
@@ -25,8 +25,11 @@ from a7sim.training.shelf import all_exercises, find_exercise
 
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 
-ASKED = {"first-order": ("at least", 0.98), "trained": ("at least", 0.90), "novice": ("below", 0.60)}
-"""Share of the attempts at each of the exercises `OF` that a profile is to pass."""
+ASKED = {"first-order": Target("at least", 98), "trained": Target("at least", 90), "novice": Target("below", 60)}
+"""Share of the attempts at each of the exercises `OF` that a profile is to pass, %."""
+
+ASKED_OF = 50
+"""Seeds that this is asked of."""
 
 OF = range(5, 12)
 
@@ -58,15 +61,15 @@ class Tried:
 
     @property
     def share(self):
-        return self.passed / self.seeds
+        """Of its attempts, %."""
+        return 100.0 * self.passed / self.seeds
 
     @property
-    def holds(self):
-        """Whether it is as asked; None where nothing is asked."""
-        if int(self.exercise.partition("-")[0]) not in OF:
-            return None
-        sense, limit = ASKED[self.profile]
-        return self.share >= limit if sense == "at least" else self.share < limit
+    def figure(self):
+        """How many passed, beside what is asked of them."""
+        asked = int(self.exercise.partition("-")[0]) in OF and self.seeds >= ASKED_OF
+        name = f"{self.exercise}, {self.profile}: passed of {self.seeds}"
+        return Figure(name, self.share, "%", target=ASKED[self.profile] if asked else None)
 
 
 def procedure_of(shelved):
@@ -117,9 +120,9 @@ def summed(shelved, profile, attempts):
 def told(rows):
     print(f"{'exercise':<26}{'profile':<13}{'passed':>9}  {'asked':<14}{'points':>7}{'minutes':>9}  failed")
     for each in rows:
-        sense, limit = ASKED[each.profile]
-        asked = "" if each.holds is None else f"{'>=' if sense == 'at least' else '<'} {100 * limit:.0f} %"
-        verdict = {None: "", True: " ok", False: " NOT"}[each.holds]
+        target, met = each.figure.target, each.figure.met
+        asked = "" if target is None else f"{'>=' if target.sense == 'at least' else '<'} {target.limit:.0f} %"
+        verdict = {None: "", True: " ok", False: " NOT"}[met]
         print(
             f"{each.exercise:<26}{each.profile:<13}{f'{each.passed}/{each.seeds}':>9}  {asked + verdict:<14}"
             f"{each.median_points:>7g}{each.median_minutes:>9g}  {each.failed}"
@@ -155,16 +158,14 @@ def drawn(rows, path):
     names = list(dict.fromkeys(each.exercise for each in rows))
     figure, axes = plt.subplots(figsize=(9.5, 1.6 + 0.5 * len(names)), layout="constrained")
     titles = {each.exercise: each.title.partition(":")[0] for each in rows}
-    for profile, (sense, limit) in ASKED.items():
+    for profile, target in ASKED.items():
         offset = 0.24 * (1 - list(ASKED).index(profile))
         mine = [each for each in rows if each.profile == profile]
         places = [len(names) - 1 - names.index(each.exercise) + offset for each in mine]
-        axes.hlines(places, 0, [100 * each.share for each in mine], color=COLOURS[profile], lw=1.4, alpha=0.55)
-        label = f"{profile} ({'≥' if sense == 'at least' else '<'} {100 * limit:.0f} % asked of 5 to 11)"
-        axes.plot(
-            [100 * each.share for each in mine], places, MARKS[profile], color=COLOURS[profile], ms=6, label=label
-        )
-        axes.axvline(100 * limit, color=COLOURS[profile], lw=1.0, ls=":")
+        axes.hlines(places, 0, [each.share for each in mine], color=COLOURS[profile], lw=1.4, alpha=0.55)
+        label = f"{profile} ({'≥' if target.sense == 'at least' else '<'} {target.limit:.0f} % asked of 5 to 11)"
+        axes.plot([each.share for each in mine], places, MARKS[profile], color=COLOURS[profile], ms=6, label=label)
+        axes.axvline(target.limit, color=COLOURS[profile], lw=1.0, ls=":")
         for each, place in zip(mine, places, strict=True):
             number = f"{each.passed} of {each.seeds}"
             axes.text(105, place, number, color=COLOURS[profile], va="center", fontsize=8)
@@ -193,7 +194,7 @@ def main():
     table, figure = given.out / "skills.csv", given.out / "skills.svg"
     if given.draw:
         drawn(read(table), figure)
-        return 0
+        return []
     named = [find_exercise(each) for each in given.exercises] or all_exercises()
     without = [each.name for each in named if procedure_of(each) is None]
     if given.exercises and without:
@@ -205,8 +206,8 @@ def main():
     print(f"seeds {seeds.start} to {seeds.stop - 1}, {given.workers} processes: {time.perf_counter() - began:.0f} s")
     kept(rows, table)
     drawn(rows, figure)
-    return int(any(each.holds is False for each in rows))
+    return [each.figure for each in rows]
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    tell(main)

@@ -1,20 +1,14 @@
 """benchmarks/fuzz_language.py finds a promise that is broken, and none is by a few thousand lines (issue 5)."""
 
-import importlib.util
-from pathlib import Path
-
 import pytest
 
 from a7sim.instrument.language import Desk, ErrorNumber
+from tests.benches import benchmark
 
 
 @pytest.fixture(scope="module")
 def fuzzing():
-    path = Path(__file__).parents[1] / "benchmarks" / "fuzz_language.py"
-    spec = importlib.util.spec_from_file_location("fuzz_language", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return benchmark("fuzz_language")
 
 
 @pytest.fixture
