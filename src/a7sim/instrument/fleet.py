@@ -619,7 +619,7 @@ class Fleet:
     def readings_at(self, who: Who, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
         guides = np.moveaxis(self._guides[:, :, who], -1, 0)
-        carriage: Array = np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T
+        carriage = np.asarray(np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T, dtype=float)
         free = self._carriages.position_free_of_runout(who, carriage)
         return {axis: self._unrounded(who, row, free[row]) for row, axis in enumerate(_AXES)}
 
