@@ -7,14 +7,15 @@ An instrument that cannot do something does not do it, and says why when asked b
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.geometry import GON, Array, length_of, mxv, plane_rotation
+from a7sim.geometry import GON, Array, length_of, mxm, mxv, plane_rotation, rotation
 from a7sim.instrument.autograph import COUNTED_FROM_ZERO, MOVE_CENTRES, guides_of
 from a7sim.instrument.condition import INSTRUMENT_STREAM, condition_of, local_coefficients, zero_error
-from a7sim.instrument.projection import place_of_centre, place_on_carrier, pose
+from a7sim.instrument.projection import place_of_centre, place_on_carrier
 from a7sim.instrument.spindles import APPROXIMATIONS, UNITS_A_DRUM
 from a7sim.manual import COUNTER_DECIMALS, LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Variant
 from a7sim.scenario.schema import Condition, Instrument, ProjectorCondition
@@ -25,6 +26,8 @@ Who = npt.NDArray[np.intp]
 Truths = npt.NDArray[np.bool_]
 
 _AXES = "XYZ"
+SHIFTS = ("bx", "by1", "by2", "bz1", "bz2")
+"""Elements that turn no projector."""
 NEAR_A_TIE = 1e-6
 """Of the last decimal."""
 
@@ -41,6 +44,12 @@ def of(values: Array, who: Who) -> Array:
     return values.take(who, axis=-1)
 
 
+def put(values: Array, who: Who, into: Array) -> None:
+    """Put values ``(k, m)`` of some instruments among those ``(k, instruments)`` of all."""
+    for row, new in zip(into, values, strict=True):
+        row[who] = new
+
+
 def rounded(values: Array, decimals: int) -> Array:
     """Return values rounded as the counters of one instrument round them: a tie by what the number exactly is.
 
@@ -48,7 +57,7 @@ def rounded(values: Array, decimals: int) -> Array:
     """
     scaled = values * 10.0**decimals
     ties = np.abs(scaled - np.floor(scaled) - 0.5) < NEAR_A_TIE
-    nearest = np.round(values, decimals)
+    nearest = np.rint(scaled) / 10.0**decimals
     if ties.any():
         nearest[ties] = [round(value, decimals) for value in values[ties].tolist()]
     return np.asarray(nearest + 0.0)
@@ -56,15 +65,73 @@ def rounded(values: Array, decimals: int) -> Array:
 
 @dataclass(frozen=True)
 class Runouts:
-    """The errors of screws that repeat with every turn: amplitudes in mm and phases ``(instruments,)``, lead in mm."""
+    """The errors of screws that repeat with every turn: amplitudes and phases ``(3, instruments)``, lead; mm."""
 
     amplitude: Array
     lead: float
     phase: Array
 
     def at(self, who: Who, position: Array) -> Array:
-        """Return by how much the nuts have gone further ``(m,)`` than the turns say, mm."""
-        return np.asarray(self.amplitude[who] * np.sin(2.0 * math.pi * position / self.lead + self.phase[who]))
+        """Return by how much the nuts have gone further ``(3, m)`` than the turns say, mm."""
+        turns = 2.0 * math.pi * position / self.lead
+        return np.asarray(of(self.amplitude, who) * np.sin(turns + of(self.phase, who)))
+
+
+class Carriages:
+    """The carriages X, Y and Z of every instrument: where their spindles stand and where these bring them with play."""
+
+    def __init__(self, variant: Variant, play: Array, runouts: Runouts | None) -> None:
+        self._low, self._high = np.array([variant.carriages[axis] for axis in _AXES]).T
+        self.at = np.repeat(np.array([[variant.carriages_at_rest[axis]] for axis in _AXES]), play.size, axis=1)
+        self._shaft = self.at.copy()
+        self._half_play = play / 2.0
+        self._runouts = runouts
+
+    def position(self, who: Who) -> Array:
+        """Return where they really stand ``(3, m)``."""
+        position = of(self._shaft, who)
+        return position if self._runouts is None else position + self._runouts.at(who, position)
+
+    def position_free_of_runout(self, who: Who, place: Array) -> Array:
+        """Return where they would stand ``(3, m)`` without the errors that the turns of their screws repeat."""
+        position = place
+        if self._runouts is not None:
+            for _ in range(APPROXIMATIONS):
+                position = place - self._runouts.at(who, position)
+        return position
+
+    def put_at_end(self, axis: int, places: Array, within: float) -> Array:
+        """Return places ``(m,)`` of a carriage, the end of its range where they are so near it."""
+        at_end = np.clip(places, self._low[axis], self._high[axis])
+        return np.where(np.abs(at_end - places) <= within, at_end, places)
+
+    def allow(self, axis: int, places: Array) -> Truths:
+        """Return to which places ``(m,)`` a carriage can be run."""
+        return np.asarray((places >= self._low[axis] - 1e-9) & (places <= self._high[axis] + 1e-9))
+
+    def surely_allow(self, places: Array) -> bool:
+        """Return whether all places ``(k, m)`` of the first k carriages lie within their ranges."""
+        k = len(places)
+        return bool(((places >= self._low[:k, None]) & (places <= self._high[:k, None])).all())
+
+    def run_to(self, who: Who, first: int, places: Array) -> None:
+        """Run carriages, from a first one on, to places ``(k, m)`` that they allow."""
+        rows = slice(first, first + len(places))
+        half = self._half_play[who]
+        put(places, who, self.at[rows])
+        put(np.minimum(np.maximum(of(self._shaft[rows], who), places - half), places + half), who, self._shaft[rows])
+
+
+@dataclass(frozen=True)
+class Levers:
+    """What base, levers, prisms and collars of every instrument come to."""
+
+    straight: Truths
+    """Where the left eye sees the left picture ``(instruments,)``."""
+    signs: Mapping[int, Array]
+    """Of what is seen of the picture in a projector ``(2, instruments)``, in um for a mm."""
+    senses: Array
+    """Of the handwheels X, Y and Z ``(3, instruments)``."""
 
 
 class Drums:
@@ -79,27 +146,16 @@ class Drums:
         play: Array,
         sigma: Array,
         fault: Array,
-        runouts: Runouts | None = None,
     ) -> None:
         self.low, self.high, self.endless = low, high, endless
         self.at = np.full(fault.shape, at)
         self._shaft = self.at.copy()
         self._error = np.zeros(fault.shape)
         self._half_play, self._sigma, self._fault = play / 2.0, sigma, fault
-        self._runouts = runouts
 
     def position(self, who: Who) -> Array:
         """Return where the shafts really stand ``(m,)``."""
-        position = self._shaft[who] + self._error[who] + self._fault[who]
-        return np.asarray(position if self._runouts is None else position + self._runouts.at(who, position))
-
-    def position_free_of_runout(self, who: Who, place: Array) -> Array:
-        """Return where the shafts would stand ``(m,)`` without the errors that their turns repeat."""
-        position = place
-        if self._runouts is not None:
-            for _ in range(APPROXIMATIONS):
-                position = place - self._runouts.at(who, position)
-        return position
+        return np.asarray(self._shaft[who] + self._error[who] + self._fault[who])
 
     def shown(self, who: Who) -> Array:
         """Return what the counters show ``(m,)``."""
@@ -138,6 +194,7 @@ class Carriers:
         self._turn = np.zeros((2, 2, laid.shape[1]))
         self._shift = np.zeros((2, laid.shape[1]))
         self._films: dict[str, Array] = {}
+        self._placed: dict[str, Array] = {}
         self.centre(np.arange(laid.shape[1]), self.centring)
 
     def centre(self, who: Who, values: Array) -> None:
@@ -146,16 +203,24 @@ class Carriers:
         dx, dy, turn = self.laid[:, who] + values
         self._turn[:, :, who] = plane_rotation(turn * GON)
         self._shift[:, who] = dx, dy
+        self._placed.clear()
 
     def point(self, who: Who, name: str) -> Array:
         """Return where an image point lies on the carriers ``(2, m)``, nan where a picture has none such."""
+        placed = self._placed.get(name)
+        if placed is None:
+            placed = self._placed[name] = mxv(self._turn, self._film(name)) + self._shift
+        return of(placed, who)
+
+    def _film(self, name: str) -> Array:
+        """Return where an image point lies on the films ``(2, instruments)``."""
         film = self._films.get(name)
         if film is None:
             nowhere = np.full(2, np.nan)
             places = [photograph.points.get(name) for photograph in self.photographs]
             columns = np.array([nowhere if place is None else place for place in places]).T
             film = self._films[name] = np.ascontiguousarray(columns)
-        return np.asarray(mxv(of(self._turn, who), of(film, who)) + of(self._shift, who))
+        return film
 
     def fiducial_displacements(self, who: Who) -> tuple[tuple[str, ...], Array]:
         """Return names and displacements ``(2, n, m)`` of the fiducials from their collimating marks."""
@@ -198,25 +263,13 @@ class Fleet:
         everywhere = np.arange(self.instruments)
         self._drums = {name: self._element_drums(name) for name in variant.elements}
         carriage_play = self._of_conditions(lambda condition: condition.carriage_backlash_mm)
-        nothing = np.zeros(self.instruments)
-        self._carriages = {
-            axis: Drums(
-                variant.carriages_at_rest[axis],
-                low,
-                high,
-                False,
-                carriage_play,
-                nothing,
-                nothing,
-                self._carriage_runouts(axis),
-            )
-            for axis, (low, high) in variant.carriages.items()
-            for at in (variant.carriages_at_rest[axis],)
-        }
+        self._carriages = Carriages(variant, carriage_play, self._carriage_runouts())
         self._slip_shares = self._of_conditions(lambda condition: condition.counter_slip_share)
-        self._units = {axis: scale.units_per_mm for axis, scale in variant.scales.items()}
-        self._decimals = dict.fromkeys(_AXES, COUNTER_DECIMALS)
-        self._offsets = {axis: np.full(self.instruments, scale.at_origin) for axis, scale in variant.scales.items()}
+        self._no_slips = not self._slip_shares.any()
+        self._units = np.array([variant.scales[axis].units_per_mm for axis in _AXES])
+        self._decimals = [COUNTER_DECIMALS] * len(_AXES)
+        self._offsets = np.empty((len(_AXES), self.instruments))
+        self._reset_offsets(everywhere)
         self._guides = np.stack([guides_of(condition) for condition in conditions], axis=-1)
         self._principal_points = {
             n: 1e-3 * self._of_projectors(n, lambda projector: projector.principal_point_um) for n in (1, 2)
@@ -227,11 +280,18 @@ class Fleet:
         self._carriers: dict[int, Carriers] = {}
         self._base_inside = np.ones(self.instruments, dtype=bool)
         self._fittings = {name: np.zeros(self.instruments, dtype=np.intp) for name in POSITIONS_OF}
+        self._levers: Levers | None = None
         self._put_right_fittings(everywhere)
         self._centres = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
         self._turned = {n: np.zeros((3, 3, self.instruments)) for n in (1, 2)}
         self._swung = {n: np.zeros((2, 2, self.instruments)) for n in (1, 2)}
         """By the swing of a projector, which its picture is seen with."""
+        self._missed = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
+        """By how much the axes miss the centre, in the frame (see `pose`)."""
+        self._common = np.zeros((3, 3, self.instruments))
+        """The rotation by the common Phi, where there is one."""
+        self._told = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
+        """Where the drums say that the centres stand."""
         for n in (1, 2):
             self._stand(everywhere, n)
 
@@ -251,10 +311,9 @@ class Fleet:
     def _where_any(self, values: Array) -> Array | None:
         return values if values.any() else None
 
-    def _carriage_runouts(self, axis: str) -> Runouts | None:
-        place = _AXES.index(axis)
-        amplitude = 1e-3 * self._of_conditions(lambda condition: condition.carriage_periodic_um[place])
-        phase = GON * self._of_conditions(lambda condition: condition.carriage_periodic_phase_gon[place])
+    def _carriage_runouts(self) -> Runouts | None:
+        amplitude = 1e-3 * np.array([condition.carriage_periodic_um for condition in self._conditions]).T.copy()
+        phase = GON * np.array([condition.carriage_periodic_phase_gon for condition in self._conditions]).T.copy()
         return Runouts(amplitude, self.variant.carriage_lead_mm, phase) if amplitude.any() else None
 
     def _element_drums(self, name: str) -> Drums:
@@ -295,21 +354,26 @@ class Fleet:
             return
         drums = self._drums[name]
         allowed = drums.allows(targets)
+        moved = [n for n in (1, 2) if name in ("bx", "common_phi") or name.endswith(str(n))]
         if name in MOVE_CENTRES:
-            allowed &= self._rods_can(who, elements={name: targets})
+            allowed &= self._rods_can(who, {n: self._centres_told(who, n, {name: targets}) for n in moved})
         self._refuse(who[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
         who, targets = who[allowed], targets[allowed]
         drums.turn_to(who, targets, rngs)
-        for n in (1, 2):
-            if name in ("bx", "common_phi") or name.endswith(str(n)):
+        for n in moved:
+            if name in SHIFTS:
+                self._shift(who, n)
+            else:
                 self._stand(who, n)
 
     def set_base_mode(self, who: Who, mode: str) -> None:
         """Set base inside or outside."""
         inside = mode == "inside"
-        able = self._rods_can(who, base_inside=inside)
+        base_inside = np.full(who.size, inside)
+        able = self._rods_can(who, {n: self._centres_told(who, n, base_inside=base_inside) for n in (1, 2)})
         self._refuse(who[~able], f"Data out of range;base {mode}: beyond the range of the rods")
         self._base_inside[who[able]] = inside
+        self._levers = None
         for n in (1, 2):
             self._stand(who, n)
 
@@ -320,6 +384,7 @@ class Fleet:
     def set_fitting(self, who: Who, name: str, position: str) -> None:
         """Put a fitting into one of its two positions."""
         self._fittings[name][who] = POSITIONS_OF[name].index(position)
+        self._levers = None
 
     def reset(self, who: Who) -> None:
         """Run every element that has a counter zero to it, base inside, fittings for a positive, presets off."""
@@ -328,10 +393,13 @@ class Fleet:
                 drums.turn_to(who, np.full(who.size, self.variant.elements[name].zero), self._rngs)
         self._base_inside[who] = True
         self._put_right_fittings(who)
-        for axis, scale in self.variant.scales.items():
-            self._offsets[axis][who] = scale.at_origin
+        self._reset_offsets(who)
         for n in (1, 2):
             self._stand(who, n)
+
+    def _reset_offsets(self, who: Who) -> None:
+        for axis, scale in self.variant.scales.items():
+            self._offsets[_AXES.index(axis), who] = scale.at_origin
 
     def _put_right_fittings(self, who: Who) -> None:
         for name, position in RIGHT_FITTINGS["positive", "inside"].as_words().items():
@@ -341,14 +409,24 @@ class Fleet:
 
     def counter(self, who: Who, axis: str) -> Array:
         """Return what the X, Y or Z counters show ``(m,)``."""
-        reading = self._offsets[axis][who] + self._units[axis] * self._carriages[axis].at[who]
-        return rounded(reading, self._decimals[axis])
+        row = _AXES.index(axis)
+        return rounded(self._unrounded(who, row, self._carriages.at[row][who]), self._decimals[row])
+
+    def counters(self, who: Who) -> Array:
+        """Return what the X, Y and Z counters show ``(3, m)``."""
+        readings = of(self._offsets, who) + self._units[:, None] * of(self._carriages.at, who)
+        if len(set(self._decimals)) == 1:
+            return rounded(readings, self._decimals[0])
+        return np.array([rounded(each, decimals) for each, decimals in zip(readings, self._decimals, strict=True)])
+
+    def _unrounded(self, who: Who, row: int, position: Array) -> Array:
+        return np.asarray(self._offsets[row][who] + self._units[row] * position)
 
     def preset(self, who: Who, axis: str, reading: float) -> None:
         """Make the counters show a reading where their carriages stand."""
-        self._offsets[axis][who] = (
-            round(reading, self._decimals[axis]) - self._units[axis] * self._carriages[axis].at[who]
-        )
+        row = _AXES.index(axis)
+        shown = round(reading, self._decimals[row])
+        self._offsets[row, who] = shown - self._units[row] * self._carriages.at[row][who]
 
     def set_height_gear(self, who: Who, gear: str | float) -> None:
         """Engage a height gear; all instruments have the same."""
@@ -356,107 +434,120 @@ class Fleet:
         if isinstance(gear, str):
             engaged = self.variant.height_gears[gear]
             units, decimals = engaged.units_per_mm, engaged.decimals
-        position = self._carriages["Z"].at[who]
-        reading = self._offsets["Z"][who] + self._units["Z"] * position
-        self._units["Z"], self._decimals["Z"] = units, decimals
-        self._offsets["Z"][who] = rounded(reading, decimals) - units * position
+        row = _AXES.index("Z")
+        position = self._carriages.at[row][who]
+        reading = self._unrounded(who, row, position)
+        self._units[row], self._decimals[row] = units, decimals
+        self._offsets[row, who] = rounded(reading, decimals) - units * position
 
     def drive(self, who: Who, axis: str, readings: Array) -> Truths:
         """Run carriages until their counters show readings ``(m,)``; return which went."""
-        wanted = rounded(readings, self._decimals[axis])
-        went = self._move(who, axis, (wanted - self._offsets[axis][who]) / self._units[axis])
+        row = _AXES.index(axis)
+        wanted = rounded(readings, self._decimals[row])
+        went = self._move(who, row, (wanted - self._offsets[row][who]) / self._units[row])
         slipping = went & (self._slip_shares[who] > 0.0)
         if slipping.any():
-            again = (wanted[slipping] - self._offsets[axis][who[slipping]]) / self._units[axis]
-            off = np.abs(again - self._carriages[axis].at[who[slipping]]) > self._half_a_count(axis)
-            self._move(who[slipping][off], axis, again[off], silently=True)
+            again = (wanted[slipping] - self._offsets[row][who[slipping]]) / self._units[row]
+            off = np.abs(again - self._carriages.at[row][who[slipping]]) > self._half_a_count(row)
+            self._move(who[slipping][off], row, again[off], silently=True)
         return went
 
-    def _half_a_count(self, axis: str) -> float:
-        return float(0.5000001 * 10.0 ** -self._decimals[axis] / self._units[axis])
+    def _half_a_count(self, row: int) -> float:
+        return float(0.5000001 * 10.0 ** -self._decimals[row] / self._units[row])
 
-    def wheel(self, who: Who, axis: str, amounts: Array) -> Truths:
-        """Turn handwheels by so many counter units ``(m,)``; their collars decide which way the carriages go."""
-        step = self._wheel_senses(who, axis) * amounts / self._units[axis]
-        return self._move(who, axis, self._carriages[axis].at[who] + step)
+    def wheels(self, who: Who, amounts: Array) -> None:
+        """Turn the handwheels X, Y and, where there is a third, Z by so many counter units ``(k, m)``, in that order.
 
-    def _wheel_senses(self, who: Who, axis: str) -> Array:
-        collar = f"{axis.lower()}collar"
-        if collar not in self.variant.fittings:
-            return np.ones(who.size)
-        polarity = next((carriers.polarity for carriers in self._carriers.values()), "positive")
-        return np.where(self._fittings[collar][who] == _RIGHT[polarity, "inside"][collar], 1.0, -1.0)
+        Their collars decide which way the carriages go.
+        """
+        k = len(amounts)
+        before = of(self._carriages.at, who)
+        steps = of(self._levers_stand.senses[:k], who) * amounts / self._units[:k, None]
+        after = before[:k] + steps
+        if self._no_slips and self._carriages.surely_allow(after) and self._rods_surely_can(who, before, after):
+            self._carriages.run_to(who, 0, after)
+            return
+        for row, each in enumerate(after):
+            self._move(who, row, each)
 
-    def _move(self, who: Who, axis: str, positions: Array, silently: bool = False) -> Truths:
-        drums = self._carriages[axis]
-        at_end = np.clip(positions, drums.low, drums.high)
-        positions = np.where(np.abs(at_end - positions) <= self._half_a_count(axis), at_end, positions)
-        allowed = drums.allows(positions) & self._rods_can(who, carriages={axis: positions})
+    def _move(self, who: Who, row: int, positions: Array, silently: bool = False) -> Truths:
+        positions = self._carriages.put_at_end(row, positions, self._half_a_count(row))
+        mark = of(self._carriages.at, who)
+        before, mark[row] = mark[row].copy(), positions
+        allowed = self._carriages.allow(row, positions) & self._rods_can(who, mark=mark)
         if not silently:
-            self._refuse(who[~allowed], f"Data out of range;{axis}: beyond its range or that of the rods")
+            self._refuse(who[~allowed], f"Data out of range;{_AXES[row]}: beyond its range or that of the rods")
         who, positions = who[allowed], positions[allowed]
-        self._slip(who, axis, drums.at[who], positions)
-        drums.turn_to(who, positions)
+        self._slip(who, row, before[allowed], positions)
+        self._carriages.run_to(who, row, positions[None])
         return np.asarray(allowed)
 
-    def _slip(self, who: Who, axis: str, before: Array, after: Array) -> None:
+    def _slip(self, who: Who, row: int, before: Array, after: Array) -> None:
         """Let counters miss carries on the way from one position ``(m,)`` to another (see `Counter.passed`)."""
+        if self._no_slips:
+            return
         for i in np.flatnonzero(self._slip_shares[who] > 0.0):
             each = who[i]
             first, last = (
-                math.floor((self._offsets[axis][each] + self._units[axis] * position[i]) / UNITS_A_DRUM)
+                math.floor((self._offsets[row, each] + self._units[row] * position[i]) / UNITS_A_DRUM)
                 for position in (before, after)
             )
             if first != last:
                 missed = self._rngs[each].binomial(abs(last - first), self._slip_shares[each])
-                self._offsets[axis][each] -= math.copysign(missed * UNITS_A_DRUM, last - first)
+                self._offsets[row, each] -= math.copysign(missed * UNITS_A_DRUM, last - first)
 
-    def _rods_can(
-        self,
-        who: Who,
-        carriages: Mapping[str, Array] | None = None,
-        elements: Mapping[str, Array] | None = None,
-        base_inside: bool | None = None,
-    ) -> Truths:
-        """Return where a change brings no rod beyond its limit, nor further beyond it."""
+    def _rods_can(self, who: Who, centres: Mapping[int, Array] | None = None, mark: Array | None = None) -> Truths:
+        """Return where no rod comes beyond its limit, nor further beyond it, with other centres or marks ``(3, m)``."""
+        now = of(self._carriages.at, who)
+        mark = now if mark is None else mark
         able = np.ones(who.size, dtype=bool)
-        for n in (1, 2):
-            beside, below = self._rods_reach(who, n, carriages or {}, elements or {}, base_inside)
+        for n in (1, 2) if centres is None else centres:
+            told = of(self._told[n], who)
+            beside, below = _reach(told if centres is None else centres[n], mark)
             if (beside < self._surely_within * below).all():
                 continue
             then = np.arctan2(beside, below) / GON
             beyond = then > self.variant.rod_limit_gon
             if beyond.any():
-                able &= ~beyond | (then <= np.arctan2(*self._rods_reach(who, n, {}, {}, None)) / GON)
+                able &= ~beyond | (then <= np.arctan2(*_reach(told, now)) / GON)
         return able
+
+    def _rods_surely_can(self, who: Who, before: Array, after: Array) -> bool:
+        """Return whether carriages can go from marks ``(3, m)`` to others ``(k, m)``, one axis after the other."""
+        both = np.stack([before, before])
+        both[1, : len(after)] = after
+        for n in (1, 2):
+            away = both - of(self._told[n], who)
+            x, y = np.abs(away[:, :2]).max(axis=0)
+            if not (np.hypot(x, y) < self._surely_within * -away[:, 2].max(axis=0)).all():
+                return False
+        return True
 
     @property
     def _surely_within(self) -> float:
         """How far to the side a rod may reach for all the depth, well within its limit."""
         return 0.99 * math.tan(self.variant.rod_limit_gon * GON)
 
-    def _rods_reach(
+    def _centres_told(
         self,
         who: Who,
         n: int,
-        carriages: Mapping[str, Array],
-        elements: Mapping[str, Array],
-        base_inside: bool | None,
-    ) -> tuple[Array, Array]:
-        """Return how far the mark lies beside the centre of a projector and below it ``(m,)``, as the drums tell."""
-        at = {axis: drums.at[who] for axis, drums in self._carriages.items() if axis not in carriages} | dict(carriages)
-        inside = self._base_inside[who] if base_inside is None else np.full(who.size, base_inside)
+        elements: Mapping[str, Array] = MappingProxyType({}),
+        base_inside: Truths | None = None,
+    ) -> Array:
+        """Return where the drums say ``(3, m)`` that centres stand, or would with other elements or another base."""
 
         def drum(name: str) -> Array:
             if name in elements:
                 return elements[name]
             return self._drums[name].at[who] if name in self._drums else np.zeros(who.size)
 
+        inside = self._base_inside[who] if base_inside is None else base_inside
         x, y, z = self._shares(n, inside) * drum("bx"), -drum(f"by{n}"), drum(f"bz{n}")
         if "common_phi" in self._drums:
             tilt = (drum("common_phi") - self.variant.elements["common_phi"].zero) * GON
             x, z = x * np.cos(tilt) + z * np.sin(tilt), z * np.cos(tilt) - x * np.sin(tilt)
-        return np.hypot(at["X"] - x, at["Y"] - y), z - at["Z"]
+        return np.array([x, y, z])
 
     def _shares(self, n: int, inside: Truths) -> Array:
         """Return where projectors stand along X ``(m,)``, as shares of bx."""
@@ -474,10 +565,12 @@ class Fleet:
             upside_down = 200.0 if photographs[each].laid == "upside down" else 0.0
             laid[:, each] = self._rngs[each].standard_normal(3) * (shift, shift, turn) + (0.0, 0.0, upside_down)
         self._carriers[projector] = Carriers(photographs, laid)
+        self._levers = None
 
     def unload(self, who: Who, projector: int) -> None:
         """Take the photographs off the carriers of a projector."""
         del self._carriers[projector]
+        self._levers = None
 
     def loaded(self, projector: int) -> str:
         """Return the name of the photograph in a projector, empty for none."""
@@ -493,12 +586,25 @@ class Fleet:
     def _stand(self, who: Who, n: int) -> None:
         """Put the projectors where their elements, the base and their faults bring them."""
         omega, phi, kappa = (self._really(who, f"{name}{n}") * GON for name in ("omega", "phi", "kappa"))
+        turned = rotation(omega, phi, kappa)
+        self._missed[n][:, who] = mxv(turned, of(self._axes[n], who))
+        if "common_phi" in self._drums:
+            common = rotation(0.0, self._really(who, "common_phi") * GON, 0.0)
+            self._common[:, :, who] = common
+            turned = mxm(common, turned)
+        self._turned[n][:, :, who] = turned
+        self._swung[n][:, :, who] = plane_rotation(kappa)
+        self._shift(who, n)
+
+    def _shift(self, who: Who, n: int) -> None:
+        """Put the projectors, turned as they stand, where the base and by and bz bring them."""
         base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
         place = place_of_centre(self._shares(n, self._base_inside[who]), *base)
-        common_phi = self._really(who, "common_phi") * GON if "common_phi" in self._drums else None
-        centre, turned = pose(omega, phi, kappa, place, of(self._axes[n], who), common_phi)
-        self._centres[n][:, who], self._turned[n][:, :, who] = centre, turned
-        self._swung[n][:, :, who] = plane_rotation(kappa)
+        centre = place + of(self._missed[n], who) - of(self._axes[n], who)
+        if "common_phi" in self._drums:
+            centre = mxv(of(self._common, who), centre)
+        put(centre, who, self._centres[n])
+        put(self._centres_told(who, n), who, self._told[n])
 
     def _really(self, who: Who, name: str) -> Array:
         if name not in self._drums:
@@ -513,19 +619,19 @@ class Fleet:
     def readings_at(self, who: Who, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
         guides = np.moveaxis(self._guides[:, :, who], -1, 0)
-        carriage = np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T
-        return {
-            axis: self._offsets[axis][who]
-            + self._units[axis] * self._carriages[axis].position_free_of_runout(who, position)
-            for axis, position in zip(_AXES, carriage, strict=True)
-        }
+        carriage = np.asarray(np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T, dtype=float)
+        free = self._carriages.position_free_of_runout(who, carriage)
+        return {axis: self._unrounded(who, row, free[row]) for row, axis in enumerate(_AXES)}
 
-    def mark_on_carrier(self, who: Who, projector: int) -> Array:
-        """Return the places ``(2, m)`` in mm on carriers where the space rods bring the floating marks."""
-        carriage = np.array([self._carriages[axis].position(who) for axis in _AXES])
+    def mark(self, who: Who) -> Array:
+        """Return where the floating marks really stand ``(3, m)``."""
+        return mxv(of(self._guides, who), self._carriages.position(who))
+
+    def mark_on_carrier(self, who: Who, projector: int, mark: Array) -> Array:
+        """Return the places ``(2, m)`` in mm on carriers where the space rods bring floating marks ``(3, m)``."""
         local, rods = self._local[projector], self._rods[projector]
         return place_on_carrier(
-            mxv(of(self._guides, who), carriage),
+            mark,
             *self.pose(who, projector),
             self._drums[f"c{projector}"].position(who),
             of(self._principal_points[projector], who),
@@ -535,34 +641,64 @@ class Fleet:
 
     def eyepiece(self, who: Who, eye: int, name: str) -> Array:
         """Return dx, dy ``(2, m)`` in um at photo scale of an image point from the mark, nan outside the field."""
-        straight = self._base_inside[who]
-        if "triangulation" in self.variant.fittings:
-            straight = self._fittings["triangulation"][who] == POSITIONS_OF["triangulation"].index("back")
+        return self._in_eyepiece(who, eye, name, self.mark(who))
+
+    def both_eyepieces(self, who: Who, name: str) -> Array:
+        """Return dx, dy in the left eyepiece and dx, dy in the right one ``(4, m)``, as `eyepiece` does."""
+        mark = self.mark(who)
+        return np.concatenate([self._in_eyepiece(who, eye, name, mark) for eye in (1, 2)])
+
+    def _in_eyepiece(self, who: Who, eye: int, name: str, mark: Array) -> Array:
+        straight = self._levers_stand.straight[who]
         seen = np.full((2, who.size), np.nan)
         for projector in (1, 2):
             looking = straight == (projector == eye)
-            if looking.all() and projector in self._carriers:
-                return self._seen_in(who, projector, name)
-            if looking.any() and projector in self._carriers:
-                seen[:, looking] = self._seen_in(who[looking], projector, name)
+            if projector in self._carriers and looking.all():
+                return self._seen_in(who, projector, name, mark)
+            if projector in self._carriers and looking.any():
+                seen[:, looking] = self._seen_in(who[looking], projector, name, mark[:, looking])
         return seen
 
-    def _seen_in(self, who: Who, projector: int, name: str) -> Array:
-        carriers = self._carriers[projector]
-        displacement = carriers.point(who, name) - self.mark_on_carrier(who, projector)
+    def _seen_in(self, who: Who, projector: int, name: str, mark: Array) -> Array:
+        displacement = self._carriers[projector].point(who, name) - self.mark_on_carrier(who, projector, mark)
         turned = mxv(of(self._swung[projector], who), displacement)
-        shown = 1e3 * self._mirrored(who, carriers.polarity) * turned
+        shown = of(self._levers_stand.signs[projector], who) * turned
         return np.where(length_of(displacement) <= self.variant.field_radius_mm, shown, np.nan)
 
-    def _mirrored(self, who: Who, polarity: str) -> Array:
-        signs = np.ones((2, who.size))
-        inside = self._base_inside[who]
+    # --- levers, prisms, collars ----------------------------------------------------------------------
+
+    @property
+    def _levers_stand(self) -> Levers:
+        if self._levers is None:
+            signs = {n: 1e3 * self._mirrored(carriers.polarity) for n, carriers in self._carriers.items()}
+            self._levers = Levers(self._straight(), signs, np.array([self._wheel_senses(axis) for axis in _AXES]))
+        return self._levers
+
+    def _straight(self) -> Truths:
+        if "triangulation" in self.variant.fittings:
+            return np.asarray(self._fittings["triangulation"] == POSITIONS_OF["triangulation"].index("back"))
+        return self._base_inside.copy()
+
+    def _mirrored(self, polarity: str) -> Array:
+        signs = np.ones((2, self.instruments))
         for row, name in enumerate(("diapositive", "dove")):
             if name not in self.variant.fittings:
                 continue
-            right = np.where(inside, _RIGHT[polarity, "inside"][name], _RIGHT[polarity, "outside"][name])
-            signs[row, self._fittings[name][who] != right] = -1.0
+            right = np.where(self._base_inside, _RIGHT[polarity, "inside"][name], _RIGHT[polarity, "outside"][name])
+            signs[row, self._fittings[name] != right] = -1.0
         return signs
+
+    def _wheel_senses(self, axis: str) -> Array:
+        collar = f"{axis.lower()}collar"
+        if collar not in self.variant.fittings:
+            return np.ones(self.instruments)
+        polarity = next((carriers.polarity for carriers in self._carriers.values()), "positive")
+        return np.where(self._fittings[collar] == _RIGHT[polarity, "inside"][collar], 1.0, -1.0)
+
+
+def _reach(centre: Array, mark: Array) -> tuple[Array, Array]:
+    """Return how far marks ``(3, m)`` lie beside centres ``(3, m)`` and below them ``(m,)``."""
+    return np.hypot(mark[0] - centre[0], mark[1] - centre[1]), centre[2] - mark[2]
 
 
 def build_fleet(instrument: Instrument, photographs: Sequence[Mapping[str, Photograph]], seeds: Sequence[int]) -> Fleet:

@@ -30,6 +30,17 @@ def without(who: Who, others: Who) -> Who:
     return np.asarray(who[stays[who]])
 
 
+def among(values: Array, who: Who) -> Array:
+    """Return the values ``(..., m)`` of some among those ``(..., sessions)`` of all."""
+    return values.take(who, axis=-1)
+
+
+def put(values: Array, who: Who, into: Array) -> None:
+    """Put values ``(k, m)`` of some among those ``(k, sessions)`` of all."""
+    for row, new in zip(into, values, strict=True):
+        row[who] = new
+
+
 class NobodyGoesOn(Exception):
     """All of a crew have given up."""
 

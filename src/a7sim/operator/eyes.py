@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.operator.crew import Who, without
+from a7sim.operator.crew import Who, among, put, without
 from a7sim.operator.hands import Truths
 from a7sim.operator.levers import put_levers_right
 from a7sim.operator.seat import Seat, side
@@ -109,7 +109,7 @@ class Eyes:
                 self._look_again_with_levers_right(who, hand, point, seen, lost)
                 self._ran_away(who[lost], hand, point)
                 who, seen = who[~lost], seen[:, ~lost]
-            steps = (seen + errors[:, who]) * (1e-3 * seat.z[who] / seat.c)
+            steps = (seen + among(errors, who)) * (1e-3 * seat.z[who] / seat.c)
             moving = ~(np.abs(steps) < self.at_rest_mm(looks)).all(axis=0)
             who = who[moving]
             if not who.size:
@@ -166,18 +166,23 @@ class Watch:
     def __init__(self, displacements: int, sessions: int) -> None:
         self._before = np.full((displacements, sessions), np.inf)
         self._times = np.zeros((displacements, sessions), dtype=int)
+        self._any_grew = False
 
     def growing(self, who: Who) -> Truths:
         """Return which of the displacements ``(k, m)`` had grown when they were last seen."""
-        return np.asarray(self._times[:, who] > 0)
+        return self._times.take(who, axis=-1) > 0
 
     def running_away(self, who: Who, seen: Array) -> Truths:
         """Return which of the displacements ``(k, m)`` in um have grown in look after look."""
         now = np.abs(seen)
-        grown = (now > 1.4 * self._before[:, who]) & (now > RUNNING_AWAY_UM)
-        self._before[:, who] = now
-        self._times[:, who] = np.where(grown, self._times[:, who] + 1, 0)
-        return np.asarray(self._times[:, who] >= RUNNING_AWAY_LOOKS)
+        grown = (now > 1.4 * among(self._before, who)) & (now > RUNNING_AWAY_UM)
+        put(now, who, self._before)
+        if not grown.any() and not self._any_grew:
+            return grown
+        self._any_grew = True
+        times = np.where(grown, self._times.take(who, axis=-1) + 1, 0)
+        self._times[:, who] = times
+        return np.asarray(times >= RUNNING_AWAY_LOOKS)
 
 
 def _outward() -> Iterator[Array]:

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array
-from a7sim.operator.crew import Who, without
+from a7sim.operator.crew import Who, among, put, without
 from a7sim.operator.eyes import MOST_LOOKS, Eyes, Watch
 from a7sim.operator.hands import Truths
 from a7sim.operator.levers import put_levers_right
@@ -100,13 +100,15 @@ class FloatingMark:
             if not who.size:
                 return _together(settled)
             readings = seat.counters(who)
-            begun[:, who] = np.where(np.isnan(begun[:, who]), readings, begun[:, who])
+            if looks == 0:
+                put(readings, who, begun)
             x, y, _ = seat.place(who, readings)
-            scale = 1e-3 * seat.z[who] / seat.c
-            rise = (seen[2] + judgement.height[who]) * scale * seat.z[who] / np.abs(seat.bx(who))
-            rise = np.clip(rise, -LONGEST_RISE_MM, LONGEST_RISE_MM)
-            along_the_rays = -rise / seat.z[who] * np.array([x - seat.bx(who) / 2.0, y])
-            steps = (seen[:2] + judgement.plan[:, who]) * scale + along_the_rays
+            z, bx = seat.z[who], seat.bx(who)
+            scale = 1e-3 * z / seat.c
+            rise = (seen[2] + judgement.height[who]) * scale * z / np.abs(bx)
+            rise = np.minimum(np.maximum(rise, -LONGEST_RISE_MM), LONGEST_RISE_MM)
+            along_the_rays = -rise / z * np.array([x - bx / 2.0, y])
+            steps = (seen[:2] + among(judgement.plan, who)) * scale + along_the_rays
             at_rest = eyes.at_rest_mm(looks)
             moving = np.maximum(np.abs(steps).max(axis=0), np.abs(rise)) >= at_rest
             wheels = np.concatenate([seat.in_units(steps), [rise * seat.units_per_mm]])

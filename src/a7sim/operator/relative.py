@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import overload
 
 import numpy as np
 import numpy.typing as npt
@@ -89,6 +90,27 @@ class Rounds:
         )
 
 
+class RoundsOfOne(Sequence[Round]):
+    """The rounds of one session, each put together when it is asked for."""
+
+    def __init__(self, session: int, rounds: Sequence[Rounds]) -> None:
+        self._session, self._rounds = session, rounds
+
+    def __len__(self) -> int:
+        return len(self._rounds)
+
+    @overload
+    def __getitem__(self, at: int) -> Round: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> Sequence[Round]: ...
+
+    def __getitem__(self, at: int | slice) -> Round | Sequence[Round]:
+        if isinstance(at, slice):
+            return RoundsOfOne(self._session, self._rounds[at])
+        return self._rounds[at].of(self._session)
+
+
 @dataclass(frozen=True)
 class RelativeOrientations:
     """The orientations of a crew; arrays have all sessions as their last axis."""
@@ -114,7 +136,7 @@ class RelativeOrientations:
         return RelativeOrientation(
             self.method,
             self.case,
-            [each.of(session) for each in self.rounds if session in each.who],
+            RoundsOfOne(session, [each for each in self.rounds if session in each.who]),
             int(self.rough_rounds[session]),
             _picked(self.elements, session),
             _there(_picked(self.residuals, session)),

@@ -6,7 +6,7 @@ import numpy as np
 
 from a7sim.geometry import GON, Array, mxv, plane_rotation
 from a7sim.manual import LEAST_COUNT, VARIANTS, Variant
-from a7sim.operator.crew import Crew, Who
+from a7sim.operator.crew import Crew, Who, among
 from a7sim.operator.hands import Hands, Truths
 from a7sim.operator.job import Job, ModelJob
 
@@ -229,7 +229,7 @@ class Seat:
     def counters(self, who: Who) -> Array:
         """Read X, Y and Z ``(3, m)``, and bear in mind how deep the mark stands."""
         readings = self.hands.counters(who)
-        self.z[who] = (self._offset[2, who] - readings[2]) / self.units_per_mm
+        self.z[who] = (self._offset[2][who] - readings[2]) / self.units_per_mm
         return readings
 
     def levels_shown(self, who: Who, levels: Sequence[float]) -> Array:
@@ -268,8 +268,9 @@ class Seat:
 
     def place(self, who: Who, readings: Array) -> Array:
         """Return readings ``(3, m)`` as x, y, z in mm: from the left-hand centre, the base line, downward."""
-        x, y = self.in_mm(readings[:2] - self._offset[:2, who])
-        z = (self._offset[2, who] - readings[2]) / self.units_per_mm
+        offset = among(self._offset, who)
+        x, y = self.in_mm(readings[:2] - offset[:2])
+        z = (offset[2] - readings[2]) / self.units_per_mm
         return np.array([x - self._share(1) * self.bx(who), y, z])
 
     def in_frame(self, who: Who, readings: Array, level: Array) -> Array:

@@ -34,17 +34,23 @@ class Crowd:
         """Yield the models as they are done; what a session gives up for stands in `bench.crew.reasons`."""
         return worked(self.bench)
 
-    def documents(self, strips: bool = True) -> list[Document]:
+    def documents(self, strips: bool = True, whole: bool = True) -> list[Document]:
         """Work to the end and return a document a seed, as `run` gives it, without what is told of line and book.
 
-        Without strips they say nothing of the strip on the ground either, which costs as much as the rest.
+        Without strips they say nothing of the strip on the ground either, which costs as much as the rest; where they
+        are not whole, of the models only what is in `of_model_in_brief`.
         """
         found: list[list[Document]] = [[] for _ in self.seeds]
         for records in self.worked():
             plan = next(model for model in self.scenario.models if model.name == records.model.name)
             beside = self._beside(records, self.scenes[0].relative_truth(plan))
             for member, session in enumerate(records.who.tolist()):
-                found[session].append(results.of_model(records.of(session), beside, member, plan.published))
+                record = records.of(session)
+                found[session].append(
+                    results.of_model(record, beside, member, plan.published)
+                    if whole
+                    else results.of_model_in_brief(record, beside, member)
+                )
         return [self._document(session, models, strips) for session, models in enumerate(found)]
 
     def _beside(self, records: ModelRecords, truth: RelativeTruth | None) -> Beside:

@@ -76,7 +76,7 @@ class FleetHands:
         return self._fleet.elements(who, names)
 
     def counters(self, who: Who) -> Array:
-        return np.array([self._fleet.counter(who, axis) for axis in "XYZ"])
+        return self._fleet.counters(who)
 
     def counter(self, who: Who, axis: str) -> Array:
         return self._fleet.counter(who, axis)
@@ -86,8 +86,7 @@ class FleetHands:
         return np.asarray(np.all(went, axis=0))
 
     def turn(self, who: Who, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
-        for axis, turned in zip("XYZ", np.round(wheels, 4), strict=False):
-            self._fleet.wheel(who, axis, turned)
+        self._fleet.wheels(who, np.round(wheels, 4))
         if element is not None and amounts is not None:
             self.turn_element(who, element, amounts)
 
@@ -95,7 +94,7 @@ class FleetHands:
         return np.round(self._fleet.eyepiece(who, eye, point), 2)
 
     def seen_by_both(self, who: Who, point: str) -> Array:
-        return np.concatenate([self.seen(who, eye, point) for eye in (1, 2)])
+        return np.round(self._fleet.both_eyepieces(who, point), 2)
 
     def record(self, who: Who, point: str) -> None:
         """Nobody keeps what a crowd registers."""

@@ -53,13 +53,7 @@ def of_model(
     model = record.model
     found = {hand: _centre(centre) for hand, centre in record.centres.items()}
     return {
-        "model": model.name,
-        "left": model.left,
-        "right": model.right,
-        "base": model.base,
-        "xy_units_per_mm": record.xy_units_per_mm,
-        "z_units_per_mm": record.z_units_per_mm,
-        "finished_at_s": round(record.finished_at, 1),
+        **_head_of(record),
         "interior_orientation": [
             {
                 "photo": each.photograph,
@@ -91,14 +85,44 @@ def of_model(
             "elements": dict(orientation.elements),
         },
         "perspective_centres": {SIDES[hand]: centre for hand, centre in found.items()},
-        "points": {
-            point: {axis: round(value, 3) for axis, value in zip("XYZ", place, strict=True)}
-            for point, place in record.points.items()
-        },
+        "points": _points(record),
         "standard_points": dict(model.standard_points),
         **({"absolute_orientation": _on_ground(record.on_ground)} if record.on_ground else {}),
         "truth": _beside_truth(record, beside, member, found) | _published_sigmas(published),
     }
+
+
+def of_model_in_brief(record: ModelRecord, beside: Beside, member: int) -> dict[str, Any]:
+    """Return of the results of a model what its strip and the responses of a study that have names are read from."""
+    orientation = record.orientation
+    found = {hand: _centre(centre, _CENTRE_FIELDS[:3]) for hand, centre in record.centres.items()}
+    return {
+        **_head_of(record),
+        "relative_orientation": {
+            "iterations": len(orientation.rounds),
+            "rms_parallax_mm": round(orientation.rms, 6),
+        },
+        "perspective_centres": {SIDES[hand]: centre for hand, centre in found.items()},
+        "points": _points(record),
+        "truth": _differences(beside, member, found),
+    }
+
+
+def _head_of(record: ModelRecord) -> dict[str, Any]:
+    model = record.model
+    return {
+        "model": model.name,
+        "left": model.left,
+        "right": model.right,
+        "base": model.base,
+        "xy_units_per_mm": record.xy_units_per_mm,
+        "z_units_per_mm": record.z_units_per_mm,
+        "finished_at_s": round(record.finished_at, 1),
+    }
+
+
+def _points(record: ModelRecord) -> dict[str, dict[str, float]]:
+    return {point: {"X": round(x, 3), "Y": round(y, 3), "Z": round(z, 3)} for point, (x, y, z) in record.points.items()}
 
 
 def of_operator(person: Person, lines: int) -> dict[str, Any]:
@@ -171,8 +195,8 @@ def _on_ground(found: OnGround) -> dict[str, Any]:
     }
 
 
-def _centre(centre: PerspectiveCentre) -> dict[str, float]:
-    return {name: round(float(getattr(centre, name)), 5) for name in _CENTRE_FIELDS}
+def _centre(centre: PerspectiveCentre, fields: Sequence[str] = _CENTRE_FIELDS) -> dict[str, float]:
+    return {name: round(float(getattr(centre, name)), 5) for name in fields}
 
 
 def _rounded(values: Any) -> dict[str, float]:
@@ -182,31 +206,47 @@ def _rounded(values: Any) -> dict[str, float]:
 def _beside_truth(
     record: ModelRecord, beside: Beside, member: int, found: dict[int, dict[str, float]]
 ) -> dict[str, Any]:
-    centres = {hand: {name: float(each[member]) for name, each in beside.centres[hand].items()} for hand in found}
-    document: dict[str, Any] = {
-        "centres": {SIDES[hand]: {name: round(v, 5) for name, v in centre.items()} for hand, centre in centres.items()},
-        "centre_differences": {
-            SIDES[hand]: {name: round(found[hand][name] - value, 5) for name, value in centre.items()}
-            for hand, centre in centres.items()
-        },
+    centres = {
+        SIDES[hand]: {name: round(float(each[member]), 5) for name, each in beside.centres[hand].items()}
+        for hand in found
     }
+    differences = _differences(beside, member, found)
     relative = beside.relative
     if relative is None:
-        return document
+        return {"centres": centres, **differences}
     exact = {name: float(each[member]) for name, each in relative.elements.items()}
     elements = record.orientation.elements
-    return document | {
+    return {
+        "centres": centres,
+        "centre_differences": differences.pop("centre_differences"),
         "source": relative.source,
         "relative_rotation": _matrix(relative.true.rotation),
         "base_direction": _vector(relative.true.base),
         "found_relative_rotation": _matrix(relative.found.rotation[..., member]),
         "found_base_direction": _vector(relative.found.base[..., member]),
-        "rotation_difference_gon": round(float(relative.rotation_gon[member]), 5),
-        "base_difference_gon": round(float(relative.base_gon[member]), 5),
+        **differences,
         "elements": _rounded(exact),
         "element_differences": {
             name: round((elements[name] - value + 200.0) % 400.0 - 200.0, 6) for name, value in exact.items()
         },
+    }
+
+
+def _differences(beside: Beside, member: int, found: dict[int, dict[str, float]]) -> dict[str, Any]:
+    """Return by how much what was found differs from the truth, in single numbers."""
+    document: dict[str, Any] = {
+        "centre_differences": {
+            SIDES[hand]: {
+                name: round(centre[name] - float(each[member]), 5) for name, each in beside.centres[hand].items()
+            }
+            for hand, centre in found.items()
+        }
+    }
+    if beside.relative is None:
+        return document
+    return document | {
+        "rotation_difference_gon": round(float(beside.relative.rotation_gon[member]), 5),
+        "base_difference_gon": round(float(beside.relative.base_gon[member]), 5),
     }
 
 

@@ -52,13 +52,16 @@ def run_all_ways(
     return document
 
 
-def documents_of_all_ways(scenario: Scenario, seeds: Sequence[int], strips: bool = True) -> list[Document]:
+def documents_of_all_ways(
+    scenario: Scenario, seeds: Sequence[int], strips: bool = True, whole: bool = True
+) -> list[Document]:
     """Return what `run_all_ways` says of each seed, all sessions at once, without what is told of line and book.
 
-    Without `strips` nothing is said of the strip on the ground that was measured at the plotter.
+    Without `strips` nothing is said of the strip on the ground that was measured at the plotter; where they are not
+    `whole`, of its models only what the responses of a study that have names are read from.
     """
     if "plotter" in scenario.work:
-        documents = open_crowd(scenario, seeds).documents(strips)
+        documents = open_crowd(scenario, seeds).documents(strips, whole)
     else:
         documents = [results.header(scenario, seed) | {"status": "complete", "message": ""} for seed in seeds]
     if scenario.work == ["plotter"]:

@@ -69,6 +69,11 @@ def reads_strip(name: str) -> bool:
     return "_at_" in name or name.startswith("strip.")
 
 
+def reads_path(name: str) -> bool:
+    """Return whether a response is read by its path, wherever in the results that leads."""
+    return "." in name
+
+
 def _in_one_model(response: Response, model: int) -> Response:
     """Return a response of the models read in one of them, counted from 1. Raises Mistake for one of the strip."""
     of_all = next((each for each in OF_ALL if response.meaning.endswith(each)), None)

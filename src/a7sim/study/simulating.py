@@ -14,7 +14,7 @@ from a7sim.session.crossing import Replicate, cases_of_strips, crossed
 from a7sim.session.strips import ground_of
 from a7sim.session.ways import documents_of_all_ways, run_all_ways
 from a7sim.standard_points import CASES
-from a7sim.study.responses import reads_strip, response_of
+from a7sim.study.responses import reads_path, reads_strip, response_of
 
 _STREAM = 9
 """Spawns the seeds of a study's replicates."""
@@ -45,7 +45,8 @@ class Task:
 
         Raises Mistake for a response that the results do not have.
         """
-        return self._values(self._crowded(seeds, strips=any(map(reads_strip, self.responses))))
+        strips, whole = any(map(reads_strip, self.responses)), any(map(reads_path, self.responses))
+        return self._values(self._crowded(seeds, strips, whole))
 
     def alone(self, cell: int, seed: int) -> Array:
         """Return responses ``(responses,)`` of one cell, its sessions worked over the link as `a7sim run` does."""
@@ -53,12 +54,15 @@ class Task:
 
     def crowded(self, seeds: Sequence[int]) -> list[list[Document]]:
         """Return documents by seed and cell, of sessions worked at once."""
-        return self._crowded(seeds, strips=True)
+        return self._crowded(seeds, strips=True, whole=True)
 
-    def _crowded(self, seeds: Sequence[int], strips: bool) -> list[list[Document]]:
+    def _crowded(self, seeds: Sequence[int], strips: bool, whole: bool) -> list[list[Document]]:
         if not self.strips:
-            return [[each] for each in documents_of_all_ways(self.scenario, seeds, strips)]
-        by_case = {case: documents_of_all_ways(in_case(self.scenario, case), seeds, strips=False) for case in CASES}
+            return [[each] for each in documents_of_all_ways(self.scenario, seeds, strips, whole)]
+        by_case = {
+            case: documents_of_all_ways(in_case(self.scenario, case), seeds, strips=False, whole=whole)
+            for case in CASES
+        }
         return self._strips([{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))], seeds)
 
     def linked(self, seed: int) -> list[Document]:
