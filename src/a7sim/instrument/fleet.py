@@ -12,24 +12,19 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who, among, put
 from a7sim.geometry import GON, Array, length_of, mxm, mxv, plane_rotation, rotation
 from a7sim.instrument.autograph import COUNTED_FROM_ZERO, MOVE_CENTRES, guides_of
 from a7sim.instrument.condition import INSTRUMENT_STREAM, condition_of, local_coefficients, zero_error
+from a7sim.instrument.fleet_parts import AXES, Carriages, Carriers, Drums, Runouts, Truths, rounded
 from a7sim.instrument.projection import place_of_centre, place_on_carrier
-from a7sim.instrument.spindles import APPROXIMATIONS, UNITS_A_DRUM
+from a7sim.instrument.spindles import UNITS_A_DRUM
 from a7sim.manual import COUNTER_DECIMALS, LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Variant
 from a7sim.scenario.schema import Condition, Instrument, ProjectorCondition
-from a7sim.scene.camera import fiducial_places
 from a7sim.scene.photograph import Photograph
 
-Who = npt.NDArray[np.intp]
-Truths = npt.NDArray[np.bool_]
-
-_AXES = "XYZ"
 SHIFTS = ("bx", "by1", "by2", "bz1", "bz2")
 """Elements that turn no projector."""
-NEAR_A_TIE = 1e-6
-"""Of the last decimal."""
 
 
 _RIGHT = {
@@ -37,89 +32,6 @@ _RIGHT = {
     for arrangement, fittings in RIGHT_FITTINGS.items()
 }
 """Which of its two positions each fitting has by rights, by polarity and base."""
-
-
-def of(values: Array, who: Who) -> Array:
-    """Return the values ``(..., m)`` of some instruments, laid out as those of all: indexing would transpose them."""
-    return values.take(who, axis=-1)
-
-
-def put(values: Array, who: Who, into: Array) -> None:
-    """Put values ``(k, m)`` of some instruments among those ``(k, instruments)`` of all."""
-    for row, new in zip(into, values, strict=True):
-        row[who] = new
-
-
-def rounded(values: Array, decimals: int) -> Array:
-    """Return values rounded as the counters of one instrument round them: a tie by what the number exactly is.
-
-    Wheels turn by thousandths, so that ties are common; numpy scales before it rounds and would take some for halves.
-    """
-    scaled = values * 10.0**decimals
-    ties = np.abs(scaled - np.floor(scaled) - 0.5) < NEAR_A_TIE
-    nearest = np.rint(scaled) / 10.0**decimals
-    if ties.any():
-        nearest[ties] = [round(value, decimals) for value in values[ties].tolist()]
-    return np.asarray(nearest + 0.0)
-
-
-@dataclass(frozen=True)
-class Runouts:
-    """The errors of screws that repeat with every turn: amplitudes and phases ``(3, instruments)``, lead; mm."""
-
-    amplitude: Array
-    lead: float
-    phase: Array
-
-    def at(self, who: Who, position: Array) -> Array:
-        """Return by how much the nuts have gone further ``(3, m)`` than the turns say, mm."""
-        turns = 2.0 * math.pi * position / self.lead
-        return np.asarray(of(self.amplitude, who) * np.sin(turns + of(self.phase, who)))
-
-
-class Carriages:
-    """The carriages X, Y and Z of every instrument: where their spindles stand and where these bring them with play."""
-
-    def __init__(self, variant: Variant, play: Array, runouts: Runouts | None) -> None:
-        self._low, self._high = np.array([variant.carriages[axis] for axis in _AXES]).T
-        self.at = np.repeat(np.array([[variant.carriages_at_rest[axis]] for axis in _AXES]), play.size, axis=1)
-        self._shaft = self.at.copy()
-        self._half_play = play / 2.0
-        self._runouts = runouts
-
-    def position(self, who: Who) -> Array:
-        """Return where they really stand ``(3, m)``."""
-        position = of(self._shaft, who)
-        return position if self._runouts is None else position + self._runouts.at(who, position)
-
-    def position_free_of_runout(self, who: Who, place: Array) -> Array:
-        """Return where they would stand ``(3, m)`` without the errors that the turns of their screws repeat."""
-        position = place
-        if self._runouts is not None:
-            for _ in range(APPROXIMATIONS):
-                position = place - self._runouts.at(who, position)
-        return position
-
-    def put_at_end(self, axis: int, places: Array, within: float) -> Array:
-        """Return places ``(m,)`` of a carriage, the end of its range where they are so near it."""
-        at_end = np.clip(places, self._low[axis], self._high[axis])
-        return np.where(np.abs(at_end - places) <= within, at_end, places)
-
-    def allow(self, axis: int, places: Array) -> Truths:
-        """Return to which places ``(m,)`` a carriage can be run."""
-        return np.asarray((places >= self._low[axis] - 1e-9) & (places <= self._high[axis] + 1e-9))
-
-    def surely_allow(self, places: Array) -> bool:
-        """Return whether all places ``(k, m)`` of the first k carriages lie within their ranges."""
-        k = len(places)
-        return bool(((places >= self._low[:k, None]) & (places <= self._high[:k, None])).all())
-
-    def run_to(self, who: Who, first: int, places: Array) -> None:
-        """Run carriages, from a first one on, to places ``(k, m)`` that they allow."""
-        rows = slice(first, first + len(places))
-        half = self._half_play[who]
-        put(places, who, self.at[rows])
-        put(np.minimum(np.maximum(of(self._shaft[rows], who), places - half), places + half), who, self._shaft[rows])
 
 
 @dataclass(frozen=True)
@@ -132,114 +44,6 @@ class Levers:
     """Of what is seen of the picture in a projector ``(2, instruments)``, in um for a mm."""
     senses: Array
     """Of the handwheels X, Y and Z ``(3, instruments)``."""
-
-
-class Drums:
-    """A spindle of every instrument: what the drum shows, where the shaft follows it with play and setting error."""
-
-    def __init__(
-        self,
-        at: float,
-        low: float,
-        high: float,
-        endless: bool,
-        play: Array,
-        sigma: Array,
-        fault: Array,
-    ) -> None:
-        self.low, self.high, self.endless = low, high, endless
-        self.at = np.full(fault.shape, at)
-        self._shaft = self.at.copy()
-        self._error = np.zeros(fault.shape)
-        self._half_play, self._sigma, self._fault = play / 2.0, sigma, fault
-
-    def position(self, who: Who) -> Array:
-        """Return where the shafts really stand ``(m,)``."""
-        return np.asarray(self._shaft[who] + self._error[who] + self._fault[who])
-
-    def shown(self, who: Who) -> Array:
-        """Return what the counters show ``(m,)``."""
-        shown = rounded(self.at[who], COUNTER_DECIMALS)
-        return rounded(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
-
-    def allows(self, values: Array) -> Truths:
-        """Return which values the drum can be turned to."""
-        return np.asarray((values >= self.low - 1e-9) & (values <= self.high + 1e-9))
-
-    def after(self, who: Who, amounts: Array) -> Array:
-        """Return to what values ``(m,)`` the drums come when they are turned by so much."""
-        values = self.at[who] + amounts
-        return np.asarray(values % self.high if self.endless else values)
-
-    def turn_to(self, who: Who, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
-        """Turn the drums to values ``(m,)`` that they allow; with dice, by their counters (see `Spindle.turn_to`)."""
-        if self.endless:
-            values = values + self.high * np.round((self.at[who] - values) / self.high)
-        self.at[who] = values
-        half = self._half_play[who]
-        self._shaft[who] = np.minimum(np.maximum(self._shaft[who], values - half), values + half)
-        for session in who[self._sigma[who] > 0.0] if rngs else ():
-            self._error[session] = self._sigma[session] * rngs[session].standard_normal()
-
-
-class Carriers:
-    """A picture of the same name on a carrier of every instrument, each laid and centred in its own way."""
-
-    def __init__(self, photographs: Sequence[Photograph], laid: Array) -> None:
-        self.name = photographs[0].name
-        self.polarity = photographs[0].polarity
-        self.photographs = photographs
-        self.laid = laid
-        self.centring = np.zeros_like(laid)
-        self._turn = np.zeros((2, 2, laid.shape[1]))
-        self._shift = np.zeros((2, laid.shape[1]))
-        self._films: dict[str, Array] = {}
-        self._placed: dict[str, Array] = {}
-        self.centre(np.arange(laid.shape[1]), self.centring)
-
-    def centre(self, who: Who, values: Array) -> None:
-        """Shift and turn the pictures ``(3, m)``, mm and gon, from where they were laid."""
-        self.centring[:, who] = values
-        dx, dy, turn = self.laid[:, who] + values
-        self._turn[:, :, who] = plane_rotation(turn * GON)
-        self._shift[:, who] = dx, dy
-        self._placed.clear()
-
-    def point(self, who: Who, name: str) -> Array:
-        """Return where an image point lies on the carriers ``(2, m)``, nan where a picture has none such."""
-        placed = self._placed.get(name)
-        if placed is None:
-            placed = self._placed[name] = mxv(self._turn, self._film(name)) + self._shift
-        return of(placed, who)
-
-    def _film(self, name: str) -> Array:
-        """Return where an image point lies on the films ``(2, instruments)``."""
-        film = self._films.get(name)
-        if film is None:
-            nowhere = np.full(2, np.nan)
-            places = [photograph.points.get(name) for photograph in self.photographs]
-            columns = np.array([nowhere if place is None else place for place in places]).T
-            film = self._films[name] = np.ascontiguousarray(columns)
-        return film
-
-    def fiducial_displacements(self, who: Who) -> tuple[tuple[str, ...], Array]:
-        """Return names and displacements ``(2, n, m)`` of the fiducials from their collimating marks."""
-        fiducials = self.photographs[0].fiducials
-        names, calibrated = fiducial_places(self.photographs[0].camera)
-        marks = calibrated[:, [names.index(name) for name in fiducials.names]]
-        film = np.stack([self.photographs[session].fiducials.xy for session in who], axis=-1)
-        placed = np.einsum("ijm,jnm->inm", self._turn[:, :, who], film) + self._shift[:, None, who]
-        return fiducials.names, np.asarray(placed - marks[:, :, None])
-
-    def sketch(self, who: Who) -> dict[str, Array]:
-        """Return the places ``(2, m)`` of points on the paper prints, nan where a print has it not."""
-        names = dict.fromkeys(name for session in who for name in self.photographs[session].sketch.names)
-        nowhere = np.full(2, np.nan)
-        prints = [self.photographs[session].sketch for session in who]
-        places = {name: [each.get(name) for each in prints] for name in names}
-        return {
-            name: np.array([nowhere if place is None else place for place in each]).T for name, each in places.items()
-        }
 
 
 class Fleet:
@@ -266,9 +70,9 @@ class Fleet:
         self._carriages = Carriages(variant, carriage_play, self._carriage_runouts())
         self._slip_shares = self._of_conditions(lambda condition: condition.counter_slip_share)
         self._no_slips = not self._slip_shares.any()
-        self._units = np.array([variant.scales[axis].units_per_mm for axis in _AXES])
-        self._decimals = [COUNTER_DECIMALS] * len(_AXES)
-        self._offsets = np.empty((len(_AXES), self.instruments))
+        self._units = np.array([variant.scales[axis].units_per_mm for axis in AXES])
+        self._decimals = [COUNTER_DECIMALS] * len(AXES)
+        self._offsets = np.empty((len(AXES), self.instruments))
         self._reset_offsets(everywhere)
         self._guides = np.stack([guides_of(condition) for condition in conditions], axis=-1)
         self._principal_points = {
@@ -399,7 +203,7 @@ class Fleet:
 
     def _reset_offsets(self, who: Who) -> None:
         for axis, scale in self.variant.scales.items():
-            self._offsets[_AXES.index(axis), who] = scale.at_origin
+            self._offsets[AXES.index(axis), who] = scale.at_origin
 
     def _put_right_fittings(self, who: Who) -> None:
         for name, position in RIGHT_FITTINGS["positive", "inside"].as_words().items():
@@ -409,12 +213,12 @@ class Fleet:
 
     def counter(self, who: Who, axis: str) -> Array:
         """Return what the X, Y or Z counters show ``(m,)``."""
-        row = _AXES.index(axis)
+        row = AXES.index(axis)
         return rounded(self._unrounded(who, row, self._carriages.at[row][who]), self._decimals[row])
 
     def counters(self, who: Who) -> Array:
         """Return what the X, Y and Z counters show ``(3, m)``."""
-        readings = of(self._offsets, who) + self._units[:, None] * of(self._carriages.at, who)
+        readings = among(self._offsets, who) + self._units[:, None] * among(self._carriages.at, who)
         if len(set(self._decimals)) == 1:
             return rounded(readings, self._decimals[0])
         return np.array([rounded(each, decimals) for each, decimals in zip(readings, self._decimals, strict=True)])
@@ -424,7 +228,7 @@ class Fleet:
 
     def preset(self, who: Who, axis: str, reading: float) -> None:
         """Make the counters show a reading where their carriages stand."""
-        row = _AXES.index(axis)
+        row = AXES.index(axis)
         shown = round(reading, self._decimals[row])
         self._offsets[row, who] = shown - self._units[row] * self._carriages.at[row][who]
 
@@ -434,7 +238,7 @@ class Fleet:
         if isinstance(gear, str):
             engaged = self.variant.height_gears[gear]
             units, decimals = engaged.units_per_mm, engaged.decimals
-        row = _AXES.index("Z")
+        row = AXES.index("Z")
         position = self._carriages.at[row][who]
         reading = self._unrounded(who, row, position)
         self._units[row], self._decimals[row] = units, decimals
@@ -442,7 +246,7 @@ class Fleet:
 
     def drive(self, who: Who, axis: str, readings: Array) -> Truths:
         """Run carriages until their counters show readings ``(m,)``; return which went."""
-        row = _AXES.index(axis)
+        row = AXES.index(axis)
         wanted = rounded(readings, self._decimals[row])
         went = self._move(who, row, (wanted - self._offsets[row][who]) / self._units[row])
         slipping = went & (self._slip_shares[who] > 0.0)
@@ -461,8 +265,8 @@ class Fleet:
         Their collars decide which way the carriages go.
         """
         k = len(amounts)
-        before = of(self._carriages.at, who)
-        steps = of(self._levers_stand.senses[:k], who) * amounts / self._units[:k, None]
+        before = among(self._carriages.at, who)
+        steps = among(self._levers_stand.senses[:k], who) * amounts / self._units[:k, None]
         after = before[:k] + steps
         if self._no_slips and self._carriages.surely_allow(after) and self._rods_surely_can(who, before, after):
             self._carriages.run_to(who, 0, after)
@@ -472,11 +276,11 @@ class Fleet:
 
     def _move(self, who: Who, row: int, positions: Array, silently: bool = False) -> Truths:
         positions = self._carriages.put_at_end(row, positions, self._half_a_count(row))
-        mark = of(self._carriages.at, who)
+        mark = among(self._carriages.at, who)
         before, mark[row] = mark[row].copy(), positions
         allowed = self._carriages.allow(row, positions) & self._rods_can(who, mark=mark)
         if not silently:
-            self._refuse(who[~allowed], f"Data out of range;{_AXES[row]}: beyond its range or that of the rods")
+            self._refuse(who[~allowed], f"Data out of range;{AXES[row]}: beyond its range or that of the rods")
         who, positions = who[allowed], positions[allowed]
         self._slip(who, row, before[allowed], positions)
         self._carriages.run_to(who, row, positions[None])
@@ -498,11 +302,11 @@ class Fleet:
 
     def _rods_can(self, who: Who, centres: Mapping[int, Array] | None = None, mark: Array | None = None) -> Truths:
         """Return where no rod comes beyond its limit, nor further beyond it, with other centres or marks ``(3, m)``."""
-        now = of(self._carriages.at, who)
+        now = among(self._carriages.at, who)
         mark = now if mark is None else mark
         able = np.ones(who.size, dtype=bool)
         for n in (1, 2) if centres is None else centres:
-            told = of(self._told[n], who)
+            told = among(self._told[n], who)
             beside, below = _reach(told if centres is None else centres[n], mark)
             if (beside < self._surely_within * below).all():
                 continue
@@ -517,7 +321,7 @@ class Fleet:
         both = np.stack([before, before])
         both[1, : len(after)] = after
         for n in (1, 2):
-            away = both - of(self._told[n], who)
+            away = both - among(self._told[n], who)
             x, y = np.abs(away[:, :2]).max(axis=0)
             if not (np.hypot(x, y) < self._surely_within * -away[:, 2].max(axis=0)).all():
                 return False
@@ -587,7 +391,7 @@ class Fleet:
         """Put the projectors where their elements, the base and their faults bring them."""
         omega, phi, kappa = (self._really(who, f"{name}{n}") * GON for name in ("omega", "phi", "kappa"))
         turned = rotation(omega, phi, kappa)
-        self._missed[n][:, who] = mxv(turned, of(self._axes[n], who))
+        self._missed[n][:, who] = mxv(turned, among(self._axes[n], who))
         if "common_phi" in self._drums:
             common = rotation(0.0, self._really(who, "common_phi") * GON, 0.0)
             self._common[:, :, who] = common
@@ -600,9 +404,9 @@ class Fleet:
         """Put the projectors, turned as they stand, where the base and by and bz bring them."""
         base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
         place = place_of_centre(self._shares(n, self._base_inside[who]), *base)
-        centre = place + of(self._missed[n], who) - of(self._axes[n], who)
+        centre = place + among(self._missed[n], who) - among(self._axes[n], who)
         if "common_phi" in self._drums:
-            centre = mxv(of(self._common, who), centre)
+            centre = mxv(among(self._common, who), centre)
         put(centre, who, self._centres[n])
         put(self._centres_told(who, n), who, self._told[n])
 
@@ -614,18 +418,18 @@ class Fleet:
 
     def pose(self, who: Who, projector: int) -> tuple[Array, Array]:
         """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
-        return of(self._centres[projector], who), of(self._turned[projector], who)
+        return among(self._centres[projector], who), among(self._turned[projector], who)
 
     def readings_at(self, who: Who, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
         guides = np.moveaxis(self._guides[:, :, who], -1, 0)
         carriage = np.asarray(np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T, dtype=float)
         free = self._carriages.position_free_of_runout(who, carriage)
-        return {axis: self._unrounded(who, row, free[row]) for row, axis in enumerate(_AXES)}
+        return {axis: self._unrounded(who, row, free[row]) for row, axis in enumerate(AXES)}
 
     def mark(self, who: Who) -> Array:
         """Return where the floating marks really stand ``(3, m)``."""
-        return mxv(of(self._guides, who), self._carriages.position(who))
+        return mxv(among(self._guides, who), self._carriages.position(who))
 
     def mark_on_carrier(self, who: Who, projector: int, mark: Array) -> Array:
         """Return the places ``(2, m)`` in mm on carriers where the space rods bring floating marks ``(3, m)``."""
@@ -634,9 +438,9 @@ class Fleet:
             mark,
             *self.pose(who, projector),
             self._drums[f"c{projector}"].position(who),
-            of(self._principal_points[projector], who),
-            None if local is None else of(local, who),
-            None if rods is None else of(rods, who),
+            among(self._principal_points[projector], who),
+            None if local is None else among(local, who),
+            None if rods is None else among(rods, who),
         )
 
     def eyepiece(self, who: Who, eye: int, name: str) -> Array:
@@ -661,8 +465,8 @@ class Fleet:
 
     def _seen_in(self, who: Who, projector: int, name: str, mark: Array) -> Array:
         displacement = self._carriers[projector].point(who, name) - self.mark_on_carrier(who, projector, mark)
-        turned = mxv(of(self._swung[projector], who), displacement)
-        shown = of(self._levers_stand.signs[projector], who) * turned
+        turned = mxv(among(self._swung[projector], who), displacement)
+        shown = among(self._levers_stand.signs[projector], who) * turned
         return np.where(length_of(displacement) <= self.variant.field_radius_mm, shown, np.nan)
 
     # --- levers, prisms, collars ----------------------------------------------------------------------
@@ -671,7 +475,7 @@ class Fleet:
     def _levers_stand(self) -> Levers:
         if self._levers is None:
             signs = {n: 1e3 * self._mirrored(carriers.polarity) for n, carriers in self._carriers.items()}
-            self._levers = Levers(self._straight(), signs, np.array([self._wheel_senses(axis) for axis in _AXES]))
+            self._levers = Levers(self._straight(), signs, np.array([self._wheel_senses(axis) for axis in AXES]))
         return self._levers
 
     def _straight(self) -> Truths:

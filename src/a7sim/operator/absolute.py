@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from a7sim.among import Who
 from a7sim.geometry import Array, length_of
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Who
 from a7sim.operator.job import ModelJob
 from a7sim.operator.levelling import MOST_ROUNDS, Control, Fit, Levelling, LevellingRound, Settings
 from a7sim.operator.seat import counter_value

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who, without
 from a7sim.geometry import Array
-from a7sim.operator.crew import Crew, Who, without
+from a7sim.operator.crew import Crew
 from a7sim.operator.eyes import Eyes
 from a7sim.operator.floating_mark import Clearing, FloatingMark, Judgement
 from a7sim.operator.hands import Hands, Truths

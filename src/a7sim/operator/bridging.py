@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from a7sim.among import Who, without
 from a7sim.geometry import Array
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Crew, NobodyGoesOn, Who, without
+from a7sim.operator.crew import Crew, NobodyGoesOn
 from a7sim.operator.interior import InteriorOrientations
 from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.line_hands import LineHands

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who
 from a7sim.geometry import Array
 from a7sim.manual import LEAST_COUNT
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Who
 from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import ModelJob
 from a7sim.operator.plate import Crosses, lie_of_plate, places_of, point_at_crosses, prints_of

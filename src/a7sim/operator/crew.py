@@ -6,6 +6,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who
 from a7sim.geometry import Array
 from a7sim.manual import POSITIONS_OF
 from a7sim.operator.dice import Dice, misread
@@ -15,30 +16,7 @@ from a7sim.operator.slips import OF_READINGS, Occasion, Slips
 from a7sim.operator.timesheet import Act, Timesheet
 from a7sim.scenario import Observer
 
-Who = npt.NDArray[np.intp]
-"""Indices ``(m,)`` of the sessions that act."""
-
 Asked = TypeVar("Asked", int, tuple[int, ...])
-
-
-def without(who: Who, others: Who) -> Who:
-    """Return those of some sessions that are not among others, in their order."""
-    if not who.size or not others.size:
-        return who
-    stays = np.ones(max(int(who.max()), int(others.max())) + 1, dtype=bool)
-    stays[others] = False
-    return np.asarray(who[stays[who]])
-
-
-def among(values: Array, who: Who) -> Array:
-    """Return the values ``(..., m)`` of some among those ``(..., sessions)`` of all."""
-    return values.take(who, axis=-1)
-
-
-def put(values: Array, who: Who, into: Array) -> None:
-    """Put values ``(k, m)`` of some among those ``(k, sessions)`` of all."""
-    for row, new in zip(into, values, strict=True):
-        row[who] = new
 
 
 class NobodyGoesOn(Exception):

@@ -14,9 +14,9 @@ from functools import partial
 
 import numpy as np
 
+from a7sim.among import Who, without
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, parallax_coefficients, rotation
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Who, without
 from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import RelativeOrientations, Rounds, assessed, merged, spread, stand_of, unknowns_of
 from a7sim.reduction import Stand

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from a7sim.among import Who, among, put, without
 from a7sim.geometry import Array
-from a7sim.operator.crew import Who, among, put, without
 from a7sim.operator.hands import Truths
 from a7sim.operator.levers import put_levers_right
 from a7sim.operator.seat import Seat, side

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who, among, put, without
 from a7sim.geometry import Array
-from a7sim.operator.crew import Who, among, put, without
 from a7sim.operator.eyes import MOST_LOOKS, Eyes, Watch
 from a7sim.operator.hands import Truths
 from a7sim.operator.levers import put_levers_right

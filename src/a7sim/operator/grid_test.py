@@ -6,10 +6,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from a7sim.among import Who
 from a7sim.geometry import GON, Array
 from a7sim.manual import Variant
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Crew, Who
+from a7sim.operator.crew import Crew
 from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.line_hands import LineHands

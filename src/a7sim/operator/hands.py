@@ -6,8 +6,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who
 from a7sim.geometry import Array
-from a7sim.operator.crew import Who
 
 Truths = npt.NDArray[np.bool_]
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who
 from a7sim.geometry import GON, Array
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Who
 from a7sim.reduction import PictureLie, Undetermined, picture_lie
 from a7sim.scenario import Camera
 

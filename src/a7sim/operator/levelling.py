@@ -12,10 +12,10 @@ from itertools import combinations
 
 import numpy as np
 
+from a7sim.among import Who
 from a7sim.geometry import GON, Array, angles_of, length_of, mxm, mxv, rotation
 from a7sim.manual import Variant
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Who
 from a7sim.operator.hands import Truths
 from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import spread

@@ -5,8 +5,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from a7sim.among import Who
 from a7sim.manual import RIGHT_FITTINGS, Variant
-from a7sim.operator.crew import Who
 from a7sim.operator.hands import Truths
 from a7sim.operator.seat import Seat
 

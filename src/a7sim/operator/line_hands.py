@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who
 from a7sim.geometry import Array
 from a7sim.link.headers import FITTING_NODES, header, short
 from a7sim.manual import NOT_VISIBLE, POSITIONS_OF
-from a7sim.operator.crew import Who
 from a7sim.operator.hands import Truths
 from a7sim.operator.person import Person
 

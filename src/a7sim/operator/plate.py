@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who
 from a7sim.geometry import Array
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Who
 from a7sim.operator.interior import fiducials_seen
 from a7sim.reduction import PlateLie, plane_fit, plate_lie
 from a7sim.scenario import Camera

@@ -7,10 +7,11 @@ from typing import overload
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who, without
 from a7sim.geometry import GON, Array
 from a7sim.manual import TILTS
 from a7sim.operator.bench import Bench
-from a7sim.operator.crew import NobodyGoesOn, Who, without
+from a7sim.operator.crew import NobodyGoesOn
 from a7sim.operator.hands import Truths
 from a7sim.operator.job import ModelJob
 from a7sim.operator.seat import wrapped

@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from a7sim.among import Who, among
 from a7sim.geometry import GON, Array, mxv, plane_rotation
 from a7sim.manual import LEAST_COUNT, VARIANTS, Variant
-from a7sim.operator.crew import Crew, Who, among
+from a7sim.operator.crew import Crew
 from a7sim.operator.hands import Hands, Truths
 from a7sim.operator.job import Job, ModelJob
 

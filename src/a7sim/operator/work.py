@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from a7sim.among import Who
 from a7sim.geometry import Array
 from a7sim.operator.absolute import OnGround, absolute_orientation_at
 from a7sim.operator.bench import Bench
 from a7sim.operator.centres import centre_of, observe_centre
-from a7sim.operator.crew import Crew, NobodyGoesOn, Who
+from a7sim.operator.crew import Crew, NobodyGoesOn
 from a7sim.operator.empirical import empirical_orientation, set_off
 from a7sim.operator.interior import InteriorOrientation, InteriorOrientations, interior_orientation
 from a7sim.operator.job import Job, ModelJob

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.among import Who
 from a7sim.geometry import Array
 from a7sim.instrument.fleet import Fleet
-from a7sim.operator.crew import Who
 from a7sim.operator.hands import Truths
 
 

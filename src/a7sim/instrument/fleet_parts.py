@@ -1,0 +1,205 @@
+"""What the plotters of a fleet are made of, each part held as arrays of all of them: carriages, drums, carriers.
+
+`who` are the indices ``(m,)`` of the instruments that are worked; what comes in and goes out has them as its last axis.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from a7sim.among import Who, among, put
+from a7sim.geometry import GON, Array, mxv, plane_rotation
+from a7sim.instrument.spindles import APPROXIMATIONS
+from a7sim.manual import COUNTER_DECIMALS, Variant
+from a7sim.scene.camera import fiducial_places
+from a7sim.scene.photograph import Photograph
+
+Truths = npt.NDArray[np.bool_]
+
+AXES = "XYZ"
+
+NEAR_A_TIE = 1e-6
+"""Of the last decimal."""
+
+
+def rounded(values: Array, decimals: int) -> Array:
+    """Return values rounded as the counters of one instrument round them: a tie by what the number exactly is.
+
+    Wheels turn by thousandths, so that ties are common; numpy scales before it rounds and would take some for halves.
+    """
+    scaled = values * 10.0**decimals
+    ties = np.abs(scaled - np.floor(scaled) - 0.5) < NEAR_A_TIE
+    nearest = np.rint(scaled) / 10.0**decimals
+    if ties.any():
+        nearest[ties] = [round(value, decimals) for value in values[ties].tolist()]
+    return np.asarray(nearest + 0.0)
+
+
+@dataclass(frozen=True)
+class Runouts:
+    """The errors of screws that repeat with every turn: amplitudes and phases ``(3, instruments)``, lead; mm."""
+
+    amplitude: Array
+    lead: float
+    phase: Array
+
+    def at(self, who: Who, position: Array) -> Array:
+        """Return by how much the nuts have gone further ``(3, m)`` than the turns say, mm."""
+        turns = 2.0 * math.pi * position / self.lead
+        return np.asarray(among(self.amplitude, who) * np.sin(turns + among(self.phase, who)))
+
+
+class Carriages:
+    """The carriages X, Y and Z of every instrument: where their spindles stand and where these bring them with play."""
+
+    def __init__(self, variant: Variant, play: Array, runouts: Runouts | None) -> None:
+        self._low, self._high = np.array([variant.carriages[axis] for axis in AXES]).T
+        self.at = np.repeat(np.array([[variant.carriages_at_rest[axis]] for axis in AXES]), play.size, axis=1)
+        self._shaft = self.at.copy()
+        self._half_play = play / 2.0
+        self._runouts = runouts
+
+    def position(self, who: Who) -> Array:
+        """Return where they really stand ``(3, m)``."""
+        position = among(self._shaft, who)
+        return position if self._runouts is None else position + self._runouts.at(who, position)
+
+    def position_free_of_runout(self, who: Who, place: Array) -> Array:
+        """Return where they would stand ``(3, m)`` without the errors that the turns of their screws repeat."""
+        position = place
+        if self._runouts is not None:
+            for _ in range(APPROXIMATIONS):
+                position = place - self._runouts.at(who, position)
+        return position
+
+    def put_at_end(self, axis: int, places: Array, within: float) -> Array:
+        """Return places ``(m,)`` of a carriage, the end of its range where they are so near it."""
+        at_end = np.clip(places, self._low[axis], self._high[axis])
+        return np.where(np.abs(at_end - places) <= within, at_end, places)
+
+    def allow(self, axis: int, places: Array) -> Truths:
+        """Return to which places ``(m,)`` a carriage can be run."""
+        return np.asarray((places >= self._low[axis] - 1e-9) & (places <= self._high[axis] + 1e-9))
+
+    def surely_allow(self, places: Array) -> bool:
+        """Return whether all places ``(k, m)`` of the first k carriages lie within their ranges."""
+        k = len(places)
+        return bool(((places >= self._low[:k, None]) & (places <= self._high[:k, None])).all())
+
+    def run_to(self, who: Who, first: int, places: Array) -> None:
+        """Run carriages, from a first one on, to places ``(k, m)`` that they allow."""
+        rows = slice(first, first + len(places))
+        half = self._half_play[who]
+        put(places, who, self.at[rows])
+        put(np.minimum(np.maximum(among(self._shaft[rows], who), places - half), places + half), who, self._shaft[rows])
+
+
+class Drums:
+    """A spindle of every instrument: what the drum shows, where the shaft follows it with play and setting error."""
+
+    def __init__(
+        self,
+        at: float,
+        low: float,
+        high: float,
+        endless: bool,
+        play: Array,
+        sigma: Array,
+        fault: Array,
+    ) -> None:
+        self.low, self.high, self.endless = low, high, endless
+        self.at = np.full(fault.shape, at)
+        self._shaft = self.at.copy()
+        self._error = np.zeros(fault.shape)
+        self._half_play, self._sigma, self._fault = play / 2.0, sigma, fault
+
+    def position(self, who: Who) -> Array:
+        """Return where the shafts really stand ``(m,)``."""
+        return np.asarray(self._shaft[who] + self._error[who] + self._fault[who])
+
+    def shown(self, who: Who) -> Array:
+        """Return what the counters show ``(m,)``."""
+        shown = rounded(self.at[who], COUNTER_DECIMALS)
+        return rounded(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
+
+    def allows(self, values: Array) -> Truths:
+        """Return which values the drum can be turned to."""
+        return np.asarray((values >= self.low - 1e-9) & (values <= self.high + 1e-9))
+
+    def after(self, who: Who, amounts: Array) -> Array:
+        """Return to what values ``(m,)`` the drums come when they are turned by so much."""
+        values = self.at[who] + amounts
+        return np.asarray(values % self.high if self.endless else values)
+
+    def turn_to(self, who: Who, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
+        """Turn the drums to values ``(m,)`` that they allow; with dice, by their counters (see `Spindle.turn_to`)."""
+        if self.endless:
+            values = values + self.high * np.round((self.at[who] - values) / self.high)
+        self.at[who] = values
+        half = self._half_play[who]
+        self._shaft[who] = np.minimum(np.maximum(self._shaft[who], values - half), values + half)
+        for session in who[self._sigma[who] > 0.0] if rngs else ():
+            self._error[session] = self._sigma[session] * rngs[session].standard_normal()
+
+
+class Carriers:
+    """A picture of the same name on a carrier of every instrument, each laid and centred in its own way."""
+
+    def __init__(self, photographs: Sequence[Photograph], laid: Array) -> None:
+        self.name = photographs[0].name
+        self.polarity = photographs[0].polarity
+        self.photographs = photographs
+        self.laid = laid
+        self.centring = np.zeros_like(laid)
+        self._turn = np.zeros((2, 2, laid.shape[1]))
+        self._shift = np.zeros((2, laid.shape[1]))
+        self._films: dict[str, Array] = {}
+        self._placed: dict[str, Array] = {}
+        self.centre(np.arange(laid.shape[1]), self.centring)
+
+    def centre(self, who: Who, values: Array) -> None:
+        """Shift and turn the pictures ``(3, m)``, mm and gon, from where they were laid."""
+        self.centring[:, who] = values
+        dx, dy, turn = self.laid[:, who] + values
+        self._turn[:, :, who] = plane_rotation(turn * GON)
+        self._shift[:, who] = dx, dy
+        self._placed.clear()
+
+    def point(self, who: Who, name: str) -> Array:
+        """Return where an image point lies on the carriers ``(2, m)``, nan where a picture has none such."""
+        placed = self._placed.get(name)
+        if placed is None:
+            placed = self._placed[name] = mxv(self._turn, self._film(name)) + self._shift
+        return among(placed, who)
+
+    def _film(self, name: str) -> Array:
+        """Return where an image point lies on the films ``(2, instruments)``."""
+        film = self._films.get(name)
+        if film is None:
+            nowhere = np.full(2, np.nan)
+            places = [photograph.points.get(name) for photograph in self.photographs]
+            columns = np.array([nowhere if place is None else place for place in places]).T
+            film = self._films[name] = np.ascontiguousarray(columns)
+        return film
+
+    def fiducial_displacements(self, who: Who) -> tuple[tuple[str, ...], Array]:
+        """Return names and displacements ``(2, n, m)`` of the fiducials from their collimating marks."""
+        fiducials = self.photographs[0].fiducials
+        names, calibrated = fiducial_places(self.photographs[0].camera)
+        marks = calibrated[:, [names.index(name) for name in fiducials.names]]
+        film = np.stack([self.photographs[session].fiducials.xy for session in who], axis=-1)
+        placed = np.einsum("ijm,jnm->inm", self._turn[:, :, who], film) + self._shift[:, None, who]
+        return fiducials.names, np.asarray(placed - marks[:, :, None])
+
+    def sketch(self, who: Who) -> dict[str, Array]:
+        """Return the places ``(2, m)`` of points on the paper prints, nan where a print has it not."""
+        names = dict.fromkeys(name for session in who for name in self.photographs[session].sketch.names)
+        nowhere = np.full(2, np.nan)
+        prints = [self.photographs[session].sketch for session in who]
+        places = {name: [each.get(name) for each in prints] for name in names}
+        return {
+            name: np.array([nowhere if place is None else place for place in each]).T for name, each in places.items()
+        }
