@@ -116,6 +116,25 @@ def test_what_cannot_be_read_is_said_in_one_sentence(typed, words, sentence):
     assert err.startswith(f"a7sim: {sentence}")
 
 
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"a = " + b"[" * 5000 + b"]" * 5000, "expected TOML, got a file that breaks its rules: tables within tables"),
+        (b"title = 'Z\xfcrich'", "line 1, column 11: expected UTF-8 text, got bytes that are none"),
+    ],
+    ids=["too deep", "not UTF-8"],
+)
+@pytest.mark.parametrize("words", [["run"], ["study"], ["train", "check"], ["console", "akwanga", "--keymap"]])
+def test_every_reader_of_toml_refuses_it_in_the_same_words(typed, tmp_path, words, content, sentence):
+    folder = tmp_path / "20-clouds"
+    folder.mkdir()
+    path = folder / "exercise.toml"
+    path.write_bytes(content)
+    code, _, err = typed(*words, folder if words[0] == "train" else path)
+    assert (code, err.count("\n")) == (2, 1)
+    assert str(path) in err and sentence in err
+
+
 @pytest.mark.parametrize("name", VERBS)
 def test_an_option_that_no_command_has_is_refused_by_all(typed, name):
     code, out, err = typed(*name.split(), "--nonsense")
