@@ -107,6 +107,12 @@ def test_every_command_that_has_a_document_prints_it_as_json():
         (["run", "a", "b"], "run: expected nothing more, got b"),
         (["run", "--out"], "expected a value after '--out', got none"),
         (["prepare", "--heights", "1"], "expected 2 values after '--heights', got fewer"),
+        (["train", "start", "1", "--script", "."], "--script: expected a file, got the folder '.'"),
+        (["train", "verify", "--journal", __file__], "--journal: expected a folder, got the file"),
+        (["train", "verify", "--journal", "nowhere"], "--journal: expected one that exists, got 'nowhere'"),
+        (["train", "start", "1", "--link", "localhost"], "--link: expected tcp://HOST:PORT, got 'localhost'"),
+        (["run", "/"], "/: expected a scenario file or one of a8-strip, "),
+        (["study", "/"], "/: expected the file of a study or one of a7-a8-comparator, "),
         (["completion", "tcsh"], "SHELL: expected one of bash, zsh, fish, got 'tcsh'"),
     ],
 )

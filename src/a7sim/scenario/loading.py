@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from a7sim.files import read_toml
+from a7sim.files import read_toml, what_is_at
 from a7sim.mistakes import Mistake
 from a7sim.scenario.references import mistakes_of_reference
 from a7sim.scenario.schema import Scenario
@@ -47,7 +47,7 @@ def find_scenario(name: str | Path) -> Path:
         if path.parent in (Path(), Path("scenarios")) and found.is_file():
             return found
     known = ", ".join(names_of("scenarios"))
-    raise ScenarioError(str(name), [f"expected a scenario file or one of {known}, found no such file"])
+    raise ScenarioError(str(name), [f"expected a scenario file or one of {known}, found {what_is_at(path)}"])
 
 
 def bare_name(name: str | Path) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 import a7sim
-from a7sim.files import read_toml
+from a7sim.files import read_toml, what_is_at
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
 from a7sim.scenario.validation import mistakes_of_form
@@ -92,7 +92,7 @@ def find_study(name: str | Path) -> Path:
         if path.parent in (Path(), Path("studies")) and found.is_file():
             return found
     known = ", ".join(sorted({file.stem for shelf in SHELVES for file in shelf.glob("*.toml")}))
-    raise StudyError(str(name)[:200], [f"expected the file of a study or one of {known}, found no such file"])
+    raise StudyError(str(name)[:200], [f"expected the file of a study or one of {known}, found {what_is_at(path)}"])
 
 
 def load_study(name: str | Path, replicates: int | None = None) -> Laid:
