@@ -107,6 +107,12 @@ def test_every_command_that_has_a_document_prints_it_as_json():
         (["run", "a", "b"], "run: expected nothing more, got b"),
         (["run", "--out"], "expected a value after '--out', got none"),
         (["prepare", "--heights", "1"], "expected 2 values after '--heights', got fewer"),
+        (["train", "start", "1", "--script", "."], "--script: expected a file, got the folder '.'"),
+        (["train", "verify", "--journal", __file__], "--journal: expected a folder, got the file"),
+        (["train", "verify", "--journal", "nowhere"], "--journal: expected one that exists, got 'nowhere'"),
+        (["train", "start", "1", "--link", "localhost"], "--link: expected tcp://HOST:PORT, got 'localhost'"),
+        (["run", "/"], "/: expected a scenario file or one of a8-strip, "),
+        (["study", "/"], "/: expected the file of a study or one of a7-a8-comparator, "),
         (["completion", "tcsh"], "SHELL: expected one of bash, zsh, fish, got 'tcsh'"),
     ],
 )
@@ -114,6 +120,25 @@ def test_what_cannot_be_read_is_said_in_one_sentence(typed, words, sentence):
     code, out, err = typed(*words)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"a7sim: {sentence}")
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"a = " + b"[" * 5000 + b"]" * 5000, "expected TOML, got a file that breaks its rules: tables within tables"),
+        (b"title = 'Z\xfcrich'", "line 1, column 11: expected UTF-8 text, got bytes that are none"),
+    ],
+    ids=["too deep", "not UTF-8"],
+)
+@pytest.mark.parametrize("words", [["run"], ["study"], ["train", "check"], ["console", "akwanga", "--keymap"]])
+def test_every_reader_of_toml_refuses_it_in_the_same_words(typed, tmp_path, words, content, sentence):
+    folder = tmp_path / "20-clouds"
+    folder.mkdir()
+    path = folder / "exercise.toml"
+    path.write_bytes(content)
+    code, _, err = typed(*words, folder if words[0] == "train" else path)
+    assert (code, err.count("\n")) == (2, 1)
+    assert str(path) in err and sentence in err
 
 
 @pytest.mark.parametrize("name", VERBS)

@@ -172,7 +172,7 @@ def test_a_deed_that_a_keymap_leaves_out_keeps_its_keys(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("[keys", "expected a keymap in TOML"),
+        ("[keys", "expected TOML"),
         ("[key]\n", "expected one table [keys], got key"),
         ('[keys]\nfly = "f"\n', "keys.fly: expected one of x_up"),
         ("[keys]\nrecord = 3\n", "keys.record: expected a key or a list of keys, got 3"),
@@ -192,7 +192,7 @@ def test_a_bad_keymap_is_one_sentence(content: str, words: str, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--keymap", "{folder}/none.toml"], "expected a keymap in TOML"),
+        (["--keymap", "{folder}/none.toml"], "expected a readable file"),
         (["nowhere"], "nowhere"),
         ([], "expected a terminal to sit at"),
         (["--drawing", "halves", "--theme", "dark"], "expected a terminal to sit at"),

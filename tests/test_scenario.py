@@ -190,6 +190,11 @@ def test_a_file_that_is_not_there_is_named_with_what_there_is():
         load_scenario("nowhere.toml")
 
 
+def test_a_folder_is_not_called_missing(tmp_path):
+    with pytest.raises(ScenarioError, match=r"expected a scenario file .*, found a folder"):
+        load_scenario(tmp_path)
+
+
 def test_broken_toml_is_named_with_its_line(tmp_path):
     path = tmp_path / "broken.toml"
     path.write_text('schema_version = 1\ntitle = "x\n', encoding="utf-8")

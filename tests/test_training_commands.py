@@ -201,7 +201,7 @@ def test_check_finds_an_exercise_that_does_not_hold(train, tmp_path):
 def test_served_anybodys_client_works_the_exercise(tmp_path):
     """Two consoles and a kill -9: what was done is there, and start goes on with it."""
     environment = {**os.environ, "A7SIM_HOME": str(tmp_path), "A7SIM_STUDENT": "ada"}
-    command = [sys.executable, "-m", "a7sim", "train", "start", "4", "--link", "tcp:127.0.0.1:0"]
+    command = [sys.executable, "-m", "a7sim", "train", "start", "4", "--link", "tcp://127.0.0.1:0"]
     for number in (1, 2):
         server = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
         try:

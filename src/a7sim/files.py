@@ -106,6 +106,11 @@ class Table:
         return value
 
 
+def what_is_at(path: Path) -> str:
+    """Return what is found where a file is looked for and there is none."""
+    return "a folder" if path.is_dir() else "no such file"
+
+
 def read_text(path: str | Path) -> str:
     """Return the text of a file. Raises Mistake with line and column for bytes that are none, and for long files."""
     path = Path(path)

@@ -1,12 +1,12 @@
 """Which key does what: the keys that the console comes with, and a person's own in TOML."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from textual.keys import Keys
 
+from a7sim.files import read_toml
 from a7sim.mistakes import Mistake
 
 Keymap = Mapping[str, tuple[str, ...]]
@@ -109,10 +109,7 @@ def sample() -> str:
 
 def load_keymap(path: Path) -> Keymap:
     """Return the keymap of a file; deeds it does not name keep their keys. Raises Mistake in one sentence."""
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise Mistake(f"{path}: expected a keymap in TOML: {error}") from error
+    content = read_toml(path)
     unknown = sorted(set(content) - {"keys"})
     table = content.get("keys", {})
     if unknown or not isinstance(table, dict):

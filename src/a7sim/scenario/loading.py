@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from a7sim.files import read_toml, what_is_at
 from a7sim.mistakes import Mistake
 from a7sim.scenario.references import mistakes_of_reference
 from a7sim.scenario.schema import Scenario
@@ -46,7 +47,7 @@ def find_scenario(name: str | Path) -> Path:
         if path.parent in (Path(), Path("scenarios")) and found.is_file():
             return found
     known = ", ".join(names_of("scenarios"))
-    raise ScenarioError(str(name), [f"expected a scenario file or one of {known}, found no such file"])
+    raise ScenarioError(str(name), [f"expected a scenario file or one of {known}, found {what_is_at(path)}"])
 
 
 def bare_name(name: str | Path) -> str:
@@ -66,12 +67,9 @@ def load_scenario(
     """
     path = find_scenario(name)
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError(str(path), [f"expected TOML, got a file that breaks its rules: {error}"]) from error
-    except OSError as error:
-        raise ScenarioError(str(path), [f"expected a readable file: {error.strerror}"]) from error
-    raw = _with_skill_as_table(raw)
+        raw = _with_skill_as_table(read_toml(path))
+    except Mistake as mistake:
+        raise ScenarioError(str(path), [str(mistake).removeprefix(str(path)).lstrip(":, ")]) from mistake
     for key, text in (overrides or {}).items():
         _set(raw, key, _value_of(text), f"--set {key}={text}")
     for key, value in (settings or {}).items():
@@ -144,7 +142,7 @@ def _value_of(text: str) -> Any:
     """Return a value as TOML says it, or the text itself."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         return text
 
 

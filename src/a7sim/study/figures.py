@@ -18,7 +18,6 @@ WIDTH_IN = 9.0
 """Of all figures, so that their letters are equally large on a page."""
 _INCHES_A_ROW, _INCHES_BESIDE, _INCHES_HIGH = 0.36, 1.2, 3.9
 _SIGNS = ((LEFT, "-"), (RIGHT, "-"), (TRUE, "-"), (LEFT, "--"), (RIGHT, "--"), (TRUE, "--"), (SOFT, "-"), (SOFT, "--"))
-_MARKS = "osD^vPX*"
 MOST_CELLS_DRAWN = 60
 """More than these cannot be told apart in a figure; tables have all."""
 _STEEP = 10.0

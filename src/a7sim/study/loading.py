@@ -1,6 +1,5 @@
 """Reading a study: every mistake in one sentence, before anything is worked."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -11,6 +10,7 @@ from typing import Any
 import msgspec
 
 import a7sim
+from a7sim.files import read_toml, what_is_at
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
 from a7sim.scenario.validation import mistakes_of_form
@@ -92,20 +92,16 @@ def find_study(name: str | Path) -> Path:
         if path.parent in (Path(), Path("studies")) and found.is_file():
             return found
     known = ", ".join(sorted({file.stem for shelf in SHELVES for file in shelf.glob("*.toml")}))
-    raise StudyError(str(name)[:200], [f"expected the file of a study or one of {known}, found no such file"])
+    raise StudyError(str(name)[:200], [f"expected the file of a study or one of {known}, found {what_is_at(path)}"])
 
 
 def load_study(name: str | Path, replicates: int | None = None) -> Laid:
-    """Return a study ready to be worked, with other replicates if given. Raises StudyError."""
+    """Return a study ready to be worked, with other replicates if given. Raises Mistake."""
     path = find_study(name)
-    source = str(path)
-    try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise StudyError(source, [f"expected TOML, got a file that breaks its rules: {error}"]) from error
+    raw = read_toml(path)
     if replicates is not None:
         raw["replicates"] = replicates
-    return study_of(raw, path.parent, source)
+    return study_of(raw, path.parent, str(path))
 
 
 def study_of(raw: Mapping[str, Any], folder: Path, source: str = "study") -> Laid:

@@ -170,7 +170,9 @@ class Progress:
         )
         if not found:
             at = f" at {exercise}" if exercise else ""
-            raise Mistake(f"{student}: expected an attempt{at}, found none: a7sim train start {exercise or 'EXERCISE'}")
+            raise Mistake(
+                f"student {student}: expected an attempt{at}, found none: a7sim train start {exercise or 'EXERCISE'}"
+            )
         return found[-1]
 
     def attempts(self, student: str | None = None) -> list[Attempt]:

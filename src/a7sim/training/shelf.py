@@ -1,12 +1,12 @@
 """Finding and reading exercises: those that come with a7sim, and folders of one's own."""
 
-import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from a7sim.files import read_toml
 from a7sim.mistakes import Mistake
 from a7sim.scenario.validation import mistakes_of_form
 from a7sim.shelves import shelves_of
@@ -48,14 +48,9 @@ def find_exercise(name: str) -> Shelved:
 
 
 def read_exercise(folder: Path) -> Shelved:
-    """Return the exercise in a folder. Raises ExerciseError, which names every mistake at once."""
+    """Return the exercise in a folder. Raises Mistake, which names every mistake at once."""
     path = folder / FILE
-    try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ExerciseError(f"{path}: expected TOML, got a file that breaks its rules: {error}") from error
-    except OSError as error:
-        raise ExerciseError(f"{path}: expected the file of an exercise: {error.strerror}") from error
+    raw = read_toml(path)
     mistakes = list(mistakes_of_form(raw, _expected()))
     if not mistakes:
         exercise = msgspec.convert(raw, Exercise)

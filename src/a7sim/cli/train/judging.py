@@ -27,7 +27,7 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
 @click.option(
     "--journal",
     "folders",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=click.Path(path_type=Path, file_okay=False, exists=True),
     multiple=True,
     help="Grade the attempts handed in as a folder, or in its folders; nothing is recorded. May be repeated.",
 )

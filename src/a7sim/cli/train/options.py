@@ -30,11 +30,6 @@ _STUDENT = click.option(
 )
 
 
-def of_a_home(command: Command) -> Command:
-    """Add --home."""
-    return _HOME(command)
-
-
 def of_a_student(command: Command) -> Command:
     """Add --home and --student."""
     return _HOME(_STUDENT(command))

@@ -1,5 +1,6 @@
 """`a7sim train start`: sit down at an exercise, play a script of it, or serve it."""
 
+import re
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -39,8 +40,8 @@ EXAMINATION = "exam"
 @click.option("--anew", is_flag=True, help="Begin anew where an attempt is under way; that one is kept.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draws other photographs than your own.")
 @click.option("--script", type=click.Path(path_type=Path, dir_okay=False), help="Do it by a script (.a7s).")
-@click.option("--link", metavar="tcp:HOST:PORT", help="Serve it there for any client instead of opening the console.")
-@click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp:{USUAL}.")
+@click.option("--link", metavar="tcp://HOST:PORT", help="Serve it there for any client instead of opening the console.")
+@click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp://{USUAL}.")
 @click.option("--plain", is_flag=True, help="The console in words, for screen readers.")
 @of_a_student
 def start_(
@@ -105,10 +106,10 @@ def _entered(shelved: Shelved, attempt: Attempt) -> AbstractContextManager[Room]
 
 
 def _address(text: str) -> Address:
-    kind, colon, address = text.partition(":")
-    if kind != "tcp" or not colon:
-        raise Mistake(f"--link: expected tcp:HOST:PORT, got {text!r}")
-    found = address_of(address, "--link")
+    url = re.fullmatch("tcp:(//)?(?P<address>.+)", text)
+    if not url:
+        raise Mistake(f"--link: expected tcp://HOST:PORT, got {text!r}")
+    found = address_of(url["address"], "--link")
     if not found.loopback:
         raise Mistake(f"--link: expected an address of this machine alone, got {found}")
     return found
