@@ -31,8 +31,8 @@ SURROUNDINGS = {
     "versions": (("CPython", "3.11.7"), ("numpy", "2.4.6")),
 }
 
-HELPERS = {"echoes", "round_trips", "bench"}
-"""Programs that measure nothing by themselves."""
+HELPERS = {"echoes", "round_trips", "bench", "mutants"}
+"""Programs that measure nothing by themselves, or measure the tests."""
 
 
 def page_of(*outcomes, load=0.1, full=False):

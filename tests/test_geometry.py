@@ -18,6 +18,7 @@ from a7sim.geometry import (
     near_vertical_parallax_coefficients,
     parallax_coefficients,
     ray_of,
+    refraction_constant,
     rotation,
     stereoscopic_intersection,
     transposed,
@@ -83,6 +84,21 @@ def test_turn_of_is_the_angle_of_a_rotation(angle, about):
 
 def test_angle_between_is_exact_for_small_angles():
     assert angle_between(np.array([1.0, 0.0, 0.0]), np.array([1.0, 1e-9, 0.0])) == pytest.approx(1e-9, rel=1e-9)
+
+
+def test_angles_between_many_vectors_are_those_between_each_two():
+    first, second = np.random.default_rng(2).standard_normal((2, 3, 5))
+    each = [angle_between(u, v) for u, v in zip(first.T, second.T, strict=True)]
+    np.testing.assert_allclose(angle_between(first, second), each, rtol=1e-14)
+
+
+@pytest.mark.parametrize("height", [4000.0, 6000.0, 9000.0])
+def test_bertrams_refraction_over_the_sea_is_that_of_a_ray_through_the_standard_atmosphere(height):
+    """A ray bends where the refractive index falls; n - 1 is 2.26e-4 times the density in kg/m3 (ICAO)."""
+    z = np.linspace(0.0, height, 2001)
+    n = 1.0 + 2.26e-4 * 1.225 * (1.0 - 22.558e-6 * z) ** 4.2559
+    bending = np.trapezoid(-np.gradient(n, z) * z, z) / height
+    assert refraction_constant(height, 0.0) == pytest.approx(bending, rel=0.1)
 
 
 @given(angles, pictures, st.floats(98.0, 215.0), st.floats(-490.0, -140.0))

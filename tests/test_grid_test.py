@@ -105,6 +105,11 @@ def test_exact_readings_give_the_faults_back(shares, c, levels):
     assert {name: float(error) for name, error in found.errors.items()} == pytest.approx(off, abs=1e-6)
 
 
+def test_a_projector_that_is_as_its_counters_show_is_tested_in_one_round():
+    found = grid_test(CROSSES, readings_of(faultless())[..., 0], LEVELS, Elements(152.68))
+    assert found.iterations == 1
+
+
 def test_s0_is_the_pointing_error_put_in_and_the_sigmas_are_the_scatter():
     found = grid_test(CROSSES, readings_of(faultless(), noise=0.005, batch=400), LEVELS, Elements(152.68))
     assert np.sqrt((found.s0**2).mean()) == pytest.approx(0.005, rel=0.02)

@@ -76,6 +76,7 @@ NUMBERS = [
 WORDS = [
     ("PROJ1:PHI MIN;PHI?;PHI mAx;PHI?;PHI default;PHI?", "70.00;106.00;100.00", []),
     ("PROJ1:PHI? MIN;PHI? maximum;PHI? DEF;PHI?", "70.00;106.00;100.00;100.00", []),
+    ("PROJ1:PHI minimum;PHI?;PHI MAXIMUM;PHI?;PHI Default;PHI?", "70.00;106.00;100.00", []),
     ("PROJ1:PHI MINI", "", [-104]),
     ("PROJ1:PHI? MINI", "", [-224]),
     ("PROJ1:PHI 'MIN'", "", [-104]),
@@ -108,6 +109,18 @@ def test_a_plain_query_is_answered_the_same_whether_anybody_listens():
             if query.endswith("?"):
                 assert (query, quick.say(query)) == (query, heard.say(query))
                 assert queue(quick) == queue(heard)
+
+
+def test_a_listener_hears_a_line_whole_but_for_what_was_given_as_a_token():
+    door = guarded()
+    door.desk.listener = (heard := []).append
+    door.say("""SYST:LOG "ours""; yours";*OPC?;:SYST:LOGIN 'heerbrugg';*OPC?""")
+    door.say("SYST:LOG heerbrugg")
+    assert [event.text for event in heard if event.direction == ">"] == [
+        'SYST:LOG "(not the token)";*OPC?;:SYST:LOGIN "(the token)";*OPC?',
+        "SYST:LOG (kept secret)",
+    ]
+    assert [event.text for event in heard if event.direction == "<"] == ["1"]
 
 
 def guarded() -> Door:

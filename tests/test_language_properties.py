@@ -77,6 +77,7 @@ def test_a_query_gives_one_reply_or_one_error_and_a_command_no_reply(unit):
     else:
         assert reply == b""
         assert errors <= 1
+    assert all(";" in each for each in door.engine.errors), "an error says what was expected or what came"
 
 
 @quick

@@ -12,7 +12,7 @@ from a7sim.reduction import Stand, Undetermined, element_corrections
 from a7sim.reduction.coplanarity import relative_orientation
 from a7sim.reduction.hallert import orientation_by_parallaxes, six_point_corrections
 from a7sim.reduction.modelling import a8_model_coordinates, model_coordinates
-from a7sim.reduction.relative_poses import relative_poses
+from a7sim.reduction.relative_poses import _facing, relative_poses
 from a7sim.reduction.schut import orientation_by_schut
 from a7sim.reduction.snooping import snooped_orientation, standardised_residuals
 
@@ -307,6 +307,20 @@ def test_pairs_from_near_and_from_far_in_one_batch_are_its_members():
         np.testing.assert_allclose(found.rotations[..., at], one.rotations, atol=1e-9)
         np.testing.assert_allclose(found.s0[at], one.s0, rtol=1e-6)
         assert found.iterations[at] == one.iterations
+
+
+@pytest.mark.parametrize("over", [1.0, -1.0])
+@pytest.mark.parametrize("reversed_", [1.0, -1.0])
+def test_of_four_poses_with_coplanar_rays_the_one_with_the_points_before_both_cameras_is_taken(over, reversed_):
+    points = np.concatenate([BASE * NINE, np.full((1, 9), -C)])
+    rays = np.array([points, points - np.array([BASE, 0.0, 0.0])[:, None]])
+    true = np.array([np.eye(3), np.eye(3)])
+    pose = true.copy()
+    pose[1, 1:] *= over
+    pose[:, :2] *= reversed_
+    found, before_both = _facing(pose, np.einsum("cij,cjn->cin", pose, rays))
+    np.testing.assert_array_equal(found, true)
+    assert before_both
 
 
 def test_photographs_turned_in_their_plane_are_oriented_too():

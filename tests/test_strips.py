@@ -102,6 +102,17 @@ def test_a_batch_of_similarities_equals_its_members_in_any_order_of_points(seed)
         np.testing.assert_allclose(together.translation[:, i], one.translation, atol=1e-8)
 
 
+@pytest.mark.parametrize("solved", [similarity_by_iteration, similarity_by_quaternion])
+def test_s0_is_that_of_the_weighted_residuals_computed_minus_given(solved):
+    rng = np.random.default_rng(6)
+    points, targets = rng.standard_normal((3, 8)), rng.standard_normal((3, 8))
+    weights = rng.uniform(0.5, 2.0, 8)
+    found = solved(points, targets, weights if solved is similarity_by_quaternion else np.tile(weights, (3, 1)))
+    residuals = found.scale * found.rotation @ points + found.translation[:, None] - targets
+    np.testing.assert_allclose(found.adjustment.residuals, residuals.reshape(-1), atol=1e-9)
+    assert found.s0 == pytest.approx(np.sqrt((weights * residuals**2).sum() / (3 * 8 - 7)), rel=1e-9)
+
+
 def test_a_model_upside_down_is_turned_over():
     points = np.array([[0, 0, -1], [1, 0, 0], [0, 2, 0], [3, 3, 1.0]]).T
     targets = np.diag([1.0, -1.0, -1.0]) @ points
@@ -116,6 +127,8 @@ def test_two_points_or_points_in_a_line_make_no_similarity(solved):
             solved(points, 2.0 * points + 5.0)
     with pytest.raises(Undetermined):
         solved(np.stack([line, line], axis=-1), np.stack([line, line], axis=-1))
+    with pytest.raises(Undetermined, match="apart from each other"):
+        solved(np.zeros((3, 4)), line)
 
 
 # --- real strips --------------------------------------------------------------------------------------------------
@@ -344,7 +357,7 @@ def test_models_that_make_no_strip_are_refused():
     assert [model.name for model in in_order([models[2], models[0], models[1]])] == ["2-3", "1-2", "0-1"]
     with pytest.raises(Mistake, match="in common"):
         formed_strip([models[0], models[1], models[3]])
-    with pytest.raises(Mistake, match="every model once"):
+    with pytest.raises(Mistake, match="every model once, got model 0-1 twice"):
         formed_strip([models[0], models[0]])
     few = Model("few", ("1:centre", "1a", "9z"), rng.standard_normal((3, 3)))
     with pytest.raises(Mistake, match="at least 3 common points"):
@@ -397,6 +410,24 @@ def test_left_handed_axes_are_warned_of_with_and_without_centres(partial):
     for model in (tilted_model(rng, points), tilted_model(rng, {**points, **centres})):
         assert absolute_orientation(model, ground).warnings == ()
         assert any("left-handed" in text for text in absolute_orientation(model, swapped).warnings)
+
+
+def test_one_model_of_a_batch_is_warned_of_as_if_it_were_alone():
+    rng = np.random.default_rng(7)
+    points, _ = flight(rng, photographs=4)
+    ground = grounded(points, lambda name: "control")
+    sound = tilted_model(rng, points)
+    assert absolute_orientation(sound, ground).warnings == ()
+    for odd in (sound.coordinates[[1, 0, 2]], sound.coordinates * np.array([1.0, 0.02, 1.0])[:, None]):
+        alone = absolute_orientation(Model("m", sound.points, odd), ground).warnings
+        both = Model("m", sound.points, np.stack([sound.coordinates, odd, 2.0 * sound.coordinates], axis=-1))
+        assert alone
+        assert absolute_orientation(both, ground).warnings == alone
+
+
+def test_the_largest_residual_is_of_those_there_are():
+    residuals = np.array([[1.0, np.nan, -3.0], [np.nan, np.nan, np.nan], [0.5, 0.25, 0.0]])
+    np.testing.assert_array_equal(largest(residuals), [3.0, np.nan, 0.5])
 
 
 def test_ground_points_the_model_has_not_are_named_and_wrong_roles_refused():
@@ -502,6 +533,8 @@ def test_three_bands_of_control_do_not_carry_the_third_degree():
     assert strip_adjustment(model, ground, 2).height.redundancy == 4
     with pytest.raises(Undetermined):
         strip_adjustment(model, ground, 3)
+    with pytest.raises(Undetermined, match="apart from each other"):
+        strip_axis(Model("heap", names, 0.0 * places))
     with pytest.raises(Undetermined, match="at least 5"):
         strip_adjustment(model, Ground(names[:4], places[:, :4], ("control",) * 4), 2)
     with pytest.raises(Mistake, match="degree"):
@@ -573,12 +606,19 @@ def test_blocks_that_hang_loose_are_refused():
     rng = np.random.default_rng(2)
     models, ground = block_of(rng, 3, 1)
     only = Ground(ground.points, ground.coordinates, ("check",) * len(ground.points))
-    with pytest.raises(Undetermined):
+    with pytest.raises(Undetermined, match="two control points in plan"):
         block_adjustment(models, only)
     apart = Model("apart", ("90", "91", "92", "93"), rng.standard_normal((3, 4)))
     again = Model("again", ("90", "91", "92", "93"), rng.standard_normal((3, 4)))
-    with pytest.raises(Undetermined):
+    with pytest.raises(Undetermined, match=r"^the ties and the control leave"):
         block_adjustment([*models, apart, again], ground)
+    heap = Model("heap", models[2].points, np.zeros_like(models[2].coordinates))
+    with pytest.raises(Undetermined, match=r"^44 equations leave some of 22 unknowns"):
+        block_adjustment([*models[:2], heap], ground)
+    three = Model("three", ("a", "b", "c"), rng.standard_normal((3, 3)))
+    heaped = Ground(("a", "b", "c"), np.zeros((3, 3)), ("control", "control", "height"))
+    with pytest.raises(Undetermined, match="extent in plan"):
+        block_adjustment([three], heaped)
     with pytest.raises(Mistake, match="500"):
         block_adjustment([], ground)
 
