@@ -62,7 +62,7 @@ def without_alternatives(line):
 
 
 def taken(words, line):
-    """Let click read a command without doing it."""
+    """Let click read a command without doing it; what a reader has in their folder is not there."""
     command, context = cli, click.Context(cli, info_name="a7sim")
     while isinstance(command, click.Group):
         name, command, words = command.resolve_command(context, words)
@@ -73,6 +73,8 @@ def taken(words, line):
     except click.exceptions.Exit:
         assert "--help" in line or "--version" in line
     except click.ClickException as refused:
+        if refused.format_message().endswith("does not exist."):
+            return
         raise AssertionError(f"{line}: {refused.format_message()}") from refused
 
 
