@@ -5,15 +5,15 @@ import fcntl
 import os
 import termios
 import tty
-from contextlib import suppress
 from pathlib import Path
 
 from a7sim.link.conversation import Conversation
+from a7sim.link.courtesy import Courtesy
 from a7sim.link.wires import MOST_UNREAD, Host
 from a7sim.mistakes import Mistake
 
-READS_IN_A_ROW = 8
-"""A client that was answered has often asked again before the loop comes round."""
+LOOKS = 8
+"""A client that was answered mostly asks again at once: so often the wire looks before it sleeps until it is woken."""
 
 LARGEST_READ = 4096
 """Bytes that a terminal of Linux holds."""
@@ -36,6 +36,7 @@ class PtyWire:
         self._unsent = bytearray()
         self._clogged = False
         self._reading = False
+        self._courtesy = Courtesy()
         self._loop = asyncio.get_running_loop()
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
@@ -71,9 +72,14 @@ class PtyWire:
 
     def _readable(self) -> None:
         near, received = self._near, self._conversation.received
-        with suppress(BlockingIOError, InterruptedError):
-            for _ in range(READS_IN_A_ROW):
-                received(os.read(near, LARGEST_READ))
+        for _ in range(LOOKS):
+            try:
+                data = os.read(near, LARGEST_READ)
+            except (BlockingIOError, InterruptedError):
+                if not self._courtesy.yielded():
+                    return
+            else:
+                received(data)
                 if not self._reading:
                     return
 

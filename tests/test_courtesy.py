@@ -1,0 +1,48 @@
+"""A server that looks again before it sleeps gives way to its client, and to nobody else for long."""
+
+import pytest
+
+from a7sim.link import courtesy
+
+
+class Machine:
+    """A processor that is given back after `away` seconds."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.away = 1e-5
+        self.given_up = 0
+
+    def give_up(self) -> None:
+        self.given_up += 1
+        self.now += self.away
+
+
+@pytest.fixture
+def machine(monkeypatch):
+    machine = Machine()
+    monkeypatch.setattr(courtesy, "monotonic", lambda: machine.now)
+    monkeypatch.setattr(courtesy.os, "sched_yield", machine.give_up)
+    return machine
+
+
+def test_the_processor_is_given_up_as_long_as_it_comes_back_soon(machine):
+    server = courtesy.Courtesy()
+    assert all(server.yielded() for _ in range(100))
+    assert machine.given_up == 100
+
+
+def test_where_others_want_it_it_is_kept_for_a_second(machine):
+    server = courtesy.Courtesy()
+    machine.away = 3e-3
+    assert [server.yielded() for _ in range(100)] == [True] * 2 + [False] * 98
+    machine.now += courtesy.UNTIL_ALONE
+    assert server.yielded()
+
+
+def test_being_away_once_says_nothing(machine):
+    """A server that was stopped, or had to wait for a page, is not in company."""
+    server = courtesy.Courtesy()
+    for away in [3e-3, 1e-5] * 50:
+        machine.away = away
+        assert server.yielded()
