@@ -66,7 +66,9 @@ def _how(document: Document) -> Iterator[Part]:
         "bootstrap. Probabilities of comparisons, and of all tests of claims together, are adjusted for their number "
         "(Holm). Effects are standardised by the spread of one replicate; below 0.2, and correlations below 0.1, they "
         "are taken for too small to matter (Cohen). In the analysis of variance replicates are blocks: each effect is "
-        "tested against its own interaction with them, with the freedom of Greenhouse and Geisser."
+        "tested against its own interaction with them, with the freedom of Greenhouse and Geisser. It asks of all "
+        "levels of a factor at once and is not adjusted; a claim asks of two sets of levels and is: of few replicates "
+        "the one may say that a factor matters and the other not yet."
     )
     if document["strips"]:
         yield Paragraph(
