@@ -103,7 +103,8 @@ class Fleet:
         return np.array([value(condition) for condition in self._conditions])
 
     def _of_projectors(self, n: int, values: Callable[[ProjectorCondition], Sequence[float]]) -> Array:
-        return np.array([values(each.left if n == 1 else each.right) for each in self._conditions]).T
+        each_row = np.array([values(each.left if n == 1 else each.right) for each in self._conditions])
+        return np.ascontiguousarray(each_row.T)
 
     def _local_errors(self, n: int) -> Array | None:
         found = [local_coefficients(each.left if n == 1 else each.right) for each in self._conditions]
@@ -268,16 +269,19 @@ class Fleet:
         before = among(self._carriages.at, who)
         steps = among(self._levers_stand.senses[:k], who) * amounts / self._units[:k, None]
         after = before[:k] + steps
-        if self._no_slips and self._carriages.surely_allow(after) and self._rods_surely_can(who, before, after):
-            self._carriages.run_to(who, 0, after)
-            return
+        if self._no_slips and who.size:
+            low, high = after.min(axis=1), after.max(axis=1)
+            if self._carriages.surely_allow(low, high) and self._rods_surely_can(who, before, low, high):
+                self._carriages.run_to(who, 0, after)
+                return
         for row, each in enumerate(after):
             self._move(who, row, each)
 
     def _move(self, who: Who, row: int, positions: Array, silently: bool = False) -> Truths:
         positions = self._carriages.put_at_end(row, positions, self._half_a_count(row))
-        mark = among(self._carriages.at, who)
-        before, mark[row] = mark[row].copy(), positions
+        before = self._carriages.at[row, who]
+        mark = among(self._carriages.at, who).copy()
+        mark[row] = positions
         allowed = self._carriages.allow(row, positions) & self._rods_can(who, mark=mark)
         if not silently:
             self._refuse(who[~allowed], f"Data out of range;{AXES[row]}: beyond its range or that of the rods")
@@ -316,14 +320,19 @@ class Fleet:
                 able &= ~beyond | (then <= np.arctan2(*_reach(told, now)) / GON)
         return able
 
-    def _rods_surely_can(self, who: Who, before: Array, after: Array) -> bool:
-        """Return whether carriages can go from marks ``(3, m)`` to others ``(k, m)``, one axis after the other."""
-        both = np.stack([before, before])
-        both[1, : len(after)] = after
+    def _rods_surely_can(self, who: Who, before: Array, low: Array, high: Array) -> bool:
+        """Return whether all carriages can go from marks ``(3, m)`` to between others ``(k,)``, one axis after another.
+
+        Looks at the box that holds all marks, seen from that which holds all centres.
+        """
+        k = len(low)
+        lowest, highest = before.min(axis=1), before.max(axis=1)
+        lowest[:k], highest[:k] = np.minimum(lowest[:k], low), np.maximum(highest[:k], high)
         for n in (1, 2):
-            away = both - among(self._told[n], who)
-            x, y = np.abs(away[:, :2]).max(axis=0)
-            if not (np.hypot(x, y) < self._surely_within * -away[:, 2].max(axis=0)).all():
+            told = among(self._told[n], who)
+            least, most = told.min(axis=1), told.max(axis=1)
+            x, y, _ = np.maximum(highest - least, most - lowest)
+            if not math.hypot(x, y) < self._surely_within * (least[2] - highest[2]):
                 return False
         return True
 
@@ -344,9 +353,9 @@ class Fleet:
         def drum(name: str) -> Array:
             if name in elements:
                 return elements[name]
-            return self._drums[name].at[who] if name in self._drums else np.zeros(who.size)
+            return among(self._drums[name].at, who) if name in self._drums else np.zeros(who.size)
 
-        inside = self._base_inside[who] if base_inside is None else base_inside
+        inside = among(self._base_inside, who) if base_inside is None else base_inside
         x, y, z = self._shares(n, inside) * drum("bx"), -drum(f"by{n}"), drum(f"bz{n}")
         if "common_phi" in self._drums:
             tilt = (drum("common_phi") - self.variant.elements["common_phi"].zero) * GON
@@ -403,7 +412,7 @@ class Fleet:
     def _shift(self, who: Who, n: int) -> None:
         """Put the projectors, turned as they stand, where the base and by and bz bring them."""
         base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
-        place = place_of_centre(self._shares(n, self._base_inside[who]), *base)
+        place = place_of_centre(self._shares(n, among(self._base_inside, who)), *base)
         centre = place + among(self._missed[n], who) - among(self._axes[n], who)
         if "common_phi" in self._drums:
             centre = mxv(among(self._common, who), centre)
@@ -453,7 +462,7 @@ class Fleet:
         return np.concatenate([self._in_eyepiece(who, eye, name, mark) for eye in (1, 2)])
 
     def _in_eyepiece(self, who: Who, eye: int, name: str, mark: Array) -> Array:
-        straight = self._levers_stand.straight[who]
+        straight = among(self._levers_stand.straight, who)
         seen = np.full((2, who.size), np.nan)
         for projector in (1, 2):
             looking = straight == (projector == eye)

@@ -109,7 +109,7 @@ class Eyes:
                 self._look_again_with_levers_right(who, hand, point, seen, lost)
                 self._ran_away(who[lost], hand, point)
                 who, seen = who[~lost], seen[:, ~lost]
-            steps = (seen + among(errors, who)) * (1e-3 * seat.z[who] / seat.c)
+            steps = (seen + among(errors, who)) * (1e-3 * among(seat.z, who) / seat.c)
             moving = ~(np.abs(steps) < self.at_rest_mm(looks)).all(axis=0)
             who = who[moving]
             if not who.size:

@@ -103,9 +103,9 @@ class FloatingMark:
             if looks == 0:
                 put(readings, who, begun)
             x, y, _ = seat.place(who, readings)
-            z, bx = seat.z[who], seat.bx(who)
+            z, bx = among(seat.z, who), seat.bx(who)
             scale = 1e-3 * z / seat.c
-            rise = (seen[2] + judgement.height[who]) * scale * z / np.abs(bx)
+            rise = (seen[2] + among(judgement.height, who)) * scale * z / np.abs(bx)
             rise = np.minimum(np.maximum(rise, -LONGEST_RISE_MM), LONGEST_RISE_MM)
             along_the_rays = -rise / z * np.array([x - bx / 2.0, y])
             steps = (seen[:2] + among(judgement.plan, who)) * scale + along_the_rays
@@ -186,8 +186,8 @@ class _Drum:
 
     def to_turn(self, who: Who, parallax: Array, scale: Array, at_rest: float) -> tuple[Array, Truths]:
         """Return by how much to turn, nothing where it is clear, and where that is out of range ``(m,)``."""
-        left = parallax + self._clearing.error[who] * scale
-        amounts = np.where(np.abs(left) < at_rest, 0.0, -left / self._clearing.gain[who])
+        left = parallax + among(self._clearing.error, who) * scale
+        amounts = np.where(np.abs(left) < at_rest, 0.0, -left / among(self._clearing.gain, who))
         if self._element.endless:
             return amounts, np.zeros(who.size, dtype=bool)
         wanted = self._seat.in_hand(who, self._clearing.element) + amounts

@@ -223,14 +223,14 @@ class Seat:
 
     def bx(self, who: Who) -> Array:
         """Return the base as it is set ``(m,)``, mm."""
-        return self._settings["bx"][who]
+        return among(self._settings["bx"], who)
 
     # --- places ---------------------------------------------------------------------------------------
 
     def counters(self, who: Who) -> Array:
         """Read X, Y and Z ``(3, m)``, and bear in mind how deep the mark stands."""
         readings = self.hands.counters(who)
-        self.z[who] = (self._offset[2][who] - readings[2]) / self.units_per_mm
+        self.z[who] = (among(self._offset[2], who) - readings[2]) / self.units_per_mm
         return readings
 
     def levels_shown(self, who: Who, levels: Sequence[float]) -> Array:

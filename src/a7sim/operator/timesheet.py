@@ -37,7 +37,9 @@ class Timesheet:
         """Write down that those who act spent so many seconds each."""
         activity = _OF_ACT.get(act) or _OF_FORM.get(form, form)
         for column, name in ((self.by_activity, activity), (self.by_act, act)):
-            column.setdefault(name, np.zeros(self._sessions))[who] += seconds
+            if name not in column:
+                column[name] = np.zeros(self._sessions)
+            column[name][who] += seconds
 
     def activities_of(self, session: int) -> dict[str, float]:
         """Return the seconds of one session by activity, in the order in which they were first taken up."""
