@@ -46,6 +46,28 @@ class Levers:
     """Of the handwheels X, Y and Z ``(3, instruments)``."""
 
 
+_OF_A_BUNDLE = 19
+"""Numbers that make the bundle of a projector."""
+
+
+class Bundles:
+    """The bundles of the projectors of many instruments, in rows of one array, so that a look picks them out once."""
+
+    def __init__(self, rows: Array) -> None:
+        self._rows = rows
+        sessions = rows.shape[-1]
+        self.turned = rows[:9].reshape(3, 3, sessions)
+        self.centre = rows[9:12]
+        self.swung = rows[12:16].reshape(2, 2, sessions)
+        """By the swing of the projector, which its picture is seen with."""
+        self.principal_point = rows[16:18]
+        self.c = rows[18]
+
+    def among(self, who: Who) -> "Bundles":
+        """Return those of some, to be read at once and not written to."""
+        return self if who.size == self.c.size else Bundles(among(self._rows, who))
+
+
 class Fleet:
     """Plotters worked by their handles, all together. Lengths in mm, angles in gon, as the counters count them."""
 
@@ -75,9 +97,6 @@ class Fleet:
         self._offsets = np.empty((len(AXES), self.instruments))
         self._reset_offsets(everywhere)
         self._guides = np.stack([guides_of(condition) for condition in conditions], axis=-1)
-        self._principal_points = {
-            n: 1e-3 * self._of_projectors(n, lambda projector: projector.principal_point_um) for n in (1, 2)
-        }
         self._rods = {n: self._where_any(1e-3 * self._of_projectors(n, lambda each: each.rod_um)) for n in (1, 2)}
         self._local = {n: self._local_errors(n) for n in (1, 2)}
         self._axes = {n: 1e-3 * self._of_projectors(n, lambda projector: projector.axes_um) for n in (1, 2)}
@@ -86,10 +105,9 @@ class Fleet:
         self._fittings = {name: np.zeros(self.instruments, dtype=np.intp) for name in POSITIONS_OF}
         self._levers: Levers | None = None
         self._put_right_fittings(everywhere)
-        self._centres = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
-        self._turned = {n: np.zeros((3, 3, self.instruments)) for n in (1, 2)}
-        self._swung = {n: np.zeros((2, 2, self.instruments)) for n in (1, 2)}
-        """By the swing of a projector, which its picture is seen with."""
+        self._bundles = {n: Bundles(np.zeros((_OF_A_BUNDLE, self.instruments))) for n in (1, 2)}
+        for n, each in self._bundles.items():
+            each.principal_point[:] = 1e-3 * self._of_projectors(n, lambda projector: projector.principal_point_um)
         self._missed = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
         """By how much the axes miss the centre, in the frame (see `pose`)."""
         self._common = np.zeros((3, 3, self.instruments))
@@ -405,8 +423,10 @@ class Fleet:
             common = rotation(0.0, self._really(who, "common_phi") * GON, 0.0)
             self._common[:, :, who] = common
             turned = mxm(common, turned)
-        self._turned[n][:, :, who] = turned
-        self._swung[n][:, :, who] = plane_rotation(kappa)
+        bundles = self._bundles[n]
+        bundles.turned[:, :, who] = turned
+        bundles.swung[:, :, who] = plane_rotation(kappa)
+        bundles.c[who] = self._drums[f"c{n}"].position(who)
         self._shift(who, n)
 
     def _shift(self, who: Who, n: int) -> None:
@@ -416,7 +436,7 @@ class Fleet:
         centre = place + among(self._missed[n], who) - among(self._axes[n], who)
         if "common_phi" in self._drums:
             centre = mxv(among(self._common, who), centre)
-        put(centre, who, self._centres[n])
+        put(centre, who, self._bundles[n].centre)
         put(self._centres_told(who, n), who, self._told[n])
 
     def _really(self, who: Who, name: str) -> Array:
@@ -427,7 +447,8 @@ class Fleet:
 
     def pose(self, who: Who, projector: int) -> tuple[Array, Array]:
         """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
-        return among(self._centres[projector], who), among(self._turned[projector], who)
+        bundles = self._bundles[projector].among(who)
+        return bundles.centre, bundles.turned
 
     def readings_at(self, who: Who, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
@@ -440,14 +461,15 @@ class Fleet:
         """Return where the floating marks really stand ``(3, m)``."""
         return mxv(among(self._guides, who), self._carriages.position(who))
 
-    def mark_on_carrier(self, who: Who, projector: int, mark: Array) -> Array:
+    def _mark_on_carrier(self, who: Who, projector: int, bundles: Bundles, mark: Array) -> Array:
         """Return the places ``(2, m)`` in mm on carriers where the space rods bring floating marks ``(3, m)``."""
         local, rods = self._local[projector], self._rods[projector]
         return place_on_carrier(
             mark,
-            *self.pose(who, projector),
-            self._drums[f"c{projector}"].position(who),
-            among(self._principal_points[projector], who),
+            bundles.centre,
+            bundles.turned,
+            bundles.c,
+            bundles.principal_point,
             None if local is None else among(local, who),
             None if rods is None else among(rods, who),
         )
@@ -473,8 +495,9 @@ class Fleet:
         return seen
 
     def _seen_in(self, who: Who, projector: int, name: str, mark: Array) -> Array:
-        displacement = self._carriers[projector].point(who, name) - self.mark_on_carrier(who, projector, mark)
-        turned = mxv(among(self._swung[projector], who), displacement)
+        bundles = self._bundles[projector].among(who)
+        displacement = self._carriers[projector].point(who, name) - self._mark_on_carrier(who, projector, bundles, mark)
+        turned = mxv(bundles.swung, displacement)
         shown = among(self._levers_stand.signs[projector], who) * turned
         return np.where(length_of(displacement) <= self.variant.field_radius_mm, shown, np.nan)
 
