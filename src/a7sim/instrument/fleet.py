@@ -180,8 +180,9 @@ class Fleet:
         moved = [n for n in (1, 2) if name in ("bx", "common_phi") or name.endswith(str(n))]
         if name in MOVE_CENTRES:
             allowed &= self._rods_can(who, {n: self._centres_told(who, n, {name: targets}) for n in moved})
-        self._refuse(who[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
-        who, targets = who[allowed], targets[allowed]
+        if not allowed.all():
+            self._refuse(who[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
+            who, targets = who[allowed], targets[allowed]
         drums.turn_to(who, targets, rngs)
         for n in moved:
             if name in SHIFTS:

@@ -87,13 +87,17 @@ class FloatingMark:
         begun = np.full((3, crew.sessions), np.nan)
         for looks in range(MOST_LOOKS):
             seen = self.looked(who, point)
-            vanished = watch.growing(who) & np.isnan(seen).any(axis=0)
-            running_away = watch.running_away(who, np.where(np.isnan(seen), 0.0, seen))
+            unseen = np.isnan(seen)
+            lost = unseen.any(axis=0)
+            vanished = watch.growing(who) & lost
+            running_away = watch.running_away(who, np.where(unseen, 0.0, seen) if lost.any() else seen)
             running_away[3] &= clearing is not None
-            mended = self._look_again_with_levers_right(who, point, seen, (vanished | running_away)[2:], begun)
-            running_away[:, mended] = False
-            lost = np.isnan(seen).any(axis=0)
-            self._see_that_it_fuses(who, point, running_away, clearing)
+            away = (vanished | running_away)[2:]
+            if away.any():
+                mended = self._look_again_with_levers_right(who, point, seen, away, begun)
+                running_away[:, mended] = False
+                lost = np.isnan(seen).any(axis=0)
+                self._see_that_it_fuses(who, point, running_away, clearing)
             keep = ~lost & crew.goes_on(who)
             if not keep.all():
                 who, seen = who[keep], seen.compress(keep, axis=-1)
@@ -150,7 +154,7 @@ class FloatingMark:
         Return whose levers were put right, as indices into `who`.
         """
         away = np.flatnonzero(parallaxes_grow.any(axis=0))
-        mended = away[put_levers_right(self.seat, who[away])] if away.size else away
+        mended = away[put_levers_right(self.seat, who[away])]
         if mended.size:
             self.seat.drive(who[mended], dict(zip("XYZ", begun[:, who[mended]], strict=True)))
             seen[:, mended] = self.looked(who[mended], point)
