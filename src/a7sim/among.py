@@ -30,9 +30,17 @@ def among(values: npt.NDArray[Scalar], who: Who) -> npt.NDArray[Scalar]:
 
 
 def put(values: npt.NDArray[np.float64], who: Who, into: npt.NDArray[np.float64]) -> None:
-    """Put values ``(k, m)`` of some among those ``(k, all)`` of all."""
+    """Put values ``(m,)`` or ``(k, m)`` of some among those ``(all,)`` or ``(k, all)`` of all."""
     if who.size == into.shape[-1]:
-        into[:] = values
+        into[...] = values
         return
-    for row, new in zip(into, values, strict=True):
+    for row, new in zip(np.atleast_2d(into), np.atleast_2d(values), strict=True):
         row[who] = new
+
+
+def add(amount: float, who: Who, to: npt.NDArray[np.float64]) -> None:
+    """Add an amount to the values of some among those ``(all,)`` of all."""
+    if who.size == to.size:
+        to += amount
+    else:
+        to[who] += amount

@@ -427,7 +427,7 @@ class Fleet:
         bundles = self._bundles[n]
         bundles.turned[:, :, who] = turned
         bundles.swung[:, :, who] = plane_rotation(kappa)
-        bundles.c[who] = self._drums[f"c{n}"].position(who)
+        put(self._drums[f"c{n}"].position(who), who, bundles.c)
         self._shift(who, n)
 
     def _shift(self, who: Who, n: int) -> None:

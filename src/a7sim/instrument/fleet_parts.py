@@ -140,9 +140,9 @@ class Drums:
         """Turn the drums to values ``(m,)`` that they allow; with dice, by their counters (see `Spindle.turn_to`)."""
         if self.endless:
             values = values + self.high * np.round((among(self.at, who) - values) / self.high)
-        self.at[who] = values
+        put(values, who, self.at)
         half = among(self._half_play, who)
-        self._shaft[who] = np.minimum(np.maximum(among(self._shaft, who), values - half), values + half)
+        put(np.minimum(np.maximum(among(self._shaft, who), values - half), values + half), who, self._shaft)
         for session in who[among(self._sigma, who) > 0.0] if rngs else ():
             self._error[session] = self._sigma[session] * rngs[session].standard_normal()
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, among
+from a7sim.among import Who, add, among
 from a7sim.geometry import Array
 from a7sim.manual import POSITIONS_OF
 from a7sim.operator.dice import Dice, misread
@@ -89,7 +89,7 @@ class Crew:
             self._rested_at[tired] = self.seconds[tired]
 
     def _since_rest(self, who: Who) -> Array:
-        return np.asarray(self.seconds[who] - self._rested_at[who])
+        return np.asarray(among(self.seconds, who) - among(self._rested_at, who))
 
     # --- chance ---------------------------------------------------------------------------------------
 
@@ -120,12 +120,14 @@ class Crew:
         return np.ascontiguousarray(np.moveaxis(drawn, 0, -1))
 
     def _among_all(self, who: Who, values: Array) -> Array:
-        among = np.zeros((*values.shape[:-1], self.sessions))
-        among[..., who] = values
-        return among
+        if who.size == self.sessions:
+            return values
+        every = np.zeros((*values.shape[:-1], self.sessions))
+        every[..., who] = values
+        return every
 
     def _acuity_factors(self, who: Who, sigma: float) -> Array:
-        return np.asarray(sigma * acuity_factor(self.observer, self.seconds[who], self._since_rest(who)))
+        return np.asarray(sigma * acuity_factor(self.observer, among(self.seconds, who), self._since_rest(who)))
 
     def _slip_factors(self, who: Who) -> Array:
         return slip_factor(self.observer, self._since_rest(who))
@@ -224,7 +226,7 @@ class Crew:
         self._let_go_by(who, seconds * self.observer.pace, act)
 
     def _let_go_by(self, who: Who, seconds: float, act: Act) -> None:
-        self.seconds[who] += seconds
+        add(seconds, who, self.seconds)
         self.timesheet.spend(who, seconds, self._form, act)
         if self.person is not None:
             self.person.clock.spend(seconds)
