@@ -487,7 +487,7 @@ class Fleet:
     def _in_eyepiece(self, who: Who, eye: int, name: str, mark: Array) -> Array:
         straight = among(self._levers_stand.straight, who)
         seen = np.full((2, who.size), np.nan)
-        for projector in (1, 2):
+        for projector in (eye, 3 - eye):
             looking = straight == (projector == eye)
             if projector in self._carriers and looking.all():
                 return self._seen_in(who, projector, name, mark)
