@@ -71,7 +71,7 @@ SKILLS = f"5 6 7 8 9 10 11 --out {SCRATCH}"
 BENCHMARKS = (
     Benchmark("run", Settings("", 20), Settings("", 20)),
     Benchmark("crowd", Settings("1 50 200", 30), Settings("", 60)),
-    Benchmark("study", Settings("--replicates 200 --growth 20", 90), Settings("--replicates 10000", 900)),
+    Benchmark("study", Settings("--replicates 200 --growth 20", 170), Settings("--replicates 10000", 900)),
     Benchmark("a8_strip", Settings("200 0", 25), Settings("", 300)),
     Benchmark("reductions", Settings("", 60), Settings("", 60), peers="python"),
     Benchmark("links", Settings("--rounds 20", 20), Settings("", 60), peers="option"),

@@ -2,8 +2,9 @@
 
 A replicate is two models in five cases, three readings each of by' and by", twenty centres, and the twenty-five strips
 that the models make, with residuals at checks. Prints CPU seconds of one process and peak memory; the ratio is to be at
-most five. Slopes are those of time over replicates, points measured, and models, both on logarithms: 1 is linear, less
-where a part of the time does not grow. Works studies/thesis-1985.toml once that is there.
+most five. Growth with replicates, points measured, and models is told by the straight line through the times (what is
+there without any, what one more costs) and how far they depart from it, and by the slope of their logarithms: 1 is
+linear, less where a part of the time does not grow. Works studies/thesis-1985.toml once that is there.
 Usage: python benchmarks/study.py [--replicates N] [--chunk N] [--growth N]
 """
 
@@ -146,23 +147,33 @@ def flight_of(models, points):
 
 
 def growth(replicates):
-    """Print how time grows with replicates, points and models; return the slopes as figures."""
+    """Print how time grows with replicates, points and models; return lines, departures and slopes as figures."""
     plain = load_scenario("akwanga")
-    half, double = replicates // 2, 2 * replicates
     grown = {
-        "replicates": [(n, plain, n) for n in (half, replicates, double)],
-        "points a model": [(n, flight_of(2, n), replicates) for n in (10, 20, 40)],
-        "models": [(n, flight_of(n, 10), replicates) for n in (1, 2, 4)],
+        "replicates": [(n, plain, n) for n in (5 * replicates // 2, 5 * replicates, 10 * replicates)],
+        "points a model": [(n, flight_of(2, n), replicates) for n in (10, 40, 70, 100)],
+        "models": [(n, flight_of(n, 10), replicates) for n in (1, 4, 8, 16)],
     }
+    sessions(plain, range(2))
     figures = []
     for name, steps in grown.items():
-        counts = [count for count, _, _ in steps]
-        seconds = [cpu_seconds(lambda s=s, n=n: sessions(s, range(n))) for _, s, n in steps]
+        counts = np.array([count for count, _, _ in steps])
+        seconds = np.array([cpu_seconds(lambda s=s, n=n: sessions(s, range(n))) for _, s, n in steps])
+        each, fixed = np.polyfit(counts, seconds, 1)
+        line = fixed + each * counts
+        departure = 100.0 * np.abs(seconds / line - 1.0).max()
         slope = np.polyfit(np.log(counts), np.log(seconds), 1)[0]
-        last = np.diff(seconds) / np.diff(counts)
-        listed = ", ".join(f"{count}: {each:.1f} s" for count, each in zip(counts, seconds, strict=True))
-        print(f"{name:15} {listed}; slope {slope:.2f}; one more costs {1e3 * last[0]:.1f}, then {1e3 * last[1]:.1f} ms")
-        figures.append(Figure(f"slope of log time over log {name}", slope))
+        listed = ", ".join(f"{count}: {took:.1f} s" for count, took in zip(counts, seconds, strict=True))
+        print(f"{name:15} {listed}")
+        print(
+            f"{'':15} {fixed:.1f} s and {1e3 * each:.1f} ms each, off by {departure:.1f} % at most; slope {slope:.2f}"
+        )
+        figures += [
+            Figure(f"one more of {name}", 1e3 * each, "ms"),
+            Figure(f"time without {name}", fixed, "s"),
+            Figure(f"departure from linear in {name}", departure, "%"),
+            Figure(f"slope of log time over log {name}", slope),
+        ]
     return figures
 
 
@@ -170,7 +181,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--replicates", type=int, default=200)
     parser.add_argument("--chunk", type=int, default=2000, help="replicates at once")
-    parser.add_argument("--growth", type=int, default=200, help="replicates of the slopes; 0 for none")
+    parser.add_argument("--growth", type=int, default=200, help="replicates of how time grows; 0 for none")
     asked = parser.parse_args()
     figures = the_whole(asked.replicates, asked.chunk)
     return figures + growth(asked.growth) if asked.growth else figures

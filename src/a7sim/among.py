@@ -1,10 +1,15 @@
 """Some among many: arrays whose last axis are all sessions of a crowd, or all instruments of a fleet."""
 
+from typing import TypeVar
+
 import numpy as np
 import numpy.typing as npt
 
 Who = npt.NDArray[np.intp]
-"""Indices ``(m,)`` of those that are meant."""
+"""Indices ``(m,)`` of those that are meant, ascending, each once: as many as there are mean everybody."""
+
+
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def without(who: Who, others: Who) -> Who:
@@ -16,12 +21,26 @@ def without(who: Who, others: Who) -> Who:
     return np.asarray(who[stays[who]])
 
 
-def among(values: npt.NDArray[np.float64], who: Who) -> npt.NDArray[np.float64]:
-    """Return the values ``(..., m)`` of some among those ``(..., all)``, laid out as these; indexing transposes."""
-    return values.take(who, axis=-1)
+def among(values: npt.NDArray[Scalar], who: Who) -> npt.NDArray[Scalar]:
+    """Return the values ``(..., m)`` of some among those ``(..., all)``, to be read at once and not written to.
+
+    They are laid out as these, where indexing transposes; everybody's are not copied.
+    """
+    return values if who.size == values.shape[-1] else values.take(who, axis=-1)
 
 
 def put(values: npt.NDArray[np.float64], who: Who, into: npt.NDArray[np.float64]) -> None:
-    """Put values ``(k, m)`` of some among those ``(k, all)`` of all."""
-    for row, new in zip(into, values, strict=True):
+    """Put values ``(m,)`` or ``(k, m)`` of some among those ``(all,)`` or ``(k, all)`` of all."""
+    if who.size == into.shape[-1]:
+        into[...] = values
+        return
+    for row, new in zip(np.atleast_2d(into), np.atleast_2d(values), strict=True):
         row[who] = new
+
+
+def add(amount: float, who: Who, to: npt.NDArray[np.float64]) -> None:
+    """Add an amount to the values of some among those ``(all,)`` of all."""
+    if who.size == to.size:
+        to += amount
+    else:
+        to[who] += amount

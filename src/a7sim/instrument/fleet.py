@@ -46,6 +46,28 @@ class Levers:
     """Of the handwheels X, Y and Z ``(3, instruments)``."""
 
 
+_OF_A_BUNDLE = 19
+"""Numbers that make the bundle of a projector."""
+
+
+class Bundles:
+    """The bundles of the projectors of many instruments, in rows of one array, so that a look picks them out once."""
+
+    def __init__(self, rows: Array) -> None:
+        self._rows = rows
+        sessions = rows.shape[-1]
+        self.turned = rows[:9].reshape(3, 3, sessions)
+        self.centre = rows[9:12]
+        self.swung = rows[12:16].reshape(2, 2, sessions)
+        """By the swing of the projector, which its picture is seen with."""
+        self.principal_point = rows[16:18]
+        self.c = rows[18]
+
+    def among(self, who: Who) -> "Bundles":
+        """Return those of some, to be read at once and not written to."""
+        return self if who.size == self.c.size else Bundles(among(self._rows, who))
+
+
 class Fleet:
     """Plotters worked by their handles, all together. Lengths in mm, angles in gon, as the counters count them."""
 
@@ -75,9 +97,6 @@ class Fleet:
         self._offsets = np.empty((len(AXES), self.instruments))
         self._reset_offsets(everywhere)
         self._guides = np.stack([guides_of(condition) for condition in conditions], axis=-1)
-        self._principal_points = {
-            n: 1e-3 * self._of_projectors(n, lambda projector: projector.principal_point_um) for n in (1, 2)
-        }
         self._rods = {n: self._where_any(1e-3 * self._of_projectors(n, lambda each: each.rod_um)) for n in (1, 2)}
         self._local = {n: self._local_errors(n) for n in (1, 2)}
         self._axes = {n: 1e-3 * self._of_projectors(n, lambda projector: projector.axes_um) for n in (1, 2)}
@@ -86,10 +105,9 @@ class Fleet:
         self._fittings = {name: np.zeros(self.instruments, dtype=np.intp) for name in POSITIONS_OF}
         self._levers: Levers | None = None
         self._put_right_fittings(everywhere)
-        self._centres = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
-        self._turned = {n: np.zeros((3, 3, self.instruments)) for n in (1, 2)}
-        self._swung = {n: np.zeros((2, 2, self.instruments)) for n in (1, 2)}
-        """By the swing of a projector, which its picture is seen with."""
+        self._bundles = {n: Bundles(np.zeros((_OF_A_BUNDLE, self.instruments))) for n in (1, 2)}
+        for n, each in self._bundles.items():
+            each.principal_point[:] = 1e-3 * self._of_projectors(n, lambda projector: projector.principal_point_um)
         self._missed = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
         """By how much the axes miss the centre, in the frame (see `pose`)."""
         self._common = np.zeros((3, 3, self.instruments))
@@ -103,7 +121,8 @@ class Fleet:
         return np.array([value(condition) for condition in self._conditions])
 
     def _of_projectors(self, n: int, values: Callable[[ProjectorCondition], Sequence[float]]) -> Array:
-        return np.array([values(each.left if n == 1 else each.right) for each in self._conditions]).T
+        each_row = np.array([values(each.left if n == 1 else each.right) for each in self._conditions])
+        return np.ascontiguousarray(each_row.T)
 
     def _local_errors(self, n: int) -> Array | None:
         found = [local_coefficients(each.left if n == 1 else each.right) for each in self._conditions]
@@ -161,8 +180,9 @@ class Fleet:
         moved = [n for n in (1, 2) if name in ("bx", "common_phi") or name.endswith(str(n))]
         if name in MOVE_CENTRES:
             allowed &= self._rods_can(who, {n: self._centres_told(who, n, {name: targets}) for n in moved})
-        self._refuse(who[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
-        who, targets = who[allowed], targets[allowed]
+        if not allowed.all():
+            self._refuse(who[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
+            who, targets = who[allowed], targets[allowed]
         drums.turn_to(who, targets, rngs)
         for n in moved:
             if name in SHIFTS:
@@ -268,16 +288,19 @@ class Fleet:
         before = among(self._carriages.at, who)
         steps = among(self._levers_stand.senses[:k], who) * amounts / self._units[:k, None]
         after = before[:k] + steps
-        if self._no_slips and self._carriages.surely_allow(after) and self._rods_surely_can(who, before, after):
-            self._carriages.run_to(who, 0, after)
-            return
+        if self._no_slips and who.size:
+            low, high = after.min(axis=1), after.max(axis=1)
+            if self._carriages.surely_allow(low, high) and self._rods_surely_can(who, before, low, high):
+                self._carriages.run_to(who, 0, after)
+                return
         for row, each in enumerate(after):
             self._move(who, row, each)
 
     def _move(self, who: Who, row: int, positions: Array, silently: bool = False) -> Truths:
         positions = self._carriages.put_at_end(row, positions, self._half_a_count(row))
-        mark = among(self._carriages.at, who)
-        before, mark[row] = mark[row].copy(), positions
+        before = self._carriages.at[row, who]
+        mark = among(self._carriages.at, who).copy()
+        mark[row] = positions
         allowed = self._carriages.allow(row, positions) & self._rods_can(who, mark=mark)
         if not silently:
             self._refuse(who[~allowed], f"Data out of range;{AXES[row]}: beyond its range or that of the rods")
@@ -316,14 +339,19 @@ class Fleet:
                 able &= ~beyond | (then <= np.arctan2(*_reach(told, now)) / GON)
         return able
 
-    def _rods_surely_can(self, who: Who, before: Array, after: Array) -> bool:
-        """Return whether carriages can go from marks ``(3, m)`` to others ``(k, m)``, one axis after the other."""
-        both = np.stack([before, before])
-        both[1, : len(after)] = after
+    def _rods_surely_can(self, who: Who, before: Array, low: Array, high: Array) -> bool:
+        """Return whether all carriages can go from marks ``(3, m)`` to between others ``(k,)``, one axis after another.
+
+        Looks at the box that holds all marks, seen from that which holds all centres.
+        """
+        k = len(low)
+        lowest, highest = before.min(axis=1), before.max(axis=1)
+        lowest[:k], highest[:k] = np.minimum(lowest[:k], low), np.maximum(highest[:k], high)
         for n in (1, 2):
-            away = both - among(self._told[n], who)
-            x, y = np.abs(away[:, :2]).max(axis=0)
-            if not (np.hypot(x, y) < self._surely_within * -away[:, 2].max(axis=0)).all():
+            told = among(self._told[n], who)
+            least, most = told.min(axis=1), told.max(axis=1)
+            x, y, _ = np.maximum(highest - least, most - lowest)
+            if not math.hypot(x, y) < self._surely_within * (least[2] - highest[2]):
                 return False
         return True
 
@@ -344,9 +372,9 @@ class Fleet:
         def drum(name: str) -> Array:
             if name in elements:
                 return elements[name]
-            return self._drums[name].at[who] if name in self._drums else np.zeros(who.size)
+            return among(self._drums[name].at, who) if name in self._drums else np.zeros(who.size)
 
-        inside = self._base_inside[who] if base_inside is None else base_inside
+        inside = among(self._base_inside, who) if base_inside is None else base_inside
         x, y, z = self._shares(n, inside) * drum("bx"), -drum(f"by{n}"), drum(f"bz{n}")
         if "common_phi" in self._drums:
             tilt = (drum("common_phi") - self.variant.elements["common_phi"].zero) * GON
@@ -396,18 +424,20 @@ class Fleet:
             common = rotation(0.0, self._really(who, "common_phi") * GON, 0.0)
             self._common[:, :, who] = common
             turned = mxm(common, turned)
-        self._turned[n][:, :, who] = turned
-        self._swung[n][:, :, who] = plane_rotation(kappa)
+        bundles = self._bundles[n]
+        bundles.turned[:, :, who] = turned
+        bundles.swung[:, :, who] = plane_rotation(kappa)
+        put(self._drums[f"c{n}"].position(who), who, bundles.c)
         self._shift(who, n)
 
     def _shift(self, who: Who, n: int) -> None:
         """Put the projectors, turned as they stand, where the base and by and bz bring them."""
         base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
-        place = place_of_centre(self._shares(n, self._base_inside[who]), *base)
+        place = place_of_centre(self._shares(n, among(self._base_inside, who)), *base)
         centre = place + among(self._missed[n], who) - among(self._axes[n], who)
         if "common_phi" in self._drums:
             centre = mxv(among(self._common, who), centre)
-        put(centre, who, self._centres[n])
+        put(centre, who, self._bundles[n].centre)
         put(self._centres_told(who, n), who, self._told[n])
 
     def _really(self, who: Who, name: str) -> Array:
@@ -418,7 +448,8 @@ class Fleet:
 
     def pose(self, who: Who, projector: int) -> tuple[Array, Array]:
         """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
-        return among(self._centres[projector], who), among(self._turned[projector], who)
+        bundles = self._bundles[projector].among(who)
+        return bundles.centre, bundles.turned
 
     def readings_at(self, who: Who, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
@@ -431,14 +462,15 @@ class Fleet:
         """Return where the floating marks really stand ``(3, m)``."""
         return mxv(among(self._guides, who), self._carriages.position(who))
 
-    def mark_on_carrier(self, who: Who, projector: int, mark: Array) -> Array:
+    def _mark_on_carrier(self, who: Who, projector: int, bundles: Bundles, mark: Array) -> Array:
         """Return the places ``(2, m)`` in mm on carriers where the space rods bring floating marks ``(3, m)``."""
         local, rods = self._local[projector], self._rods[projector]
         return place_on_carrier(
             mark,
-            *self.pose(who, projector),
-            self._drums[f"c{projector}"].position(who),
-            among(self._principal_points[projector], who),
+            bundles.centre,
+            bundles.turned,
+            bundles.c,
+            bundles.principal_point,
             None if local is None else among(local, who),
             None if rods is None else among(rods, who),
         )
@@ -453,9 +485,9 @@ class Fleet:
         return np.concatenate([self._in_eyepiece(who, eye, name, mark) for eye in (1, 2)])
 
     def _in_eyepiece(self, who: Who, eye: int, name: str, mark: Array) -> Array:
-        straight = self._levers_stand.straight[who]
+        straight = among(self._levers_stand.straight, who)
         seen = np.full((2, who.size), np.nan)
-        for projector in (1, 2):
+        for projector in (eye, 3 - eye):
             looking = straight == (projector == eye)
             if projector in self._carriers and looking.all():
                 return self._seen_in(who, projector, name, mark)
@@ -464,8 +496,9 @@ class Fleet:
         return seen
 
     def _seen_in(self, who: Who, projector: int, name: str, mark: Array) -> Array:
-        displacement = self._carriers[projector].point(who, name) - self.mark_on_carrier(who, projector, mark)
-        turned = mxv(among(self._swung[projector], who), displacement)
+        bundles = self._bundles[projector].among(who)
+        displacement = self._carriers[projector].point(who, name) - self._mark_on_carrier(who, projector, bundles, mark)
+        turned = mxv(bundles.swung, displacement)
         shown = among(self._levers_stand.signs[projector], who) * turned
         return np.where(length_of(displacement) <= self.variant.field_radius_mm, shown, np.nan)
 

@@ -15,7 +15,7 @@ from a7sim.geometry import GON, Array, mxv, plane_rotation
 from a7sim.instrument.spindles import APPROXIMATIONS
 from a7sim.manual import COUNTER_DECIMALS, Variant
 from a7sim.scene.camera import fiducial_places
-from a7sim.scene.photograph import Photograph
+from a7sim.scene.photograph import Marks, Photograph
 
 Truths = npt.NDArray[np.bool_]
 
@@ -31,8 +31,10 @@ def rounded(values: Array, decimals: int) -> Array:
     Wheels turn by thousandths, so that ties are common; numpy scales before it rounds and would take some for halves.
     """
     scaled = values * 10.0**decimals
-    ties = np.abs(scaled - np.floor(scaled) - 0.5) < NEAR_A_TIE
-    nearest = np.rint(scaled) / 10.0**decimals
+    nearest = np.rint(scaled)
+    scaled -= nearest
+    ties = np.abs(scaled, out=scaled) > 0.5 - NEAR_A_TIE
+    nearest /= 10.0**decimals
     if ties.any():
         nearest[ties] = [round(value, decimals) for value in values[ties].tolist()]
     return np.asarray(nearest + 0.0)
@@ -84,15 +86,15 @@ class Carriages:
         """Return to which places ``(m,)`` a carriage can be run."""
         return np.asarray((places >= self._low[axis] - 1e-9) & (places <= self._high[axis] + 1e-9))
 
-    def surely_allow(self, places: Array) -> bool:
-        """Return whether all places ``(k, m)`` of the first k carriages lie within their ranges."""
-        k = len(places)
-        return bool(((places >= self._low[:k, None]) & (places <= self._high[:k, None])).all())
+    def surely_allow(self, low: Array, high: Array) -> bool:
+        """Return whether the ranges of the first k carriages hold all from the low to the high places ``(k,)``."""
+        k = len(low)
+        return bool(((low >= self._low[:k]) & (high <= self._high[:k])).all())
 
     def run_to(self, who: Who, first: int, places: Array) -> None:
         """Run carriages, from a first one on, to places ``(k, m)`` that they allow."""
         rows = slice(first, first + len(places))
-        half = self._half_play[who]
+        half = among(self._half_play, who)
         put(places, who, self.at[rows])
         put(np.minimum(np.maximum(among(self._shaft[rows], who), places - half), places + half), who, self._shaft[rows])
 
@@ -118,11 +120,11 @@ class Drums:
 
     def position(self, who: Who) -> Array:
         """Return where the shafts really stand ``(m,)``."""
-        return np.asarray(self._shaft[who] + self._error[who] + self._fault[who])
+        return np.asarray(among(self._shaft, who) + among(self._error, who) + among(self._fault, who))
 
     def shown(self, who: Who) -> Array:
         """Return what the counters show ``(m,)``."""
-        shown = rounded(self.at[who], COUNTER_DECIMALS)
+        shown = rounded(among(self.at, who), COUNTER_DECIMALS)
         return rounded(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
 
     def allows(self, values: Array) -> Truths:
@@ -131,17 +133,17 @@ class Drums:
 
     def after(self, who: Who, amounts: Array) -> Array:
         """Return to what values ``(m,)`` the drums come when they are turned by so much."""
-        values = self.at[who] + amounts
+        values = among(self.at, who) + amounts
         return np.asarray(values % self.high if self.endless else values)
 
     def turn_to(self, who: Who, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
         """Turn the drums to values ``(m,)`` that they allow; with dice, by their counters (see `Spindle.turn_to`)."""
         if self.endless:
-            values = values + self.high * np.round((self.at[who] - values) / self.high)
-        self.at[who] = values
-        half = self._half_play[who]
-        self._shaft[who] = np.minimum(np.maximum(self._shaft[who], values - half), values + half)
-        for session in who[self._sigma[who] > 0.0] if rngs else ():
+            values = values + self.high * np.round((among(self.at, who) - values) / self.high)
+        put(values, who, self.at)
+        half = among(self._half_play, who)
+        put(np.minimum(np.maximum(among(self._shaft, who), values - half), values + half), who, self._shaft)
+        for session in who[among(self._sigma, who) > 0.0] if rngs else ():
             self._error[session] = self._sigma[session] * rngs[session].standard_normal()
 
 
@@ -156,7 +158,7 @@ class Carriers:
         self.centring = np.zeros_like(laid)
         self._turn = np.zeros((2, 2, laid.shape[1]))
         self._shift = np.zeros((2, laid.shape[1]))
-        self._films: dict[str, Array] = {}
+        self._films = _places_of([photograph.points for photograph in photographs])
         self._placed: dict[str, Array] = {}
         self.centre(np.arange(laid.shape[1]), self.centring)
 
@@ -177,13 +179,8 @@ class Carriers:
 
     def _film(self, name: str) -> Array:
         """Return where an image point lies on the films ``(2, instruments)``."""
-        film = self._films.get(name)
-        if film is None:
-            nowhere = np.full(2, np.nan)
-            places = [photograph.points.get(name) for photograph in self.photographs]
-            columns = np.array([nowhere if place is None else place for place in places]).T
-            film = self._films[name] = np.ascontiguousarray(columns)
-        return film
+        nowhere = np.full((2, len(self.photographs)), np.nan)
+        return self._films.get(name, nowhere)
 
     def fiducial_displacements(self, who: Who) -> tuple[tuple[str, ...], Array]:
         """Return names and displacements ``(2, n, m)`` of the fiducials from their collimating marks."""
@@ -196,10 +193,16 @@ class Carriers:
 
     def sketch(self, who: Who) -> dict[str, Array]:
         """Return the places ``(2, m)`` of points on the paper prints, nan where a print has it not."""
-        names = dict.fromkeys(name for session in who for name in self.photographs[session].sketch.names)
-        nowhere = np.full(2, np.nan)
-        prints = [self.photographs[session].sketch for session in who]
-        places = {name: [each.get(name) for each in prints] for name in names}
-        return {
-            name: np.array([nowhere if place is None else place for place in each]).T for name, each in places.items()
-        }
+        return _places_of([self.photographs[session].sketch for session in who])
+
+
+def _places_of(prints: Sequence[Marks]) -> dict[str, Array]:
+    """Return the places ``(2, m)`` of marks on many photographs by name, nan where one has it not."""
+    alike: dict[tuple[str, ...], list[int]] = {}
+    for i, each in enumerate(prints):
+        alike.setdefault(each.names, []).append(i)
+    places = {name: np.full((2, len(prints)), np.nan) for names in alike for name in names}
+    for names, those in alike.items():
+        for name, place in zip(names, np.stack([prints[i].xy for i in those], axis=-1).swapaxes(0, 1), strict=True):
+            places[name][:, those] = place
+    return places

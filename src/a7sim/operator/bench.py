@@ -297,6 +297,7 @@ class Bench:
         crew, observer = self.crew, self.crew.observer
         tolerance = FAINTEST_SLIP_MM + 5e-3 * observer.parallax_um * self.seat.z / self.seat.c
         doubtful, lost = who, who[:0]
+        readings = values.shape[1]
         bys = " and ".join("by'" if projector == 1 else 'by"' for projector in projectors)
         for number in range(MOST_POINTINGS):
             flat = values.reshape(-1, crew.sessions)[:, doubtful]
@@ -306,16 +307,17 @@ class Bench:
             doubtful, worst = doubtful[off], worst[off]
             if not doubtful.size:
                 return without(crew.still(who), lost)
-            for place in np.unique(worst):
-                again = doubtful[worst == place]
-                i, k = divmod(int(place), values.shape[1])
+            for i in np.unique(worst // readings):
+                of_this = worst // readings == i
+                again, k = doubtful[of_this], np.zeros(crew.sessions, dtype=np.intp)
+                k[again] = worst[of_this] % readings
+                value, entry = (np.take_along_axis(each[i], k[None], axis=0)[0] for each in (values, numbers))
                 by = f"by{projectors[i]}"
-                crew.strike(again, numbers[i, k], f"does not agree with the other readings of {bys} at {point}")
+                crew.strike(again, entry, f"does not agree with the other readings of {bys} at {point}")
                 errors = crew.errors_again(again, observer.parallax_um, 1)[0]
                 slips = crew.slips_again(again, 1)[0]
-                found = self._clear_with_by(
-                    again, projectors[i], point, judgement, errors, slips, rest, values[i, k], numbers[i, k]
-                )
+                found = self._clear_with_by(again, projectors[i], point, judgement, errors, slips, rest, value, entry)
+                values[i, k[found], found], numbers[i, k[found], found] = value[found], entry[found]
                 lost = np.concatenate([lost, without(again, found)])
                 if found.size:
                     self._turn_back(found, (by,), rest)

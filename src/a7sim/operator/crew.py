@@ -1,12 +1,11 @@
 """The people at a batch of instruments, one a session: what they get wrong, how long they take, what they write."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who
+from a7sim.among import Who, add, among
 from a7sim.geometry import Array
 from a7sim.manual import POSITIONS_OF
 from a7sim.operator.dice import Dice, misread
@@ -15,8 +14,6 @@ from a7sim.operator.skill import MINUTE, acuity_factor, needs_a_break, slip_fact
 from a7sim.operator.slips import OF_READINGS, Occasion, Slips
 from a7sim.operator.timesheet import Act, Timesheet
 from a7sim.scenario import Observer
-
-Asked = TypeVar("Asked", int, tuple[int, ...])
 
 
 class NobodyGoesOn(Exception):
@@ -86,54 +83,54 @@ class Crew:
             self.person.book.round = number
 
     def _rest(self, who: Who) -> None:
-        tired = who[needs_a_break(self.observer, self._since_rest[who])]
+        tired = who[needs_a_break(self.observer, self._since_rest(who))]
         if tired.size:
             self._let_go_by(tired, MINUTE * self.observer.break_minutes, "resting")
             self._rested_at[tired] = self.seconds[tired]
 
-    @property
-    def _since_rest(self) -> Array:
-        return self.seconds - self._rested_at
+    def _since_rest(self, who: Who) -> Array:
+        return np.asarray(among(self.seconds, who) - among(self._rested_at, who))
 
     # --- chance ---------------------------------------------------------------------------------------
 
     def errors(self, who: Who, sigma: float, shape: tuple[int, ...]) -> Array:
         """Return the errors of planned settings ``(*shape, sessions)``, zero for those who do not act."""
-        return self._among_all(who, self._acuity_factors(who, sigma) * self._drawn(who, shape, Dice.errors, shape))
+        return self._among_all(who, self._acuity_factors(who, sigma) * self._drawn(who, shape, Dice.errors))
 
     def slips(self, who: Who, shape: tuple[int, ...]) -> Array:
         """Return what is misread at planned readings ``(*shape, sessions)``, in counter units."""
-        luck = self._drawn(who, (3, *shape), Dice.luck, shape)
-        return self._among_all(who, misread(self.observer, luck, self._slip_factors[who]))
+        luck = self._drawn(who, (3, *shape), Dice.luck)
+        return self._among_all(who, misread(self.observer, luck, self._slip_factors(who)))
 
     def errors_again(self, who: Who, sigma: float, count: int) -> Array:
         """Return the errors ``(count, sessions)`` of settings made once more."""
-        drawn = self._drawn(who, (count,), Dice.errors_again, count)
+        drawn = self._drawn(who, (count,), Dice.errors_again)
         return self._among_all(who, self._acuity_factors(who, sigma) * drawn)
 
     def slips_again(self, who: Who, count: int) -> Array:
         """Return what is misread ``(count, sessions)`` at readings made once more."""
-        luck = self._drawn(who, (3, count), Dice.luck_again, count)
-        return self._among_all(who, misread(self.observer, luck, self._slip_factors[who]))
+        luck = self._drawn(who, (3, count), Dice.luck_again)
+        return self._among_all(who, misread(self.observer, luck, self._slip_factors(who)))
 
-    def _drawn(self, who: Who, shape: tuple[int, ...], draw: Callable[[Dice, Asked], Array], asked: Asked) -> Array:
+    def _drawn(self, who: Who, shape: tuple[int, ...], draw: Callable[[Dice, Array], None]) -> Array:
         """Return what the dice of those who act draw ``(*shape, m)``."""
         drawn = np.empty((who.size, *shape))
-        for i, session in enumerate(who.tolist()):
-            drawn[i] = draw(self._dice[session], asked)
+        for session, into in zip(who.tolist(), drawn, strict=True):
+            draw(self._dice[session], into)
         return np.ascontiguousarray(np.moveaxis(drawn, 0, -1))
 
     def _among_all(self, who: Who, values: Array) -> Array:
-        among = np.zeros((*values.shape[:-1], self.sessions))
-        among[..., who] = values
-        return among
+        if who.size == self.sessions:
+            return values
+        every = np.zeros((*values.shape[:-1], self.sessions))
+        every[..., who] = values
+        return every
 
     def _acuity_factors(self, who: Who, sigma: float) -> Array:
-        return np.asarray(sigma * acuity_factor(self.observer, self.seconds, self._since_rest)[who])
+        return np.asarray(sigma * acuity_factor(self.observer, among(self.seconds, who), self._since_rest(who)))
 
-    @property
-    def _slip_factors(self) -> Array:
-        return slip_factor(self.observer, self._since_rest)
+    def _slip_factors(self, who: Who) -> Array:
+        return slip_factor(self.observer, self._since_rest(who))
 
     # --- slips ----------------------------------------------------------------------------------------
 
@@ -142,10 +139,10 @@ class Crew:
         self.come_back(who)
         if not self._slips.possible("wrong point"):
             return
-        factors = self._slip_factors
+        factors = self._slip_factors(who)
         for i, session in enumerate(who):
             candidates = [name for name, found in near.items() if found[i]]
-            self._slips.come_to(self._occasion(session, point), candidates, factors[session])
+            self._slips.come_to(self._occasion(session, point), candidates, factors[i])
 
     def come_back(self, who: Who) -> None:
         """Look once more which point it is."""
@@ -180,13 +177,13 @@ class Crew:
 
     def write(self, who: Who, point: str, item: str, shown: Array, misread: Array) -> Array:
         """Return what is written ``(m,)`` of what counters show; `misread` ``(sessions,)`` is what chance adds."""
-        written = np.round(shown + misread[who], 4)
-        factors = self._slip_factors
-        tempted = np.arange(who.size) if self._slips.possible(*OF_READINGS) else np.flatnonzero(misread[who])
-        for i in tempted:
-            session = who[i]
-            occasion = self._occasion(session, point, item)
-            written[i] = self._slips.write(occasion, float(shown[i]), float(written[i]), factors[session])
+        wrongly = among(misread, who)
+        written = np.round(shown + wrongly, 4)
+        tempted = np.arange(who.size) if self._slips.possible(*OF_READINGS) else np.flatnonzero(wrongly)
+        factors = self._slip_factors(who[tempted])
+        for i, factor in zip(tempted.tolist(), factors, strict=True):
+            occasion = self._occasion(who[i], point, item)
+            written[i] = self._slips.write(occasion, float(shown[i]), float(written[i]), factor)
         return written
 
     def puts(self, who: Who, fitting: str, position: str) -> Iterator[tuple[Who, str]]:
@@ -195,10 +192,10 @@ class Crew:
             yield who, position
             return
         (other,) = set(POSITIONS_OF[fitting]) - {position}
-        factors = self._slip_factors
+        factors = self._slip_factors(who)
         forgotten = [
-            self._slips.forgets(self._occasion(session, fitting, "fitting"), position, other, factors[session])
-            for session in who
+            self._slips.forgets(self._occasion(session, fitting, "fitting"), position, other, factor)
+            for session, factor in zip(who, factors, strict=True)
         ]
         left = np.array(forgotten, dtype=bool)
         for them, put in ((who[~left], position), (who[left], other)):
@@ -210,11 +207,11 @@ class Crew:
         if not self._slips.possible("element not re-read"):
             return now
         noted = {name: each.copy() for name, each in now.items()}
-        factors = self._slip_factors
+        factors = self._slip_factors(who)
         for name, old in before.items():
-            for session in who:
+            for session, factor in zip(who, factors, strict=True):
                 occasion = self._occasion(session, name, "element")
-                if self._slips.uses_old(occasion, float(old[session]), float(now[name][session]), factors[session]):
+                if self._slips.uses_old(occasion, float(old[session]), float(now[name][session]), factor):
                     noted[name][session] = old[session]
         return noted
 
@@ -229,7 +226,7 @@ class Crew:
         self._let_go_by(who, seconds * self.observer.pace, act)
 
     def _let_go_by(self, who: Who, seconds: float, act: Act) -> None:
-        self.seconds[who] += seconds
+        add(seconds, who, self.seconds)
         self.timesheet.spend(who, seconds, self._form, act)
         if self.person is not None:
             self.person.clock.spend(seconds)

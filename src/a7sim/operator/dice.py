@@ -18,7 +18,7 @@ class Dice:
 
     Errors come in blocks, one draw for each setting that a step of the procedure makes, so that the same
     seed gives the same errors however long the closed loop of turning and looking takes. Lapses, of which most
-    persons have none, come one by one from a stream of their own.
+    persons have none, come one by one from a stream of their own. What is drawn is put into the arrays handed over.
     """
 
     def __init__(self, observer: Observer, seed: int) -> None:
@@ -28,21 +28,22 @@ class Dice:
         self._again = np.random.default_rng(again)
         self._lapses = np.random.default_rng(lapses)
 
-    def errors(self, shape: tuple[int, ...]) -> Array:
-        """Return the errors of planned settings, in units of their standard deviation."""
-        return self._planned.standard_normal(shape)
+    def errors(self, into: Array) -> None:
+        """Draw the errors of planned settings, in units of their standard deviation."""
+        into[...] = self._planned.standard_normal(into.shape)
 
-    def errors_again(self, count: int) -> Array:
-        """Return the errors ``(count,)`` of settings that have to be made once more, in the same unit."""
-        return self._again.standard_normal(count)
+    def errors_again(self, into: Array) -> None:
+        """Draw the errors ``(count,)`` of settings that have to be made once more, in the same unit."""
+        into[:] = self._again.standard_normal(into.size)
 
-    def luck(self, shape: tuple[int, ...]) -> Array:
-        """Return the luck ``(3, *shape)`` with which planned readings are read, for `misread`."""
-        return _luck(self._planned, shape)
+    def luck(self, into: Array) -> None:
+        """Draw the luck ``(3, ...)`` with which planned readings are read, for `misread`."""
+        _luck(self._planned, into)
 
-    def luck_again(self, count: int) -> Array:
-        """Return the luck ``(3, count)`` with which readings are made once more."""
-        return np.concatenate([_luck(self._again, (1,)) for _ in range(count)], axis=1)
+    def luck_again(self, into: Array) -> None:
+        """Draw the luck ``(3, count)`` with which readings are made once more."""
+        for i in range(into.shape[1]):
+            _luck(self._again, into[:, i : i + 1])
 
     def lapses(self, rate: float) -> bool:
         """Return whether something happens that does so with this rate."""
@@ -53,12 +54,11 @@ class Dice:
         return int(self._lapses.integers(count))
 
 
-def _luck(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-    luck = np.empty((3, *shape))
-    luck[0] = rng.random(shape)
-    luck[1] = rng.integers(len(_LAST_DIGITS), size=shape)
-    luck[2] = rng.integers(len(_GROSS_SLIPS), size=shape)
-    return luck
+def _luck(rng: np.random.Generator, into: Array) -> None:
+    shape = into.shape[1:]
+    into[0] = rng.random(shape)
+    into[1] = rng.integers(len(_LAST_DIGITS), size=shape)
+    into[2] = rng.integers(len(_GROSS_SLIPS), size=shape)
 
 
 def misread(observer: Observer, luck: Array, factor: Array) -> Array:

@@ -109,7 +109,7 @@ class Eyes:
                 self._look_again_with_levers_right(who, hand, point, seen, lost)
                 self._ran_away(who[lost], hand, point)
                 who, seen = who[~lost], seen[:, ~lost]
-            steps = (seen + among(errors, who)) * (1e-3 * seat.z[who] / seat.c)
+            steps = (seen + among(errors, who)) * (1e-3 * among(seat.z, who) / seat.c)
             moving = ~(np.abs(steps) < self.at_rest_mm(looks)).all(axis=0)
             who = who[moving]
             if not who.size:
@@ -170,7 +170,7 @@ class Watch:
 
     def growing(self, who: Who) -> Truths:
         """Return which of the displacements ``(k, m)`` had grown when they were last seen."""
-        return self._times.take(who, axis=-1) > 0
+        return among(self._times, who) > 0
 
     def running_away(self, who: Who, seen: Array) -> Truths:
         """Return which of the displacements ``(k, m)`` in um have grown in look after look."""
@@ -180,7 +180,7 @@ class Watch:
         if not grown.any() and not self._any_grew:
             return grown
         self._any_grew = True
-        times = np.where(grown, self._times.take(who, axis=-1) + 1, 0)
+        times = np.where(grown, among(self._times, who) + 1, 0)
         self._times[:, who] = times
         return np.asarray(times >= RUNNING_AWAY_LOOKS)
 

@@ -87,13 +87,17 @@ class FloatingMark:
         begun = np.full((3, crew.sessions), np.nan)
         for looks in range(MOST_LOOKS):
             seen = self.looked(who, point)
-            vanished = watch.growing(who) & np.isnan(seen).any(axis=0)
-            running_away = watch.running_away(who, np.where(np.isnan(seen), 0.0, seen))
+            unseen = np.isnan(seen)
+            lost = unseen.any(axis=0)
+            vanished = watch.growing(who) & lost
+            running_away = watch.running_away(who, np.where(unseen, 0.0, seen) if lost.any() else seen)
             running_away[3] &= clearing is not None
-            mended = self._look_again_with_levers_right(who, point, seen, (vanished | running_away)[2:], begun)
-            running_away[:, mended] = False
-            lost = np.isnan(seen).any(axis=0)
-            self._see_that_it_fuses(who, point, running_away, clearing)
+            away = (vanished | running_away)[2:]
+            if away.any():
+                mended = self._look_again_with_levers_right(who, point, seen, away, begun)
+                running_away[:, mended] = False
+                lost = np.isnan(seen).any(axis=0)
+                self._see_that_it_fuses(who, point, running_away, clearing)
             keep = ~lost & crew.goes_on(who)
             if not keep.all():
                 who, seen = who[keep], seen.compress(keep, axis=-1)
@@ -103,9 +107,9 @@ class FloatingMark:
             if looks == 0:
                 put(readings, who, begun)
             x, y, _ = seat.place(who, readings)
-            z, bx = seat.z[who], seat.bx(who)
+            z, bx = among(seat.z, who), seat.bx(who)
             scale = 1e-3 * z / seat.c
-            rise = (seen[2] + judgement.height[who]) * scale * z / np.abs(bx)
+            rise = (seen[2] + among(judgement.height, who)) * scale * z / np.abs(bx)
             rise = np.minimum(np.maximum(rise, -LONGEST_RISE_MM), LONGEST_RISE_MM)
             along_the_rays = -rise / z * np.array([x - bx / 2.0, y])
             steps = (seen[:2] + among(judgement.plan, who)) * scale + along_the_rays
@@ -150,7 +154,7 @@ class FloatingMark:
         Return whose levers were put right, as indices into `who`.
         """
         away = np.flatnonzero(parallaxes_grow.any(axis=0))
-        mended = away[put_levers_right(self.seat, who[away])] if away.size else away
+        mended = away[put_levers_right(self.seat, who[away])]
         if mended.size:
             self.seat.drive(who[mended], dict(zip("XYZ", begun[:, who[mended]], strict=True)))
             seen[:, mended] = self.looked(who[mended], point)
@@ -186,8 +190,8 @@ class _Drum:
 
     def to_turn(self, who: Who, parallax: Array, scale: Array, at_rest: float) -> tuple[Array, Truths]:
         """Return by how much to turn, nothing where it is clear, and where that is out of range ``(m,)``."""
-        left = parallax + self._clearing.error[who] * scale
-        amounts = np.where(np.abs(left) < at_rest, 0.0, -left / self._clearing.gain[who])
+        left = parallax + among(self._clearing.error, who) * scale
+        amounts = np.where(np.abs(left) < at_rest, 0.0, -left / among(self._clearing.gain, who))
         if self._element.endless:
             return amounts, np.zeros(who.size, dtype=bool)
         wanted = self._seat.in_hand(who, self._clearing.element) + amounts

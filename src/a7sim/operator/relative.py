@@ -1,7 +1,9 @@
 """Numerical relative orientation with by' and by" (thesis 3.4.2)."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import overload
 
 import numpy as np
@@ -79,6 +81,11 @@ class Rounds:
     sigmas: Mapping[str, Array]
     over_correction: Array | None = None
 
+    @cached_property
+    def those(self) -> frozenset[int]:
+        """Who measured in it, to ask for one."""
+        return frozenset(self.who.tolist())
+
     def of(self, session: int) -> Round:
         """Return one session's round."""
         return Round(
@@ -132,30 +139,45 @@ class RelativeOrientations:
         squares = np.square(list(self.residuals.values()))
         return np.asarray(np.sqrt(np.nansum(squares, axis=0) / np.maximum(1, (~np.isnan(squares)).sum(axis=0))))
 
+    @cached_property
+    def _listed(self) -> "_Listed":
+        return _Listed(
+            {name: each.tolist() for name, each in self.elements.items()},
+            {label: each.tolist() for label, each in self.residuals.items()},
+            {label: list(zip(*each.tolist(), strict=True)) for label, each in self.places.items()},
+        )
+
     def of(self, session: int) -> RelativeOrientation:
         """Return one session's orientation."""
+        listed = self._listed
+        residuals = _there(_picked(listed.residuals, session))
         return RelativeOrientation(
             self.method,
             self.case,
-            RoundsOfOne(session, [each for each in self.rounds if session in each.who]),
+            RoundsOfOne(session, [each for each in self.rounds if session in each.those]),
             int(self.rough_rounds[session]),
-            _picked(self.elements, session),
-            _there(_picked(self.residuals, session)),
-            {
-                label: tuple(place[:, session].tolist())
-                for label, place in self.places.items()
-                if not np.isnan(self.residuals[label][session])
-            },
+            _picked(listed.elements, session),
+            residuals,
+            {label: places[session] for label, places in listed.places.items() if label in residuals},
             self.procedure,
         )
 
 
-def _picked(values: Mapping[str, Array], session: int) -> dict[str, float]:
+@dataclass(frozen=True)
+class _Listed:
+    """What is left at standard points and what the counters show, as lists by session: quicker asked for one by one."""
+
+    elements: Mapping[str, Sequence[float]]
+    residuals: Mapping[str, Sequence[float]]
+    places: Mapping[str, Sequence[tuple[float, float, float]]]
+
+
+def _picked(values: Mapping[str, Array | Sequence[float]], session: int) -> dict[str, float]:
     return {name: float(each[session]) for name, each in values.items()}
 
 
 def _there(values: Mapping[str, float]) -> dict[str, float]:
-    return {name: value for name, value in values.items() if not np.isnan(value)}
+    return {name: value for name, value in values.items() if not math.isnan(value)}
 
 
 def unknowns_of(method: str, model: ModelJob) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from a7sim.among import Who, among
+from a7sim.among import Who, among, put
 from a7sim.geometry import GON, Array, mxv, plane_rotation
 from a7sim.manual import LEAST_COUNT, VARIANTS, Variant
 from a7sim.operator.crew import Crew
@@ -223,14 +223,14 @@ class Seat:
 
     def bx(self, who: Who) -> Array:
         """Return the base as it is set ``(m,)``, mm."""
-        return self._settings["bx"][who]
+        return among(self._settings["bx"], who)
 
     # --- places ---------------------------------------------------------------------------------------
 
     def counters(self, who: Who) -> Array:
         """Read X, Y and Z ``(3, m)``, and bear in mind how deep the mark stands."""
         readings = self.hands.counters(who)
-        self.z[who] = (self._offset[2][who] - readings[2]) / self.units_per_mm
+        put((among(self._offset[2], who) - readings[2]) / self.units_per_mm, who, self.z)
         return readings
 
     def levels_shown(self, who: Who, levels: Sequence[float]) -> Array:

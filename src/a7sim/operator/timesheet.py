@@ -5,8 +5,8 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from a7sim.among import Who, add
 from a7sim.geometry import Array
 
 Act = Literal["looking", "turning", "reading", "setting", "driving", "mounting", "computing", "resting", "other"]
@@ -33,11 +33,13 @@ class Timesheet:
         self.by_activity: dict[str, Array] = {}
         self.by_act: dict[str, Array] = {}
 
-    def spend(self, who: npt.NDArray[np.intp], seconds: float, form: str, act: Act) -> None:
+    def spend(self, who: Who, seconds: float, form: str, act: Act) -> None:
         """Write down that those who act spent so many seconds each."""
         activity = _OF_ACT.get(act) or _OF_FORM.get(form, form)
         for column, name in ((self.by_activity, activity), (self.by_act, act)):
-            column.setdefault(name, np.zeros(self._sessions))[who] += seconds
+            if name not in column:
+                column[name] = np.zeros(self._sessions)
+            add(seconds, who, column[name])
 
     def activities_of(self, session: int) -> dict[str, float]:
         """Return the seconds of one session by activity, in the order in which they were first taken up."""

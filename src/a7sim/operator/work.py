@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -60,9 +61,13 @@ class ModelRecords:
     on_ground: Mapping[int, OnGround] | None = None
     """By session, where models are levelled and scaled at the instrument; those without enough control have none."""
 
+    @cached_property
+    def _points_listed(self) -> dict[str, list[list[float]]]:
+        return {point: each.T.tolist() for point, each in self.points.items()}
+
     def of(self, session: int) -> ModelRecord:
         """Return one session's record."""
-        places = {point: tuple(each[:, session].tolist()) for point, each in self.points.items()}
+        places = {point: each[session] for point, each in self._points_listed.items()}
         return ModelRecord(
             self.model,
             {name: each.of(session) for name, each in self.interior.items()},

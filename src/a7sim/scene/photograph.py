@@ -86,4 +86,6 @@ def within_format(xy: Array, half_width_mm: float = 107.0) -> npt.NDArray[np.boo
 def chosen(marks: Marks, keep: Sequence[bool] | npt.NDArray[np.bool_]) -> Marks:
     """Return the marks for which `keep` is true."""
     kept = np.asarray(keep, dtype=bool)
+    if kept.all():
+        return marks
     return Marks(tuple(np.array(marks.names, dtype=object)[kept]), marks.xy[:, kept])
