@@ -65,7 +65,7 @@ def command(
         prepare_folder(out, force)
         with Journal(Keeping(durability)).opened(out, header, None) as journal:
             host, port = door.getsockname()[:2]
-            where = f"socket://{Address(host, port)}"
+            where = f"tcp://{Address(host, port)}"
             click.echo(as_json(head("record") | {"url": where, "instrument": url}) if as_document else where, nl=False)
             click.echo("" if as_document else "\nready")
             Between(url, journal.heard, WallClock(), stop).serve(door)

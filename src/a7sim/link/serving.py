@@ -47,15 +47,15 @@ class Server:
     async def open(self, doors: Doors) -> list[dict[str, Any]]:
         """Open all doors and return what each is, as a document. Raises Mistake, and then none is open."""
         try:
-            opened = [await self._listen("tcp", "socket", TcpWire, address) for address in doors.tcp]
-            opened += [await self._listen("rfc2217", "rfc2217", TelnetWire, address) for address in doors.rfc2217]
+            opened = [await self._listen("tcp", TcpWire, address) for address in doors.tcp]
+            opened += [await self._listen("rfc2217", TelnetWire, address) for address in doors.rfc2217]
             opened += [self._lay(path) for path in doors.pty]
         except BaseException:
             await self.close()
             raise
         return opened
 
-    async def _listen(self, kind: str, scheme: str, wire: type[TcpWire], address: Address) -> dict[str, Any]:
+    async def _listen(self, kind: str, wire: type[TcpWire], address: Address) -> dict[str, Any]:
         loop = asyncio.get_running_loop()
         try:
             listener = await loop.create_server(
@@ -65,7 +65,7 @@ class Server:
             raise Mistake(f"--{kind} {address}: expected an address to listen on: {_reason(error)}") from error
         self._listeners.append(listener)
         host, port = listener.sockets[0].getsockname()[:2]
-        return {"kind": kind, "host": host, "port": port, "url": f"{scheme}://{Address(host, port)}"}
+        return {"kind": kind, "host": host, "port": port, "url": f"{kind}://{Address(host, port)}"}
 
     def _lay(self, path: Path) -> dict[str, Any]:
         terminal = PtyWire(self, path)
