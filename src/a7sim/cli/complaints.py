@@ -11,7 +11,7 @@ _WORDS = (
         "expected {low} to {known}, got {got}",
     ),
     (r"(?P<got>.+) is not a valid integer( range)?", "expected a whole number, got {got}"),
-    (r"(?P<got>.+) is not a valid float( range)?", "expected a number, got {got}"),
+    (r"(?P<got>.+) is not a valid number", "expected a number, got {got}"),
     (r"(?:File|Path|Directory) (?P<got>.+) does not exist", "expected one that exists, got {got}"),
     (r"File (?P<got>.+) is a directory", "expected a file, got the folder {got}"),
     (r"Directory (?P<got>.+) is a file", "expected a folder, got the file {got}"),
@@ -53,16 +53,17 @@ def _of_bounds(error: click.BadParameter) -> str | None:
     if isinstance(kind, click.Choice):
         return f"expected one of {', '.join(map(str, kind.choices))}, got {got}"
     if isinstance(kind, click.IntRange | click.FloatRange):
-        return f"expected {_in_words(kind)}, got {got}"
+        return f"expected {in_words(kind)}, got {got}"
     return None
 
 
-def _in_words(bounds: click.IntRange | click.FloatRange) -> str:
+def in_words(bounds: click.IntRange | click.FloatRange) -> str:
+    """Return what a range holds: 1 to 5, or 0 or more."""
     low, high = bounds.min, bounds.max
     if low is not None and high is not None and not bounds.min_open:
-        return f"{low:g} to {high:g}"
-    above = "" if low is None else f"more than {low:g}" if bounds.min_open else f"{low:g} or more"
-    below = "" if high is None else f"{high:g} at the most"
+        return f"{low:.12g} to {high:.12g}"
+    above = "" if low is None else f"more than {low:.12g}" if bounds.min_open else f"{low:.12g} or more"
+    below = "" if high is None else f"{high:.12g} at the most"
     return ", ".join(filter(None, (above, below)))
 
 

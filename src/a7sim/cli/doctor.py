@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import click
 
 import a7sim
+from a7sim.cli import options
 from a7sim.mistakes import Mistake
 from a7sim.shelves import Kind, names_of
 
@@ -46,7 +47,7 @@ class Library(NamedTuple):
 
 
 @click.command("doctor")
-@click.option("--json", "as_document", is_flag=True, help="Print what was found as one JSON document.")
+@options.as_document
 def command(as_document: bool) -> None:
     """Say what is installed, what is missing and how to get it, and what the terminal can do.
 

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli import EXIT_DIFFERS
-from a7sim.cli.names import a_scenario, a_session
-from a7sim.cli.options import of_a_folder
+from a7sim.cli import EXIT_DIFFERS, options
+from a7sim.cli.names import a_session
 from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
 from a7sim.scenario import load_scenario
@@ -41,15 +40,10 @@ _MOST_PARTS = 20
     metavar="T|@LINE|TEXT",
     help="Tell from a time on (s, or h:mm:ss), a line, or the first note with a text, such as the name of a form.",
 )
-@click.option(
-    "--scenario",
-    metavar="SCENARIO",
-    shell_complete=a_scenario,
-    help="What the session was of, where it does not stand beside it.",
-)
-@of_a_folder
-@click.option("--json", "as_document", is_flag=True, help="Print how it ended as one JSON document.")
-@click.option("--quiet", is_flag=True, help="Do not print the conversation.")
+@options.instrument_of
+@options.new_folder("the journal of a script")
+@options.as_document
+@options.quiet(but="how it ended, with --verify")
 def command(
     session: str,
     verify: bool,
@@ -62,8 +56,6 @@ def command(
     quiet: bool,
 ) -> None:
     """Say the lines of SESSION again to a fresh instrument: a folder, a journal, or a script (.a7s).
-
-    Of a script --out keeps the journal.
 
     Example: a7sim replay runs/akwanga --verify --quiet
     """

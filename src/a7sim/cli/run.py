@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from a7sim.cli.names import a_scenario
-from a7sim.cli.options import (
+from a7sim.cli.operators import (
     POINTS_A_MODEL,
     chosen,
     ended,

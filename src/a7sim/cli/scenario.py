@@ -2,7 +2,7 @@
 
 import click
 
-from a7sim.cli import EXIT_MISTAKE
+from a7sim.cli import EXIT_MISTAKE, options
 from a7sim.cli.names import a_scenario
 from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
@@ -20,7 +20,7 @@ def command() -> None:
 
 @command.command("validate")
 @click.argument("file", metavar="SCENARIO", shell_complete=a_scenario)
-@click.option("--json", "as_document", is_flag=True, help="Print the mistakes as one JSON document.")
+@options.as_document
 def validate(file: str, as_document: bool) -> None:
     """Name every mistake of a SCENARIO and of the files it names; exit code 2 if there is any.
 
@@ -46,9 +46,9 @@ def validate(file: str, as_document: bool) -> None:
 
 
 @command.command("schema")
-@click.option("--json", "as_document", is_flag=True, help="Print it inside one JSON document of a7sim.")
+@options.as_document
 def schema(as_document: bool) -> None:
-    """Print the JSON Schema of scenario files.
+    """Print the JSON Schema of scenario files; with --json, within a document such as all commands print.
 
     Example: a7sim scenario schema > scenario.schema.json
     """

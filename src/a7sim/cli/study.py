@@ -19,9 +19,9 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from a7sim.cli import EXIT_DIFFERS
+from a7sim.cli import EXIT_DIFFERS, options
 from a7sim.cli.names import a_study
-from a7sim.cli.options import of_a_folder, of_results
+from a7sim.cli.operators import of_results
 from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.study.auditing import audited
@@ -45,10 +45,12 @@ from a7sim.study.tally import Tally
     show_default=True,
     help="Who works: this process alone, a pool of others, dask, or MPI.",
 )
-@click.option("--workers", type=click.IntRange(min=1), help="Of the pool or of dask here; as many as there are cores.")
+@click.option(
+    "--workers", type=options.COUNT, metavar="N", help="Of the pool or of dask here; as many as there are cores."
+)
 @click.option("--scheduler", metavar="URL", help="Of dask, such as tcp://HOST:8786, whose workers work; else its own.")
-@click.option("--audit", type=click.IntRange(min=1), metavar="N", help="Work N picked sessions again over the link.")
-@of_a_folder
+@click.option("--audit", type=options.COUNT, metavar="N", help="Work N picked sessions again over the link.")
+@options.new_folder("checkpoint, tables, page and results; a study cut off goes on there")
 @of_results
 def command(
     study: str,

@@ -136,21 +136,17 @@ def _heights(order: Order, spots: Spots) -> tuple[float, ...]:
     low, high = spots.range
     for height in order.contours:
         if not low < height < high:
-            raise Mistake(
-                f"contour {height:g}: expected a height within the model, {low:.1f} to {high:.1f} m, got {height:g}"
-            )
+            raise Mistake(f"--contour {height:g}: expected a height within the model, {low:.1f} to {high:.1f} m")
     heights = set(order.contours)
     if order.interval is not None:
         first, last = math.ceil(low / order.interval), math.floor(high / order.interval)
         if last - first >= MOST_CONTOURS:
             raise Mistake(
-                f"contour interval {order.interval:g}: expected at most {MOST_CONTOURS} contours from {low:.1f} to "
+                f"--interval {order.interval:g}: expected at most {MOST_CONTOURS} contours from {low:.1f} to "
                 f"{high:.1f} m, got {last - first + 1}"
             )
         if last < first and not heights and not order.errands:
-            raise Mistake(
-                f"contour interval {order.interval:g}: expected a multiple of it from {low:.1f} to {high:.1f} m"
-            )
+            raise Mistake(f"--interval {order.interval:g}: expected a multiple of it from {low:.1f} to {high:.1f} m")
         heights |= {order.interval * k for k in range(first, last + 1)}
     return tuple(sorted(heights))
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli import options
 from a7sim.cli.names import an_exercise
 from a7sim.cli.serve import USUAL, Served, Told, serve
 from a7sim.cli.train.options import named, of_a_student, progress_in
@@ -38,11 +39,11 @@ EXAMINATION = "exam"
     help="No hints, nothing ticks, one grading; another seed than for practice. Without EXERCISE, the examination.",
 )
 @click.option("--anew", is_flag=True, help="Begin anew where an attempt is under way; that one is kept.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draws other photographs than your own.")
-@click.option("--script", type=click.Path(path_type=Path, dir_okay=False), help="Do it by a script (.a7s).")
+@options.seed("your own")
+@click.option("--script", type=options.FILE, help="Do it by a script (.a7s).")
 @click.option("--link", metavar="tcp://HOST:PORT", help="Serve it there for any client instead of opening the console.")
 @click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp://{USUAL}.")
-@click.option("--plain", is_flag=True, help="The console in words, for screen readers.")
+@options.plain
 @of_a_student
 def start_(
     exercise: str | None,
