@@ -20,6 +20,7 @@ from a7sim.session.playing import Player
 from a7sim.session.replaying import Difference, Replay, names_scenario, replayed
 from a7sim.session.scripts import SUFFIX, find_script, read_script
 from a7sim.session.seeking import line_sought
+from a7sim.wording import counted
 
 _MOST_PARTS = 20
 
@@ -180,8 +181,8 @@ def _ended(
         click.echo(as_json(document), nl=False)
     elif not silent:
         came = f"{differing} different" if differing else "no difference"
-        rest = f"; a torn last line of {torn} bytes is left out" if torn else ""
-        click.echo(f"{lines} lines, {checkpoints} checkpoints: {came}{rest}")
+        rest = f"; a torn last line of {counted(torn, 'byte')} is left out" if torn else ""
+        click.echo(f"{counted(lines, 'line')}, {counted(checkpoints, 'checkpoint')}: {came}{rest}")
 
 
 def played(session: str, pace: Pace, out: Path | None, force: bool, silent: bool, as_document: bool) -> None:
@@ -214,4 +215,4 @@ def played(session: str, pace: Pace, out: Path | None, force: bool, silent: bool
         click.echo(f"a7sim: {failed}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
     if not silent:
-        click.echo(f"{len(script.statements)} statements: all as expected")
+        click.echo(f"{counted(len(script.statements), 'statement')}: all as expected")

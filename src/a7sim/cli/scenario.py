@@ -8,6 +8,7 @@ from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
 from a7sim.scenario import ScenarioError, load_scenario, scenario_schema
 from a7sim.scene import build_scene
+from a7sim.wording import counted
 
 
 @click.group("scenario")
@@ -40,7 +41,8 @@ def validate(file: str, as_document: bool) -> None:
         for mistake_text in mistakes:
             click.echo(f"a7sim: {file}: {mistake_text}", err=True)
     else:
-        click.echo(f"{file}: {scenario.title}, {len(scenario.photos)} photographs, {len(scenario.models)} models")
+        photographs, models = counted(len(scenario.photos), "photograph"), counted(len(scenario.models), "model")
+        click.echo(f"{file}: {scenario.title}, {photographs}, {models}")
     if mistakes:
         raise click.exceptions.Exit(EXIT_MISTAKE)
 

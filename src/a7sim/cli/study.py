@@ -33,6 +33,7 @@ from a7sim.study.loading import Laid, load_study
 from a7sim.study.running import work
 from a7sim.study.tables import of_study
 from a7sim.study.tally import Tally
+from a7sim.wording import counted
 
 
 @click.command("study")
@@ -101,12 +102,12 @@ def _leave_page(out: Path, document: Document) -> None:
 
 def _audit(laid: Laid, tally: Tally, picks: int, silent: bool) -> None:
     differences = audited(laid, tally, picks)
-    worked = min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells))))
+    worked = counted(min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells)))), "session")
     if differences:
-        click.echo(f"a7sim: {len(differences)} of {worked} sessions differ over the link; {differences[0]}", err=True)
+        click.echo(f"a7sim: {len(differences)} of {worked} differ over the link; {differences[0]}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
     if not silent:
-        click.echo(f"{worked} sessions worked again over the link gave the same digits.")
+        click.echo(f"{worked} worked again over the link gave the same digits.")
 
 
 class _Rate(ProgressColumn):

@@ -14,6 +14,7 @@ from a7sim.link.conversation import Conversation, Terms, Wire
 from a7sim.link.pty_wire import PtyWire
 from a7sim.link.wires import LARGEST_READ, TcpWire, TelnetWire
 from a7sim.mistakes import Mistake
+from a7sim.wording import counted
 
 MOST_TURNED_AWAY = 64
 """Clients at a time that are told why they are turned away; the others are just turned away."""
@@ -96,7 +97,7 @@ class Server:
             if len(self._turned_away) >= MOST_TURNED_AWAY:
                 wire.abort()
             self._turned_away.add(wire)
-            text = entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {most} clients at a time")
+            text = entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {counted(most, 'client')} at a time")
             return f"{text}\n".encode("ascii")
         self._wires.add(wire)
         return Conversation(self.desk, self._clock, self._terms, wire, self.desk.opened + 1, serial)

@@ -18,6 +18,7 @@ from a7sim.operator.level_model import LevelModel
 from a7sim.operator.person import Person
 from a7sim.operator.stereo_view import COARSE_MM, FINE_MM, MIDDLING_MM, Look, StereoView, Surface, rectified
 from a7sim.scenario import Observer
+from a7sim.wording import counted
 
 LONGEST_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
 """From vertex to vertex."""
@@ -300,7 +301,9 @@ class Compilation:
             found = self._both_ways(name, height, start, z, lines)
             vertices = found.readings.shape[1]
             if vertices < 2 or ("joined" in found.endings and _length(found.readings[:2]) < _STUB_MM):
-                self._person.client.send(f'NOTE "{name}: {vertices} vertices, no line or more of one drawn before"')
+                self._person.client.send(
+                    f'NOTE "{name}: {counted(vertices, "vertex", "vertices")}, no line or more of one drawn before"'
+                )
             else:
                 lines.append(found)
         return lines

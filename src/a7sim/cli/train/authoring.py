@@ -10,6 +10,7 @@ from a7sim.documents import as_json, head
 from a7sim.training.checking import checked
 from a7sim.training.shelf import all_exercises, find_exercise
 from a7sim.training.skeleton import begin_exercise
+from a7sim.wording import counted
 
 EXIT_FAULTY = 1
 
@@ -30,7 +31,7 @@ def check_(exercises: tuple[str, ...], as_document: bool) -> None:
         click.echo(as_json(head("train check") | {"exercises": told}), nl=False)
     else:
         for each in found:
-            points = "" if each.reference_points is None else f" (reference {each.reference_points:g} points)"
+            points = "" if each.reference_points is None else f" (reference {counted(each.reference_points, 'point')})"
             click.echo(f"{each.name}: {'holds' if not each.faults else f'{len(each.faults)} to mend'}{points}")
             for fault in each.faults:
                 click.echo(f"  {fault}")

@@ -15,6 +15,7 @@ from a7sim.sheets import sheet
 from a7sim.training.exercise import Shelved
 from a7sim.training.exports import HOME_PAGE, as_class_document, as_nbgrader, as_xapi
 from a7sim.training.shelf import all_exercises, find_exercise
+from a7sim.wording import counted
 
 
 @click.command("list")
@@ -71,7 +72,8 @@ def _shown(shelved: Shelved) -> str:
     exercise = shelved.exercise
     steps = [f"  - {each.text}" for each in exercise.steps]
     criteria = [f"  {each.weight:4g}  {each.title}" for each in exercise.criteria]
-    facts = f"{exercise.minutes:g} minutes, {exercise.pass_points:g} of 100 points pass, {len(exercise.hints)} hints"
+    minutes, hints = counted(exercise.minutes, "minute"), counted(len(exercise.hints), "hint")
+    facts = f"{minutes}, {exercise.pass_points:g} of 100 points pass, {hints}"
     return "\n".join([shelved.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
 
 

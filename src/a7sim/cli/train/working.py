@@ -12,6 +12,7 @@ from a7sim.mistakes import Mistake
 from a7sim.training.account import answers_in
 from a7sim.training.attempts import write_answers, write_hint
 from a7sim.training.shelf import find_exercise
+from a7sim.wording import counted
 
 
 @click.command("hint")
@@ -33,7 +34,7 @@ def hint_(exercise: str | None, as_document: bool, home: Path | None, student: s
         told = {"exercise": attempt.exercise, "hint": number, "cost": hint.cost, "text": hint.text}
         click.echo(as_json(head("train hint") | told), nl=False)
     else:
-        click.echo(f"hint {number} (-{hint.cost:g} points): {hint.text}")
+        click.echo(f"hint {number} (-{counted(hint.cost, 'point')}): {hint.text}")
 
 
 @click.command("answer")
