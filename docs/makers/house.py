@@ -86,7 +86,7 @@ def _reached(room, below):
 def _places(layers):
     for row, rooms in enumerate(layers):
         for room in rooms:
-            yield room, (MARGIN + BOX / 2 + COLUMNS.get(room, 3.9) * GAP, MARGIN + row * ROW + TALL / 2)
+            yield room, (MARGIN + BOX / 2 + COLUMNS.get(room, 3.6) * GAP, MARGIN + row * ROW + TALL / 2)
 
 
 def _box(room, place):
