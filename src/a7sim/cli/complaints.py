@@ -38,9 +38,9 @@ def _said(error: click.ClickException, context: click.Context | None) -> str:
         meant = f"; did you mean {', '.join(sorted(error.possibilities))}?" if error.possibilities else ""
         return f"{told}expected an option of this command, got {error.option_name}{meant}"
     if isinstance(error, click.MissingParameter) and error.param is not None:
-        return f"{told}expected {_name_of(error.param)}, got none"
+        return f"{told}expected {name_of(error.param)}, got none"
     if isinstance(error, click.BadParameter) and error.param is not None:
-        return f"{_name_of(error.param)}: {_of_bounds(error) or _reworded(error.message)}"
+        return f"{name_of(error.param)}: {_of_bounds(error) or _reworded(error.message)}"
     return f"{told}{_reworded(error.format_message())}"
 
 
@@ -73,7 +73,8 @@ def _or_like(word: str, context: click.Context) -> str:
     return f"; did you mean {like[0]}?" if like else ""
 
 
-def _name_of(parameter: click.Parameter) -> str:
+def name_of(parameter: click.Parameter) -> str:
+    """Return what people call an option or an argument: --seed, SCENARIO."""
     if isinstance(parameter, click.Option):
         return max(parameter.opts, key=len)
     return parameter.metavar or parameter.human_readable_name.upper()

@@ -11,6 +11,7 @@ import msgspec
 from click.core import ParameterSource
 
 from a7sim.cli import EXIT_DOES_NOT_FIT, options
+from a7sim.cli.complaints import name_of
 from a7sim.cli.names import OneOf
 from a7sim.mistakes import Mistake
 from a7sim.scenario import PROFILES, Observer, Request, Scenario, bare_name, load_scenario, requested
@@ -111,8 +112,8 @@ def resumed_alone(*beside: str) -> None:
     allowed = {"resume", "as_document", "quiet", *beside}
     for name in ctx.params:
         if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            said = max(next(each.opts for each in ctx.command.params if each.name == name), key=len)
-            raise Mistake(f"--resume: expected no {said} beside it, since the journal says what was asked for")
+            said = next(each for each in ctx.command.params if each.name == name)
+            raise Mistake(f"--resume: expected no {name_of(said)} beside it, since the journal says what was asked for")
 
 
 POINTS_A_MODEL = 130

@@ -109,7 +109,7 @@ def command(
         resumed_alone(*_OF_THE_DOOR)
         served = _served_again(begun_in(resume, "serve"), token, Keeping(durability, resumes=True))
     elif scenario is None:
-        raise Mistake("serve: expected a SCENARIO, or --resume DIR")
+        raise Mistake("serve: expected SCENARIO or --resume DIR, got none")
     else:
         loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
         if out is not None:
@@ -216,8 +216,11 @@ def _doors(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]
 
 
 def _refuse_open_doors(doors: Doors, listen_anyway: bool, token: str | None) -> None:
-    for address in (*doors.tcp, *doors.rfc2217):
+    asked = [("--tcp", each) for each in doors.tcp] + [("--rfc2217", each) for each in doors.rfc2217]
+    for option, address in asked:
         if not address.loopback and not listen_anyway:
-            raise Mistake(f"{address}: expected an address of this machine alone (--listen-anyway lets others in)")
+            raise Mistake(
+                f"{option} {address}: expected an address of this machine alone (--listen-anyway lets others in)"
+            )
     if listen_anyway and token is None:
         raise Mistake(f"--listen-anyway: expected a token, from --token-file or in the environment as {TOKEN_VARIABLE}")

@@ -14,6 +14,7 @@ from a7sim.computing import Outcome
 from a7sim.computing.interior import Flight
 from a7sim.computing.strips import PairCamera
 from a7sim.documents import Document, as_json
+from a7sim.mistakes import Mistake
 from a7sim.reduction.strips import JoinMethod
 
 NARROWEST = 80
@@ -80,7 +81,9 @@ def interior(
     Example: a7sim reduce interior counts.csv --camera scenarios/akwanga.toml --out refined
     """
     if flying_height is not None and flying_height <= ground_height:
-        raise click.UsageError(f"--flying-height: expected more than the ground height of {ground_height:g} m")
+        raise Mistake(
+            f"--flying-height: expected more than the ground height of {ground_height:g} m, got {flying_height:g}"
+        )
     flight = None if flying_height is None else Flight(flying_height, ground_height)
     outcome = computing.interior(counts, camera, method, count_mm, correct, flight)
     _deliver(outcome, as_document, out, tables.of_interior)

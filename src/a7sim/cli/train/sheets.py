@@ -102,7 +102,7 @@ def report_(
     with progress_in(home) as progress:
         graded, best, attempts = progress.grades(whose), progress.best(whose), progress.attempts(whose)
     if not attempts:
-        raise Mistake(f"{whose or 'the class'}: expected attempts to report on, found none")
+        raise Mistake(f"{f'student {whose}' if whose else 'the class'}: expected attempts to report on, found none")
     if to == "csv":
         text = as_nbgrader(best)
     elif to == "json":

@@ -62,9 +62,11 @@ def start_(
     Example: a7sim train start 4
     """
     if exercise is None and not exam:
-        raise Mistake("start: expected an EXERCISE such as 4 (a7sim train list), or --exam for the examination")
+        raise Mistake(
+            "train start: expected EXERCISE, such as 4 (a7sim train list), or --exam for the examination, got none"
+        )
     if sum((script is not None, link is not None, serves)) > 1:
-        raise Mistake("start: expected one of --script, --link and --serve, got several")
+        raise Mistake("train start: expected one of --script, --link and --serve, got several")
     address = _address(link) if link is not None else USUAL if serves else None
     played = read_script(script) if script is not None else None
     shelved = find_exercise(exercise or EXAMINATION)
@@ -112,7 +114,7 @@ def _address(text: str) -> Address:
         raise Mistake(f"--link: expected tcp://HOST:PORT, got {text!r}")
     found = address_of(url["address"], "--link")
     if not found.loopback:
-        raise Mistake(f"--link: expected an address of this machine alone, got {found}")
+        raise Mistake(f"--link {text}: expected an address of this machine alone")
     return found
 
 
