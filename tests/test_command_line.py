@@ -171,6 +171,12 @@ def test_what_cannot_be_read_is_said_in_one_sentence(typed, words, sentence):
     assert err.startswith(f"a7sim: {sentence}")
 
 
+def test_without_textual_the_console_says_how_to_get_it(typed, monkeypatch):
+    monkeypatch.setitem(sys.modules, "textual", None)
+    said = "a7sim: console: expected textual to be installed: pip install 'a7sim[console]'\n"
+    assert typed("console", "akwanga") == (2, "", said)
+
+
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [

@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -140,10 +141,8 @@ def _refuse_beside(option: str, given: str | None, **others: object) -> None:
 
 
 def _see_that_textual_is_there() -> None:
-    try:
-        import textual  # noqa: F401
-    except ImportError as error:
-        raise Mistake("console: expected textual to be installed: pip install 'a7sim[console]'") from error
+    if find_spec("textual") is None:
+        raise Mistake("console: expected textual to be installed: pip install 'a7sim[console]'")
 
 
 def _first_visit() -> bool:

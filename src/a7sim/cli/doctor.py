@@ -126,7 +126,9 @@ def libraries() -> dict[str, list[Library]]:
     asked: dict[str, list[Library]] = {"": []}
     within: dict[str, list[str]] = {}
     for text in requirements:
-        name, parts, bounds, marker = _REQUIREMENT.match(text).groups(default="")  # type: ignore[union-attr]
+        found = _REQUIREMENT.match(text)
+        assert found is not None, text
+        name, parts, bounds, marker = found.groups(default="")
         extra = _EXTRA.search(marker)
         here = asked.setdefault(extra[1] if extra else "", [])
         if name == "a7sim":
