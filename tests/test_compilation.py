@@ -9,10 +9,11 @@ import pytest
 
 from a7sim.mistakes import Mistake
 from a7sim.operator.bench import Bench
-from a7sim.operator.compilation import Area, Compilation, Errand, Spots, Tracing, _chain
+from a7sim.operator.compilation import Compilation
 from a7sim.operator.crew import Crew
 from a7sim.operator.level_model import levelled
 from a7sim.operator.line_hands import LineHands
+from a7sim.operator.map_lines import Area, Errand, Spots, Tracing, chained
 from a7sim.operator.plotting import Order, Sheet, _heights
 from a7sim.operator.stereo_view import FINE_MM, StereoView
 from a7sim.operator.work import worked
@@ -239,9 +240,9 @@ def test_an_operator_is_given_no_coordinate_that_a_points_role_leaves_out():
     assert np.isnan(at["H1"]).tolist() == [True, True, False]
 
 
-def test_a_contour_that_ends_where_it_begins_is_an_empty_chain():
-    assert _chain([]).shape == (3, 0)
-    assert _chain([np.array([1.0, 2.0, 3.0])]).shape == (3, 1)
+def test_a_contour_that_ends_where_it_begins_is_an_emptychained():
+    assert chained([]).shape == (3, 0)
+    assert chained([np.array([1.0, 2.0, 3.0])]).shape == (3, 1)
 
 
 @pytest.mark.parametrize(

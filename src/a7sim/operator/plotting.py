@@ -10,11 +10,12 @@ import numpy as np
 from a7sim.geometry import Array, length_of
 from a7sim.mistakes import Mistake
 from a7sim.operator.bench import Bench
-from a7sim.operator.compilation import Area, Compilation, Errand, Spots, Traced, Tracing
+from a7sim.operator.compilation import Compilation
 from a7sim.operator.crew import Crew
 from a7sim.operator.job import Job
 from a7sim.operator.level_model import LevelModel, levelled, oriented
 from a7sim.operator.line_hands import LineHands
+from a7sim.operator.map_lines import Area, Errand, Spots, Traced, Tracing
 from a7sim.operator.person import Person
 from a7sim.operator.preparation import PLAN_GEARS
 from a7sim.operator.stereo_view import StereoView

@@ -12,7 +12,7 @@ from a7sim.documents import Document, head, of_absolute
 from a7sim.geometry import Array, length_of
 from a7sim.manual import BASE_COMPONENTS, VARIANTS
 from a7sim.mistakes import Mistake
-from a7sim.operator.compilation import CONTOUR, Errand, Traced, Tracing
+from a7sim.operator.map_lines import CONTOUR, Errand, Traced, Tracing
 from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, plotted
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
