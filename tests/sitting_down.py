@@ -120,7 +120,7 @@ class Person:
 
     def message(self) -> str:
         """Return what the message line says."""
-        return str(self.console.main.query_one("#message").content)  # type: ignore[attr-defined]
+        return str(self.console.main.query_one("#message").content)
 
     async def frame(self) -> list[str]:
         """Return the rows of the screen as text, once they are laid out."""

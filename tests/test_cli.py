@@ -309,7 +309,7 @@ def test_validate_names_every_mistake(tmp_path):
     done = a7sim("scenario", "validate", tmp_path / "bad.toml")
     assert done.returncode == 2
     assert "camera.fiducials[0].x: expected mm within the 230 mm format, got 412" in done.stderr
-    assert "sed: unknown key; did you mean seed?" in done.stderr
+    assert "sed: expected a key that is known; did you mean seed?" in done.stderr
     document = json.loads(a7sim("scenario", "validate", tmp_path / "bad.toml", "--json").stdout)
     assert len(document["mistakes"]) == 2
 

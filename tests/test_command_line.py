@@ -14,7 +14,9 @@ import pytest
 from click.shell_completion import BashComplete
 
 from a7sim.cli import cli, doctor
+from a7sim.cli.options import PLOTTERS
 from a7sim.cli.verbs import Verbs
+from a7sim.manual import VARIANTS
 from a7sim.shelves import names_of
 
 ROOT = Path(__file__).parents[1]
@@ -87,8 +89,37 @@ def test_options_have_help_and_speak_of_the_same_by_the_same_name(name):
         assert document not in options or options[document].is_flag
 
 
+OF_ITS_OWN = {
+    "--method": "a procedure, or a way to compute",
+    "--flying-height": "above the ground for prepare, above the sea for refraction",
+    "--link": "where one is served, or where to serve",
+    "--out": "what is left there",
+    "--quiet": "replay says how --verify ended",
+    "--to": "what is written",
+    "--speed": "a pace, or any number",
+}
+"""Options that two commands have in two senses, and why."""
+
+
+def test_an_option_reads_the_same_in_every_help():
+    told = {}
+    for command in VERBS.values():
+        for name, option in options_of(command).items():
+            meant = (option.help.partition("  [")[0].rstrip("."), option.make_metavar(click.Context(command)))
+            told.setdefault(name, set()).add(meant)
+    assert {name for name, meant in told.items() if len(meant) > 1} == set(OF_ITS_OWN)
+    assert all(re.match("(Folder|File) for ", about) for about, _ in told["--out"])
+
+
+def test_the_plotters_to_choose_from_are_those_of_the_manual():
+    assert tuple(VARIANTS) == PLOTTERS
+
+
 def test_every_command_that_has_a_document_prints_it_as_json():
     assert {name for name in VERBS if "--json" not in options_of(VERBS[name])} == set(NO_DOCUMENT)
+
+
+FLOWN = ("--c", "152.676", "--photo-scale", "8000", "--photo-base", "91")
 
 
 @pytest.mark.parametrize(
@@ -113,6 +144,24 @@ def test_every_command_that_has_a_document_prints_it_as_json():
         (["train", "start", "1", "--link", "localhost"], "--link: expected tcp://HOST:PORT, got 'localhost'"),
         (["run", "/"], "/: expected a scenario file or one of a8-strip, "),
         (["study", "/"], "/: expected the file of a study or one of a7-a8-comparator, "),
+        (
+            ["prepare", *FLOWN, "--heights", "2", "1"],
+            "--heights: expected the lowest ground before the highest, got 2 a",
+        ),
+        (
+            ["prepare", *FLOWN, "--flying-height", "900", "--heights", "1", "2"],
+            "prepare: expected --photo-scale or --fl",
+        ),
+        (["prepare", *FLOWN, "--heights", "1", "9000"], "--heights: expected ground below the flight, got 9000 m, 32"),
+        (["run"], "run: expected SCENARIO or --resume DIR, got none"),
+        (["run", "akwanga", "--resume", "x"], "--resume: expected no SCENARIO beside it"),
+        (["serve"], "serve: expected SCENARIO or --resume DIR, got none"),
+        (["serve", "akwanga", "--rfc2217", "8.8.8.8:1"], "--rfc2217 8.8.8.8:1: expected an address of this machine al"),
+        (["train", "start"], "train start: expected EXERCISE, such as 4 (a7sim train list), or --exam"),
+        (["compile", "akwanga", "--model", "9"], "--model: expected one of 1, 2, got 9"),
+        (["compile", "akwanga", "--line", "nope"], "--line: expected one of road1, track1, got nope"),
+        (["compile", "akwanga"], "compile: expected a --contour, an --interval or a --line to be drawn, got none"),
+        (["send", "tcp://127.0.0.1:1", "--timeout", "nan"], "--timeout: expected a finite number, got nan"),
         (["completion", "tcsh"], "SHELL: expected one of bash, zsh, fish, got 'tcsh'"),
     ],
 )
@@ -120,6 +169,12 @@ def test_what_cannot_be_read_is_said_in_one_sentence(typed, words, sentence):
     code, out, err = typed(*words)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"a7sim: {sentence}")
+
+
+def test_without_textual_the_console_says_how_to_get_it(typed, monkeypatch):
+    monkeypatch.setitem(sys.modules, "textual", None)
+    said = "a7sim: console: expected textual to be installed: pip install 'a7sim[console]'\n"
+    assert typed("console", "akwanga") == (2, "", said)
 
 
 @pytest.mark.parametrize(

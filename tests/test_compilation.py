@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from a7sim.cli import cli
 from a7sim.mistakes import Mistake
 from a7sim.operator.bench import Bench
-from a7sim.operator.compilation import Area, Compilation, Errand, Spots, Tracing, _chain
+from a7sim.operator.compilation import Compilation
 from a7sim.operator.crew import Crew
 from a7sim.operator.level_model import levelled
 from a7sim.operator.line_hands import LineHands
+from a7sim.operator.map_lines import Area, Errand, Spots, Tracing, chained
 from a7sim.operator.plotting import Order, Sheet, _heights
 from a7sim.operator.stereo_view import FINE_MM, StereoView
 from a7sim.operator.work import worked
@@ -205,7 +204,7 @@ def test_index_contours_are_every_fifth_of_their_interval():
 
 
 def test_a_height_outside_the_model_is_a_mistake(worker):
-    with pytest.raises(Mistake, match=r"contour 900: expected a height within the model"):
+    with pytest.raises(Mistake, match=r"--contour 900: expected a height within the model"):
         _heights(Order((900.0,), None, (), Tracing(0.0)), worker.spots)
     flat = Spots(np.zeros((3, 1, 2)), np.array([[1.0, 2.0]]))
     with pytest.raises(Mistake, match="at most 100 contours"):
@@ -215,9 +214,9 @@ def test_a_height_outside_the_model_is_a_mistake(worker):
 @pytest.mark.parametrize(
     ("wanted", "said"),
     [
-        (Wanted("9", (460.0,)), "model: expected one of 1, 2"),
-        (Wanted("1", lines=("road9",)), "line: expected one of road1, track1, got road9"),
-        (Wanted("1"), "something to compile"),
+        (Wanted("9", (460.0,)), "--model: expected one of 1, 2"),
+        (Wanted("1", lines=("road9",)), "--line: expected one of road1, track1, got road9"),
+        (Wanted("1"), "compile: expected a --contour"),
     ],
 )
 def test_what_cannot_be_compiled_is_said_before_any_work(wanted, said):
@@ -228,7 +227,7 @@ def test_what_cannot_be_compiled_is_said_before_any_work(wanted, said):
 def test_an_unknown_line_ends_with_one_sentence_and_exit_code_2():
     done = a7sim("compile", "akwanga", "--line", "road9")
     assert done.returncode == 2
-    assert done.stderr == "a7sim: line: expected one of road1, track1, got road9\n"
+    assert done.stderr == "a7sim: --line: expected one of road1, track1, got road9\n"
 
 
 def test_an_operator_is_given_no_coordinate_that_a_points_role_leaves_out():
@@ -241,13 +240,22 @@ def test_an_operator_is_given_no_coordinate_that_a_points_role_leaves_out():
     assert np.isnan(at["H1"]).tolist() == [True, True, False]
 
 
-def test_a_contour_that_ends_where_it_begins_is_an_empty_chain():
-    assert _chain([]).shape == (3, 0)
-    assert _chain([np.array([1.0, 2.0, 3.0])]).shape == (3, 1)
+def test_a_contour_that_ends_where_it_begins_is_an_emptychained():
+    assert chained([]).shape == (3, 0)
+    assert chained([np.array([1.0, 2.0, 3.0])]).shape == (3, 1)
 
 
-@pytest.mark.parametrize("value", ["nan", "inf", "0", "-5", "ten"])
-def test_an_interval_that_is_no_distance_is_refused(value):
-    done = CliRunner().invoke(cli, ["compile", "akwanga", "--interval", value])
-    assert done.exit_code == 2
-    assert f"expected a number above 0, got '{value}'" in done.output
+@pytest.mark.parametrize(
+    ("value", "sentence"),
+    [
+        ("nan", "expected a finite number, got nan"),
+        ("inf", "expected a finite number, got inf"),
+        ("0", "expected more than 0, got 0.0"),
+        ("-5", "expected more than 0, got -5.0"),
+        ("ten", "expected a number, got 'ten'"),
+    ],
+)
+def test_an_interval_that_is_no_distance_is_refused(typed, value, sentence):
+    code, _, err = typed("compile", "akwanga", "--interval", value)
+    assert (code, err.count("\n")) == (2, 1)
+    assert err.startswith(f"a7sim: --interval: {sentence}")

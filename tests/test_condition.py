@@ -189,7 +189,7 @@ def test_a_scenario_names_a_class_or_lists_faults_or_both(written, understood):
         ("wrn", "instrument.condition: expected a table or 'new' or 'serviced' or 'worn', got \"wrn\""),
         (7, "instrument.condition: expected a table or 'new' or 'serviced' or 'worn', got 7"),
         ({"upkeep": "old"}, "instrument.condition.upkeep: expected 'new' or 'serviced' or 'worn', got \"old\""),
-        ({"backlash": 1}, "instrument.condition.backlash: unknown key; did you mean backlash_mm?"),
+        ({"backlash": 1}, "instrument.condition.backlash: expected a key that is known; did you mean backlash_mm?"),
         ({"counter_slip_share": 2}, "instrument.condition.counter_slip_share: expected a share from 0 to 1, got 2"),
         ({"left": {"rod_um": [1]}}, "instrument.condition.left.rod_um: expected a list of 2 numbers, got 1"),
     ],

@@ -48,6 +48,11 @@ def test_links_lead_somewhere_within_what_is_built(path):
 
 
 @pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(ROOT)) for path in PAGES])
+def test_no_diagram_needs_a_script_to_be_drawn(path):
+    assert "```mermaid" not in path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(ROOT)) for path in PAGES])
 def test_every_command_on_a_page_is_one_that_the_command_line_takes(path):
     for line in re.findall(r"^(?:    )?(a7sim [a-z].*)$", path.read_text(encoding="utf-8"), re.M):
         for each in without_alternatives(re.split(r"  #| [<>] ", line)[0]):

@@ -43,7 +43,7 @@ class Room:
             line = recorder.stdout.readline()
             assert line, "the recorder has ended"
             text += line
-        self.places["127.0.0.1:5026"] = json.loads(text)["url"].removeprefix("socket://")
+        self.places["127.0.0.1:5026"] = json.loads(text)["url"].removeprefix("tcp://")
 
     def close(self):
         """End with Ctrl-C, the last begun first, as the page says; each leaves with exit code 0."""

@@ -209,7 +209,7 @@ def test_what_differs_is_told_with_the_numbers_of_the_results(akwanga_folder, re
         "truth.slips.invented": ["-", "1"],
     }
     printed = typed("compare", akwanga_folder, copy)[1]
-    assert "6 facts differ" in printed
+    assert "6 differences" in printed
     assert "models 2 relative_orientation elements" in printed
     everything = json.loads(typed("compare", akwanga_folder, copy, "--json", "--all")[1])["rows"]
     assert ["Akwanga", "Akwanga"] in [row["values"] for row in everything]

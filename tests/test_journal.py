@@ -622,7 +622,9 @@ def test_what_a_client_and_an_instrument_say_is_recorded_and_replays(tmp_path, c
         text = ""
         while not text.endswith("\n}\n"):
             text += recorder.stdout.readline()
-        port = int(json.loads(text)["url"].rsplit(":", 1)[1])
+        scheme, _, port = json.loads(text)["url"].split(":")
+        assert scheme == "tcp"
+        port = int(port)
         with Line(port) as line:
             assert line.ask("DRIV:X 30;*OPC?;:COUN:X?") == "1;30.00"
             line.send(b"EYEP1:PICT? 4,4,1\n" + b"x" * 5000 + b"\n")

@@ -71,7 +71,7 @@ def test_from_novice_to_first_order_everything_gets_better():
     [
         ({"observer": "expert"}, "observer: expected 'novice', 'trained', 'first-order' or a table, got \"expert\""),
         ({"observer.skill": "expert"}, "observer.skill: expected 'first-order' or 'novice' or 'trained'"),
-        ({"observer.skil": '"novice"'}, "observer.skil: unknown key; did you mean skill?"),
+        ({"observer.skil": '"novice"'}, "observer.skil: expected a key that is known; did you mean skill?"),
         ({"observer.certain_slips": "[{ kind = 'fall asleep' }]"}, r"observer.certain_slips[0].kind: expected"),
         (
             {"observer.certain_slips": "[{ kind = 'gross', model = '9' }]"},

@@ -176,7 +176,7 @@ def test_folders_long_files_and_files_that_are_not_there_are_refused(said, tmp_p
     options, _, _ = COMMANDS[command]
     command = command.split()[0]
     (tmp_path / "folder").mkdir()
-    one_sentence(said(command, "folder", *options), "folder", "directory")
+    one_sentence(said(command, "folder", *options), "expected a file, got the folder 'folder'")
     one_sentence(said(command, "none.csv", *options), "none.csv", "No such file")
     with (tmp_path / "noise.csv").open("wb") as file:
         file.truncate(100_000_000)

@@ -58,13 +58,13 @@ def test_every_mistake_is_named_at_once_with_its_path():
     raw["plan"]["centre_levels"] = [4900.0, 4900.0]
     raw["film"]["irregular_um"] = -1
     assert mistakes_of(raw) == [
-        "sed: unknown key; did you mean seed?",
+        "sed: expected a key that is known; did you mean seed?",
         'title: expected a text of 1 to 64 characters, got ""',
         'camera.c: expected a principal distance of 98 to 215 mm, got "long"',
         "camera.fiducials[2].x: expected mm within the 230 mm format, got 412",
         "film.irregular_um: expected a standard deviation, zero or more, got -1",
         "photos[1].position: expected a list of 3 numbers, got a list of 2",
-        "photos[2].kapa: unknown key; did you mean kappa?",
+        "photos[2].kapa: expected a key that is known; did you mean kappa?",
         "plan.case: expected 'A' or 'B' or 'C' or 'D' or 'E', got \"F\"",
         "plan.bx: expected a base of 10 to 280 mm, got nothing",
         "photos[2].name: expected a name of its own, got '103' as in photos[0]",
@@ -215,7 +215,7 @@ def test_overrides_reach_any_value_and_a_wrong_path_is_named():
     assert (scenario.observer.parallax_um, scenario.photos[1].phi, scenario.plan.case) == (2.5, 3.0, "E")
     with pytest.raises(ScenarioError, match=r"photos\.7\.phi"):
         load_scenario("akwanga", {"photos.7.phi": "3"})
-    with pytest.raises(ScenarioError, match=r"plan\.cse: unknown key; did you mean case\?"):
+    with pytest.raises(ScenarioError, match=r"plan\.cse: expected a key that is known; did you mean case\?"):
         load_scenario("akwanga", {"plan.cse": "E"})
 
 

@@ -47,6 +47,7 @@ def test_the_document_says_where_it_listens_and_all_doors_lead_to_one_instrument
     document = everywhere.document
     assert (document["schema_version"], document["command"], document["seed"]) == (1, "serve", 7)
     assert [door["kind"] for door in document["listening"]] == ["tcp", "rfc2217", "pty"]
+    assert [door["url"].partition("://")[0] for door in document["listening"][:2]] == ["tcp", "rfc2217"]
     for n, door in enumerate(document["listening"]):
         with serial.serial_for_url(door["url"], timeout=PATIENCE) as port:
             client = Client(port)

@@ -167,7 +167,7 @@ def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
             return measure_of(Measured(measure=name, options=options)).of(account)
 
         assert found("spread", handles=["by1"]) == Found(0.04, "by' at point 1 read from 0.26 to 0.30")
-        assert found("missing-readings", points=["2"]) == Found(1.0, "1 of 1 registrations are missing: 2")
+        assert found("missing-readings", points=["2"]) == Found(1.0, "1 of 1 registration missing: 2")
         assert found("wrong-approach", handles=["by1"]).value == 1.0
         assert found("handles-moved", handles=["by1", "by2"]) == Found(1.0, "by' moved")
         assert found("run-by-motor", handles=["X"]).value == 0.0

@@ -43,7 +43,7 @@ def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: 
 
 
 def shown(console: Console) -> str:
-    return str(console.main.query_one("#tasks").content)  # type: ignore[attr-defined]
+    return str(console.main.query_one("#tasks").content)
 
 
 def test_points_are_driven_to_with_a_gear_engaged_before_and_counters_preset_by_a_line(tmp_path: Path) -> None:

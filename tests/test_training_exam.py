@@ -80,7 +80,7 @@ def test_the_examination_is_started_without_a_name_and_hands_out_the_job(train, 
 
 def test_who_names_no_exercise_is_asked_for_one(train):
     code, _, err = train("start")
-    assert code == 2 and "expected an EXERCISE such as 4" in err and "--exam for the examination" in err
+    assert code == 2 and "train start: expected EXERCISE, such as 4" in err and "--exam for the examination" in err
 
 
 def test_beyond_its_time_the_checklist_says_so(train, tmp_path):

@@ -11,10 +11,11 @@ from click.testing import CliRunner
 from a7sim.cli import cli
 from a7sim.operator import DoesNotFit, work
 from a7sim.operator.bench import Bench
-from a7sim.operator.compilation import Area, Compilation, Tracing
+from a7sim.operator.compilation import Compilation
 from a7sim.operator.crew import Crew
 from a7sim.operator.level_model import levelled
 from a7sim.operator.line_hands import LineHands
+from a7sim.operator.map_lines import Area, Tracing
 from a7sim.operator.stereo_view import StereoView
 from a7sim.operator.work import worked
 from a7sim.scenario import load_scenario

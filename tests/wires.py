@@ -24,7 +24,7 @@ def everywhere(desk):
         doors = Doors([ANYWHERE], [ANYWHERE], [Path(folder) / "pty"])
         with Served(desk, doors=doors) as opened:
             urls = {door["kind"]: door["url"] for door in opened.opened}
-            yield urls | {"socket": urls["tcp"], "tcp": urls["tcp"].replace("socket://", "tcp://")}
+            yield urls | {"socket": urls["tcp"].replace("tcp://", "socket://")}
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from inspect import cleandoc
 import click
 
 from a7sim.cli import cli
+from a7sim.cli.complaints import in_words
 
 OPENING = """# Commands
 
@@ -62,8 +63,10 @@ def _row(option, context):
     extra = option.get_help_extra(context)
     bracketed = re.compile(r"\s*\[(?:[^\[\]]|\[[^\]]*\])*\]$")
     told = bracketed.sub("", about) if any(extra.values()) else about
-    limits = ", ".join(str(extra[key]) for key in ("range", "required") if extra.get(key))
-    default = str(extra.get("default", ""))
+    limits = ", ".join(filter(None, (in_words(option.type) if "range" in extra else "", extra.get("required", ""))))
+    told, spoken, said = told.partition("  [default: ")
+    told += "." if spoken else ""
+    default = str(extra.get("default", said.removesuffix("]")))
     meaning = f"{told} ({limits})" if limits else told
     words = words.replace(" RANGE", "")
     return f"| <code>{_celled(words)}</code> | {_celled(_escaped(meaning))} | {default} |"

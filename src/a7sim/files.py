@@ -19,6 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from a7sim.mistakes import Mistake
+from a7sim.wording import counted
 
 LONGEST_FILE = 20_000_000
 """Bytes; a longer file is refused before it is read."""
@@ -182,7 +183,7 @@ def _csv_table(path: Path, text: str) -> Table:
         raise Mistake(f"{path}, line {header_line}, column {_shown(twice)}: expected every column once, got it twice")
     for line, cells in lines[1:]:
         if len(cells) != len(columns):
-            raise Mistake(f"{path}, line {line}: expected {len(columns)} columns, got {len(cells)}")
+            raise Mistake(f"{path}, line {line}: expected {counted(len(columns), 'column')}, got {len(cells)}")
     cells_of = tuple((line, dict(zip(columns, cells, strict=True))) for line, cells in lines[1:])
     return Table(path, tuple(columns), cells_of, f", line {header_line}", "line")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from a7sim.cli.names import a_scenario
-from a7sim.cli.options import chosen, ended, of_a_folder, of_a_scenario, of_results, watched
+from a7sim.cli.operators import chosen, ended, of_a_folder, of_a_scenario, of_results, watched
 
 _POINTS_A_MODEL = 260
 """About how many points an operator works on in a model in both ways."""

@@ -8,6 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from a7sim.cli.options import Number
 from a7sim.mistakes import Mistake
 
 PORT, IDLE_MIN = 8515, 30.0
@@ -15,11 +16,16 @@ PORT, IDLE_MIN = 8515, 30.0
 _OPTIONS = (
     click.option("--browser", is_flag=True, help="Serve it to browsers of this machine instead."),
     click.option(
-        "--port", type=click.IntRange(0, 65535), default=PORT, show_default=True, help="Where; 0 for any that is free."
+        "--port",
+        type=click.IntRange(0, 65535),
+        metavar="N",
+        default=PORT,
+        show_default=True,
+        help="Where; 0 for any that is free.",
     ),
     click.option(
         "--idle-exit",
-        type=click.FloatRange(min=0.0, min_open=True, max=1e5),
+        type=Number(min=0.0, min_open=True, max=1e5),
         default=IDLE_MIN,
         show_default=True,
         metavar="MIN",

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from a7sim.cli.names import a_scenario
-from a7sim.cli.options import chosen, ended, of_a_folder, of_a_scenario, of_results, watched
+from a7sim.cli.operators import chosen, ended, of_a_folder, of_a_scenario, of_results, watched
 from a7sim.mistakes import Mistake
 
 PROJECTORS = 2
@@ -13,9 +13,18 @@ PROJECTORS = 2
 
 @click.command("calibrate")
 @click.argument("scenario", shell_complete=a_scenario)
-@click.option("--points", type=int, default=25, show_default=True, help="Crosses of the plate, evenly spaced.")
-@click.option("--levels", type=click.IntRange(1, 5), default=2, show_default=True, help="Levels of Z.")
-@click.option("--pointings", type=click.IntRange(1, 20), default=2, show_default=True, help="At each cross and level.")
+@click.option(
+    "--points", type=int, metavar="N", default=25, show_default=True, help="Crosses of the plate, evenly spaced."
+)
+@click.option("--levels", type=click.IntRange(1, 5), metavar="N", default=2, show_default=True, help="Levels of Z.")
+@click.option(
+    "--pointings",
+    type=click.IntRange(1, 20),
+    metavar="N",
+    default=2,
+    show_default=True,
+    help="At each cross and level.",
+)
 @of_a_scenario
 @of_a_folder
 @of_results

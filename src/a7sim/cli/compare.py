@@ -4,13 +4,14 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli import options
 from a7sim.mistakes import Mistake
 
 
 @click.command("compare")
-@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="DIR DIR...")
+@click.argument("folders", nargs=-1, required=True, type=options.PLACE, metavar="DIR DIR...")
 @click.option("--all", "everything", is_flag=True, help="Also what is the same.")
-@click.option("--json", "as_document", is_flag=True, help="Print the comparison as one JSON document.")
+@options.as_document
 def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> None:
     """Lay the results of sessions beside each other: settings, elements, residuals, centres, strips, times, slips.
 

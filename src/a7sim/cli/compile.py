@@ -4,8 +4,9 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli import options
 from a7sim.cli.names import a_scenario
-from a7sim.cli.options import Above, chosen, ended, of_a_folder, of_a_scenario, of_results, watched
+from a7sim.cli.operators import chosen, ended, of_a_scenario, of_results, watched
 
 _POINTS = 400
 """About how many points and vertices an operator works on; the bar only needs the order of it."""
@@ -13,14 +14,18 @@ _POINTS = 400
 
 @click.command("compile")
 @click.argument("scenario", shell_complete=a_scenario)
-@click.option("--model", "name", default="1", show_default=True, help="Model to be compiled.")
-@click.option("--contour", "contours", multiple=True, type=Above(-1e6), metavar="M", help="Height of a contour in m.")
-@click.option("--interval", type=Above(), metavar="M", help="All contours whose height is a multiple of this.")
+@click.option("--model", "name", metavar="NAME", default="1", show_default=True, help="Model to be compiled.")
+@click.option(
+    "--contour", "contours", multiple=True, type=options.HEIGHT, metavar="M", help="Height of a contour in m."
+)
+@click.option(
+    "--interval", type=options.above(0.0), metavar="M", help="All contours whose height is a multiple of this."
+)
 @click.option("--line", "lines", multiple=True, metavar="NAME", help="Road or track of the scenario.")
-@click.option("--map-scale", type=Above(99.0), metavar="N", help="Scale number of the map.")
+@options.map_scale
 @click.option("--tremor", type=click.IntRange(0, 500), metavar="UM", help="Tremor at photo scale.")
 @of_a_scenario
-@of_a_folder
+@options.new_folder("journal, book, map and results")
 @of_results
 def command(
     scenario: str,

@@ -11,7 +11,7 @@ _WORDS = (
         "expected {low} to {known}, got {got}",
     ),
     (r"(?P<got>.+) is not a valid integer( range)?", "expected a whole number, got {got}"),
-    (r"(?P<got>.+) is not a valid float( range)?", "expected a number, got {got}"),
+    (r"(?P<got>.+) is not a valid number", "expected a number, got {got}"),
     (r"(?:File|Path|Directory) (?P<got>.+) does not exist", "expected one that exists, got {got}"),
     (r"File (?P<got>.+) is a directory", "expected a file, got the folder {got}"),
     (r"Directory (?P<got>.+) is a file", "expected a folder, got the file {got}"),
@@ -38,9 +38,9 @@ def _said(error: click.ClickException, context: click.Context | None) -> str:
         meant = f"; did you mean {', '.join(sorted(error.possibilities))}?" if error.possibilities else ""
         return f"{told}expected an option of this command, got {error.option_name}{meant}"
     if isinstance(error, click.MissingParameter) and error.param is not None:
-        return f"{told}expected {_name_of(error.param)}, got none"
+        return f"{told}expected {name_of(error.param)}, got none"
     if isinstance(error, click.BadParameter) and error.param is not None:
-        return f"{_name_of(error.param)}: {_of_bounds(error) or _reworded(error.message)}"
+        return f"{name_of(error.param)}: {_of_bounds(error) or _reworded(error.message)}"
     return f"{told}{_reworded(error.format_message())}"
 
 
@@ -53,16 +53,17 @@ def _of_bounds(error: click.BadParameter) -> str | None:
     if isinstance(kind, click.Choice):
         return f"expected one of {', '.join(map(str, kind.choices))}, got {got}"
     if isinstance(kind, click.IntRange | click.FloatRange):
-        return f"expected {_in_words(kind)}, got {got}"
+        return f"expected {in_words(kind)}, got {got}"
     return None
 
 
-def _in_words(bounds: click.IntRange | click.FloatRange) -> str:
+def in_words(bounds: click.IntRange | click.FloatRange) -> str:
+    """Return what a range holds: 1 to 5, or 0 or more."""
     low, high = bounds.min, bounds.max
     if low is not None and high is not None and not bounds.min_open:
-        return f"{low:g} to {high:g}"
-    above = "" if low is None else f"more than {low:g}" if bounds.min_open else f"{low:g} or more"
-    below = "" if high is None else f"{high:g} at the most"
+        return f"{low:.12g} to {high:.12g}"
+    above = "" if low is None else f"more than {low:.12g}" if bounds.min_open else f"{low:.12g} or more"
+    below = "" if high is None else f"{high:.12g} at the most"
     return ", ".join(filter(None, (above, below)))
 
 
@@ -72,7 +73,8 @@ def _or_like(word: str, context: click.Context) -> str:
     return f"; did you mean {like[0]}?" if like else ""
 
 
-def _name_of(parameter: click.Parameter) -> str:
+def name_of(parameter: click.Parameter) -> str:
+    """Return what people call an option or an argument: --seed, SCENARIO."""
     if isinstance(parameter, click.Option):
         return max(parameter.opts, key=len)
     return parameter.metavar or parameter.human_readable_name.upper()

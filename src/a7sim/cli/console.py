@@ -2,13 +2,15 @@
 
 import sys
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import click
 
+from a7sim.cli import options
 from a7sim.cli.browser import drawn_by_a_browser, in_a_browser, served_instead
-from a7sim.cli.names import OneOf, a_scenario
+from a7sim.cli.names import a_scenario
 from a7sim.cli.prompt import data_folder
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.words import ACUITY_UM
@@ -25,31 +27,26 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 @click.command("console")
 @click.argument("scenario", required=False, shell_complete=a_scenario)
 @click.option("--connect", metavar="URL", help="Sit down at a served instrument; SCENARIO is then the job sheet.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draws film and instrument.")
-@click.option("--variant", type=OneOf(["A7", "A8"]), help="Another plotter.")
+@options.seed()
+@options.variant()
 @click.option("--theme", type=click.Choice(THEMES), help="Colours  [default: enamel]")
 @click.option(
     "--drawing",
     type=click.Choice([each.value for each in Drawing]),
     help="How pictures are drawn  [default: the best there is]",
 )
-@click.option("--plain", is_flag=True, help="Say in words what the eyes see; nothing rolls. For screen readers.")
+@options.plain
 @click.option(
     "--acuity",
-    type=click.FloatRange(min=0.0, min_open=True, max=1e4),
+    type=options.Number(min=0.0, min_open=True, max=1e4),
     default=ACUITY_UM,
     show_default=True,
     metavar="UM",
     help="What the eye tells apart, in words, at photo scale.",
 )
-@click.option("--keymap", type=click.Path(path_type=Path, dir_okay=False), help="File with keys of your own.")
+@click.option("--keymap", type=options.FILE, help="File with keys of your own.")
 @click.option("--write-keymap", is_flag=True, help="Write all keys to --keymap, or to the usual file, and end.")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder of the session  [default: one among your data]",
-)
+@options.out_folder("the session", "one among your data")
 @click.option(
     "--go-on/--anew",
     "go_on",
@@ -61,7 +58,7 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
     metavar="SESSION|URL",
     help="Watch a session (folder, .jsonl, .a7s), or a served instrument that somebody works.",
 )
-@click.option("--token-file", type=click.Path(path_type=Path, dir_okay=False), help="File with a server's token.")
+@options.token_file
 @in_a_browser
 @click.pass_context
 def command(
@@ -144,10 +141,8 @@ def _refuse_beside(option: str, given: str | None, **others: object) -> None:
 
 
 def _see_that_textual_is_there() -> None:
-    try:
-        import textual  # noqa: F401
-    except ImportError as error:
-        raise Mistake("console: expected textual to be installed: pip install 'a7sim[console]'") from error
+    if find_spec("textual") is None:
+        raise Mistake("console: expected textual to be installed: pip install 'a7sim[console]'")
 
 
 def _first_visit() -> bool:

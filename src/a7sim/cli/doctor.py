@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import click
 
 import a7sim
+from a7sim.cli import options
 from a7sim.mistakes import Mistake
 from a7sim.shelves import Kind, names_of
 
@@ -46,7 +47,7 @@ class Library(NamedTuple):
 
 
 @click.command("doctor")
-@click.option("--json", "as_document", is_flag=True, help="Print what was found as one JSON document.")
+@options.as_document
 def command(as_document: bool) -> None:
     """Say what is installed, what is missing and how to get it, and what the terminal can do.
 
@@ -125,7 +126,9 @@ def libraries() -> dict[str, list[Library]]:
     asked: dict[str, list[Library]] = {"": []}
     within: dict[str, list[str]] = {}
     for text in requirements:
-        name, parts, bounds, marker = _REQUIREMENT.match(text).groups(default="")  # type: ignore[union-attr]
+        found = _REQUIREMENT.match(text)
+        assert found is not None, text
+        name, parts, bounds, marker = found.groups(default="")
         extra = _EXTRA.search(marker)
         here = asked.setdefault(extra[1] if extra else "", [])
         if name == "a7sim":

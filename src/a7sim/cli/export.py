@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli.options import Above
+from a7sim.cli import options
 from a7sim.mistakes import Mistake
 from a7sim.report.cast import cast_of
 from a7sim.report.decks import deck_of
@@ -17,7 +17,7 @@ _OPTION_OF = {"speed": "asciicast", "way": "cards"}
 
 
 @click.command("export")
-@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.argument("folder", type=options.PLACE, metavar="DIR")
 @click.option(
     "--to",
     "kind",
@@ -25,8 +25,10 @@ _OPTION_OF = {"speed": "asciicast", "way": "cards"}
     type=click.Choice(["asciicast", "book", "forms", "cards"]),
     help="A film of the terminal, the observation book as CSV or on printed forms, or N.R.C. cards.",
 )
-@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Instead of standard output.")
-@click.option("--speed", type=Above(), help="asciicast: how much faster than it happened.  [default: 120]")
+@options.out_file("what is made", "standard output")
+@click.option(
+    "--speed", type=options.above(0.0), help="How many times as fast as it happened, of an asciicast  [default: 120]"
+)
 @click.option("--way", metavar="WAY", help="cards: comparator or A8, where the strip was measured so.")
 def command(folder: Path, kind: str, out: Path | None, speed: float | None, way: str | None) -> None:
     """Write the session in DIR as something else.

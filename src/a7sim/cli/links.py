@@ -2,42 +2,30 @@
 
 import os
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
 
 import click
 
+from a7sim.cli.options import TOKEN_VARIABLE, Number, together, token_file
 from a7sim.link.opening import TIMEOUT_S
 from a7sim.mistakes import Mistake
-
-TOKEN_VARIABLE = "A7SIM_TOKEN"
 
 LONGEST_TOKEN = 1000
 """Characters: a line of the language has room for it, even if all are quotes that have to be doubled."""
 
 _SENDABLE = re.compile(f"[ -~]{{1,{LONGEST_TOKEN}}}")
 
-Command = TypeVar("Command", bound=Callable[..., Any])
-
 _TIMEOUT = click.option(
     "--timeout",
-    type=click.FloatRange(min=0.0, min_open=True, max=1e6),
+    type=Number(min=0.0, min_open=True, max=1e6),
     default=TIMEOUT_S,
     show_default=True,
     metavar="SECONDS",
     help="How long a reply is waited for.",
 )
-_TOKEN_FILE = click.option(
-    "--token-file",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help=f"File with the token of a server that asks for one; without it, the token is {TOKEN_VARIABLE}'s.",
-)
 
-
-def of_a_link(command: Command) -> Command:
-    """Add --timeout and --token-file: how to talk to a served instrument."""
-    return _TIMEOUT(_TOKEN_FILE(command))
+of_a_link = together(_TIMEOUT, token_file)
+"""--timeout, --token-file: how to talk to a served instrument."""
 
 
 def token_from(file: Path | None) -> str | None:

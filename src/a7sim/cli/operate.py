@@ -6,7 +6,7 @@ import click
 
 from a7sim.cli.links import of_a_link, token_from
 from a7sim.cli.names import a_scenario
-from a7sim.cli.options import (
+from a7sim.cli.operators import (
     POINTS_A_MODEL,
     chosen,
     ended,

@@ -1,91 +1,55 @@
-"""What the commands that seat an operator share: options, the scenario that they choose, and how they end."""
+"""What several commands ask for, each option once: its name, its kind and what its help says; light to import."""
 
 import math
-import shlex
-import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
-import msgspec
-from click.core import ParameterSource
 
-from a7sim.cli import EXIT_DOES_NOT_FIT
-from a7sim.cli.names import OneOf
-from a7sim.mistakes import Mistake
-from a7sim.scenario import PROFILES, Observer, Request, Scenario, bare_name, load_scenario, requested
-from a7sim.session.durable import DURABILITIES
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
-    from a7sim.documents import Document
-    from a7sim.session import Watcher
+from a7sim.cli.names import OneOf, a_scenario
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+Option = Callable[[Command], Command]
+
+TOKEN_VARIABLE = "A7SIM_TOKEN"
+
+PLOTTERS = ("A7", "A8")
+"""The variants of the manual, which is not read to say what there is to choose from."""
+
+FILE = click.Path(path_type=Path, dir_okay=False)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+PLACE = click.Path(path_type=Path)
+"""A file or a folder, of which whoever opens it says what it should be."""
 
 
-class Above(click.ParamType[float]):
-    """A finite number above a bound."""
+class Number(click.FloatRange):
+    """A finite number within a range."""
 
     name = "number"
 
-    def __init__(self, bound: float = 0.0) -> None:
-        self._bound = bound
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the number, or fail with a sentence."""
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not (math.isfinite(number) and number > self._bound):
-            self.fail(f"expected a number above {self._bound:g}, got {value!r}", param, ctx)
+        """Return the number; click lets nan through any range."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"expected a finite number, got {value}", param, ctx)
         return number
 
 
-_OF_A_SCENARIO = (
-    click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draws film, instrument and operator."),
-    click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario."),
-    click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
-    click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error."),
-)
-_OF_AN_ORIENTATION = (
-    click.option(
-        "--case",
-        type=OneOf("ABCDE"),
-        help="Standard points used (thesis).",
-    ),
-    click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one."),
-)
-_OF_A_FOLDER = (
-    click.option(
-        "--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for journal, book, tables and results."
-    ),
-    click.option("--force", is_flag=True, help="Write into a folder that exists."),
-)
-DURABILITY_OPTION = click.option(
-    "--durability",
-    type=click.Choice(DURABILITIES),
-    default="records",
-    show_default=True,
-    help="When the journal is on the disk: every line, every registration and the rest within 0.2 s, or never.",
-)
-_OF_A_JOURNAL = (
-    click.option(
-        "--resume", type=click.Path(path_type=Path), metavar="DIR", help="Go on with the session in DIR, cut off."
-    ),
-    DURABILITY_OPTION,
-)
-_OF_RESULTS = (
-    click.option("--json", "as_document", is_flag=True, help="Print the results as one JSON document."),
-    click.option("--quiet", is_flag=True, help="Print nothing."),
-)
+def above(bound: float) -> Number:
+    """Return the kind of the numbers above a bound."""
+    return Number(min=bound, min_open=True)
 
 
-def _with(options: tuple[Callable[[Command], Command], ...]) -> Callable[[Command], Command]:
+HEIGHT = Number(-1e6, 1e6)
+"""A height or a counter's reading, below the zero or above."""
+
+COUNT = click.IntRange(min=1)
+
+
+def together(*options: Option[Any]) -> Option[Any]:
+    """Return several options as one, in their order."""
+
     def decorated(command: Command) -> Command:
         for option in reversed(options):
             command = option(command)
@@ -94,114 +58,79 @@ def _with(options: tuple[Callable[[Command], Command], ...]) -> Callable[[Comman
     return decorated
 
 
-_NOT_OF_THE_RESULTS = {
-    *("seed", "out", "force", "resume", "durability", "as_document", "quiet"),
-    *("url", "timeout", "token_file"),
-}
-_SAME_RESULTS_AS = {"operate": "run"}
-
-of_a_scenario = _with(_OF_A_SCENARIO)
-"""--seed, --set, --skill, --perfect-observer: what `chosen` takes."""
-
-of_an_orientation = _with(_OF_AN_ORIENTATION)
-"""--case, --method."""
-
-of_a_folder = _with(_OF_A_FOLDER)
-"""--out, --force."""
-
-of_a_journal = _with(_OF_A_JOURNAL)
-"""--resume, --durability."""
-
-of_results = _with(_OF_RESULTS)
-"""--json, --quiet: what `ended` takes."""
+def about(option: str, default: str | None = None) -> str:
+    """Return what help says about an option, and about what it is where it is left out."""
+    return f"{option}." if default is None else f"{option}  [default: {default}]"
 
 
-def chosen(
-    scenario: str,
-    seed: int | None,
-    settings: tuple[str, ...],
-    skill: str | None,
-    perfect_observer: bool,
-    others: Mapping[str, str | None] | None = None,
-) -> tuple[Scenario, int]:
-    """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
-    overrides = _overrides(settings, {**(others or {}), "observer.skill": skill})
-    loaded = load_scenario(scenario, overrides)
-    if perfect_observer:
-        loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
-        overrides["observer"] = "perfect"
-    seed = loaded.seed if seed is None else seed
-    return requested(loaded, Request(command_line=_command_line(bare_name(scenario), seed), settings=overrides)), seed
+def seed(default: str = "the scenario's") -> Option[Any]:
+    """Return --seed, which is `default` where it is left out."""
+    return click.option(
+        "--seed", type=click.IntRange(min=0), metavar="N", help=about("Seed of all that is drawn by chance", default)
+    )
 
 
-def _command_line(scenario: str, seed: int) -> str:
-    """Return the command under way as anybody could type it for the same results."""
-    ctx = click.get_current_context()
-    verb = ctx.info_name or ""
-    words = ["a7sim", _SAME_RESULTS_AS.get(verb, verb), scenario, "--seed", str(seed)]
-    for option in ctx.command.params:
-        name = option.name or ""
-        given = ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
-        if given and isinstance(option, click.Option) and name not in _NOT_OF_THE_RESULTS:
-            value = ctx.params[name]
-            flag = max(option.opts, key=len)
-            for each in value if option.multiple else [value]:
-                words += [flag] if option.is_flag else [flag, f"{each:g}" if isinstance(each, float) else str(each)]
-    return shlex.join(words)
+def out_folder(of: str, default: str | None = None, required: bool = False) -> Option[Any]:
+    """Return --out DIR, a folder of what `of` says."""
+    return click.option("--out", type=PLACE, metavar="DIR", required=required, help=about(f"Folder for {of}", default))
 
 
-def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> dict[str, str]:
-    overrides = {}
-    for setting in settings:
-        key, equals, value = setting.partition("=")
-        if not equals or not key:
-            raise Mistake(f"--set: expected PATH=VALUE such as plan.bx=190.0, got {setting!r}")
-        overrides[key] = value
-    return overrides | {key: f'"{value}"' for key, value in texts.items() if value is not None}
+def out_file(of: str, default: str | None = None) -> Option[Any]:
+    """Return --out FILE, a file of what `of` says."""
+    return click.option("--out", type=FILE, metavar="FILE", help=about(f"File for {of}", default))
 
 
-def resumed_alone(*beside: str) -> None:
-    """See that --resume comes without all that the journal says. Raises Mistake."""
-    ctx = click.get_current_context()
-    allowed = {"resume", "as_document", "quiet", *beside}
-    for name in ctx.params:
-        if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            said = max(next(each.opts for each in ctx.command.params if each.name == name), key=len)
-            raise Mistake(f"--resume: expected no {said} beside it, since the journal says what was asked for")
+force = click.option("--force", is_flag=True, help="Write into a folder that exists.")
 
 
-POINTS_A_MODEL = 130
-"""About how many points an operator works on in a model; the bar only needs the order of it."""
+def new_folder(of: str, required: bool = False) -> Option[Any]:
+    """Return --out DIR and --force, for a folder that is not there yet."""
+    return together(out_folder(of, required=required), force)
 
 
-@contextmanager
-def watched(points: int, as_document: bool, quiet: bool) -> "Iterator[Watcher]":
-    """Show on a terminal how the operator gets on with about so many points."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from a7sim.session import Watcher
-
-    columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
-    unwatched = quiet or as_document or not sys.stderr.isatty()
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
-        task = progress.add_task("sitting down", total=points)
-        yield Watcher(
-            lambda activity: progress.update(task, description=activity),
-            lambda: progress.advance(task),
-        )
+as_document = click.option(
+    "--json", "as_document", is_flag=True, help="Print what there is to say as one JSON document."
+)
 
 
-def ended(document: "Document", as_document: bool, quiet: bool, tables: "Callable[[Document], RenderableType]") -> None:
-    """Show the results, and end with exit code 1 where the operator gave up."""
-    from rich.console import Console
+def quiet(but: str = "") -> Option[Any]:
+    """Return --quiet, which prints nothing but what `but` says."""
+    return click.option("--quiet", is_flag=True, help=f"Print nothing{f' but {but}' if but else ''}.")
 
-    from a7sim.documents import as_json
 
-    if as_document:
-        click.echo(as_json(document), nl=False)
-    elif not quiet:
-        Console().print(tables(document))
-    if document["status"] != "complete":
-        click.echo(f"a7sim: the operator gave up: {document['message']}", err=True)
-        raise click.exceptions.Exit(EXIT_DOES_NOT_FIT)
+def variant(default: str | None = None) -> Option[Any]:
+    """Return --variant, which is that of the scenario where there is no default."""
+    told = about("Which plotter", None if default else "the scenario's")
+    return click.option("--variant", type=OneOf(PLOTTERS), default=default, show_default=default is not None, help=told)
+
+
+instrument_of = click.option(
+    "--scenario",
+    metavar="SCENARIO",
+    shell_complete=a_scenario,
+    help="What the instrument is of; only a journal whose scenario is known can be replayed.",
+)
+
+map_scale = click.option("--map-scale", type=above(99.0), metavar="N", help="Scale number of the map.")
+
+plain = click.option("--plain", is_flag=True, help="Say in words what the eyes see; nothing rolls. For screen readers.")
+
+
+def principal_distance(required: bool) -> Option[Any]:
+    """Return --c."""
+    return click.option("--c", "c", type=Number(1.0, 1e5), required=required, help="Principal distance, mm.")
+
+
+def tcp(default: str, multiple: bool = False) -> Option[Any]:
+    """Return --tcp, where clients find a bare socket: `default` where it is left out."""
+    told = about("Listen on a bare socket", default)
+    return click.option(
+        "--tcp", default=None if multiple else default, multiple=multiple, metavar="HOST:PORT", help=told
+    )
+
+
+token_file = click.option(
+    "--token-file",
+    type=FILE,
+    help=f"File with the token of a server that asks for one; without it, the token is {TOKEN_VARIABLE}'s.",
+)

@@ -7,8 +7,7 @@ import msgspec
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
-from a7sim.cli.names import OneOf
-from a7sim.cli.options import Above
+from a7sim.cli import options
 from a7sim.documents import as_json, head
 from a7sim.manual import VARIANTS
 from a7sim.operator.preparation import Flight, ModelScale, Preparation, preparation
@@ -16,20 +15,14 @@ from a7sim.sheets import sheet
 
 
 @click.command("prepare")
-@click.option("--c", "c", type=Above(), required=True, help="Principal distance of the camera, mm.")
-@click.option("--photo-scale", type=Above(), help="Scale number of the photographs at the mean ground.")
-@click.option("--flying-height", type=Above(), help="Above the mean ground, m, in place of the photo scale.")
-@click.option("--photo-base", type=Above(), required=True, help="Base in the photograph, mm.")
-@click.option("--heights", type=Above(-1e6), nargs=2, required=True, help="Lowest and highest ground, m.")
-@click.option("--map-scale", type=Above(), help="Scale number of the map that is drawn.")
-@click.option(
-    "--variant",
-    type=OneOf(VARIANTS),
-    default="A7",
-    show_default=True,
-    help="Of which plotter.",
-)
-@click.option("--json", "as_document", is_flag=True, help="Print the sheet as one JSON document.")
+@options.principal_distance(required=True)
+@click.option("--photo-scale", type=options.above(0.0), help="Scale number of the photographs at the mean ground.")
+@click.option("--flying-height", type=options.above(0.0), help="Above the mean ground, m, in place of the photo scale.")
+@click.option("--photo-base", type=options.above(0.0), required=True, help="Base in the photograph, mm.")
+@click.option("--heights", type=options.HEIGHT, nargs=2, required=True, help="Lowest and highest ground, m.")
+@options.map_scale
+@options.variant("A7")
+@options.as_document
 def command(
     c: float,
     photo_scale: float | None,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli.names import a_scenario
-from a7sim.cli.options import DURABILITY_OPTION
+from a7sim.cli import options
+from a7sim.cli.operators import DURABILITY
 from a7sim.documents import as_json, head
 from a7sim.link.addresses import Address, address_of
 from a7sim.link.between import Between
@@ -25,18 +25,12 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
 @click.command("record")
 @click.argument("url")
-@click.option("--tcp", default="127.0.0.1:0", show_default=True, metavar="HOST:PORT", help="Where clients come.")
-@click.option(
-    "--scenario",
-    metavar="SCENARIO",
-    shell_complete=a_scenario,
-    help="What the instrument is served from, so that it can be replayed.",
-)
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="With which seed.")
-@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder for the journal.")
-@click.option("--force", is_flag=True, help="Write into a folder that exists.")
-@DURABILITY_OPTION
-@click.option("--json", "as_document", is_flag=True, help="Print where clients come as one JSON document.")
+@options.tcp("127.0.0.1:0")
+@options.instrument_of
+@options.seed()
+@options.new_folder("the journal", required=True)
+@DURABILITY
+@options.as_document
 def command(
     url: str,
     tcp: str,
@@ -65,7 +59,7 @@ def command(
         prepare_folder(out, force)
         with Journal(Keeping(durability)).opened(out, header, None) as journal:
             host, port = door.getsockname()[:2]
-            where = f"socket://{Address(host, port)}"
+            where = f"tcp://{Address(host, port)}"
             click.echo(as_json(head("record") | {"url": where, "instrument": url}) if as_document else where, nl=False)
             click.echo("" if as_document else "\nready")
             Between(url, journal.heard, WallClock(), stop).serve(door)

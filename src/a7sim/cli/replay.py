@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli import EXIT_DIFFERS
-from a7sim.cli.names import a_scenario, a_session
-from a7sim.cli.options import of_a_folder
+from a7sim.cli import EXIT_DIFFERS, options
+from a7sim.cli.names import a_session
 from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
 from a7sim.scenario import load_scenario
@@ -21,6 +20,7 @@ from a7sim.session.playing import Player
 from a7sim.session.replaying import Difference, Replay, names_scenario, replayed
 from a7sim.session.scripts import SUFFIX, find_script, read_script
 from a7sim.session.seeking import line_sought
+from a7sim.wording import counted
 
 _MOST_PARTS = 20
 
@@ -41,15 +41,10 @@ _MOST_PARTS = 20
     metavar="T|@LINE|TEXT",
     help="Tell from a time on (s, or h:mm:ss), a line, or the first note with a text, such as the name of a form.",
 )
-@click.option(
-    "--scenario",
-    metavar="SCENARIO",
-    shell_complete=a_scenario,
-    help="What the session was of, where it does not stand beside it.",
-)
-@of_a_folder
-@click.option("--json", "as_document", is_flag=True, help="Print how it ended as one JSON document.")
-@click.option("--quiet", is_flag=True, help="Do not print the conversation.")
+@options.instrument_of
+@options.new_folder("the journal of a script")
+@options.as_document
+@options.quiet(but="how it ended, with --verify")
 def command(
     session: str,
     verify: bool,
@@ -62,8 +57,6 @@ def command(
     quiet: bool,
 ) -> None:
     """Say the lines of SESSION again to a fresh instrument: a folder, a journal, or a script (.a7s).
-
-    Of a script --out keeps the journal.
 
     Example: a7sim replay runs/akwanga --verify --quiet
     """
@@ -188,8 +181,8 @@ def _ended(
         click.echo(as_json(document), nl=False)
     elif not silent:
         came = f"{differing} different" if differing else "no difference"
-        rest = f"; a torn last line of {torn} bytes is left out" if torn else ""
-        click.echo(f"{lines} lines, {checkpoints} checkpoints: {came}{rest}")
+        rest = f"; a torn last line of {counted(torn, 'byte')} is left out" if torn else ""
+        click.echo(f"{counted(lines, 'line')}, {counted(checkpoints, 'checkpoint')}: {came}{rest}")
 
 
 def played(session: str, pace: Pace, out: Path | None, force: bool, silent: bool, as_document: bool) -> None:
@@ -222,4 +215,4 @@ def played(session: str, pace: Pace, out: Path | None, force: bool, silent: bool
         click.echo(f"a7sim: {failed}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
     if not silent:
-        click.echo(f"{len(script.statements)} statements: all as expected")
+        click.echo(f"{counted(len(script.statements), 'statement')}: all as expected")

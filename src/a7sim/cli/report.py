@@ -5,10 +5,12 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli import options
+
 
 @click.command("report")
-@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
-@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Instead of DIR/report.html.")
+@click.argument("folder", type=options.PLACE, metavar="DIR")
+@options.out_file("the page", "DIR/report.html")
 @click.option("--open", "shown", is_flag=True, help="Show it in the browser.")
 def command(folder: Path, out: Path | None, shown: bool) -> None:
     """Write the report of the session in DIR: figures, tables and settings on one page that needs nothing beside it.

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from a7sim.cli.names import a_scenario
-from a7sim.cli.options import (
+from a7sim.cli.operators import (
     POINTS_A_MODEL,
     chosen,
     ended,
@@ -70,7 +70,7 @@ def command(
         begun = begun_in(resume, "run")
         loaded, seed, every_case, out = begun.scenario, begun.seed, begun.setting("strips") == "all", resume
     elif scenario is None:
-        raise Mistake("run: expected a SCENARIO, or --resume DIR")
+        raise Mistake("run: expected SCENARIO or --resume DIR, got none")
     else:
         others = {"plan.case": case, "plan.method": method}
         loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer, others)

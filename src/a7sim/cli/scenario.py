@@ -2,12 +2,13 @@
 
 import click
 
-from a7sim.cli import EXIT_MISTAKE
+from a7sim.cli import EXIT_MISTAKE, options
 from a7sim.cli.names import a_scenario
 from a7sim.documents import as_json, head
 from a7sim.mistakes import Mistake
 from a7sim.scenario import ScenarioError, load_scenario, scenario_schema
 from a7sim.scene import build_scene
+from a7sim.wording import counted
 
 
 @click.group("scenario")
@@ -20,7 +21,7 @@ def command() -> None:
 
 @command.command("validate")
 @click.argument("file", metavar="SCENARIO", shell_complete=a_scenario)
-@click.option("--json", "as_document", is_flag=True, help="Print the mistakes as one JSON document.")
+@options.as_document
 def validate(file: str, as_document: bool) -> None:
     """Name every mistake of a SCENARIO and of the files it names; exit code 2 if there is any.
 
@@ -40,15 +41,16 @@ def validate(file: str, as_document: bool) -> None:
         for mistake_text in mistakes:
             click.echo(f"a7sim: {file}: {mistake_text}", err=True)
     else:
-        click.echo(f"{file}: {scenario.title}, {len(scenario.photos)} photographs, {len(scenario.models)} models")
+        photographs, models = counted(len(scenario.photos), "photograph"), counted(len(scenario.models), "model")
+        click.echo(f"{file}: {scenario.title}, {photographs}, {models}")
     if mistakes:
         raise click.exceptions.Exit(EXIT_MISTAKE)
 
 
 @command.command("schema")
-@click.option("--json", "as_document", is_flag=True, help="Print it inside one JSON document of a7sim.")
+@options.as_document
 def schema(as_document: bool) -> None:
-    """Print the JSON Schema of scenario files.
+    """Print the JSON Schema of scenario files; with --json, within a document such as all commands print.
 
     Example: a7sim scenario schema > scenario.schema.json
     """

@@ -8,6 +8,7 @@ from typing import Any
 import click
 import msgspec
 
+from a7sim.cli import options
 from a7sim.cli.links import of_a_link, token_from
 from a7sim.link.client import Client
 from a7sim.link.exchange import Exchange, say
@@ -20,8 +21,8 @@ EXIT_REFUSED = 1
 @click.argument("url")
 @click.argument("lines", metavar="[LINE]...", nargs=-1)
 @of_a_link
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File for the bytes of a block.")
-@click.option("--json", "as_document", is_flag=True, help="Print all exchanges as one JSON document.")
+@options.out_file("the bytes of blocks")
+@options.as_document
 def command(
     url: str, lines: tuple[str, ...], timeout: float, token_file: Path | None, out: Path | None, as_document: bool
 ) -> None:

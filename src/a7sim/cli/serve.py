@@ -9,9 +9,11 @@ from typing import Any
 
 import click
 
-from a7sim.cli.links import TOKEN_VARIABLE, token_from
+from a7sim.cli import options
+from a7sim.cli.links import token_from
 from a7sim.cli.names import a_scenario
-from a7sim.cli.options import Above, chosen, of_a_folder, of_a_journal, of_a_scenario, resumed_alone
+from a7sim.cli.operators import chosen, of_a_journal, of_a_scenario, resumed_alone
+from a7sim.cli.options import TOKEN_VARIABLE
 from a7sim.documents import Document, as_json, head
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import Desk
@@ -42,32 +44,33 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
 @click.command("serve")
 @click.argument("scenario", required=False, shell_complete=a_scenario)
-@click.option("--tcp", multiple=True, metavar="HOST:PORT", help="Listen on a bare socket  [default: 127.0.0.1:5025]")
+@options.tcp(str(USUAL), multiple=True)
 @click.option("--rfc2217", multiple=True, metavar="HOST:PORT", help="Listen as a serial port over telnet.")
-@click.option("--pty", multiple=True, type=click.Path(path_type=Path), help="Make a link to a pseudo-terminal.")
-@click.option("--baud", type=click.IntRange(50, 10_000_000), help="As slow as a wire of so many bits a second.")
+@click.option("--pty", multiple=True, type=options.PLACE, metavar="PATH", help="Make a link to a pseudo-terminal.")
+@click.option(
+    "--baud", type=click.IntRange(50, 10_000_000), metavar="N", help="As slow as a wire of so many bits a second."
+)
 @click.option("--realtime", is_flag=True, help="Movement lasts as long on the wall as on the simulated clock.")
 @click.option("--listen-anyway", is_flag=True, help="Let other machines in; clients must log in with a token.")
+@options.token_file
+@click.option("--clients", type=options.COUNT, metavar="N", default=64, show_default=True, help="Most at a time.")
 @click.option(
-    "--token-file",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help=f"File with the token; without it, the token is {TOKEN_VARIABLE}'s.",
-)
-@click.option(
-    "--clients", type=click.IntRange(min=1), metavar="N", default=64, show_default=True, help="Most at a time."
-)
-@click.option(
-    "--idle", type=Above(), default=3600.0, show_default=True, metavar="SECONDS", help="Drop who is silent for so long."
+    "--idle",
+    type=options.above(0.0),
+    default=3600.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Drop who is silent for so long.",
 )
 @click.option("--fault", metavar="FAULTS", help=f"Fail now and then: {EXAMPLE}")
 @click.option(
     "--fault-seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Draws the faults."
 )
 @of_a_scenario
-@of_a_folder
+@options.new_folder("the journal")
 @of_a_journal
-@click.option("--json", "as_document", is_flag=True, help="Print where it listens as one JSON document.")
-@click.option("--quiet", is_flag=True, help="Print nothing.")
+@options.as_document
+@options.quiet()
 def command(
     scenario: str | None,
     tcp: tuple[str, ...],
@@ -106,7 +109,7 @@ def command(
         resumed_alone(*_OF_THE_DOOR)
         served = _served_again(begun_in(resume, "serve"), token, Keeping(durability, resumes=True))
     elif scenario is None:
-        raise Mistake("serve: expected a SCENARIO, or --resume DIR")
+        raise Mistake("serve: expected SCENARIO or --resume DIR, got none")
     else:
         loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
         if out is not None:
@@ -213,8 +216,11 @@ def _doors(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]
 
 
 def _refuse_open_doors(doors: Doors, listen_anyway: bool, token: str | None) -> None:
-    for address in (*doors.tcp, *doors.rfc2217):
+    asked = [("--tcp", each) for each in doors.tcp] + [("--rfc2217", each) for each in doors.rfc2217]
+    for option, address in asked:
         if not address.loopback and not listen_anyway:
-            raise Mistake(f"{address}: expected an address of this machine alone (--listen-anyway lets others in)")
+            raise Mistake(
+                f"{option} {address}: expected an address of this machine alone (--listen-anyway lets others in)"
+            )
     if listen_anyway and token is None:
         raise Mistake(f"--listen-anyway: expected a token, from --token-file or in the environment as {TOKEN_VARIABLE}")

@@ -19,9 +19,9 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from a7sim.cli import EXIT_DIFFERS
+from a7sim.cli import EXIT_DIFFERS, options
 from a7sim.cli.names import a_study
-from a7sim.cli.options import of_a_folder, of_results
+from a7sim.cli.operators import of_results
 from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.study.auditing import audited
@@ -33,6 +33,7 @@ from a7sim.study.loading import Laid, load_study
 from a7sim.study.running import work
 from a7sim.study.tables import of_study
 from a7sim.study.tally import Tally
+from a7sim.wording import counted
 
 
 @click.command("study")
@@ -45,10 +46,12 @@ from a7sim.study.tally import Tally
     show_default=True,
     help="Who works: this process alone, a pool of others, dask, or MPI.",
 )
-@click.option("--workers", type=click.IntRange(min=1), help="Of the pool or of dask here; as many as there are cores.")
+@click.option(
+    "--workers", type=options.COUNT, metavar="N", help="Of the pool or of dask here; as many as there are cores."
+)
 @click.option("--scheduler", metavar="URL", help="Of dask, such as tcp://HOST:8786, whose workers work; else its own.")
-@click.option("--audit", type=click.IntRange(min=1), metavar="N", help="Work N picked sessions again over the link.")
-@of_a_folder
+@click.option("--audit", type=options.COUNT, metavar="N", help="Work N picked sessions again over the link.")
+@options.new_folder("checkpoint, tables, page and results; a study cut off goes on there")
 @of_results
 def command(
     study: str,
@@ -99,12 +102,12 @@ def _leave_page(out: Path, document: Document) -> None:
 
 def _audit(laid: Laid, tally: Tally, picks: int, silent: bool) -> None:
     differences = audited(laid, tally, picks)
-    worked = min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells))))
+    worked = counted(min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells)))), "session")
     if differences:
-        click.echo(f"a7sim: {len(differences)} of {worked} sessions differ over the link; {differences[0]}", err=True)
+        click.echo(f"a7sim: {len(differences)} of {worked} differ over the link; {differences[0]}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
     if not silent:
-        click.echo(f"{worked} sessions worked again over the link gave the same digits.")
+        click.echo(f"{worked} worked again over the link gave the same digits.")
 
 
 class _Rate(ProgressColumn):

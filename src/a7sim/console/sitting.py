@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from a7sim.console.dialogs import Ask
 from a7sim.console.dials import Dials
@@ -18,11 +18,11 @@ _READING = r"([XYZ])\s*=?\s*([-+]?[0-9]*\.?[0-9]+)"
 
 
 class Sitting:
-    """Somebody at a console."""
+    """Somebody at a console, the only class that has these deeds."""
 
     @property
     def _console(self) -> "Console":
-        return self  # type: ignore[return-value] # the only class that has these deeds
+        return cast("Console", self)
 
     def _at(self) -> tuple[Variant, Dials]:
         console = self._console

@@ -25,7 +25,7 @@ _URL = re.compile(r"a7sim://.+|(tcp|socket|rfc2217)://(\[[0-9a-f:.%]+\]|[^/:?#\[
 def open_port(url: str, timeout: float = TIMEOUT_S) -> Any:
     """Return the pyserial port that a URL names, open, its reads ending after `timeout` s.
 
-    `socket://` is another name of `tcp://`. Raises Mistake in one sentence where it cannot be opened.
+    `socket://` is pyserial's name of `tcp://`. Raises Mistake in one sentence where it cannot be opened.
     """
     if not _is_named(url):
         raise Mistake(f"expected {FORMS}, got {url!r}")

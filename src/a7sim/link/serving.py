@@ -14,6 +14,7 @@ from a7sim.link.conversation import Conversation, Terms, Wire
 from a7sim.link.pty_wire import PtyWire
 from a7sim.link.wires import LARGEST_READ, TcpWire, TelnetWire
 from a7sim.mistakes import Mistake
+from a7sim.wording import counted
 
 MOST_TURNED_AWAY = 64
 """Clients at a time that are told why they are turned away; the others are just turned away."""
@@ -47,15 +48,15 @@ class Server:
     async def open(self, doors: Doors) -> list[dict[str, Any]]:
         """Open all doors and return what each is, as a document. Raises Mistake, and then none is open."""
         try:
-            opened = [await self._listen("tcp", "socket", TcpWire, address) for address in doors.tcp]
-            opened += [await self._listen("rfc2217", "rfc2217", TelnetWire, address) for address in doors.rfc2217]
+            opened = [await self._listen("tcp", TcpWire, address) for address in doors.tcp]
+            opened += [await self._listen("rfc2217", TelnetWire, address) for address in doors.rfc2217]
             opened += [self._lay(path) for path in doors.pty]
         except BaseException:
             await self.close()
             raise
         return opened
 
-    async def _listen(self, kind: str, scheme: str, wire: type[TcpWire], address: Address) -> dict[str, Any]:
+    async def _listen(self, kind: str, wire: type[TcpWire], address: Address) -> dict[str, Any]:
         loop = asyncio.get_running_loop()
         try:
             listener = await loop.create_server(
@@ -65,7 +66,7 @@ class Server:
             raise Mistake(f"--{kind} {address}: expected an address to listen on: {_reason(error)}") from error
         self._listeners.append(listener)
         host, port = listener.sockets[0].getsockname()[:2]
-        return {"kind": kind, "host": host, "port": port, "url": f"{scheme}://{Address(host, port)}"}
+        return {"kind": kind, "host": host, "port": port, "url": f"{kind}://{Address(host, port)}"}
 
     def _lay(self, path: Path) -> dict[str, Any]:
         terminal = PtyWire(self, path)
@@ -96,7 +97,7 @@ class Server:
             if len(self._turned_away) >= MOST_TURNED_AWAY:
                 wire.abort()
             self._turned_away.add(wire)
-            text = entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {most} clients at a time")
+            text = entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {counted(most, 'client')} at a time")
             return f"{text}\n".encode("ascii")
         self._wires.add(wire)
         return Conversation(self.desk, self._clock, self._terms, wire, self.desk.opened + 1, serial)

@@ -6,18 +6,30 @@ is followed by its middle as the left eye sees it, the mark being kept on the gr
 the link bench alone, since it needs what the eyepieces show; lengths are mm at model scale unless said otherwise.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from a7sim.geometry import Array, length_of
 from a7sim.operator.bench import Bench
 from a7sim.operator.level_model import LevelModel
+from a7sim.operator.map_lines import (
+    CONTOUR,
+    Area,
+    Ending,
+    Errand,
+    Spots,
+    Traced,
+    Tracing,
+    chained,
+    crosses,
+    distance_to,
+    length_along,
+)
 from a7sim.operator.person import Person
 from a7sim.operator.stereo_view import COARSE_MM, FINE_MM, MIDDLING_MM, Look, StereoView, Surface, rectified
-from a7sim.scenario import Observer
+from a7sim.wording import counted
 
 LONGEST_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
 """From vertex to vertex."""
@@ -25,14 +37,8 @@ LONGEST_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
 SPOTS_MM = 25.0
 """About how far spot heights stand from each other."""
 
-TREMOR_SHARE = 2.0
-"""Tremor of a moving hand for the error of a stereoscopic pointing at rest [assumption; no source at hand]."""
-
 _SHARP_TURN, _GENTLE_TURN = 0.35, 0.12
 """Radians from vertex to vertex, beyond which steps are made shorter, and below which they are made longer."""
-
-CONTOUR = "contour"
-"""Kind of a line of one height."""
 
 _MOST_STRAYED, _SHARPEST = 0.6, 0.3
 """Of a correction, as a share of the step; and of a turn from vertex to vertex, as its cosine."""
@@ -66,122 +72,6 @@ _ROAD_SEEN = 0.45
 
 _WIDTHS_MM = tuple(np.geomspace(0.5, 4.0, 10).tolist())
 _END_REACHED_MM = 6.0
-
-
-@dataclass(frozen=True)
-class Tracing:
-    """How a person follows lines: tremor in um at photo scale, along and across, and the time a vertex takes."""
-
-    tremor_um: float
-    seconds_per_vertex: float = 1.5
-    """[assumption; no source at hand]"""
-
-    @classmethod
-    def of(cls, observer: Observer, tremor_um: float | None = None) -> "Tracing":
-        """Return how an observer follows lines where nothing else is said."""
-        return cls(TREMOR_SHARE * observer.stereo_um if tremor_um is None else tremor_um)
-
-
-@dataclass(frozen=True)
-class Errand:
-    """A line to be compiled, from an old map: east and north in m of its start, of a place further on, and its end."""
-
-    name: str
-    kind: str
-    start: tuple[float, float]
-    towards: tuple[float, float]
-    end: tuple[float, float]
-
-
-Ending = Literal["closed", "edge", "end", "joined", "lost"]
-"""At its own beginning, the edge of the area, the end on the old map, a line drawn before, or where it is lost."""
-
-
-@dataclass(frozen=True)
-class Traced:
-    """A line as it was registered: readings of the counters ``(3, n)``; a closed one ends with its first vertex."""
-
-    name: str
-    kind: str
-    height: float | None
-    """In m; None for a line of changing height."""
-    readings: Array
-    endings: tuple[Ending, Ending]
-
-    @property
-    def closed(self) -> bool:
-        """Whether it returns to where it begins."""
-        return self.endings[1] == "closed"
-
-
-@dataclass(frozen=True)
-class Area:
-    """The part of the model that is compiled, in readings of X and Y ``(2,)``."""
-
-    low: Array
-    high: Array
-
-    @classmethod
-    def within(cls, standard_points: Mapping[str, str], places: Mapping[str, tuple[float, float, float]]) -> "Area":
-        """Return the rectangle between the outer standard points 3, 4, 5 and 6, or what there is of them.
-
-        Every side must have one.
-        """
-
-        def along(axis: int, corners: str) -> list[float]:
-            there = [standard_points[label] for label in corners if label in standard_points]
-            return [places[name][axis] for name in there if name in places]
-
-        low = [max(along(0, "35")), max(along(1, "56"))]
-        high = [min(along(0, "46")), min(along(1, "34"))]
-        return cls(np.array(low), np.array(high))
-
-    def holds(self, place: Array) -> bool:
-        """Return whether a place ``(2,)`` lies in it."""
-        return bool((place >= self.low - 1e-6).all() and (place <= self.high + 1e-6).all())
-
-    def shortened(self, place: Array, step: Array) -> Array:
-        """Return a step ``(2,)`` cut off at the border; the place lies within."""
-        beyond = np.where(step > 0.0, self.high - place, self.low - place)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shares = np.where(step != 0.0, beyond / step, np.inf)
-        return np.asarray(step * min(1.0, max(0.0, float(shares.min()))))
-
-    def grid(self, spacing: float) -> tuple[Array, Array]:
-        """Return X ``(k,)`` and Y ``(l,)`` of a grid over it, as nearly `spacing` apart as comes out even."""
-        counts = np.maximum(2, np.round((self.high - self.low) / spacing).astype(int) + 1)
-        return np.linspace(self.low[0], self.high[0], counts[0]), np.linspace(self.low[1], self.high[1], counts[1])
-
-
-@dataclass(frozen=True)
-class Spots:
-    """Spot heights on a grid: readings ``(3, k, l)``, nan where the ground was not seen; heights in m ``(k, l)``."""
-
-    readings: Array
-    heights: Array
-
-    @property
-    def range(self) -> tuple[float, float]:
-        """Lowest and highest."""
-        return float(np.nanmin(self.heights)), float(np.nanmax(self.heights))
-
-    def crossings(self, height: float) -> Iterator[tuple[Array, Array, Array]]:
-        """Yield place ``(2,)``, and the two spots ``(2,)`` between which ground of a height must lie."""
-        for axis in (0, 1):
-            count = self.heights.shape[axis] - 1
-            first, second = (self.heights.take(range(i, i + count), axis=axis) for i in (0, 1))
-            begins, ends = (self.readings[:2].take(range(i, i + count), axis=axis + 1) for i in (0, 1))
-            for i, j in np.argwhere((first < height) != (second < height)):
-                if np.isnan(first[i, j] + second[i, j]):
-                    continue
-                share = (height - first[i, j]) / (second[i, j] - first[i, j])
-                begin, end = begins[:, i, j], ends[:, i, j]
-                yield begin + share * (end - begin), begin, end
-
-    def nearest(self, place: Array) -> float:
-        """Return the Z reading of the spot nearest to a place ``(2,)``."""
-        distance = length_of(self.readings[:2] - place[:, None, None])
-        return float(self.readings[2].flat[np.nanargmin(np.where(np.isnan(self.heights), np.nan, distance))])
 
 
 @dataclass(frozen=True)
@@ -289,18 +179,20 @@ class Compilation:
         name = f"contour {height:g}"
         lines: list[Traced] = []
         for guess, begin, end in spots.crossings(height):
-            if any(_crosses(line.readings[:2], begin, end) for line in lines):
+            if any(crosses(line.readings[:2], begin, end) for line in lines):
                 continue
             middle = np.array([*guess, spots.nearest(guess)])
             z = float(self.model.readings_of(_at_height(self.model.on_ground(middle), height))[2])
             self._drive(guess, z)
             start = self._on_contour(guess, None, name)
-            if start is None or any(_distance(line.readings[:2], start.place) < _SAME_LINE_MM for line in lines):
+            if start is None or any(distance_to(line.readings[:2], start.place) < _SAME_LINE_MM for line in lines):
                 continue
             found = self._both_ways(name, height, start, z, lines)
             vertices = found.readings.shape[1]
-            if vertices < 2 or ("joined" in found.endings and _length(found.readings[:2]) < _STUB_MM):
-                self._person.client.send(f'NOTE "{name}: {vertices} vertices, no line or more of one drawn before"')
+            if vertices < 2 or ("joined" in found.endings and length_along(found.readings[:2]) < _STUB_MM):
+                self._person.client.send(
+                    f'NOTE "{name}: {counted(vertices, "vertex", "vertices")}, no line or more of one drawn before"'
+                )
             else:
                 lines.append(found)
         return lines
@@ -308,10 +200,10 @@ class Compilation:
     def _both_ways(self, name: str, height: float, start: _Vertex, z: float, drawn: Sequence[Traced]) -> Traced:
         there, ending = self._followed(name, start, drawn)
         if ending == "closed":
-            return Traced(name, CONTOUR, height, _chain([*there, there[0]]), ("closed", "closed"))
+            return Traced(name, CONTOUR, height, chained([*there, there[0]]), ("closed", "closed"))
         self._drive(start.place, z)
         back, other = self._followed(name, _Vertex(start.place, -start.heading, start.surface), drawn)
-        return Traced(name, CONTOUR, height, _chain([*back[::-1], *there]), (other, ending))
+        return Traced(name, CONTOUR, height, chained([*back[::-1], *there]), (other, ending))
 
     def _followed(self, name: str, start: _Vertex, drawn: Sequence[Traced]) -> tuple[list[Array], Ending]:
         """Follow a contour from a place on it; return its vertices and how it ended."""
@@ -333,7 +225,7 @@ class Compilation:
                 continue
             bend = _angle(at.heading, following.heading)
             at = following
-            if any(_distance(line.readings[:2], at.place) < _JOINED_MM for line in drawn):
+            if any(distance_to(line.readings[:2], at.place) < _JOINED_MM for line in drawn):
                 return vertices, "joined"
             if length_of(cut) < length_of(wanted) - 1e-9:
                 return vertices, "edge"
@@ -524,35 +416,3 @@ def _next_step(step: float, bend: float) -> float:
     if abs(bend) > _SHARP_TURN:
         return max(0.6 * step, SHORTEST_STEP_MM)
     return min(1.3 * step, LONGEST_STEP_MM) if abs(bend) < _GENTLE_TURN else step
-
-
-def _crosses(chain: Array, begin: Array, end: Array) -> bool:
-    """Return whether a chain ``(2, n)`` crosses the straight piece between two places ``(2,)``."""
-    piece = end - begin
-
-    def sides(origin: Array, direction: Array, places: Array) -> Array:
-        off = places - (origin[:, None] if origin.ndim == 1 else origin)
-        return np.asarray(direction[0] * off[1] - direction[1] * off[0])
-
-    of_chain = sides(begin, piece, chain)
-    parts, starts = np.diff(chain, axis=1), chain[:, :-1]
-    of_begin = sides(starts, parts, np.broadcast_to(begin[:, None], starts.shape))
-    of_end = sides(starts, parts, np.broadcast_to(end[:, None], starts.shape))
-    return bool(((of_chain[:-1] * of_chain[1:] <= 0.0) & (of_begin * of_end <= 0.0)).any())
-
-
-def _chain(vertices: Sequence[Array]) -> Array:
-    """Return vertices ``(3,)`` as a chain ``(3, n)``."""
-    return np.array(vertices).reshape(-1, 3).T
-
-
-def _length(chain: Array) -> float:
-    return float(length_of(np.diff(chain, axis=1)).sum())
-
-
-def _distance(chain: Array, place: Array) -> float:
-    """Return how far a place ``(2,)`` lies from a chain ``(2, n)``."""
-    begins, pieces = chain[:, :-1], np.diff(chain, axis=1)
-    squares = np.maximum((pieces * pieces).sum(axis=0), 1e-12)
-    shares = np.clip(((place[:, None] - begins) * pieces).sum(axis=0) / squares, 0.0, 1.0)
-    return float(length_of(place[:, None] - begins - pieces * shares).min())

@@ -10,11 +10,12 @@ import numpy as np
 from a7sim.geometry import Array, length_of
 from a7sim.mistakes import Mistake
 from a7sim.operator.bench import Bench
-from a7sim.operator.compilation import Area, Compilation, Errand, Spots, Traced, Tracing
+from a7sim.operator.compilation import Compilation
 from a7sim.operator.crew import Crew
 from a7sim.operator.job import Job
 from a7sim.operator.level_model import LevelModel, levelled, oriented
 from a7sim.operator.line_hands import LineHands
+from a7sim.operator.map_lines import Area, Errand, Spots, Traced, Tracing
 from a7sim.operator.person import Person
 from a7sim.operator.preparation import PLAN_GEARS
 from a7sim.operator.stereo_view import StereoView
@@ -136,21 +137,17 @@ def _heights(order: Order, spots: Spots) -> tuple[float, ...]:
     low, high = spots.range
     for height in order.contours:
         if not low < height < high:
-            raise Mistake(
-                f"contour {height:g}: expected a height within the model, {low:.1f} to {high:.1f} m, got {height:g}"
-            )
+            raise Mistake(f"--contour {height:g}: expected a height within the model, {low:.1f} to {high:.1f} m")
     heights = set(order.contours)
     if order.interval is not None:
         first, last = math.ceil(low / order.interval), math.floor(high / order.interval)
         if last - first >= MOST_CONTOURS:
             raise Mistake(
-                f"contour interval {order.interval:g}: expected at most {MOST_CONTOURS} contours from {low:.1f} to "
+                f"--interval {order.interval:g}: expected at most {MOST_CONTOURS} contours from {low:.1f} to "
                 f"{high:.1f} m, got {last - first + 1}"
             )
         if last < first and not heights and not order.errands:
-            raise Mistake(
-                f"contour interval {order.interval:g}: expected a multiple of it from {low:.1f} to {high:.1f} m"
-            )
+            raise Mistake(f"--interval {order.interval:g}: expected a multiple of it from {low:.1f} to {high:.1f} m")
         heights |= {order.interval * k for k in range(first, last + 1)}
     return tuple(sorted(heights))
 

@@ -37,23 +37,28 @@ class Flight:
         cls,
         c: float,
         photo_base: float,
-        heights: Sequence[float],
+        heights: tuple[float, float],
         photo_scale: float | None = None,
         flying_height: float | None = None,
     ) -> "Flight":
-        """Return a flight by its photo scale or its flying height in m above the mean ground, one of the two.
+        """Return a flight over the lowest and the highest ground, by its photo scale or its flying height.
 
-        Raises Mistake where they do not make a flight.
+        Heights are m, the flying height above the mean ground. Raises Mistake where they do not make a flight.
         """
         if (photo_scale is None) == (flying_height is None):
-            raise Mistake("expected a photo scale or a flying height, one of the two")
-        if not c > 0.0:
-            raise Mistake(f"expected a principal distance above zero, got {c:g}")
+            got = "none" if photo_scale is None else "both"
+            raise Mistake(f"prepare: expected --photo-scale or --flying-height, one of the two, got {got}")
+        lowest, highest = heights
+        if lowest > highest:
+            raise Mistake(f"--heights: expected the lowest ground before the highest, got {lowest:g} and {highest:g}")
         if photo_scale is None:
-            photo_scale = 1e3 * (flying_height or 0.0) / c
-        flight = cls(c, photo_scale, photo_base, min(heights), max(heights))
-        if not (c > 0.0 and photo_scale > 0.0 and photo_base > 0.0 and flight.lowest_flown > 0.0):
-            raise Mistake("expected c, photo scale and photo base above zero and the ground below the flight")
+            photo_scale = 1e3 * (flying_height or 0.0) / c if c else 0.0
+        if not min(c, photo_scale, photo_base) > 0.0:
+            raise Mistake("prepare: expected --c, --photo-base and --photo-scale or --flying-height above zero")
+        flight = cls(c, photo_scale, photo_base, lowest, highest)
+        if not flight.lowest_flown > 0.0:
+            above = -flight.lowest_flown
+            raise Mistake(f"--heights: expected ground below the flight, got {highest:g} m, {above:g} m above it")
         return flight
 
     @property

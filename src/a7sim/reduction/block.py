@@ -19,6 +19,7 @@ from a7sim.reduction.absolute import Ground, GroundFit
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.similarity import similarity_columns, turn_by
 from a7sim.reduction.strips import Model
+from a7sim.wording import counted
 
 MOST_MODELS = 500
 MOST_ITERATIONS = 30
@@ -114,7 +115,9 @@ def block_adjustment(models: Sequence[Model], ground: Ground, height_weight: flo
         moves = np.abs(step[0] / scales).max(), np.abs(step[1:4]).max(), np.abs(step[4:]).max() / extent.max()
         if max(moves) < CONVERGED:
             return _result(e, ground, (scales, turns, shifts, free), weights, iteration, normal, scale)
-    raise Undetermined(f"the block of {len(models)} models does not come to rest in {MOST_ITERATIONS} iterations")
+    raise Undetermined(
+        f"the block of {counted(len(models), 'model')} does not come to rest in {MOST_ITERATIONS} iterations"
+    )
 
 
 def _equations(models: tuple[Model, ...], ground: Ground) -> _Equations:

@@ -21,6 +21,7 @@ from a7sim.geometry import Array, angles_of, dots, length_of, mxm, mxv, rotation
 from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
 from a7sim.reduction.normal_equations import LARGEST_CONDITION
 from a7sim.reduction.relative_poses import RelativePoses, relative_poses
+from a7sim.wording import counted
 
 Unknowns = Literal["independent", "dependent"]
 
@@ -134,7 +135,7 @@ def _why(poses: RelativePoses, n: int) -> str:
         )
     return (
         f"no relative orientation brings the rays of all {n} points{which} together before both cameras "
-        f"(condition number {condition:.1e}, {poses.iterations.flat[first]} iterations)"
+        f"(condition number {condition:.1e}, {counted(int(poses.iterations.flat[first]), 'iteration')})"
     )
 
 

@@ -18,6 +18,7 @@ from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, coplanari
 from a7sim.reduction.least_squares import Undetermined, adjusted
 from a7sim.reduction.normal_equations import LARGEST_CONDITION
 from a7sim.reduction.relative_poses import FEWEST_POINTS, MOST_ITERATIONS, TOLERANCE
+from a7sim.wording import counted
 
 Scalars = float | Array
 """One number, or one for each pair of a batch ``(...)``."""
@@ -162,7 +163,7 @@ def orientation_by_parallaxes(
     if active.any() or not (step.condition < LARGEST_CONDITION).all() or not (condition.ahead > 0.0).all():
         raise Undetermined(
             f"the y-parallaxes of {n} points do not orient the pair (condition number "
-            f"{float(np.max(step.condition)):.1e}, {int(iterations.max())} iterations)"
+            f"{float(np.max(step.condition)):.1e}, {counted(int(iterations.max()), 'iteration')})"
         )
     scale = -points[2].mean(axis=0) / np.sqrt(c1 * c2)
     unit = -np.sqrt(2.0) * scale * condition.by_base[1]  # p = b . (a1 x a2) / (x1 z2 - z1 x2)

@@ -8,6 +8,7 @@ from a7sim.reduction.least_squares import Undetermined, adjusted
 from a7sim.reduction.normal_equations import LARGEST_CONDITION
 from a7sim.reduction.relative_poses import FEWEST_POINTS, MOST_ITERATIONS, TOLERANCE
 from a7sim.reduction.turns import turn_about
+from a7sim.wording import counted
 
 
 def orientation_by_schut(image1: Array, image2: Array, c1: float, c2: float, bx: float = 1.0) -> RelativeOrientation:
@@ -44,7 +45,7 @@ def orientation_by_schut(image1: Array, image2: Array, c1: float, c2: float, bx:
     if active.any() or not (step.condition < LARGEST_CONDITION).all() or not meets:
         raise Undetermined(
             f"Schut's equations do not orient the {n} points (condition number {float(np.max(step.condition)):.1e}, "
-            f"{int(iterations.max())} iterations)"
+            f"{counted(int(iterations.max()), 'iteration')})"
         )
     names = ("omega2", "phi2", "kappa2", "by2", "bz2")
     return finished((image1, image2), (c1, c2), names, (left, right), bx * base, iterations, ~active, unit * bx)

@@ -14,6 +14,7 @@ from a7sim.documents import Document, head
 from a7sim.mistakes import Mistake
 from a7sim.report.kept import Kept
 from a7sim.sheets import sheet
+from a7sim.wording import counted
 
 BESIDE_THE_POINT = frozenset(
     {
@@ -143,4 +144,4 @@ def table_of(sessions: Sequence[Kept], rows: Sequence[Row], width: int) -> Rende
         for row in members:
             table.add_row(row.fact.rpartition(".")[2], *row.values)
         parts += [Text(), Text(group.replace(".", " ") or "session", style="bold"), table]
-    return Group(*parts, Text(f"\n{sum(row.differs for row in rows)} facts differ"))
+    return Group(*parts, Text(f"\n{counted(sum(row.differs for row in rows), 'difference')}"))

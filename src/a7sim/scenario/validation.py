@@ -41,8 +41,8 @@ def _mistakes_in_table(raw: Raw, table: inspect.StructType, described: str | Non
     for key in raw:
         if key not in fields:
             near = get_close_matches(str(key), fields, n=1)
-            hint = f"; did you mean {near[0]}?" if near else f"; known here: {', '.join(fields)}"
-            yield f"{_join(path, key)}: unknown key{hint}"
+            known = f"a key that is known; did you mean {near[0]}?" if near else f"one of {', '.join(fields)}"
+            yield f"{_join(path, key)}: expected {known}"
     for name, field in fields.items():
         if name in raw:
             yield from mistakes_of_form(raw[name], field.type, _join(path, name))

@@ -8,6 +8,7 @@ from rich.text import Text
 
 from a7sim.session.compiling import USUAL_C_FACTORS
 from a7sim.sheets import sheet
+from a7sim.wording import counted
 
 
 def of_compilation(document: dict[str, Any]) -> RenderableType:
@@ -18,10 +19,12 @@ def of_compilation(document: dict[str, Any]) -> RenderableType:
     low, high = document["range_m"]
     parts: list[RenderableType] = [
         Text(
-            f"Model {document['model']} levelled in {levelling['rounds']} rounds to 1:{levelling['scale_found']:.1f}, "
-            f"{levelling['tilt_left_gon']:.3f} gon left; drawn at 1:{document['map_scale']:.0f} by "
-            f"{document['plan_gear']}\n{document['spot_heights']} spot heights, {low:.1f} to {high:.1f} m; expected "
-            f"standard errors: height {expected['sigma_height_m']:.3f} m, plan {expected['sigma_plan_m']:.3f} m"
+            f"Model {document['model']} levelled in {counted(levelling['rounds'], 'round')} to "
+            f"1:{levelling['scale_found']:.1f}, {levelling['tilt_left_gon']:.3f} gon left; "
+            f"drawn at 1:{document['map_scale']:.0f} by {document['plan_gear']}\n"
+            f"{counted(document['spot_heights'], 'spot height')}, {low:.1f} to {high:.1f} m; "
+            f"expected standard errors: height {expected['sigma_height_m']:.3f} m, "
+            f"plan {expected['sigma_plan_m']:.3f} m"
         ),
         Text(),
         _lines(document["lines"]),
@@ -30,7 +33,9 @@ def of_compilation(document: dict[str, Any]) -> RenderableType:
     if contours is not None:
         parts += [Text(), Text(_in_words(contours))]
     operator = document["operator"]
-    parts.append(Text(f"{operator['hours']:.1f} hours at the instrument, {operator['lines_over_the_link']} lines"))
+    parts.append(
+        Text(f"{operator['hours']:.1f} hours at the instrument, {counted(operator['lines_over_the_link'], 'line')}")
+    )
     return Group(*parts)
 
 

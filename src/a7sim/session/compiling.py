@@ -12,7 +12,7 @@ from a7sim.documents import Document, head, of_absolute
 from a7sim.geometry import Array, length_of
 from a7sim.manual import BASE_COMPONENTS, VARIANTS
 from a7sim.mistakes import Mistake
-from a7sim.operator.compilation import CONTOUR, Errand, Traced, Tracing
+from a7sim.operator.map_lines import CONTOUR, Errand, Traced, Tracing
 from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, plotted
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
@@ -96,19 +96,19 @@ def _see_that_it_can_be(scenario: Scenario, wanted: Wanted) -> None:
         raise Mistake(f"plan.plan_gear: expected a gear to the plotting table ({known}), got {scenario.plan.plan_gear}")
     models = {model.name: model for model in scenario.models}
     if wanted.model not in models:
-        raise Mistake(f"model: expected one of {', '.join(models)}, got {wanted.model}")
+        raise Mistake(f"--model: expected one of {', '.join(models)}, got {wanted.model}")
     flown = {photo.name for photo in scenario.photos if photo.position is not None}
     model = models[wanted.model]
     if not {model.left, model.right} <= flown:
-        raise Mistake(f"model {wanted.model}: expected photographs that show the ground, got measured points only")
+        raise Mistake(f"--model {wanted.model}: expected photographs that show the ground, got measured points only")
     known_lines = [line.name for line in scenario.lines]
     for name in wanted.lines:
         if name not in known_lines:
             raise Mistake(
-                f"line: expected one of {', '.join(known_lines) or 'none, the scenario has no lines'}, got {name}"
+                f"--line: expected one of {', '.join(known_lines) or 'none, the scenario has no lines'}, got {name}"
             )
     if not (wanted.contours or wanted.interval or wanted.lines):
-        raise Mistake("expected something to compile: a contour, an interval or a line, got none")
+        raise Mistake("compile: expected a --contour, an --interval or a --line to be drawn, got none")
 
 
 def _order(wanted: Wanted, scenario: Scenario, scene: Scene) -> Order:

@@ -26,6 +26,7 @@ from a7sim.session.results import of_request
 from a7sim.session.running import Watcher, open_session
 from a7sim.session.sitting import sitting
 from a7sim.sheets import sheet
+from a7sim.wording import counted
 
 SYMBOLS = {"omega": "ω", "phi": "φ", "kappa": "κ"}
 
@@ -207,9 +208,9 @@ def sheet_of(document: Document) -> RenderableType:
     parts: list[RenderableType] = [
         Text(f"Grid test of Wild {document['variant']} no. {document['serial']}", style="bold"),
         Text(
-            f"{document['crosses']} crosses of plate {document['plate']} at Z "
+            f"{counted(document['crosses'], 'cross', 'crosses')} of plate {document['plate']} at Z "
             f"{' and '.join(f'{-z:g}' for z in document['levels_mm'])} mm below the centre, "
-            f"{document['pointings']} pointings each"
+            f"{counted(document['pointings'], 'pointing')} each"
         ),
     ]
     for projector, each in document["projectors"].items():

@@ -10,7 +10,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from a7sim.geometry import Array, length_of
-from a7sim.operator.compilation import CONTOUR, Traced
+from a7sim.operator.map_lines import CONTOUR, Traced
 from a7sim.operator.plotting import Sheet
 
 INDEX_EVERY = 5

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from a7sim.sheets import sheet
 from a7sim.standard_points import FIGURE_4_1, POSITIONS
+from a7sim.wording import counted
 
 _ELEMENTS = (
     ("κ", "kappa", "gon"),
@@ -43,14 +44,14 @@ def of_session(document: dict[str, Any]) -> RenderableType:
 def of_hours(operator: dict[str, Any]) -> Text:
     """Return how long an operator took and for what; of one in a crowd nothing is told of line and book."""
     activities = (f"{name} {hours:.1f}" for name, hours in operator["time_by_activity_h"].items())
-    counted = [f"{operator['hours']:.1f} hours at the instrument"]
+    told = [f"{operator['hours']:.1f} hours at the instrument"]
     if "book_entries" in operator:
-        counted += [
-            f"{operator['lines_over_the_link']} lines over the link",
-            f"{operator['book_entries']} readings in the book",
+        told += [
+            counted(operator["lines_over_the_link"], "line") + " over the link",
+            counted(operator["book_entries"], "reading") + " in the book",
             f"{operator['struck_out']} struck out",
         ]
-    return Text(f"{', '.join(counted)}\nWhere they went: {', '.join(activities)}")
+    return Text(f"{', '.join(told)}\nWhere they went: {', '.join(activities)}")
 
 
 def of_strips(document: dict[str, Any]) -> RenderableType:
@@ -66,7 +67,7 @@ def of_strips(document: dict[str, Any]) -> RenderableType:
     return Group(
         _titled("Strips of all cases, rms residuals in m", table),
         Text(f"\n{first}", overflow="fold"),
-        Text(f"{hours:.1f} hours at the instrument in {len(document['sessions'])} sessions"),
+        Text(f"{hours:.1f} hours at the instrument in {counted(len(document['sessions']), 'session')}"),
         *([Text(said, style="bold")] if said else []),
     )
 

@@ -17,6 +17,7 @@ from a7sim.training.grading import Grade, account_in, found_in, grade_by, graded
 from a7sim.training.measures import Found, measure_of
 from a7sim.training.room import entered
 from a7sim.training.variation import scenario_for
+from a7sim.wording import counted
 
 LEAST_HINTS, LEAST_FAULTY = 2, 2
 
@@ -141,13 +142,13 @@ def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
 def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
     reference = runs["reference"].grade(exercise)
     if not reference.passed:
-        told = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or f"{reference.points:g} points"
+        told = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or counted(reference.points, "point")
         yield f"reference: expected it to pass, got {told}"
     for i, faulty in enumerate(exercise.faulty, start=1):
         grade = runs[f"faulty {i}"].grade(exercise)
         called = faulty.script or f"faulty {i} ({faulty.procedure})"
         if grade.passed:
-            yield f"{called}: expected it to fail, got {grade.points:g} points"
+            yield f"{called}: expected it to fail, got {counted(grade.points, 'point')}"
         if faulty.fails not in [each.id for each in grade.failed]:
             got = ", ".join(each.id for each in grade.failed) or "nothing"
             yield f"{called}: expected {faulty.fails} to fail, got {got}"

@@ -45,7 +45,7 @@ def as_nbgrader(best: Mapping[tuple[str, str], Graded]) -> str:
     return csv_text(NBGRADER_COLUMNS, rows)
 
 
-def as_document(
+def as_class_document(
     graded: Sequence[Graded], best: Mapping[tuple[str, str], Graded], attempts: Sequence[Attempt]
 ) -> Document:
     """Return all grades as a document, the best ones by student and exercise first."""

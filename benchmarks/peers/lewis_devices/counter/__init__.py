@@ -1,5 +1,7 @@
 """One counter for lewis: the same query as the plotter's, and a reply of the same length."""
 
+from typing import ClassVar
+
 from lewis.adapters.stream import Cmd, StreamInterface
 from lewis.devices import Device
 
@@ -13,7 +15,7 @@ class Counter(Device):
 class CounterInterface(StreamInterface):
     """The register on a line."""
 
-    commands = {Cmd("show", r"^COUN:X\?$")}  # noqa: RUF012
+    commands: ClassVar = {Cmd("show", r"^COUN:X\?$")}
     in_terminator = "\n"
     out_terminator = "\n"
 

@@ -8,11 +8,13 @@ import click
 from rich.console import Console
 
 from a7sim import computing
+from a7sim.cli.options import FILE, HEIGHT, Number, principal_distance
 from a7sim.cli.reduce import options, tables
 from a7sim.computing import Outcome
 from a7sim.computing.interior import Flight
 from a7sim.computing.strips import PairCamera
 from a7sim.documents import Document, as_json
+from a7sim.mistakes import Mistake
 from a7sim.reduction.strips import JoinMethod
 
 NARROWEST = 80
@@ -32,10 +34,11 @@ def command() -> None:
 
 
 @command.command("interior")
-@click.argument("counts", type=options.FILE)
+@click.argument("counts", type=FILE)
 @click.option(
     "--camera",
-    type=options.FILE,
+    type=FILE,
+    metavar="FILE",
     required=True,
     help="TOML with c, fiducials (name, x, y in mm), principal_point and distortion; a scenario's [camera] will do.",
 )
@@ -48,7 +51,7 @@ def command() -> None:
 )
 @click.option(
     "--count-mm",
-    type=options.Number(min=0.0, min_open=True, max=10.0),
+    type=Number(min=0.0, min_open=True, max=10.0),
     help="Size of a count, mm (1 for counts in mm): tells how the film has shrunk, and the principal distance to set.",
 )
 @click.option(
@@ -57,10 +60,8 @@ def command() -> None:
     multiple=True,
     help="Correct the points and bring them to the principal point; may be given several times.",
 )
-@click.option("--flying-height", type=options.Number(1.0, 30000.0), help="Of the camera above the sea, m.")
-@click.option(
-    "--ground-height", type=options.Number(-500.0, 9000.0), default=0.0, show_default=True, help="Above the sea, m."
-)
+@click.option("--flying-height", type=Number(1.0, 30000.0), help="Of the camera above the sea, m.")
+@click.option("--ground-height", type=Number(-500.0, 9000.0), default=0.0, show_default=True, help="Above the sea, m.")
 @options.documented
 def interior(
     counts: Path,
@@ -80,17 +81,19 @@ def interior(
     Example: a7sim reduce interior counts.csv --camera scenarios/akwanga.toml --out refined
     """
     if flying_height is not None and flying_height <= ground_height:
-        raise click.UsageError(f"--flying-height: expected more than the ground height of {ground_height:g} m")
+        raise Mistake(
+            f"--flying-height: expected more than the ground height of {ground_height:g} m, got {flying_height:g}"
+        )
     flight = None if flying_height is None else Flight(flying_height, ground_height)
     outcome = computing.interior(counts, camera, method, count_mm, correct, flight)
     _deliver(outcome, as_document, out, tables.of_interior)
 
 
 @command.command("relative")
-@click.argument("pair", type=options.FILE)
-@options.principal_distance(required=True)
+@click.argument("pair", type=FILE)
+@principal_distance(required=True)
 @options.principal_point
-@click.option("--bx", type=options.LENGTH, default=92.0, show_default=True, help="Length of the base, mm.")
+@options.base("92.0", 92.0)
 @click.option(
     "--unknowns",
     type=click.Choice(["independent", "dependent"]),
@@ -127,13 +130,13 @@ def relative(
 
 
 @command.command("centres")
-@click.argument("pointings", type=options.FILE)
+@click.argument("pointings", type=FILE)
 @click.option(
     "--method", type=click.Choice(computing.CENTRE_METHODS), default="two-levels", show_default=True, help="See above."
 )
-@click.option("--z1", type=options.PLACE, default=4900.0, show_default=True, help="Z-counter reading of X1, Y1.")
-@click.option("--z2", type=options.PLACE, default=5100.0, show_default=True, help="Z-counter reading of X2, Y2.")
-@options.principal_distance(required=False, help_text="Principal distance of the projector, mm, with a grid plate.")
+@click.option("--z1", type=HEIGHT, default=4900.0, show_default=True, help="Z-counter reading of X1, Y1.")
+@click.option("--z2", type=HEIGHT, default=5100.0, show_default=True, help="Z-counter reading of X2, Y2.")
+@principal_distance(required=False)
 @options.documented
 def centres(
     pointings: Path,
@@ -149,7 +152,7 @@ def centres(
     \b
     two-levels  point,X1,Y1,X2,Y2     pointings at the levels --z1 and --z2
     levels      point,level,X,Y       at any number of levels, every point at each
-    grid        point,x,y,X,Y,Z       crosses of a grid plate in mm, readings in mm
+    grid        point,x,y,X,Y,Z       crosses of a grid plate in mm, readings in mm; needs --c
     a8          model,base,column,height  from the A8's base scale and column, mm
 
     Example: a7sim reduce centres pointings.csv --z1 4900 --z2 5100
@@ -158,7 +161,7 @@ def centres(
 
 
 @command.command("similarity")
-@click.argument("common", type=options.FILE)
+@click.argument("common", type=FILE)
 @click.option(
     "--method",
     type=click.Choice(computing.SIMILARITY_METHODS),
@@ -176,7 +179,7 @@ def similarity(common: Path, method: computing.SimilarityMethod, out: Path | Non
 
 
 @command.command("connect")
-@click.argument("models", type=options.FILE, nargs=-1, required=True)
+@click.argument("models", type=FILE, nargs=-1, required=True)
 @options.join_method
 @options.documented
 def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_document: bool) -> None:
@@ -190,10 +193,10 @@ def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_d
 
 
 @command.command("strip")
-@click.argument("file", type=options.FILE)
-@options.principal_distance(required=False, help_text="Principal distance of pairs, mm.")
+@click.argument("file", type=FILE)
+@principal_distance(required=False)
 @options.principal_point
-@click.option("--bx", type=options.LENGTH, help="bx of every model of pairs, mm; else the mean x-parallax.")
+@options.base("of pairs, their mean x-parallax")
 @options.ground(required=False)
 @options.join_method
 @click.option("--polynomial", type=click.Choice(["2", "3"]), help="Adjust the strip by polynomials of this degree.")
@@ -231,7 +234,7 @@ def strip(
 
 
 @command.command("absolute")
-@click.argument("model", type=options.FILE)
+@click.argument("model", type=FILE)
 @options.ground(required=True)
 @options.against
 @options.documented
@@ -244,11 +247,11 @@ def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, 
 
 
 @command.command("block")
-@click.argument("models", type=options.FILE, nargs=-1, required=True)
+@click.argument("models", type=FILE, nargs=-1, required=True)
 @options.ground(required=True)
 @click.option(
     "--height-weight",
-    type=options.Number(min=1e-6, max=1e6),
+    type=Number(min=1e-6, max=1e6),
     default=1.0,
     show_default=True,
     help="Weight of equations in height against those in plan.",

@@ -8,6 +8,7 @@ from rich.table import Table
 
 from a7sim.documents import Document
 from a7sim.sheets import sheet
+from a7sim.wording import counted
 
 ANGLES = ("omega", "phi", "kappa")
 SHIFTS = ("Tx", "Ty", "Tz")
@@ -27,7 +28,7 @@ def of_interior(document: Document) -> Shown:
         residuals = [(name, *(1e3 * v for v in each)) for name, each in picture["residuals_mm"].items()]
         shown += [
             "",
-            f"Photograph {picture['photo']}: {len(picture['points'])} points, "
+            f"Photograph {picture['photo']}: {counted(len(picture['points']), 'point')}, "
             f"s0 {1e3 * picture['s0_mm']:.1f} um, redundancy {picture['statistics']['redundancy']}",
             _table(("unknown", "value", "±"), unknowns),
             _table(("fiducial", "vx, um", "vy, um"), residuals, 1),
@@ -71,7 +72,7 @@ def of_relative(document: Document) -> Shown:
         _table(("point", "X, mm", "Y, mm", "Z, mm", "p, um"), points),
         "",
         f"s0 {1e3 * document['s0_mm']:.2f} um in the picture, "
-        f"redundancy {document['statistics']['redundancy']}, {document['iterations']} iterations, "
+        f"redundancy {document['statistics']['redundancy']}, {counted(document['iterations'], 'iteration')}, "
         f"condition {document['condition']:.2g}",
     ]
     if document["method"] == "robust":
@@ -110,7 +111,10 @@ def of_centres(document: Document) -> Shown:
         "",
     ]
     if method == "grid":
-        return [*shown, f"s0 {1e3 * document['s0_mm']:.2f} um on the plate, {document['iterations']} iterations"]
+        return [
+            *shown,
+            f"s0 {1e3 * document['s0_mm']:.2f} um on the plate, {counted(document['iterations'], 'iteration')}",
+        ]
     of_pointing = f", a pointing {document['pointing_rms']:.4f}" if "pointing_rms" in document else ""
     return [*shown, f"rms {document['rms']:.4f}{of_pointing}, redundancy {document['redundancy']}"]
 
@@ -151,7 +155,8 @@ def of_connection(document: Document) -> Shown:
 def of_strip(document: Document) -> Shown:
     """Show joins, absolute orientation, residuals, and what the polynomials found the strip to be."""
     shown: Shown = [
-        f"Strip of {len(document['models'])} models from {document['input']}, joined on {document['method']}",
+        f"Strip of {counted(len(document['models']), 'model')} from {document['input']}, "
+        f"joined on {document['method']}",
         f"joins in the unit of model {document['models'][0]['model']}{', mm' if document['input'] == 'pairs' else ''}",
         "",
         *_of_joins(document["joins"]),
@@ -180,7 +185,7 @@ def of_block(document: Document) -> Shown:
         for each in document["models"]
     ]
     return [
-        f"Block of {len(models)} models: s0 {document['s0_m']:.4f} m, in plan {document['s0_plan_m']:.4f}, "
+        f"Block of {counted(len(models), 'model')}: s0 {document['s0_m']:.4f} m, in plan {document['s0_plan_m']:.4f}, "
         f"in height {document['s0_height_m']:.4f}, redundancy {document['redundancy']}",
         "",
         _table(("model", "scale", "rms vX, m", "vY", "vZ", "points"), models, 3),
@@ -219,8 +224,9 @@ def _of_ground(document: Document) -> Shown:
 
 def _of_accuracy(accuracy: Document) -> list[str]:
     return [
-        f"{which}, {each['points']} points: rms X {_metres(each['rms']['X'])}, Y {_metres(each['rms']['Y'])}, "
-        f"Z {_metres(each['rms']['Z'])} m; plan {_metres(each['plan'])}, height {_metres(each['height'])} m"
+        f"{which}, {counted(each['points'], 'point')}: rms X {_metres(each['rms']['X'])}, "
+        f"Y {_metres(each['rms']['Y'])}, Z {_metres(each['rms']['Z'])} m; "
+        f"plan {_metres(each['plan'])}, height {_metres(each['height'])} m"
         for which, each in accuracy.items()
     ]
 
@@ -242,7 +248,11 @@ def _of_comparison(document: Document) -> Shown:
     compared = document["compare"]
     rows: list[tuple[Any, ...]] = [(point, *each) for point, each in compared["differences"].items()]
     rows += [(name, *compared[key].values()) for name, key in (("mean square", "rms"), ("largest", "largest"))]
-    return ["", f"Computed minus given, {compared['points']} points", _table(("point", "dX", "dY", "dZ"), rows, 3)]
+    return [
+        "",
+        f"Computed minus given, {counted(compared['points'], 'point')}",
+        _table(("point", "dX", "dY", "dZ"), rows, 3),
+    ]
 
 
 def _of_methods(rows: Sequence[Document]) -> Table:

@@ -4,18 +4,20 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli import options
 from a7sim.cli.names import an_exercise
 from a7sim.documents import as_json, head
 from a7sim.training.checking import checked
 from a7sim.training.shelf import all_exercises, find_exercise
 from a7sim.training.skeleton import begin_exercise
+from a7sim.wording import counted
 
 EXIT_FAULTY = 1
 
 
 @click.command("check")
 @click.argument("exercises", nargs=-1, metavar="[EXERCISE]...", shell_complete=an_exercise)
-@click.option("--json", "as_document", is_flag=True, help="Print what was found as one JSON document.")
+@options.as_document
 def check_(exercises: tuple[str, ...], as_document: bool) -> None:
     """See that exercises hold: the reference passes, each faulty one fails for its reason, no criterion is dead.
 
@@ -29,7 +31,7 @@ def check_(exercises: tuple[str, ...], as_document: bool) -> None:
         click.echo(as_json(head("train check") | {"exercises": told}), nl=False)
     else:
         for each in found:
-            points = "" if each.reference_points is None else f" (reference {each.reference_points:g} points)"
+            points = "" if each.reference_points is None else f" (reference {counted(each.reference_points, 'point')})"
             click.echo(f"{each.name}: {'holds' if not each.faults else f'{len(each.faults)} to mend'}{points}")
             for fault in each.faults:
                 click.echo(f"  {fault}")
@@ -38,7 +40,7 @@ def check_(exercises: tuple[str, ...], as_document: bool) -> None:
 
 
 @click.command("new")
-@click.argument("folder", type=click.Path(path_type=Path), metavar="NAME")
+@click.argument("folder", type=options.PLACE, metavar="NAME")
 def new_(folder: Path) -> None:
     """Write the skeleton of an exercise into a new folder; check says what is still missing.
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 import msgspec
 
-from a7sim.cli import EXIT_DIFFERS
+from a7sim.cli import EXIT_DIFFERS, options
 from a7sim.cli.names import an_exercise
 from a7sim.cli.train.options import last_attempt, named, of_a_student, progress_in
 from a7sim.documents import as_json, head
@@ -28,13 +28,12 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
     "--journal",
     "folders",
     type=click.Path(path_type=Path, file_okay=False, exists=True),
+    metavar="DIR",
     multiple=True,
     help="Grade the attempts handed in as a folder, or in its folders; nothing is recorded. May be repeated.",
 )
-@click.option(
-    "--seed", type=click.IntRange(min=0), metavar="N", help="Of attempts handed in that were started with a --seed."
-)
-@click.option("--json", "as_document", is_flag=True, help="Print the grade as one JSON document.")
+@options.seed("that of each attempt handed in")
+@options.as_document
 @of_a_student
 def verify_(
     exercise: str | None,
@@ -91,7 +90,7 @@ def _graded(progress: Progress, attempt: Attempt) -> Grade:
 @click.argument("exercise", required=False, shell_complete=an_exercise)
 @click.option(
     "--every",
-    type=click.FloatRange(min=0.1, max=3600.0),
+    type=options.Number(min=0.1, max=3600.0),
     default=1.0,
     show_default=True,
     metavar="SECONDS",

@@ -2,12 +2,11 @@
 
 import getpass
 import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
 
 import click
 
+from a7sim.cli.options import FOLDER, together
 from a7sim.cli.prompt import data_folder
 from a7sim.mistakes import Mistake
 from a7sim.training.progress import Attempt, Progress
@@ -17,22 +16,22 @@ HOME_VARIABLE, STUDENT_VARIABLE = "A7SIM_HOME", "A7SIM_STUDENT"
 
 LONGEST_NAME = 100
 
-Command = TypeVar("Command", bound=Callable[..., Any])
-
 _HOME = click.option(
     "--home",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=FOLDER,
+    metavar="DIR",
     envvar=HOME_VARIABLE,
     help=f"Folder of progress and journals; also {HOME_VARIABLE}  [default: the platform's data folder]",
 )
 _STUDENT = click.option(
-    "--student", envvar=STUDENT_VARIABLE, help=f"Whose progress; also {STUDENT_VARIABLE}  [default: who is logged in]"
+    "--student",
+    metavar="NAME",
+    envvar=STUDENT_VARIABLE,
+    help=f"Whose progress; also {STUDENT_VARIABLE}  [default: who is logged in]",
 )
 
-
-def of_a_student(command: Command) -> Command:
-    """Add --home and --student."""
-    return _HOME(_STUDENT(command))
+of_a_student = together(_HOME, _STUDENT)
+"""--home, --student."""
 
 
 def progress_in(home: Path | None) -> Progress:

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
+from a7sim.cli import options
 from a7sim.cli.names import an_exercise
 from a7sim.cli.train.options import named, of_a_student, progress_in
 from a7sim.documents import Document, as_json, head
@@ -12,22 +13,23 @@ from a7sim.mistakes import Mistake
 from a7sim.session.folder import write_whole
 from a7sim.sheets import sheet
 from a7sim.training.exercise import Shelved
-from a7sim.training.exports import HOME_PAGE, as_document, as_nbgrader, as_xapi
+from a7sim.training.exports import HOME_PAGE, as_class_document, as_nbgrader, as_xapi
 from a7sim.training.shelf import all_exercises, find_exercise
+from a7sim.wording import counted
 
 
 @click.command("list")
 @click.argument("exercise", required=False, shell_complete=an_exercise)
-@click.option("--json", "as_json_", is_flag=True, help="Print what is listed as one JSON document.")
+@options.as_document
 @of_a_student
-def list_(exercise: str | None, as_json_: bool, home: Path | None, student: str | None) -> None:
+def list_(exercise: str | None, as_document: bool, home: Path | None, student: str | None) -> None:
     """List the exercises and how far they are done; or show what EXERCISE is about.
 
     Example: a7sim train list 4
     """
     if exercise is not None:
         shelved = find_exercise(exercise)
-        click.echo(as_json(_of_exercise(shelved)) if as_json_ else f"{_shown(shelved)}\n", nl=False)
+        click.echo(as_json(_of_exercise(shelved)) if as_document else f"{_shown(shelved)}\n", nl=False)
         return
     name = named(student)
     with progress_in(home) as progress:
@@ -40,7 +42,7 @@ def list_(exercise: str | None, as_json_: bool, home: Path | None, student: str 
         state = "passed" if grade and grade.grade.passed else "under way" if mine and not mine[-1].closed else ""
         points = grade.grade.points if grade else None
         rows.append((shelved.exercise.number, shelved.exercise.title, state, points, len(mine)))
-    if as_json_:
+    if as_document:
         keys = ("number", "title", "state", "points", "attempts")
         exercises = [dict(zip(keys, row, strict=True)) for row in rows]
         click.echo(as_json(head("train list") | {"student": name, "exercises": exercises}), nl=False)
@@ -70,7 +72,8 @@ def _shown(shelved: Shelved) -> str:
     exercise = shelved.exercise
     steps = [f"  - {each.text}" for each in exercise.steps]
     criteria = [f"  {each.weight:4g}  {each.title}" for each in exercise.criteria]
-    facts = f"{exercise.minutes:g} minutes, {exercise.pass_points:g} of 100 points pass, {len(exercise.hints)} hints"
+    minutes, hints = counted(exercise.minutes, "minute"), counted(len(exercise.hints), "hint")
+    facts = f"{minutes}, {exercise.pass_points:g} of 100 points pass, {hints}"
     return "\n".join([shelved.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
 
 
@@ -83,8 +86,10 @@ def _shown(shelved: Shelved) -> str:
     show_default=True,
     help="A page, nbgrader's table, a document, or statements for a learning record store.",
 )
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File  [default: standard output]")
-@click.option("--home-page", default=HOME_PAGE, show_default=True, help="Of the students' accounts, for xapi.")
+@options.out_file("the sheet", "standard output")
+@click.option(
+    "--home-page", metavar="URL", default=HOME_PAGE, show_default=True, help="Of the students' accounts, for xapi."
+)
 @of_a_student
 def report_(
     whole_class: bool, to: str, out: Path | None, home_page: str, home: Path | None, student: str | None
@@ -97,11 +102,11 @@ def report_(
     with progress_in(home) as progress:
         graded, best, attempts = progress.grades(whose), progress.best(whose), progress.attempts(whose)
     if not attempts:
-        raise Mistake(f"{whose or 'the class'}: expected attempts to report on, found none")
+        raise Mistake(f"{f'student {whose}' if whose else 'the class'}: expected attempts to report on, found none")
     if to == "csv":
         text = as_nbgrader(best)
     elif to == "json":
-        text = as_json(as_document(graded, best, attempts))
+        text = as_json(as_class_document(graded, best, attempts))
     elif to == "xapi":
         text = as_xapi(graded, home_page)
     else:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli import options
 from a7sim.cli.names import an_exercise
 from a7sim.cli.serve import USUAL, Served, Told, serve
 from a7sim.cli.train.options import named, of_a_student, progress_in
@@ -38,11 +39,11 @@ EXAMINATION = "exam"
     help="No hints, nothing ticks, one grading; another seed than for practice. Without EXERCISE, the examination.",
 )
 @click.option("--anew", is_flag=True, help="Begin anew where an attempt is under way; that one is kept.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Draws other photographs than your own.")
-@click.option("--script", type=click.Path(path_type=Path, dir_okay=False), help="Do it by a script (.a7s).")
+@options.seed("your own")
+@click.option("--script", type=options.FILE, help="Do it by a script (.a7s).")
 @click.option("--link", metavar="tcp://HOST:PORT", help="Serve it there for any client instead of opening the console.")
 @click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp://{USUAL}.")
-@click.option("--plain", is_flag=True, help="The console in words, for screen readers.")
+@options.plain
 @of_a_student
 def start_(
     exercise: str | None,
@@ -61,9 +62,11 @@ def start_(
     Example: a7sim train start 4
     """
     if exercise is None and not exam:
-        raise Mistake("start: expected an EXERCISE such as 4 (a7sim train list), or --exam for the examination")
+        raise Mistake(
+            "train start: expected EXERCISE, such as 4 (a7sim train list), or --exam for the examination, got none"
+        )
     if sum((script is not None, link is not None, serves)) > 1:
-        raise Mistake("start: expected one of --script, --link and --serve, got several")
+        raise Mistake("train start: expected one of --script, --link and --serve, got several")
     address = _address(link) if link is not None else USUAL if serves else None
     played = read_script(script) if script is not None else None
     shelved = find_exercise(exercise or EXAMINATION)
@@ -111,7 +114,7 @@ def _address(text: str) -> Address:
         raise Mistake(f"--link: expected tcp://HOST:PORT, got {text!r}")
     found = address_of(url["address"], "--link")
     if not found.loopback:
-        raise Mistake(f"--link: expected an address of this machine alone, got {found}")
+        raise Mistake(f"--link {text}: expected an address of this machine alone")
     return found
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli import options
 from a7sim.cli.names import an_exercise
 from a7sim.cli.train.options import last_attempt, named, of_a_student, progress_in
 from a7sim.documents import as_json, head
@@ -11,11 +12,12 @@ from a7sim.mistakes import Mistake
 from a7sim.training.account import answers_in
 from a7sim.training.attempts import write_answers, write_hint
 from a7sim.training.shelf import find_exercise
+from a7sim.wording import counted
 
 
 @click.command("hint")
 @click.argument("exercise", required=False, shell_complete=an_exercise)
-@click.option("--json", "as_document", is_flag=True, help="Print the hint as one JSON document.")
+@options.as_document
 @of_a_student
 def hint_(exercise: str | None, as_document: bool, home: Path | None, student: str | None) -> None:
     """Give the next hint of the attempt under way; it costs points and is recorded.
@@ -32,7 +34,7 @@ def hint_(exercise: str | None, as_document: bool, home: Path | None, student: s
         told = {"exercise": attempt.exercise, "hint": number, "cost": hint.cost, "text": hint.text}
         click.echo(as_json(head("train hint") | told), nl=False)
     else:
-        click.echo(f"hint {number} (-{hint.cost:g} points): {hint.text}")
+        click.echo(f"hint {number} (-{counted(hint.cost, 'point')}): {hint.text}")
 
 
 @click.command("answer")
@@ -43,7 +45,7 @@ def hint_(exercise: str | None, as_document: bool, home: Path | None, student: s
     shell_complete=an_exercise,
     help="Of which exercise  [default: the last one started]",
 )
-@click.option("--json", "as_document", is_flag=True, help="Print all answers as one JSON document.")
+@options.as_document
 @of_a_student
 def answer_(
     answers: tuple[str, ...], exercise: str | None, as_document: bool, home: Path | None, student: str | None

@@ -23,6 +23,7 @@ from a7sim.report.drawing import (
 )
 from a7sim.report.page import Picture, Sheet
 from a7sim.standard_points import PLACES, POSITIONS
+from a7sim.wording import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +47,7 @@ def residual_parallaxes(model: Document, name: str) -> Picture:
     step = nice(largest or 1e-3)
     length = 0.26 * across / max(largest, 1e-3)
     title = f"Model {model['model']}: residual y-parallaxes, rms {orientation['rms_parallax_mm']:.4f} mm"
-    said = f"Arrows along y at {len(residuals)} standard points; the largest parallax is {largest:.3f} mm."
+    said = f"Arrows along y at {counted(len(residuals), 'standard point')}; the largest parallax is {largest:.3f} mm."
     with drawing(name, title, said, size=(WIDTH_IN, 5.0)) as drawn:
         axes = drawn.axes[0]
         labels = list(residuals)
@@ -94,7 +95,8 @@ def iterations(model: Document, name: str) -> Picture:
     numbers = list(range(1, len(rounds) + 1))
     last = orientation["rms_parallax_mm"]
     title = f"Model {model['model']}: y-parallaxes round by round"
-    said = f"Rms {rounds[0]['rms_mm']:.4f} mm in the first of {len(rounds)} rounds, {last:.4f} mm left at the end."
+    first = f"Rms {rounds[0]['rms_mm']:.4f} mm in the first of {counted(len(rounds), 'round')}"
+    said = f"{first}, {last:.4f} mm left at the end."
     with drawing(name, title, said, size=(WIDTH_IN, 5.0)) as drawn:
         axes = drawn.axes[0]
         axes.set_yscale("log")

@@ -14,6 +14,7 @@ from a7sim.standard_points import CASES, PLACES
 from a7sim.training.account import Account
 from a7sim.training.measures.base import BEST_POINTING_UM, HALF_A_COUNT, Found, Measure, listed, measure, title, where
 from a7sim.training.witness import Reading
+from a7sim.wording import counted
 
 FEWEST_POINTS = 3
 
@@ -82,9 +83,9 @@ class LevelsMissing(_Centres, frozen=True, kw_only=True):
                 short += [(element, level, point) for point in missing]
         wanted = len(self.elements) * len(self.levels) * len(self.points)
         if not short:
-            return Found(0.0, f"all {wanted} registrations are there")
+            return Found(0.0, "no registration is missing")
         told = listed(f"{point} with {title(element)} at {level:.0f}" for element, level, point in short)
-        return Found(float(len(short)), f"{len(short)} of {wanted} registrations are missing: {told}")
+        return Found(float(len(short)), f"{len(short)} of {counted(wanted, 'registration')} missing: {told}")
 
 
 @measure("pointing-rms")
@@ -113,7 +114,7 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
         if not off:
             return Found(None, "nothing was registered at the levels")
         rms = math.sqrt(fmean(each**2 for each in off))
-        told = f"over {len(off) // 2} pointings the images stood {rms:.1f} um (rms) beside the mark, "
+        told = f"over {counted(len(off) // 2, 'pointing')} the images stood {rms:.1f} um (rms) beside the mark, "
         told += f"most of all by {worst[0]:.0f} um at {worst[1]}"
         return Found(round(rms, 2), told)
 

@@ -22,6 +22,7 @@ from a7sim.training.measures.base import (
     title,
 )
 from a7sim.training.witness import AXES, PLAIN, Deed, Reading
+from a7sim.wording import counted
 
 PLAN_AXES = ("X", "Y")
 
@@ -97,8 +98,8 @@ class MissingPointings(Measure, frozen=True, kw_only=True):
         lacking = {where: lacks for where, lacks in lacking.items() if lacks > 0}
         missing, wanted = sum(lacking.values()), len(self.points) * self.each * len(self.bases)
         if not missing:
-            return Found(0.0, f"all {wanted} registrations are there")
-        return Found(float(missing), f"{missing} of {wanted} registrations are missing: {listed(lacking)}")
+            return Found(0.0, "no registration is missing")
+        return Found(float(missing), f"{missing} of {counted(wanted, 'registration')} missing: {listed(lacking)}")
 
 
 @measure("heights-off")

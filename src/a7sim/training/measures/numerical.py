@@ -18,6 +18,7 @@ from a7sim.training.forms import FIVE, multipliers
 from a7sim.training.measures.base import BEST_PARALLAX_UM, HALF_A_COUNT, Found, Measure, listed, measure, title
 from a7sim.training.measures.clearing import stands_of
 from a7sim.training.witness import Reading
+from a7sim.wording import counted
 
 BYS = ("by1", "by2")
 
@@ -204,7 +205,9 @@ class ParallaxRms(Measure, frozen=True, kw_only=True):
         if not left:
             return Found(None, "nothing was registered with both images in view")
         rms = math.sqrt(fmean(each**2 for each in left))
-        return Found(round(rms, 2), f"over {len(left)} readings y-parallaxes of {rms:.1f} um (rms) were left")
+        return Found(
+            round(rms, 2), f"over {counted(len(left), 'reading')} y-parallaxes of {rms:.1f} um (rms) were left"
+        )
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye leaves, and the rounding of the drum."""

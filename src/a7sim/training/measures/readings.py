@@ -9,6 +9,7 @@ from a7sim.scenario import Scenario
 from a7sim.training.account import Account
 from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, listed, measure, readings_with, title, where
 from a7sim.training.witness import AXES, PLAIN, Reading
+from a7sim.wording import counted
 
 
 @measure("missing-readings")
@@ -37,9 +38,9 @@ class MissingReadings(Measure, frozen=True, kw_only=True):
                     short.setdefault(f"{title(element) + ' at ' if element else ''}{point}", []).append(str(lacks))
         wanted = len(self.points) * max(1, len(self.elements)) * self.each
         if not missing:
-            return Found(0.0, f"all {wanted} registrations are there")
+            return Found(0.0, "no registration is missing")
         late = f" after the last turn of {listed(map(title, self.after))}" if self.after else ""
-        return Found(float(missing), f"{missing} of {wanted} registrations are missing{late}: {listed(short)}")
+        return Found(float(missing), f"{missing} of {counted(wanted, 'registration')} missing{late}: {listed(short)}")
 
 
 @measure("wrong-approach")
@@ -71,7 +72,7 @@ class WrongApproach(Measure, frozen=True, kw_only=True):
         told = [f"{title(handle)} at {where(some, account)}" for handle, some in wrong.items() if some]
         return Found(
             float(len(bad)),
-            f"{len(bad)} of {len(readings)} registrations came from {from_where} readings: {listed(told)}",
+            f"{len(bad)} of {counted(len(readings), 'registration')} came from {from_where} readings: {listed(told)}",
         )
 
 
@@ -188,7 +189,9 @@ class OtherNotAtRest(Measure, frozen=True, kw_only=True):
                 )
         if not all_read:
             return Found(None, f"no reading of {listed(map(title, self.pairs))} was registered")
-        return Found(float(count), listed(told) if told else f"at all {all_read} readings the other one stood at rest")
+        return Found(
+            float(count), listed(told) if told else f"the other one stood at rest at {counted(all_read, 'reading')}"
+        )
 
 
 @measure("spread")
