@@ -14,6 +14,15 @@ from tests.examples import PROFILE
 
 settings.load_profile(PROFILE)
 
+
+def _let_processes_keep_bytecode() -> None:
+    """Let no process that a test starts compile the whole package anew, as it would on many a container."""
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
+
+
+_let_processes_keep_bytecode()
+
 BESIDE_THE_PROJECT = Path(__file__).parents[2] / "shared" / "reference"
 
 
