@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -13,6 +14,22 @@ from a7sim.cli import main
 from tests.examples import PROFILE
 
 settings.load_profile(PROFILE)
+
+
+def _let_processes_keep_bytecode() -> None:
+    """Let no process that a test starts compile the whole package anew, as it would on many a container."""
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
+
+
+_let_processes_keep_bytecode()
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collector pass over what stays to the end anyway, modules and tests, and come less often."""
+    gc.freeze()
+    gc.set_threshold(200_000, 20, 50)
+
 
 BESIDE_THE_PROJECT = Path(__file__).parents[2] / "shared" / "reference"
 

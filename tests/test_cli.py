@@ -44,7 +44,7 @@ def a7sim(*arguments, cwd=ROOT):
 @pytest.fixture(scope="module")
 def akwanga_run(tmp_path_factory):
     out = tmp_path_factory.mktemp("runs") / "akwanga"
-    done = a7sim("run", "scenarios/akwanga.toml", "--seed", 7, "--out", out)
+    done = a7sim("run", "scenarios/akwanga.toml", "--seed", 7, *READ_ONCE, "--out", out)
     assert done.returncode == 0, done.stderr
     return done, out
 
@@ -150,18 +150,18 @@ def test_the_book_and_the_models_are_tables(akwanga_run):
 def test_the_same_seed_gives_the_same_bytes_and_another_gives_other_numbers(akwanga_run, tmp_path):
     """Also in a process of its own, whose hashes are others."""
     _, out = akwanga_run
-    again = in_a_process("run", ROOT / "scenarios/akwanga.toml", "--seed", 7, "--out", tmp_path / "again")
+    again = in_a_process("run", ROOT / "scenarios/akwanga.toml", "--seed", 7, *READ_ONCE, "--out", tmp_path / "again")
     assert again.returncode == 0
     for name in FILES:
         assert (tmp_path / "again" / name).read_bytes() == (out / name).read_bytes()
-    assert a7sim("run", "akwanga", "--seed", 8, "--out", tmp_path / "other").returncode == 0
+    assert a7sim("run", "akwanga", "--seed", 8, *READ_ONCE, "--out", tmp_path / "other").returncode == 0
     for name in FILES - {"strip-numbers.csv"}:
         assert (tmp_path / "other" / name).read_bytes() != (out / name).read_bytes()
 
 
 def test_json_prints_one_document_and_nothing_else(akwanga_run):
     _, out = akwanga_run
-    done = a7sim("run", "akwanga", "--seed", 7, "--json")
+    done = a7sim("run", "scenarios/akwanga.toml", "--seed", 7, *READ_ONCE, "--json")
     assert done.stdout.encode() == (out / "results.json").read_bytes()
     assert done.stderr == ""
 

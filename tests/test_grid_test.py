@@ -88,6 +88,15 @@ def sheets_of(scenario, seed=1, **order):
     return document["projectors"]
 
 
+def sheets_of_crowd(scenario, seeds, **order):
+    """The left and the right projector, each of many sessions, which test as each would at its line (see below)."""
+    order = GridTestOrder(scenario.camera, scenario.grid_plate, **order)
+    bench = open_crowd(scenario, seeds).bench
+    sheets = list(calibrated(Bench(bench.crew, bench.hands, order.job), order))
+    assert all(len(sheet.who) == len(seeds) for sheet in sheets)
+    return sheets
+
+
 # --- the reduction ------------------------------------------------------------------------------------
 
 
@@ -268,10 +277,9 @@ def test_without_errors_given_faults_are_found_back():
 def test_given_faults_are_found_within_three_sigmas():
     scenario = with_faults()
     shares = [
-        projector["truth"]["differences"][name] / each["sigma"]
-        for seed in range(8)
-        for projector in sheets_of(scenario, seed).values()
-        for name, each in projector["elements"].items()
+        (sheet.test.errors[name] - truth * (GON if name in ANGLES else 1.0)) / sheet.test.sigmas[name]
+        for sheet, at_the_line in zip(sheets_of_crowd(scenario, range(8)), sheets_of(scenario).values(), strict=True)
+        for name, truth in at_the_line["truth"]["errors"].items()
     ]
     assert np.mean(np.abs(shares) <= 3.0) >= 0.97
     assert np.abs(shares).max() < 5.0
@@ -282,19 +290,19 @@ def test_given_faults_are_found_within_three_sigmas():
 def test_s0_is_that_of_the_mean_of_the_pointings(pointings):
     """Pointing error over the root of their number, and in it the plate's 1 um and counters read to 0.01."""
     scenario = load_scenario("akwanga", {"observer.monocular_um": "6", "observer.blunder_rate": "0"})
-    sheets = [each for seed in range(4) for each in sheets_of(scenario, seed, pointings=pointings).values()]
-    s0 = np.sqrt(np.mean([each["s0_um"] ** 2 for each in sheets]))
+    sheets = sheets_of_crowd(scenario, range(4), pointings=pointings)
+    s0 = 1e3 * np.sqrt(np.mean([sheet.test.s0**2 for sheet in sheets]))
     assert s0 == pytest.approx(np.sqrt(36.0 / pointings + 1.0 + 3.0 / pointings), rel=0.08)
     if pointings > 1:
-        assert np.mean([each["pointing_um"] for each in sheets]) == pytest.approx(6.2, rel=0.06)
+        assert 1e3 * np.mean([sheet.pointing for sheet in sheets]) == pytest.approx(6.2, rel=0.06)
     else:
-        assert sheets[0]["pointing_um"] is None
+        assert all(np.isnan(sheet.pointing).all() for sheet in sheets)
 
 
 def test_a_serviced_instrument_gives_four_to_seven_um():
     scenario = load_scenario("grid-test")
-    s0 = [each["s0_um"] for seed in range(5) for each in sheets_of(scenario, seed).values()]
-    assert 4.0 < min(s0) <= max(s0) < 7.0
+    s0 = 1e3 * np.array([sheet.test.s0 for sheet in sheets_of_crowd(scenario, range(5))])
+    assert 4.0 < s0.min() <= s0.max() < 7.0
 
 
 def test_slips_are_struck_out_and_do_not_spoil_the_test():

@@ -85,6 +85,7 @@ class Autograph:
         self.base_mode = variant.base_modes[0]
         self.fittings = RIGHT_FITTINGS["positive", self.base_mode]
         self._poses: dict[int, tuple[Array, Array]] = {}
+        self._nominal_centres: dict[int, tuple[float, float, float]] = {}
         projectors = {n: self._projector_condition(n) for n in (1, 2)}
         self._principal_points = {n: 1e-3 * np.array(each.principal_point_um) for n, each in projectors.items()}
         self._local = {n: local_coefficients(each) for n, each in projectors.items()}
@@ -139,7 +140,7 @@ class Autograph:
         if name in MOVE_CENTRES and spindle.allows(target):
             self._refuse_if_rods_cannot(elements={name: target})
         self._turn(name, target, rng)
-        self._poses.clear()
+        self._forget_poses(*(projector for projector in (1, 2) if name.endswith(str(projector))))
 
     def _turn(self, name: str, target: float, rng: np.random.Generator | None) -> None:
         spindle = self._spindles[name]
@@ -165,7 +166,7 @@ class Autograph:
         if mode != self.base_mode:
             self._takes("base mode", self.variant.rates.lever)
         self.base_mode = mode
-        self._poses.clear()
+        self._forget_poses()
 
     def fitting(self, name: str) -> str:
         """Return the position of a fitting. Raises SettingsConflict if the variant has none such."""
@@ -198,7 +199,7 @@ class Autograph:
         self._fit(RIGHT_FITTINGS["positive", self.base_mode])
         for counter in self._counters.values():
             counter.clear()
-        self._poses.clear()
+        self._forget_poses()
 
     def _takes(self, part: str, seconds: float) -> None:
         if seconds > 0.0:
@@ -259,7 +260,7 @@ class Autograph:
         }
         self.register_again(state)
         self._taken.clear()
-        self._poses.clear()
+        self._forget_poses()
 
     def register_again(self, state: State) -> None:
         """Register what a state holds on top of what is registered."""
@@ -365,9 +366,18 @@ class Autograph:
     def _rod_inclination(
         self, projector: int, carriages: Mapping[str, float], elements: Mapping[str, float], base_mode: str
     ) -> float:
-        at = {axis: spindle.at for axis, spindle in self._carriages.items()} | dict(carriages)
-        x, y, z = self._nominal_centre(projector, elements, base_mode)
-        return math.atan2(math.hypot(at["X"] - x, at["Y"] - y), z - at["Z"]) / GON
+        at_x, at_y, at_z = [carriages.get(axis, self._carriages[axis].at) for axis in "XYZ"]
+        x, y, z = (
+            self._nominal_centre(projector, elements, base_mode)
+            if elements or base_mode != self.base_mode
+            else self._present_nominal_centre(projector)
+        )
+        return math.atan2(math.hypot(at_x - x, at_y - y), z - at_z) / GON
+
+    def _present_nominal_centre(self, projector: int) -> tuple[float, float, float]:
+        if projector not in self._nominal_centres:
+            self._nominal_centres[projector] = self._nominal_centre(projector, {}, self.base_mode)
+        return self._nominal_centres[projector]
 
     def _nominal_centre(
         self, projector: int, changed: Mapping[str, float], base_mode: str
@@ -445,6 +455,12 @@ class Autograph:
 
     # --- the space rods and the view ------------------------------------------------------------------
 
+    def _forget_poses(self, *projectors: int) -> None:
+        """Let poses be worked out anew, of all projectors where none is named."""
+        for projector in projectors or (1, 2):
+            self._poses.pop(projector, None)
+            self._nominal_centres.pop(projector, None)
+
     def pose(self, projector: int) -> tuple[Array, Array]:
         """Return where a projector really stands: centre ``(3,)`` in mm and rotation ``(3, 3)``."""
         if projector not in self._poses:
@@ -506,10 +522,11 @@ class Autograph:
         if carrier is None or place is None:
             return None
         displacement = place - self.mark_on_carrier(projector)
-        if length_of(displacement) > self.variant.field_radius_mm:
+        x, y = displacement.tolist()
+        if math.sqrt(x * x + y * y) > self.variant.field_radius_mm:
             return None
-        dx, dy = self._view(projector, carrier) @ displacement
-        return float(1e3 * dx), float(1e3 * dy)
+        dx, dy = (self._view(projector, carrier) @ displacement).tolist()
+        return 1e3 * dx, 1e3 * dy
 
     def stereo(self, name: str) -> tuple[float, float] | None:
         """Return px, py in um at photo scale, left eye minus right eye, None unless both eyes see the point."""

@@ -9,11 +9,14 @@ projector the left eye sees, and a collar that does not belong to the picture re
 
 from collections.abc import Collection
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from a7sim.geometry import GON, Array, plane_rotation
 from a7sim.manual import RIGHT_FITTINGS, Fittings
+
+VIEWS_KEPT = 64
 
 
 def as_they_act(fittings: Fittings, polarity: str, base: str, has: Collection[str]) -> Fittings:
@@ -28,8 +31,9 @@ def projector_seen(eyepiece: int, fittings: Fittings) -> int:
     return eyepiece if straight else 3 - eyepiece
 
 
+@lru_cache(maxsize=VIEWS_KEPT)
 def view(fittings: Fittings, polarity: str, base: str, kappa_gon: float) -> Array:
-    """Return the matrix ``(2, 2)`` from displacements on the carrier to those in the eyepiece, both in mm.
+    """Return the matrix ``(2, 2)`` from displacements on the carrier to those in the eyepiece, in mm; not to write.
 
     The optics stand still while the camera swings, so a swung picture is seen swung.
     """
@@ -40,7 +44,9 @@ def view(fittings: Fittings, polarity: str, base: str, kappa_gon: float) -> Arra
             1.0 if fittings.dove == right.dove else -1.0,
         ]
     )
-    return np.asarray(mirrored[:, None] * plane_rotation(kappa_gon * GON))
+    seen = np.asarray(mirrored[:, None] * plane_rotation(kappa_gon * GON))
+    seen.flags.writeable = False
+    return seen
 
 
 def wheel_senses(fittings: Fittings, polarity: str) -> dict[str, float]:

@@ -105,6 +105,12 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
 
     def readline(self, size: int | None = -1, /) -> bytes:
         """Return a line with its end, or what there is when the timeout ends."""
+        with self._alone:
+            start = self._read_up_to
+            end = self._unread.find(b"\n", start) + 1
+            if end and size == -1 and self._engine is not None:
+                self._read_up_to = end
+                return self._unread[start:end]
         return self.read_until(b"\n", None if size is None or size < 0 else size)
 
     def _take(self, length: Any, most: int | None) -> bytes:

@@ -1,7 +1,6 @@
 """The journal of a session as it is written: what crossed the link and what the operator wrote down, in order."""
 
 import re
-from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -138,8 +137,11 @@ class Journal:
 
     def heard(self, event: LinkEvent) -> None:
         """Write what happened on the link. Raises JournalStopped where that fails, unless somebody just went."""
-        with suppress(JournalStopped) if event.direction == "-" else nullcontext():
+        try:
             self._hear(event)
+        except JournalStopped:
+            if event.direction != "-":
+                raise
 
     def _hear(self, event: LinkEvent) -> None:
         if event.direction in "<>":

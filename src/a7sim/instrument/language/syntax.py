@@ -1,8 +1,9 @@
 """Taking a command line apart: units, headers, parameters. Nothing here knows a command."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 
@@ -13,6 +14,9 @@ _HEADER = re.compile(r"(\*[A-Za-z]+|:?[A-Za-z][A-Za-z0-9_]*(?::[A-Za-z][A-Za-z0-
 _MNEMONIC = re.compile(r"([A-Za-z_]+?)(\d*)")
 _NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z]*)")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_NEVER = re.compile(r"[^ -~\t]")
+
+HEADERS_KEPT = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +70,11 @@ def units_of(line: str) -> Iterator[str]:
             yield unit
 
 
-def _split(text: str, separator: str) -> Iterator[str]:
+def _split(text: str, separator: str) -> Iterable[str]:
+    return text.split(separator) if '"' not in text and "'" not in text else _split_outside_quotes(text, separator)
+
+
+def _split_outside_quotes(text: str, separator: str) -> Iterator[str]:
     start, quote = 0, ""
     for i, character in enumerate(text):
         if quote:
@@ -81,9 +89,9 @@ def _split(text: str, separator: str) -> Iterator[str]:
 
 def unit_of(text: str) -> Unit:
     """Return a unit with its header taken apart. Raises LanguageError."""
-    for character in text:
-        if not (" " <= character <= "~" or character == "\t"):
-            raise LanguageError(ErrorNumber.INVALID_CHARACTER, f"character number {ord(character)}")
+    never = _NEVER.search(text)
+    if never is not None:
+        raise LanguageError(ErrorNumber.INVALID_CHARACTER, f"character number {ord(never[0])}")
     header = _HEADER.match(text)
     if header is None:
         raise LanguageError(ErrorNumber.SYNTAX_ERROR, f"expected a header, got {text[:20]}")
@@ -91,9 +99,14 @@ def unit_of(text: str) -> Unit:
     if rest and rest[0] not in " \t":
         raise LanguageError(ErrorNumber.SYNTAX_ERROR, f"expected a blank after {header[0]}, got {rest[:10]}")
     name = header[1]
-    common = name.startswith("*")
-    mnemonics = ((name.upper(), None),) if common else tuple(map(_mnemonic, name.lstrip(":").split(":")))
-    return Unit(mnemonics, name.startswith(":"), common, header[2] == "?", rest.strip())
+    return Unit(_mnemonics(name), name[0] == ":", name[0] == "*", header[2] == "?", rest.strip())
+
+
+@lru_cache(maxsize=HEADERS_KEPT)
+def _mnemonics(name: str) -> tuple[tuple[str, int | None], ...]:
+    if name[0] == "*":
+        return ((name.upper(), None),)
+    return tuple(map(_mnemonic, name.lstrip(":").split(":")))
 
 
 def _mnemonic(text: str) -> tuple[str, int | None]:

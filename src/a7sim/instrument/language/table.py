@@ -202,18 +202,18 @@ class Command:
 
     def call(self, given: Sequence[Parameter], suffix: int, client: Any) -> Call:
         """Return the call that the parameters of a unit make of this command. Raises LanguageError."""
-        least = sum(not each.optional for each in self.takes)
-        if len(given) < least:
-            raise LanguageError(ErrorNumber.MISSING_PARAMETER, f"expected {self.written()}")
-        if len(given) > len(self.takes) and self.repeats is None:
-            raise LanguageError(ErrorNumber.PARAMETER_NOT_ALLOWED, f"expected {self.written()}")
-        taken = [*self.takes, *([self.repeats] * max(0, len(given) - len(self.takes)))]
-        values = [
-            kind.read(parameter, client, suffix)
-            for kind, parameter in zip(taken, given, strict=False)
-            if kind is not None
-        ]
+        taken = self.takes if len(given) == len(self.takes) else self._taken(len(given))
+        values = [kind.read(parameter, client, suffix) for kind, parameter in zip(taken, given, strict=False)]
         return Call(suffix, tuple(values))
+
+    def _taken(self, given: int) -> Sequence[Taken]:
+        """Return what so many parameters are, one by one; those that are left out stand behind them."""
+        if given < sum(not each.optional for each in self.takes):
+            raise LanguageError(ErrorNumber.MISSING_PARAMETER, f"expected {self.written()}")
+        more = max(0, given - len(self.takes))
+        if more and self.repeats is None:
+            raise LanguageError(ErrorNumber.PARAMETER_NOT_ALLOWED, f"expected {self.written()}")
+        return self.takes if self.repeats is None else [*self.takes, *[self.repeats] * more]
 
 
 def short_form(word: str) -> str:
@@ -246,15 +246,13 @@ class CommandTable:
 
     def find(self, mnemonics: Sequence[tuple[str, int | None]], query: bool) -> tuple[Command, int]:
         """Return the command of a whole header path and its suffix. Raises LanguageError."""
-        shown = ":".join(f"{name}{'' if number is None else number}" for name, number in mnemonics)
-        try:
-            found = self._commands[tuple(name for name, _ in mnemonics), query]
-        except KeyError:
-            raise LanguageError(ErrorNumber.UNDEFINED_HEADER, shown + ("?" if query else "")) from None
+        found = self._commands.get((tuple([name for name, _ in mnemonics]), query))
+        if found is None:
+            raise LanguageError(ErrorNumber.UNDEFINED_HEADER, _shown(mnemonics) + ("?" if query else ""))
         suffix = 1
         for (_, number), numbered in zip(mnemonics, found.numbered, strict=True):
             if number is not None and not numbered:
-                raise LanguageError(ErrorNumber.UNDEFINED_HEADER, shown)
+                raise LanguageError(ErrorNumber.UNDEFINED_HEADER, _shown(mnemonics))
             if numbered and number is not None:
                 if number not in found.command.suffixes:
                     raise LanguageError(ErrorNumber.HEADER_SUFFIX_OUT_OF_RANGE, f"expected 1 or 2, got {number}")
@@ -264,6 +262,10 @@ class CommandTable:
     def headers(self) -> list[str]:
         """Return all headers in the order of the table."""
         return [command.header for command in self.commands]
+
+
+def _shown(mnemonics: Sequence[tuple[str, int | None]]) -> str:
+    return ":".join(f"{name}{'' if number is None else number}" for name, number in mnemonics)
 
 
 def _paths_of(header: str) -> list[tuple[str, ...]]:
