@@ -95,7 +95,7 @@ def test_a_token_comes_from_a_file_or_the_environment_and_goes_out_first(tmp_pat
         (["tcp://127.0.0.1:1", "*OPC?"], "a7sim: tcp://127.0.0.1:1: expected an instrument to answer there"),
         (["nowhere", "*OPC?"], "a7sim: nowhere: expected an instrument to answer there: no such file"),
         (["127.0.0.1:5025", "*OPC?"], "tcp://HOST:PORT"),
-        ([OWN, "--timeout", "0", "*OPC?"], "more than 0, 1e+06 at the most"),
+        ([OWN, "--timeout", "0", "*OPC?"], "more than 0, 1000000 at the most"),
         ([OWN, "--token-file", "no/such/file", "*OPC?"], "--token-file no/such/file: expected a file with a token: No"),
         ([OWN, "--token-file", sys.executable, "*OPC?"], "expected a token of 1 to 1000 printable ASCII characters"),
     ],

@@ -249,7 +249,7 @@ def test_why_a_client_is_turned_away():
     with Served(terms=Terms(most_clients=1)) as served:
         assert served.line().ask("*TST?") == "0"
         late = served.line()
-        assert late.ask("*IDN?") == '-200,"Execution error;expected at most 1 clients at a time"'
+        assert late.ask("*IDN?") == '-200,"Execution error;expected at most 1 client at a time"'
         assert late.hung_up()
 
 
