@@ -1,7 +1,6 @@
 """Bridging: what must go on from model to model does, and the strip closes as well as its counters allow."""
 
-import json
-from itertools import islice, pairwise
+from itertools import pairwise
 
 import msgspec
 import numpy as np
@@ -13,14 +12,11 @@ from a7sim.operator.bench import Bench, Parallaxes
 from a7sim.operator.bridging import bridged
 from a7sim.operator.crew import NobodyGoesOn
 from a7sim.reduction import similarity_by_quaternion
-from a7sim.report.kept import read_session
-from a7sim.report.writing import report_of
 from a7sim.scenario import ScenarioError, load_scenario
-from a7sim.session.bridge import bridged_strip, run_bridge, tables_of
+from a7sim.session.bridge import bridged_strip, run_bridge
 from a7sim.session.crowd import open_crowd
 from a7sim.session.ways import documents_of_all_ways, run_all_ways
 from a7sim.study.loading import load_study
-from tests.pages import Page
 from tests.sessions import without_errors
 
 CLOSES_MM = 0.05
@@ -144,59 +140,6 @@ def _gives_up(bench, who, model, before):
 def test_a_scenario_without_base_out_cannot_ask_for_a_bridge():
     with pytest.raises(ScenarioError, match="base inside and outside in turn"):
         load_scenario("a8-strip", {"work": '["bridge"]'})
-
-
-@pytest.fixture(scope="module")
-def shipped(tmp_path_factory):
-    """The strip of ten models that comes with a7sim, bridged and worked as independent models, and its folder."""
-    out = tmp_path_factory.mktemp("bridge") / "out"
-    scenario = load_scenario("bridge", {"plan.parallax_readings": "1"})
-    return scenario, run_bridge(scenario, 2, out), out
-
-
-@pytest.mark.slow
-def test_the_shipped_strip_is_bridged_and_worked_as_independent_models_to_its_end(shipped):
-    _, document, _ = shipped
-    assert (document["status"], document["message"]) == ("complete", "")
-    for way in ("bridged", "independent"):
-        assert document[way]["strip"]["accuracy_m"]["checks"]["points"] == 20
-        assert document[way]["strip"]["accuracy_m"]["checks"]["plan"] < 1.5
-    assert len(document["bridged"]["models"]) == 10
-    assert document["bridged"]["strip"].keys() == document["independent"]["strip"].keys() - {"joins"}
-    tables_of(document)
-
-
-@pytest.mark.slow
-def test_a_bridge_leaves_its_files(shipped):
-    _, document, out = shipped
-    assert json.loads((out / "results.json").read_text()) == json.loads(json.dumps(document))
-    journal = {"session.jsonl", "session.scenario.json", "session.states.jsonl"}
-    assert {"independent", "book.csv", "models.csv", "results.json", *journal} == {p.name for p in out.iterdir()}
-    assert json.loads((out / "independent" / "results.json").read_text())["strip"] == document["independent"]["strip"]
-
-
-@pytest.mark.slow
-def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(shipped):
-    """One procedure, two benches: with errors too, every reading of a session is the same."""
-    scenario, document, out = shipped
-    models = list(islice(bridged(open_crowd(scenario, (2,)).bench), 2))
-    rows = [row.split(",")[:2] for row in (out / "models.csv").read_text().splitlines()[2:]]
-    points = [[model.model.name, point] for model in models for point in model.places_of(0)]
-    assert rows[: len(points)] == points
-    for said, model in zip(document["bridged"]["models"], models, strict=False):
-        assert said["elements"] == {name: each[0] for name, each in model.orientation.elements.items()}
-        assert said["scale"] == pytest.approx(model.scale[0], abs=1e-7)
-
-
-@pytest.mark.slow
-def test_the_report_of_a_bridge_has_both_strips(shipped):
-    _, document, out = shipped
-    page = Page(report_of(read_session(out)))
-    table = page.table("Bridged models: scale carried by bx, rms of differences at common points")
-    assert [row[3] for row in table.rows] == [f"{model['scale']:.5f}" for model in document["bridged"]["models"]]
-    text = "".join(page.text)
-    assert "Strip, bridged: residuals in plan" in text
-    assert "Strip, independent: plan and profile" in text
 
 
 def test_a_strip_without_base_out_cannot_be_bridged():

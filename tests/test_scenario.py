@@ -29,7 +29,7 @@ def mistakes_of(raw):
 
 
 WORKED_ELSEWHERE = {"bridge"}
-"""By test_bridging: bridged, and as independent models."""
+"""By test_bridging_shipped: bridged, and as independent models."""
 
 
 @pytest.mark.parametrize("path", [p for p in SCENARIOS if p.stem not in WORKED_ELSEWHERE], ids=lambda path: path.stem)

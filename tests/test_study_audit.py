@@ -29,9 +29,9 @@ def worked(tmp_path_factory):
     laid = study_of(AT_THE_PLOTTER, tmp_path_factory.mktemp("study"))
     tally = Tally.empty(1, 1)
     work(laid, tally, InProcess())
-    linked = laid.tasks[0].linked(seed_of(laid.study.seed, 0))
+    linked = laid.tasks[0].linked(0, seed_of(laid.study.seed, 0))
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Task, "linked", lambda task, seed: linked)
+        patched.setattr(Task, "linked", lambda task, cell, seed: linked)
         yield laid, tally
 
 

@@ -7,10 +7,10 @@ from a7sim.mistakes import Mistake
 from a7sim.report.drawing import standalone
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from a7sim.session.combinations import combinations, in_case
+from a7sim.session.combinations import combinations
 from a7sim.session.crossing import crossed
-from a7sim.session.crowd import open_crowd
 from a7sim.session.strips import ground_of, grounded, models_of, of_grounded
+from a7sim.session.ways import documents_of_all_ways
 from a7sim.standard_points import CASES
 from a7sim.study import claims
 from a7sim.study import figures as figures_of_study
@@ -62,13 +62,32 @@ def scenario():
     return load_scenario("akwanga", settings=STUDY["settings"])
 
 
+SEEDS = [seed_of(STUDY["seed"], each) for each in range(3)]
+
+
 @pytest.fixture(scope="module")
-def replicates(scenario):
+def asked(tmp_path_factory):
+    """The numbers of three replicates as the study's task gives them, and the sessions that it worked, by case."""
+    (task,) = laid(tmp_path_factory.mktemp("asked")).tasks
+    by_case = {}
+
+    def kept(scenario, *arguments, **options):
+        by_case[scenario.plan.case] = documents_of_all_ways(scenario, *arguments, **options)
+        return by_case[scenario.plan.case]
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("a7sim.study.simulating.documents_of_all_ways", kept)
+        return task.together(SEEDS), by_case
+
+
+@pytest.fixture(scope="module")
+def replicates(asked):
     """Sessions of three replicates in every case; in the second case D gave up."""
-    seeds = [seed_of(STUDY["seed"], each) for each in range(3)]
-    by_case = {case: open_crowd(in_case(scenario, case), seeds).documents() for case in CASES}
-    by_case["D"][1] |= {"status": "does not fit", "message": "said in the test", "models": []}
-    return [{case: each[i] for case, each in by_case.items()} for i in range(3)]
+    _, by_case = asked
+    gave_up = {"status": "does not fit", "message": "said in the test", "models": []}
+    return [
+        {case: each[i] | (gave_up if (i, case) == (1, "D") else {}) for case, each in by_case.items()} for i in range(3)
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -142,6 +161,23 @@ def test_cells_are_the_strips_and_a_model_does_not_know_with_which_it_is_combine
     assert (task.cells, study.task_of(8)) == (25, (task, 8))
 
 
+def test_one_cell_needs_no_session_but_those_of_its_own_cases(tmp_path, monkeypatch, scenario, replicates, ground):
+    """An audit works these alone, on both benches, and its strips are the study's to the last bit."""
+    (task,) = laid(tmp_path).tasks
+    worked_cases = []
+
+    def worked_already(scenario, *_, **__):
+        worked_cases.append(scenario.plan.case)
+        return [replicates[0][scenario.plan.case], replicates[2][scenario.plan.case]]
+
+    monkeypatch.setattr("a7sim.study.simulating.documents_of_all_ways", worked_already)
+    whole = crossed([replicates[0], replicates[2]], 2, ground, scenario.strip)
+    for cell, cases in ((8, ["B", "D"]), (15, ["D", "A"]), (12, ["C"])):
+        assert task.crowded(cell, SEEDS[::2]) == [each[cell] for each in whole]
+        assert worked_cases == cases
+        worked_cases.clear()
+
+
 def test_a_task_cut_off_between_its_cells_goes_on_to_the_same_numbers(tmp_path, monkeypatch):
     """Some of the cells that share a session may have been added and others not; chunks do not matter."""
 
@@ -168,11 +204,11 @@ def _numbers(study, largest_chunk, tally=None):
 
 
 @pytest.mark.slow
-def test_a_strip_over_the_link_gives_the_same_digits(tmp_path):
-    """A picked strip is that of five sessions over the link, to the last digit kept."""
+def test_a_strip_over_the_link_gives_the_same_digits(tmp_path, asked):
+    """A picked strip is that of the sessions of its two cases over the link, to the last digit kept."""
     task, cell = laid(tmp_path).task_of(8)
-    seed = seed_of(STUDY["seed"], 1)
-    assert task.alone(cell, seed).tolist() == task.together([seed])[cell, :, 0].tolist()
+    numbers, _ = asked
+    assert task.alone(cell, SEEDS[1]).tolist() == numbers[cell, :, 1].tolist()
 
 
 @pytest.fixture(scope="module")

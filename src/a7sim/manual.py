@@ -5,7 +5,7 @@ tables 3.2, 3.3 and 3.7 and section 3.2.3.6 (geometry.md, Counters and ranges, G
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TypeVar
 
@@ -142,7 +142,7 @@ class Fittings:
 
     def as_words(self) -> dict[str, str]:
         """Return the position of every fitting by its name."""
-        return asdict(self)
+        return {name: getattr(self, name) for name in POSITIONS_OF}
 
 
 POSITIONS_OF: Mapping[str, tuple[str, str]] = MappingProxyType(

@@ -7,7 +7,6 @@ diapositive lever on the wrong side leaves it mirrored left to right, the triang
 projector the left eye sees, and a collar that does not belong to the picture reverses its handwheel.
 """
 
-from collections.abc import Collection
 from dataclasses import replace
 from functools import lru_cache
 
@@ -19,7 +18,8 @@ from a7sim.manual import RIGHT_FITTINGS, Fittings
 VIEWS_KEPT = 64
 
 
-def as_they_act(fittings: Fittings, polarity: str, base: str, has: Collection[str]) -> Fittings:
+@lru_cache(maxsize=VIEWS_KEPT)
+def as_they_act(fittings: Fittings, polarity: str, base: str, has: tuple[str, ...]) -> Fittings:
     """Return the fittings of an instrument that has only some: the others are built right for any picture."""
     right = RIGHT_FITTINGS[polarity, base].as_words()
     return replace(fittings, **{name: position for name, position in right.items() if name not in has})

@@ -54,8 +54,8 @@ def audited(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] = lam
         seeds = [seed_of(laid.study.seed, replicate) for replicate in replicates]
         sample = tally.sample(i)
         task, cell = laid.task_of(i)
-        for replicate, seed, together in zip(replicates, seeds, task.crowded(seeds), strict=True):
-            on_the_bench, linked = together[cell], task.linked(seed)[cell]
+        for replicate, seed, on_the_bench in zip(replicates, seeds, task.crowded(cell, seeds), strict=True):
+            linked = task.linked(cell, seed)
             kept = zip(laid.responses, sample[:, replicate].tolist(), strict=True)
             differences = [
                 *((response.name, one, other) for response, one in kept if _off(one, other := response.of(linked))),

@@ -10,7 +10,7 @@ from a7sim.geometry import Array
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
 from a7sim.session.combinations import in_case
-from a7sim.session.crossing import Replicate, cases_of_strips, crossed
+from a7sim.session.crossing import Cases, Replicate, cases_of_strips, crossed
 from a7sim.session.strips import ground_of
 from a7sim.session.ways import documents_of_all_ways, run_all_ways
 from a7sim.standard_points import CASES
@@ -46,30 +46,43 @@ class Task:
         Raises Mistake for a response that the results do not have.
         """
         strips, whole = any(map(reads_strip, self.responses)), any(map(reads_path, self.responses))
-        return self._values(self._crowded(seeds, strips, whole))
+        return self._values(self._crowded(seeds, tuple(CASES), strips, whole))
 
     def alone(self, cell: int, seed: int) -> Array:
         """Return responses ``(responses,)`` of one cell, its sessions worked over the link as `a7sim run` does."""
-        return np.asarray(self._values([self.linked(seed)])[cell, :, 0])
+        return np.asarray(self._values([[self.linked(cell, seed)]])[0, :, 0])
 
-    def crowded(self, seeds: Sequence[int]) -> list[list[Document]]:
-        """Return documents by seed and cell, of sessions worked at once."""
-        return self._crowded(seeds, strips=True, whole=True)
+    def crowded(self, cell: int, seeds: Sequence[int]) -> list[Document]:
+        """Return documents of one cell by seed, of sessions worked at once."""
+        cases, place = self._cases_of(cell)
+        return [each[place] for each in self._crowded(seeds, cases, strips=True, whole=True)]
 
-    def _crowded(self, seeds: Sequence[int], strips: bool, whole: bool) -> list[list[Document]]:
+    def linked(self, cell: int, seed: int) -> Document:
+        """Return the document of one cell, of sessions worked over the link."""
+        if not self.strips:
+            return run_all_ways(self.scenario, seed)
+        cases, place = self._cases_of(cell)
+        return self._strips([{case: run_all_ways(in_case(self.scenario, case), seed) for case in cases}], [seed])[0][
+            place
+        ]
+
+    def _cases_of(self, cell: int) -> tuple[Cases, int]:
+        """Return the cases of the models of a cell, each once, and its place among all strips of these cases alone."""
+        if not self.strips:
+            return (), 0
+        models = len(self.scenario.models)
+        of_cell = cases_of_strips(tuple(CASES), models)[cell]
+        cases = tuple(dict.fromkeys(of_cell))
+        return cases, cases_of_strips(cases, models).index(of_cell)
+
+    def _crowded(self, seeds: Sequence[int], cases: Cases, strips: bool, whole: bool) -> list[list[Document]]:
         if not self.strips:
             return [[each] for each in documents_of_all_ways(self.scenario, seeds, strips, whole)]
         by_case = {
             case: documents_of_all_ways(in_case(self.scenario, case), seeds, strips=False, whole=whole)
-            for case in CASES
+            for case in cases
         }
         return self._strips([{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))], seeds)
-
-    def linked(self, seed: int) -> list[Document]:
-        """Return a document a cell, of sessions worked over the link."""
-        if not self.strips:
-            return [run_all_ways(self.scenario, seed)]
-        return self._strips([{case: run_all_ways(in_case(self.scenario, case), seed) for case in CASES}], [seed])[0]
 
     def _strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> list[list[Document]]:
         scenario = self.scenario

@@ -9,13 +9,13 @@ from msgspec.structs import replace as changed
 
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
-from a7sim.session.scripts import Say, read_script
+from a7sim.session.scripts import Say, Script, read_script
 from a7sim.training.account import Account
-from a7sim.training.attempts import attempted, hand_out, open_, played_script, seed_played
-from a7sim.training.exercise import FULL_MARKS, Exercise, Played, Shelved
-from a7sim.training.grading import Grade, account_in, found_in, grade_by, graded
+from a7sim.training.attempts import attempted, seed_played
+from a7sim.training.exercise import FULL_MARKS, Exercise, Shelved
+from a7sim.training.grading import Grade, account_in, found_in, grade_by
 from a7sim.training.measures import Found, measure_of
-from a7sim.training.room import entered
+from a7sim.training.rehearsing import Rehearsals
 from a7sim.training.variation import scenario_for
 from a7sim.wording import counted
 
@@ -105,38 +105,37 @@ def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
 
 
 def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
-    """Return the accounts of the reference, the faulty ones, who does nothing, who is slow, who stops early."""
+    """Return the accounts of the reference, the faulty ones, who does nothing, who is slow, who stops early.
+
+    The reference is an attempt as a student's, journal and all; the others are rehearsed.
+    """
     exercise = shelved.exercise
-    accounts: dict[str, Account] = {}
-    for i, played in enumerate((exercise.reference, *exercise.faulty)):
-        name = "reference" if i == 0 else f"faulty {i}"
-        seed = seed_played(shelved, played)
-        trouble = attempted(shelved, played, place / name, seed)
-        if trouble and i == 0:
-            raise Mistake(f"reference: expected it to come to its end: {trouble}")
+    rehearsals = Rehearsals(shelved)
+    accounts = {"reference": _of_reference(shelved, place)}
+    for i, played in enumerate(exercise.faulty, start=1):
+        accounts[f"faulty {i}"], trouble = rehearsals.attempted(played)
         if trouble and played.script:
             raise Mistake(f"{played.script}: {trouble}")
-        accounts[name] = account_in(shelved, seed, place / name)
     seed = seed_played(shelved, exercise.reference)
-    scripted = bool(exercise.reference.script)
-    for name, minutes in (("nothing", 0.0), ("slow", 10.0 * exercise.minutes), ("half", 0.0)):
-        if name == "half" and not scripted:
-            accounts[name] = accounts["nothing"]
-            continue
-        folder = place / name
-        folder.mkdir()
-        hand_out(shelved, seed, folder)
-        with entered(shelved, seed, folder, "somebody", "practice") as room:
-            open_(room)
-            if name != "nothing" and scripted:
-                script = read_script(shelved.folder / exercise.reference.script)
-                lines = [each for each in script.statements if isinstance(each, Say)]
-                kept = script.statements if name == "slow" else tuple(lines[: len(lines) // 2])
-                played_script(room, replace(script, statements=tuple(kept)))
-            room.clock.spend(60.0 * minutes)
-            room.desk.close(room.desk.open("late", time=room.clock.now).client, room.clock.now)
-        accounts[name] = account_in(shelved, seed, folder)
+    script = read_script(shelved.folder / exercise.reference.script) if exercise.reference.script else None
+    accounts["nothing"] = rehearsals.left(seed, None)
+    accounts["slow"] = rehearsals.left(seed, script, 10.0 * exercise.minutes)
+    accounts["half"] = rehearsals.left(seed, _half_of(script)) if script else accounts["nothing"]
     return accounts
+
+
+def _of_reference(shelved: Shelved, place: Path) -> Account:
+    reference = shelved.exercise.reference
+    seed = seed_played(shelved, reference)
+    trouble = attempted(shelved, reference, place, seed)
+    if trouble:
+        raise Mistake(f"reference: expected it to come to its end: {trouble}")
+    return account_in(shelved, seed, place)
+
+
+def _half_of(script: Script) -> Script:
+    lines = [each for each in script.statements if isinstance(each, Say)]
+    return replace(script, statements=tuple(lines[: len(lines) // 2]))
 
 
 def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
@@ -188,10 +187,3 @@ def _dead_criteria(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
 def _verdict(run: _Run, exercise: Exercise) -> tuple[bool, float]:
     grade = run.grade(exercise)
     return grade.passed, grade.points
-
-
-def results_of(shelved: Shelved, played: Played, place: Path, seed: int | None = None) -> Grade:
-    """Return the grade of something played, for a seed of its own where one is given. For checks and studies."""
-    seed = seed_played(shelved, played) if seed is None else seed
-    attempted(shelved, played, place, seed)
-    return graded(shelved, seed, place)

@@ -155,14 +155,14 @@ def account_in(shelved: Shelved, seed: int, folder: Path) -> Account:
         raise
     except Mistake as mistake:
         raise Unreliable(str(mistake)) from mistake
-    return account_of(room, folder)
+    return account_of(room, written_answers(folder))
 
 
-def account_of(room: Room, folder: Path) -> Account:
+def account_of(room: Room, written: dict[str, str] | None = None) -> Account:
     """Return the account of an attempt with what was answered on paper, and what its maker of papers knows."""
     exercise = room.shelved.exercise
     hidden = handed_out(exercise.handout, room.scenario, room.seed, exercise.handout_options).hidden
-    return room.account(written_answers(folder), dict(hidden))
+    return room.account(written, dict(hidden))
 
 
 def as_sentences(grade: Grade) -> Sequence[str]:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +53,17 @@ class Room:
         exercise = self.shelved.exercise
         return Account(exercise, self.scenario, self.scene, self.autograph, self.witness, written or {}, hidden or {})
 
+    def as_it_stands(self) -> "Room":
+        """Return a room of its own in which all has happened as in this one, of which no journal is kept.
+
+        To be asked while every client is gone.
+        """
+        autograph = WitnessedAutograph.of(self.scenario.instrument, self.scene.drawer, self.seed)
+        desk = Desk(autograph, autograph.witness.heard)
+        desk.restore(self.desk.state())
+        autograph.witness.know(self.witness)
+        return replace(self, desk=desk, clock=Clock(self.clock.now), autograph=autograph)
+
 
 def header_for(shelved: Shelved, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
     """Return what the journal of an attempt says first. It names the scenario by its hash alone: it holds the truth."""
@@ -64,6 +75,12 @@ def _built(shelved: Shelved, seed: int, observer: dict[str, Any]) -> tuple[Scena
     scenario = scenario_for(shelved, seed, observer)
     scene = build_scene(scenario, seed)
     return scenario, scene, WitnessedAutograph.of(scenario.instrument, scene.drawer, seed)
+
+
+def rehearsal_room(shelved: Shelved, seed: int) -> Room:
+    """Return the room of an attempt of which no journal is kept; the opening is still to be done."""
+    scenario, scene, autograph = _built(shelved, seed, {})
+    return Room(shelved, scenario, seed, scene, Desk(autograph, autograph.witness.heard), Clock(), autograph)
 
 
 @contextmanager

@@ -83,6 +83,11 @@ class Witness:
     now: float = 0.0
     client: str = ""
 
+    def know(self, other: "Witness") -> None:
+        """Know what another has seen so far, and nothing else."""
+        self.deeds, self.readings, self.sides = [*other.deeds], [*other.readings], dict(other.sides)
+        self.began, self.opened, self.now, self.client = other.began, other.opened, other.now, other.client
+
     def heard(self, event: LinkEvent) -> None:
         """Take note of who speaks, when, and what is noted down."""
         if event.direction == "<":

@@ -1,0 +1,67 @@
+"""The strip of ten models that comes with a7sim, bridged to its end: a file of its own, for another worker."""
+
+import json
+from itertools import islice
+
+import pytest
+
+from a7sim.operator.bridging import bridged
+from a7sim.report.kept import read_session
+from a7sim.report.writing import report_of
+from a7sim.scenario import load_scenario
+from a7sim.session.bridge import run_bridge, tables_of
+from a7sim.session.crowd import open_crowd
+from tests.pages import Page
+
+
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory):
+    """The strip of ten models that comes with a7sim, bridged and worked as independent models, and its folder."""
+    out = tmp_path_factory.mktemp("bridge") / "out"
+    scenario = load_scenario("bridge", {"plan.parallax_readings": "1"})
+    return scenario, run_bridge(scenario, 2, out), out
+
+
+@pytest.mark.slow
+def test_the_shipped_strip_is_bridged_and_worked_as_independent_models_to_its_end(shipped):
+    _, document, _ = shipped
+    assert (document["status"], document["message"]) == ("complete", "")
+    for way in ("bridged", "independent"):
+        assert document[way]["strip"]["accuracy_m"]["checks"]["points"] == 20
+        assert document[way]["strip"]["accuracy_m"]["checks"]["plan"] < 1.5
+    assert len(document["bridged"]["models"]) == 10
+    assert document["bridged"]["strip"].keys() == document["independent"]["strip"].keys() - {"joins"}
+    tables_of(document)
+
+
+@pytest.mark.slow
+def test_a_bridge_leaves_its_files(shipped):
+    _, document, out = shipped
+    assert json.loads((out / "results.json").read_text()) == json.loads(json.dumps(document))
+    journal = {"session.jsonl", "session.scenario.json", "session.states.jsonl"}
+    assert {"independent", "book.csv", "models.csv", "results.json", *journal} == {p.name for p in out.iterdir()}
+    assert json.loads((out / "independent" / "results.json").read_text())["strip"] == document["independent"]["strip"]
+
+
+@pytest.mark.slow
+def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(shipped):
+    """One procedure, two benches: with errors too, every reading of a session is the same."""
+    scenario, document, out = shipped
+    models = list(islice(bridged(open_crowd(scenario, (2,)).bench), 2))
+    rows = [row.split(",")[:2] for row in (out / "models.csv").read_text().splitlines()[2:]]
+    points = [[model.model.name, point] for model in models for point in model.places_of(0)]
+    assert rows[: len(points)] == points
+    for said, model in zip(document["bridged"]["models"], models, strict=False):
+        assert said["elements"] == {name: each[0] for name, each in model.orientation.elements.items()}
+        assert said["scale"] == pytest.approx(model.scale[0], abs=1e-7)
+
+
+@pytest.mark.slow
+def test_the_report_of_a_bridge_has_both_strips(shipped):
+    _, document, out = shipped
+    page = Page(report_of(read_session(out)))
+    table = page.table("Bridged models: scale carried by bx, rms of differences at common points")
+    assert [row[3] for row in table.rows] == [f"{model['scale']:.5f}" for model in document["bridged"]["models"]]
+    text = "".join(page.text)
+    assert "Strip, bridged: residuals in plan" in text
+    assert "Strip, independent: plan and profile" in text

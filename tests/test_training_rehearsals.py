@@ -1,0 +1,40 @@
+"""Rehearsals, by which `a7sim train check` judges faulty attempts: nothing is kept, and nothing is otherwise."""
+
+import pytest
+
+from a7sim.training.attempts import attempted, seed_played
+from a7sim.training.grading import account_in, found_in
+from a7sim.training.rehearsing import Rehearsals
+from a7sim.training.shelf import find_exercise
+
+
+def seen(account):
+    witness = account.witness
+    return witness.deeds, witness.readings, witness.sides, account.seconds, account.answers, account.autograph.state()
+
+
+@pytest.mark.parametrize("number", ["4", "9", "12"])
+def test_a_rehearsal_comes_to_what_the_journal_of_the_same_attempt_gives(number, tmp_path):
+    """By a script and by a procedure, after an opening and without: every deed, reading and measure, to the digit.
+
+    The second rehearsal begins from an opening that was done for the first.
+    """
+    shelved = find_exercise(number)
+    played = shelved.exercise.faulty[0]
+    rehearsals = Rehearsals(shelved)
+    rehearsals.attempted(shelved.exercise.reference)
+    rehearsed, trouble = rehearsals.attempted(played)
+    seed = seed_played(shelved, played)
+    assert attempted(shelved, played, tmp_path, seed) == trouble
+    journalled = account_in(shelved, seed, tmp_path)
+    assert len(journalled.deeds) > 0
+    assert seen(rehearsed) == seen(journalled)
+    assert found_in(rehearsed) == found_in(journalled)
+
+
+def test_what_is_rehearsed_leaves_the_opening_as_it_was():
+    rehearsals = Rehearsals(find_exercise("9"))
+    seed = seed_played(rehearsals.shelved, rehearsals.shelved.exercise.reference)
+    before = rehearsals.left(seed, None)
+    rehearsals.attempted(rehearsals.shelved.exercise.reference)
+    assert seen(rehearsals.left(seed, None)) == seen(before)
