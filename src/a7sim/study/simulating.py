@@ -1,6 +1,6 @@
 """Working replicates of a cell together on the batch bench."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,11 +54,11 @@ class Task:
 
     def crowded(self, seeds: Sequence[int]) -> list[list[Document]]:
         """Return documents by seed and cell, of sessions worked at once."""
-        return self._crowded(seeds, strips=True, whole=True)
+        return list(self._crowded(seeds, strips=True, whole=True))
 
-    def _crowded(self, seeds: Sequence[int], strips: bool, whole: bool) -> list[list[Document]]:
+    def _crowded(self, seeds: Sequence[int], strips: bool, whole: bool) -> Iterator[list[Document]]:
         if not self.strips:
-            return [[each] for each in documents_of_all_ways(self.scenario, seeds, strips, whole)]
+            return ([each] for each in documents_of_all_ways(self.scenario, seeds, strips, whole))
         by_case = {
             case: documents_of_all_ways(in_case(self.scenario, case), seeds, strips=False, whole=whole)
             for case in CASES
@@ -69,15 +69,16 @@ class Task:
         """Return a document a cell, of sessions worked over the link."""
         if not self.strips:
             return [run_all_ways(self.scenario, seed)]
-        return self._strips([{case: run_all_ways(in_case(self.scenario, case), seed) for case in CASES}], [seed])[0]
+        (strips,) = self._strips([{case: run_all_ways(in_case(self.scenario, case), seed) for case in CASES}], [seed])
+        return strips
 
-    def _strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> list[list[Document]]:
+    def _strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> Iterator[list[Document]]:
         scenario = self.scenario
         ground = ground_of(scenario, build_scene(scenario, seeds[0]))
         return crossed(replicates, len(scenario.models), ground, scenario.strip)
 
-    def _values(self, replicates: Sequence[Sequence[Document]]) -> Array:
+    def _values(self, replicates: Iterable[Sequence[Document]]) -> Array:
         """Return responses ``(cells, responses, replicates)`` of documents by replicate and cell."""
         responses = [response_of(name) for name in self.responses]
-        read = [[[response.of(each) for each in cells] for cells in replicates] for response in responses]
-        return np.moveaxis(np.array(read), 2, 0)
+        read = [np.array([response.of_all(cells) for response in responses]).T for cells in replicates]
+        return np.stack(read, axis=-1)
