@@ -76,7 +76,8 @@ def observe_centre(bench: Bench, who: Who, model: ModelJob, hand: int) -> Perspe
 
 def centre_of(centres: PerspectiveCentre, session: int) -> PerspectiveCentre:
     """Return one session's centre."""
-    return PerspectiveCentre(*(None if each is None else each[..., session] for each in _PARTS(centres)))
+    parts: list[Any] = [None if each is None else each[..., session] for each in _PARTS(centres)]
+    return PerspectiveCentre(*parts)
 
 
 def _among_all(centres: PerspectiveCentre, who: Who, sessions: int) -> PerspectiveCentre:
