@@ -25,6 +25,7 @@ from a7sim.session.crowd import open_crowd
 from a7sim.session.strips import ground_of, models_of
 from a7sim.standard_points import CASES
 from a7sim.study.loading import StudyError, load_study
+from a7sim.study.running import Pace
 from a7sim.study.simulating import seed_of
 
 TARGET = Target("at most", 5, "ratio")
@@ -84,8 +85,16 @@ def study_work():
     return lambda seeds: [task.together(seeds) for task in tasks], "studies/thesis-1985.toml"
 
 
+def cpu_seconds_to_draw_often(calls, times):
+    """CPU seconds of drawing what was recorded, so many times."""
+    return sum(cpu_seconds_to_draw(calls) for _ in range(times))
+
+
 def the_whole(replicates, chunk):
-    """Print the time of all replicates and of drawing their random numbers; return both, and memory, as figures."""
+    """Print the time of all replicates and of drawing their random numbers; return both, and memory, as figures.
+
+    Half is drawn before each chunk and half after it, so that a change of the machine's speed hits both.
+    """
     work, what = study_work()
     seeds = [seed_of(1985, replicate) for replicate in range(replicates)]
     work(seeds[:2])
@@ -95,10 +104,11 @@ def the_whole(replicates, chunk):
     took = drawing = 0.0
     for first in range(0, replicates, chunk):
         some = seeds[first : first + chunk]
+        times = -(-len(some) // recorded)
+        before = cpu_seconds_to_draw_often(calls, times // 2)
         took += cpu_seconds(lambda some=some: work(some))
-        drawing += sum(cpu_seconds_to_draw(calls) for _ in range(0, len(some), recorded)) * (
-            len(some) / (recorded * -(-len(some) // recorded))
-        )
+        after = cpu_seconds_to_draw_often(calls, times - times // 2)
+        drawing += (before + after) * len(some) / (recorded * times)
     ratio = took / drawing
     print(f"{what}: {replicates} replicates, {chunk} at once")
     print(f"study    {took:9.1f} s CPU  {1e3 * took / replicates:8.2f} ms a replicate")
@@ -180,7 +190,7 @@ def growth(replicates):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--replicates", type=int, default=200)
-    parser.add_argument("--chunk", type=int, default=2000, help="replicates at once")
+    parser.add_argument("--chunk", type=int, default=Pace.largest_chunk, help="replicates at once")
     parser.add_argument("--growth", type=int, default=200, help="replicates of how time grows; 0 for none")
     asked = parser.parse_args()
     figures = the_whole(asked.replicates, asked.chunk)

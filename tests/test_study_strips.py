@@ -98,7 +98,7 @@ def ground(scenario):
 def test_strips_on_arrays_are_those_of_the_computing_room(scenario, replicates, ground):
     """Every one of the twenty-five is `grounded` to a hundredth of a micron, far below the 0.1 mm that are printed."""
     by_case = {case: models_of(each["models"]) for case, each in replicates[0].items()}
-    documents = crossed(replicates[:1], 2, ground, scenario.strip)[0]
+    (documents,) = crossed(replicates[:1], 2, ground, scenario.strip)
     assert len(documents) == 25
     for combination, document in zip(combinations(by_case), documents, strict=True):
         expected = of_grounded(grounded(combination.models, ground))
@@ -111,12 +111,12 @@ def test_strips_on_arrays_are_those_of_the_computing_room(scenario, replicates, 
 
 
 def test_no_bit_of_a_strip_depends_on_the_replicates_beside_it(scenario, replicates, ground):
-    together = crossed(replicates, 2, ground, scenario.strip)
-    assert together == [crossed([each], 2, ground, scenario.strip)[0] for each in replicates]
+    together = list(crossed(replicates, 2, ground, scenario.strip))
+    assert together == [strips for each in replicates for strips in crossed([each], 2, ground, scenario.strip)]
 
 
 def test_a_session_that_gave_up_takes_only_its_own_strips_along(scenario, replicates, ground):
-    of_second = crossed(replicates, 2, ground, scenario.strip)[1]
+    _, of_second, *_ = crossed(replicates, 2, ground, scenario.strip)
     statuses = [document["status"] for document in of_second]
     assert statuses.count("does not fit") == 9
     assert statuses[0] == statuses[-1] == "complete"
@@ -125,7 +125,7 @@ def test_a_session_that_gave_up_takes_only_its_own_strips_along(scenario, replic
 
 def test_hours_of_a_strip_of_one_case_are_those_of_its_session(scenario, replicates, ground):
     for number, case in ((0, "A"), (12, "C"), (24, "E")):
-        hours = crossed(replicates[:1], 2, ground, scenario.strip)[0][number]["operator"]["hours"]
+        hours = next(crossed(replicates[:1], 2, ground, scenario.strip))[number]["operator"]["hours"]
         assert hours == pytest.approx(replicates[0][case]["operator"]["hours"], abs=1e-3)
 
 

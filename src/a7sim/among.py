@@ -33,9 +33,11 @@ def put(values: npt.NDArray[np.float64], who: Who, into: npt.NDArray[np.float64]
     """Put values ``(m,)`` or ``(k, m)`` of some among those ``(all,)`` or ``(k, all)`` of all."""
     if who.size == into.shape[-1]:
         into[...] = values
-        return
-    for row, new in zip(np.atleast_2d(into), np.atleast_2d(values), strict=True):
-        row[who] = new
+    elif into.ndim == 1:
+        into[who] = values
+    else:
+        for row, new in zip(into, values, strict=True):
+            row[who] = new
 
 
 def add(amount: float, who: Who, to: npt.NDArray[np.float64]) -> None:

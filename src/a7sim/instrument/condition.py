@@ -114,8 +114,7 @@ def condition_of(instrument: Instrument, seed: int) -> Condition:
     stated = instrument.condition
     listed = Condition(upkeep=stated) if isinstance(stated, str) else stated
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM, _FAULTS)))
-    drawn = _drawn(FAULTS_OF[listed.upkeep], rng) if listed.upkeep else Condition()
-    total: Condition = _on_top(drawn, listed)
+    total: Condition = _on_top(_drawn(FAULTS_OF[listed.upkeep], rng), listed) if listed.upkeep else listed
     left, right = (_with_pattern(each, rng) for each in (total.left, total.right))
     return msgspec.structs.replace(total, left=left, right=right)
 

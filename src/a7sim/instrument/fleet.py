@@ -178,15 +178,18 @@ class Fleet:
         drums = self._drums[name]
         allowed = drums.allows(targets)
         moved = [n for n in (1, 2) if name in ("bx", "common_phi") or name.endswith(str(n))]
+        told: dict[int, Array] = {}
         if name in MOVE_CENTRES:
-            allowed &= self._rods_can(who, {n: self._centres_told(who, n, {name: targets}) for n in moved})
+            told = {n: self._centres_told(who, n, {name: targets}) for n in moved}
+            allowed &= self._rods_can(who, told)
         if not allowed.all():
             self._refuse(who[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
             who, targets = who[allowed], targets[allowed]
+            told = {n: each.compress(allowed, axis=-1) for n, each in told.items()}
         drums.turn_to(who, targets, rngs)
         for n in moved:
             if name in SHIFTS:
-                self._shift(who, n)
+                self._shift(who, n, told[n])
             else:
                 self._stand(who, n)
 
@@ -329,14 +332,13 @@ class Fleet:
         mark = now if mark is None else mark
         able = np.ones(who.size, dtype=bool)
         for n in (1, 2) if centres is None else centres:
-            told = among(self._told[n], who)
-            beside, below = _reach(told if centres is None else centres[n], mark)
+            beside, below = _reach(among(self._told[n], who) if centres is None else centres[n], mark)
             if (beside < self._surely_within * below).all():
                 continue
             then = np.arctan2(beside, below) / GON
             beyond = then > self.variant.rod_limit_gon
             if beyond.any():
-                able &= ~beyond | (then <= np.arctan2(*_reach(told, now)) / GON)
+                able &= ~beyond | (then <= np.arctan2(*_reach(among(self._told[n], who), now)) / GON)
         return able
 
     def _rods_surely_can(self, who: Who, before: Array, low: Array, high: Array) -> bool:
@@ -428,17 +430,17 @@ class Fleet:
         bundles.turned[:, :, who] = turned
         bundles.swung[:, :, who] = plane_rotation(kappa)
         put(self._drums[f"c{n}"].position(who), who, bundles.c)
-        self._shift(who, n)
+        self._shift(who, n, self._centres_told(who, n))
 
-    def _shift(self, who: Who, n: int) -> None:
-        """Put the projectors, turned as they stand, where the base and by and bz bring them."""
+    def _shift(self, who: Who, n: int, told: Array) -> None:
+        """Put the projectors, turned as they stand, where base, by and bz bring them and these are told ``(3, m)``."""
         base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
         place = place_of_centre(self._shares(n, among(self._base_inside, who)), *base)
         centre = place + among(self._missed[n], who) - among(self._axes[n], who)
         if "common_phi" in self._drums:
             centre = mxv(among(self._common, who), centre)
         put(centre, who, self._bundles[n].centre)
-        put(self._centres_told(who, n), who, self._told[n])
+        put(told, who, self._told[n])
 
     def _really(self, who: Who, name: str) -> Array:
         if name not in self._drums:
@@ -486,11 +488,12 @@ class Fleet:
 
     def _in_eyepiece(self, who: Who, eye: int, name: str, mark: Array) -> Array:
         straight = among(self._levers_stand.straight, who)
-        seen = np.full((2, who.size), np.nan)
-        for projector in (eye, 3 - eye):
-            looking = straight == (projector == eye)
+        ways = ((eye, straight), (3 - eye, ~straight))
+        for projector, looking in ways:
             if projector in self._carriers and looking.all():
                 return self._seen_in(who, projector, name, mark)
+        seen = np.full((2, who.size), np.nan)
+        for projector, looking in ways:
             if projector in self._carriers and looking.any():
                 seen[:, looking] = self._seen_in(who[looking], projector, name, mark[:, looking])
         return seen

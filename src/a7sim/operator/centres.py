@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,8 @@ FEWEST_POINTS = 3
 
 Levels = npt.NDArray[np.float64]
 
+_PARTS = attrgetter(*(field.name for field in fields(PerspectiveCentre)))
+
 
 def observe_centre(bench: Bench, who: Who, model: ModelJob, hand: int) -> PerspectiveCentre:
     """Return the centres ``(sessions,)`` of one photograph in counter units, by the method of the plan.
@@ -73,7 +76,8 @@ def observe_centre(bench: Bench, who: Who, model: ModelJob, hand: int) -> Perspe
 
 def centre_of(centres: PerspectiveCentre, session: int) -> PerspectiveCentre:
     """Return one session's centre."""
-    return PerspectiveCentre(*(_each(centres, lambda values: values[..., session])))
+    parts: list[Any] = [None if each is None else each[..., session] for each in _PARTS(centres)]
+    return PerspectiveCentre(*parts)
 
 
 def _among_all(centres: PerspectiveCentre, who: Who, sessions: int) -> PerspectiveCentre:

@@ -178,7 +178,7 @@ class Crew:
     def write(self, who: Who, point: str, item: str, shown: Array, misread: Array) -> Array:
         """Return what is written ``(m,)`` of what counters show; `misread` ``(sessions,)`` is what chance adds."""
         wrongly = among(misread, who)
-        written = np.round(shown + wrongly, 4)
+        written = np.asarray(shown + wrongly).round(4)
         tempted = np.arange(who.size) if self._slips.possible(*OF_READINGS) else np.flatnonzero(wrongly)
         factors = self._slip_factors(who[tempted])
         for i, factor in zip(tempted.tolist(), factors, strict=True):

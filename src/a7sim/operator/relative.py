@@ -65,7 +65,8 @@ class RelativeOrientation:
     @property
     def rms(self) -> float:
         """Rms in mm of the residual parallaxes at all standard points."""
-        return float(np.sqrt(np.mean(np.square(list(self.residuals.values())))))
+        residuals = np.array(list(self.residuals.values()))
+        return math.sqrt((residuals * residuals).mean())
 
 
 @dataclass(frozen=True)

@@ -210,7 +210,7 @@ class Seat:
         self._left_at.setdefault(name, np.full(self.crew.sessions, np.nan))[who] = at
 
     def _turned(self, who: Who, name: str, amounts: Array) -> None:
-        self._left_at[name][who] += np.round(amounts, TURNED_DECIMALS)
+        self._left_at[name][who] += amounts.round(TURNED_DECIMALS)
 
     def learn_settings(self, who: Who) -> None:
         """Read off what the places of images depend on."""

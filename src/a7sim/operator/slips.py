@@ -146,13 +146,14 @@ class Slips:
 
     def _written(self, each: Occasion, shown: float, misread: float, factor: float) -> tuple[SlipKind | None, float]:
         dice = self._dice[each.session]
-        possible = _written_wrongly(shown, each.item)
-        planted = self._planted_here(each, _plain_to_see(possible, shown))
-        if planted is not None:
-            return planted.kind, possible[planted.kind][-1]
+        if self._planted[each.session]:
+            possible = _written_wrongly(shown, each.item)
+            planted = self._planted_here(each, _plain_to_see(possible, shown))
+            if planted is not None:
+                return planted.kind, possible[planted.kind][-1]
         if abs(misread - shown) > LAST_DIGIT / 2.0:
             return "last digit" if abs(misread - shown) < 1.5 * LAST_DIGIT else "gross", misread
-        for kind, ways in possible.items():
+        for kind, ways in _written_wrongly(shown, each.item).items():
             if kind in _RATES and dice.lapses(self._rate(kind) * factor):
                 return kind, ways[dice.choice(len(ways))]
         return None, misread

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,8 @@ from a7sim.scenario.schema import Camera, Film
 
 SKETCH_SIGMA_MM = 0.3
 """Points are pricked on the paper print to about half a millimetre (protocol.md)."""
+
+_NO_DEFORMATION = np.eye(2)
 
 Content = Callable[[Array, float], Array]
 """Grey values 0..1 ``(...)`` of picture elements at film places ``(2, ...)``, so many mm wide on film."""
@@ -65,7 +68,7 @@ class Deformation:
         """Return the deformation of one photograph on this film."""
         shrink = np.asarray(film.shrinkage_ppm) + film.shrinkage_sigma_ppm * rng.standard_normal(2)
         shear = film.shear_sigma_ppm * rng.standard_normal()
-        matrix = np.eye(2) - 1e-6 * np.array([[shrink[0], shear], [shear, shrink[1]]])
+        matrix = _NO_DEFORMATION - 1e-6 * np.array([[shrink[0], shear], [shear, shrink[1]]])
         return cls(matrix, film.irregular_um / 1000.0, film.identification_um / 1000.0)
 
     def of_fiducials(self, xy: Array, rng: np.random.Generator) -> Array:
@@ -88,4 +91,4 @@ def chosen(marks: Marks, keep: Sequence[bool] | npt.NDArray[np.bool_]) -> Marks:
     kept = np.asarray(keep, dtype=bool)
     if kept.all():
         return marks
-    return Marks(tuple(np.array(marks.names, dtype=object)[kept]), marks.xy[:, kept])
+    return Marks(tuple(compress(marks.names, kept.tolist())), marks.xy[:, kept])

@@ -28,25 +28,21 @@ def cases_of_strips(cases: Sequence[str], models: int) -> list[Cases]:
     return list(product(cases, repeat=models))
 
 
-def crossed(replicates: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan) -> list[list[Document]]:
-    """Return a document for each strip of each replicate, as if one session had worked its models in these cases.
+def crossed(replicates: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan) -> Iterator[list[Document]]:
+    """Yield a document for each strip of each replicate, as if one session had worked its models in these cases.
 
     It holds models, hours, and the strip with its joins and accuracy; its `status` is that of the session that gave up,
     if a model is of such a one. No digit of a replicate depends on those beside it. Raises Mistake for models that make
     no strip.
     """
-    found: list[list[Document]] = []
     for first in range(0, len(replicates), AT_ONCE):
         some = replicates[first : first + AT_ONCE]
         strips = _on_arrays(some, models, ground, plan)
-        found += [
-            [
+        for i, each in enumerate(some):
+            yield [
                 _document(each, cases, strips.get((i, cases)) or _by_itself(each, cases, ground, plan))
                 for cases in cases_of_strips(tuple(each), models)
             ]
-            for i, each in enumerate(some)
-        ]
-    return found
 
 
 def _on_arrays(

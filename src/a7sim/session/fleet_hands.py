@@ -36,10 +36,10 @@ class FleetHands:
         return self._fleet.fitting(who, name)
 
     def set_element(self, who: Who, name: str, values: Array) -> None:
-        self._fleet.set_element(who, name, np.round(values, 2))
+        self._fleet.set_element(who, name, values.round(2))
 
     def turn_element(self, who: Who, name: str, amounts: Array) -> None:
-        self._fleet.turn_element(who, name, np.round(amounts, 5))
+        self._fleet.turn_element(who, name, amounts.round(5))
 
     def preset(self, who: Who, readings: Mapping[str, float]) -> None:
         for axis, reading in readings.items():
@@ -60,17 +60,17 @@ class FleetHands:
 
     def fiducials(self, who: Who, projector: int) -> tuple[list[str], Array]:
         names, displacements = self._fleet.carriers(projector).fiducial_displacements(who)
-        return list(names), np.round(displacements, 3)
+        return list(names), displacements.round(3)
 
     def centring(self, who: Who, projector: int) -> Array:
-        return np.round(self._fleet.carriers(projector).centring[:, who], 3)
+        return self._fleet.carriers(projector).centring[:, who].round(3)
 
     def centre(self, who: Who, projector: int, values: Array) -> None:
-        self._fleet.carriers(projector).centre(who, np.round(values, 3))
+        self._fleet.carriers(projector).centre(who, values.round(3))
 
     def prints(self, who: Who, projector: int) -> dict[str, Array]:
         sketch = self._fleet.carriers(projector).sketch(who)
-        return {name: np.round(places, 1) for name, places in sketch.items()}
+        return {name: places.round(1) for name, places in sketch.items()}
 
     def elements(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
         return self._fleet.elements(who, names)
@@ -82,19 +82,19 @@ class FleetHands:
         return self._fleet.counter(who, axis)
 
     def drive(self, who: Who, readings: Mapping[str, Array]) -> Truths:
-        went = [self._fleet.drive(who, axis, np.round(each, 2)) for axis, each in readings.items()]
+        went = [self._fleet.drive(who, axis, each.round(2)) for axis, each in readings.items()]
         return np.asarray(np.all(went, axis=0))
 
     def turn(self, who: Who, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
-        self._fleet.wheels(who, np.round(wheels, 4))
+        self._fleet.wheels(who, wheels.round(4))
         if element is not None and amounts is not None:
             self.turn_element(who, element, amounts)
 
     def seen(self, who: Who, eye: int, point: str) -> Array:
-        return np.round(self._fleet.eyepiece(who, eye, point), 2)
+        return self._fleet.eyepiece(who, eye, point).round(2)
 
     def seen_by_both(self, who: Who, point: str) -> Array:
-        return np.round(self._fleet.both_eyepieces(who, point), 2)
+        return self._fleet.both_eyepieces(who, point).round(2)
 
     def record(self, who: Who, point: str) -> None:
         """Nobody keeps what a crowd registers."""

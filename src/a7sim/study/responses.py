@@ -1,7 +1,7 @@
 """What a study reads from the document of results of every replicate: one number a response."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from types import MappingProxyType
@@ -32,6 +32,25 @@ class Response:
     unit: str
     meaning: str
     read: Reader
+    model: int | None = None
+    """The one it is read in, counted from 1; where there is none, it may be read anywhere in the results."""
+
+    def of_all(self, documents: Sequence[Document]) -> list[float]:
+        """Return the responses of sessions, read once of those that share the model in which it is read."""
+        if self.model is None:
+            return [self.of(each) for each in documents]
+        found: dict[object, float] = {}
+        for each in documents:
+            key = self._source(each)
+            if key not in found:
+                found[key] = self.of(each)
+        return [found[self._source(each)] for each in documents]
+
+    def _source(self, document: Document) -> tuple[str, int]:
+        """Return what tells which model it is read in of a document that is kept."""
+        models = document.get("models", ())
+        shared = models[self.model - 1] if self.model is not None and len(models) >= self.model else document
+        return document["status"], id(shared)
 
     def of(self, document: Document) -> float:
         """Return the response of a session to ten digits, nan if it gave up.
@@ -87,7 +106,7 @@ def _in_one_model(response: Response, model: int) -> Response:
         return response.read({**document, "models": models})
 
     meaning = f"{response.meaning.removesuffix(of_all)} of model {model}"
-    return Response(f"{response.name}{OF_MODEL}{model}", response.unit, meaning, read)
+    return Response(f"{response.name}{OF_MODEL}{model}", response.unit, meaning, read, model)
 
 
 def _at(document: Document, parts: list[str]) -> float:

@@ -32,7 +32,7 @@ class Pace:
     """So many times as long as it takes to open a chunk, it is worked."""
     save_seconds: float = 5.0
     """A checkpoint is written no more often than this."""
-    largest_chunk: int = 2000
+    largest_chunk: int = 5000
 
 
 class _Size:

@@ -1,6 +1,6 @@
 """Working replicates of a cell together on the batch bench."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,9 +62,8 @@ class Task:
         if not self.strips:
             return run_all_ways(self.scenario, seed)
         cases, place = self._cases_of(cell)
-        return self._strips([{case: run_all_ways(in_case(self.scenario, case), seed) for case in cases}], [seed])[0][
-            place
-        ]
+        (strips,) = self._strips([{case: run_all_ways(in_case(self.scenario, case), seed) for case in cases}], [seed])
+        return strips[place]
 
     def _cases_of(self, cell: int) -> tuple[Cases, int]:
         """Return the cases of the models of a cell, each once, and its place among all strips of these cases alone."""
@@ -75,22 +74,22 @@ class Task:
         cases = tuple(dict.fromkeys(of_cell))
         return cases, cases_of_strips(cases, models).index(of_cell)
 
-    def _crowded(self, seeds: Sequence[int], cases: Cases, strips: bool, whole: bool) -> list[list[Document]]:
+    def _crowded(self, seeds: Sequence[int], cases: Cases, strips: bool, whole: bool) -> Iterator[list[Document]]:
         if not self.strips:
-            return [[each] for each in documents_of_all_ways(self.scenario, seeds, strips, whole)]
+            return ([each] for each in documents_of_all_ways(self.scenario, seeds, strips, whole))
         by_case = {
             case: documents_of_all_ways(in_case(self.scenario, case), seeds, strips=False, whole=whole)
             for case in cases
         }
         return self._strips([{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))], seeds)
 
-    def _strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> list[list[Document]]:
+    def _strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> Iterator[list[Document]]:
         scenario = self.scenario
         ground = ground_of(scenario, build_scene(scenario, seeds[0]))
         return crossed(replicates, len(scenario.models), ground, scenario.strip)
 
-    def _values(self, replicates: Sequence[Sequence[Document]]) -> Array:
+    def _values(self, replicates: Iterable[Sequence[Document]]) -> Array:
         """Return responses ``(cells, responses, replicates)`` of documents by replicate and cell."""
         responses = [response_of(name) for name in self.responses]
-        read = [[[response.of(each) for each in cells] for cells in replicates] for response in responses]
-        return np.moveaxis(np.array(read), 2, 0)
+        read = [np.array([response.of_all(cells) for response in responses]).T for cells in replicates]
+        return np.stack(read, axis=-1)
