@@ -166,10 +166,15 @@ def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
 
 @pytest.mark.parametrize(
     ("opening", "each", "settled"),
-    [(30.0, 0.1, range(2000, 2001)), (0.0, 0.02, range(990, 1001)), (0.0, 3.0, range(1, 8))],
+    [
+        (30.0, 0.1, range(2700, 2701)),
+        (60.0, 0.1, range(5000, 5001)),
+        (0.0, 0.02, range(990, 1001)),
+        (0.0, 3.0, range(1, 8)),
+    ],
 )
 def test_chunks_are_as_large_as_pays(opening, each, settled):
-    """Rule: what costs much to open is worked long, and what costs nothing to open for about twenty seconds."""
+    """Rule: what costs much to open is worked long, up to a limit, and what costs nothing to open for about twenty seconds."""
     size = _Size(Pace())
     for _ in range(8):
         size.learn(size.best, opening + each * size.best)

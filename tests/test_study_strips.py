@@ -171,7 +171,7 @@ def test_one_cell_needs_no_session_but_those_of_its_own_cases(tmp_path, monkeypa
         return [replicates[0][scenario.plan.case], replicates[2][scenario.plan.case]]
 
     monkeypatch.setattr("a7sim.study.simulating.documents_of_all_ways", worked_already)
-    whole = crossed([replicates[0], replicates[2]], 2, ground, scenario.strip)
+    whole = list(crossed([replicates[0], replicates[2]], 2, ground, scenario.strip))
     for cell, cases in ((8, ["B", "D"]), (15, ["D", "A"]), (12, ["C"])):
         assert task.crowded(cell, SEEDS[::2]) == [each[cell] for each in whole]
         assert worked_cases == cases
