@@ -169,9 +169,8 @@ def growth(replicates):
     for name, steps in grown.items():
         counts = np.array([count for count, _, _ in steps])
         seconds = np.array([cpu_seconds(lambda s=s, n=n: sessions(s, range(n))) for _, s, n in steps])
-        each, fixed = np.polyfit(counts, seconds, 1)
-        line = fixed + each * counts
-        departure = 100.0 * np.abs(seconds / line - 1.0).max()
+        each, fixed = np.polyfit(counts, seconds, 1, w=1.0 / seconds)
+        departure = 100.0 * np.abs((fixed + each * counts) / seconds - 1.0).max()
         slope = np.polyfit(np.log(counts), np.log(seconds), 1)[0]
         listed = ", ".join(f"{count}: {took:.1f} s" for count, took in zip(counts, seconds, strict=True))
         print(f"{name:15} {listed}")
