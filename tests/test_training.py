@@ -135,6 +135,17 @@ BAD = {
     'measure = "minutes"': ('measure = "minuets"', r"criterion\[6\]\.measure: expected one of"),
     'measure = "not-opposed"\ndone': ('measure = "parallax-left"\ndone', r"step\[4\]\.measure: .* the truth"),
     'fails = "cleared"': ('fails = "clear"', r"faulty\[1\]\.fails: expected one of complete"),
+    'id = "at-rest"': ('id = "complete"', "criterion: expected every id once, got 'complete' twice"),
+    'reference = { script = "reference.a7s" }': (
+        'reference = { script = "reference.a7s", procedure = "interior" }',
+        "reference: expected a script or a procedure, got both",
+    ),
+    'opening = { script = "opening.a7s" }': ("opening = {}", "opening: expected a script or a procedure, got neither"),
+    'script = "faulty-by2-left.a7s"': (
+        'procedure = "guess"',
+        r"faulty\[0\]\.procedure: expected one of .*, got 'guess'",
+    ),
+    "minutes = 60": ('minutes = 60\nhandout = "sweets"', "handout: expected one of .*, got 'sweets'"),
     "away = 0.02": ('away = "far"', r"criterion\[4\]\.options\.away: expected a number, got \"far\""),
 }
 
