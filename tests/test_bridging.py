@@ -1,5 +1,6 @@
 """Bridging: what must go on from model to model does, and the strip closes as well as its counters allow."""
 
+import json
 from itertools import pairwise
 
 import msgspec
@@ -17,6 +18,7 @@ from a7sim.session.bridge import bridged_strip, run_bridge
 from a7sim.session.crowd import open_crowd
 from a7sim.session.ways import documents_of_all_ways, run_all_ways
 from a7sim.study.loading import load_study
+from tests.processes import a7sim_here
 from tests.sessions import without_errors
 
 CLOSES_MM = 0.05
@@ -185,3 +187,23 @@ def test_of_two_readings_that_contradict_each_other_either_may_be_the_wrong_one(
     crowd = open_crowd(msgspec.structs.replace(scenario, models=scenario.models[:1]), range(12))
     assert len(list(crowd.worked())) == 1
     assert not any("do not agree" in why for why in crowd.bench.crew.reasons.values()), crowd.bench.crew.reasons
+
+
+@pytest.mark.parametrize(("photo", "picture", "bridged"), [(1, "202", 0), (2, "203", 1)])
+def test_who_gives_up_a_bridge_says_why_and_leaves_the_models_that_stand(tmp_path, photo, picture, bridged):
+    """Exit code 1, the reason in results, table and complaint; nothing is worked independently."""
+    said = a7sim_here(
+        "bridge", "bridge", "--set", f"photos.{photo}.laid=upside down", "--set", "plan.parallax_readings=1",
+        "--out", tmp_path / "out",
+    )  # fmt: skip
+    document = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
+    assert (said.returncode, document["status"]) == (1, "does not fit")
+    assert document["message"].startswith(f"picture {picture} lies upside down")
+    assert said.stderr == f"a7sim: the operator gave up: {document['message']}\n"
+    assert f"does not fit: {document['message']}" in " ".join(said.stdout.split())
+    models = document["bridged"]["models"]
+    assert len(models) == bridged
+    for model in models:
+        row = [model["model"], model["base"], f"{model['elements']['bx']:.2f}", f"{model['scale']:.5f}"]
+        assert row in [line.split()[:4] for line in said.stdout.splitlines()]
+    assert "independent" not in document and not (tmp_path / "out" / "independent").exists()

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from a7sim.console.app import Console
-from a7sim.console.drum_panels import Elements
+from a7sim.console.drum_panels import Elements, Wheeled
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.panels import Book
 from a7sim.console.seat import Seat
@@ -161,6 +161,58 @@ def test_free_hand_is_a_state_of_its_own_that_goes_past_the_collars() -> None:
             assert console.dials.counters["X"] == "1.00"
             await person.press("h", "right")
             assert console.dials.counters["X"] == "0.00"
+
+    played(sit_down())
+
+
+def test_the_drum_under_the_mouse_turns_and_is_taken_up() -> None:
+    """A wheel turns its counter; an element comes into hand, of the projector under the mouse."""
+    console = at_akwanga()
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+
+            async def rolled(drum: str, way: int) -> None:
+                console.post_message(Wheeled(drum, way))
+                await person.settle()
+
+            for drum, hands, side in (("by2", "by", 2), ("kappa1", "kappa", 1), ("bx", "bx", 1)):
+                before = float(console.dials.elements[drum])
+                await rolled(drum, 0)
+                assert float(console.dials.elements[drum]) == before
+                await rolled(drum, 1)
+                assert float(console.dials.elements[drum]) == pytest.approx(before + console.hands.step)
+                assert (console.hands.name, console.hands.side) == (hands, side)
+            before = float(console.dials.counters["X"])
+            await rolled("X", -1)
+            assert float(console.dials.counters["X"]) == pytest.approx(before - console.hands.step)
+            assert console.hands.name == "bx"
+
+    played(sit_down())
+
+
+def test_in_free_hand_a_click_in_the_left_picture_brings_that_place_under_the_mark() -> None:
+    """To the right and up in the picture is to the right and up in the model, and nothing at the wheels."""
+    console = at_akwanga()
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.look_on()
+            await person.press("down")
+            at_wheels = dict(console.dials.counters)
+            console.post_message(Eyepiece.Clicked(4, 2))
+            await person.settle()
+            assert console.dials.counters == at_wheels
+            await person.press("h")
+            await person.look_on()
+            console.post_message(Eyepiece.Clicked(4, 2))
+            await person.settle()
+            moved = {axis: float(console.dials.counters[axis]) - float(at_wheels[axis]) for axis in "XYZ"}
+            assert moved["X"] > 0.0 and moved["Z"] == 0.0
+            assert abs(moved["Y"]) == pytest.approx(moved["X"], abs=0.02), "half-blocks are square: 4 across, 2 x 2 up"
 
     played(sit_down())
 

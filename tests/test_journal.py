@@ -535,6 +535,48 @@ def test_a_changed_reply_stops_the_replay_with_both_lines_and_the_state(copied, 
     ]
 
 
+def test_a_replay_that_only_tells_goes_on_beyond_a_difference_and_counts_it(copied, capsys):
+    journalled = read_journal(copied / "session.jsonl")
+    number = next(n for n in range(3000, len(journalled)) if "COUN" in journalled.event(n).text) + 1
+
+    def change(n, data):
+        return data | {"text": "1" + data["text"]} if n == number else data
+
+    (copied / "session.jsonl").write_bytes(forged(journalled, change=change))
+    done = said_here(capsys, "replay", copied)
+    told = done.stdout.splitlines()
+    assert not done.returncode
+    assert [line.split(None, 1)[1] for line in told if line.startswith("   differs ")] == [
+        f"client1 < {journalled.event(number).text}"
+    ]
+    assert len(told) == len(journalled) + 1
+    assert told[-1].endswith(": 1 different")
+    assert f"line {number}: the first difference" in done.stderr.splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("interior", "--from", "@3"), "--from: expected a journal to seek in, got a script"),
+        (("interior", "--scenario", "akwanga"), "--scenario: expected a journal, got a script, which says its own"),
+        ((".", "--out", "out"), "--out: expected a script, whose journal it keeps; a journal there is already"),
+    ],
+)
+def test_what_a_script_or_a_journal_cannot_take_is_refused_in_one_sentence(typed, words, sentence):
+    assert typed("replay", *words) == (2, "", f"a7sim: {sentence}\n")
+
+
+def test_a_script_of_which_the_instrument_says_otherwise_ends_with_exit_code_3_and_both(typed, tmp_path):
+    script = tmp_path / "mine.a7s"
+    script.write_text("scenario akwanga seed 4\nDRIV:X 1.20\nexpect COUN:X? = 9.5\n", encoding="utf-8")
+    code, printed, complained = typed("replay", script, "--json")
+    document = json.loads(printed)
+    difference = document["difference"]
+    assert (code, document["status"], complained.count("\n")) == (3, "differs", 1)
+    assert (difference["line"], difference["file"]) == (3, str(script))
+    assert "9.5" in difference["expected"] and "1.20" in difference["got"]
+
+
 def test_a_changed_command_shows_in_what_the_state_differs(copied, capsys):
     journalled = read_journal(copied / "session.jsonl")
     number = next(n for n in range(2, len(journalled)) if journalled.event(n).text.startswith("PROJ1:PDIS "))

@@ -94,6 +94,66 @@ def test_every_mistake_is_named_at_once_with_its_path():
             lambda raw: raw["instrument"]["condition"].update(left=1),
             "instrument.condition.left: expected a table, got 1",
         ),
+        (
+            lambda raw: raw["plan"].update(centre_levels="low"),
+            'plan.centre_levels: expected 2 to 10 counter readings, got "low"',
+        ),
+        (
+            lambda raw: raw["plan"].update(centre_levels=[4900.0, 5000.0, 5100.0]),
+            "plan.centre_levels: expected two levels, got 3 (centre_method = 'levels' takes more)",
+        ),
+        (
+            lambda raw: raw["camera"]["fiducials"].append({"name": "5", "x": 0.0, "y": 106.0}),
+            "camera.fiducials: expected four or eight fiducials, got 5",
+        ),
+        (
+            lambda raw: raw["photos"][0].update(measured={"file": "pair.csv"}),
+            "photos[0]: expected either a position it was flown from or a measured file, got both",
+        ),
+        (
+            lambda raw: raw["photos"][0].update(measured={"side": "left", "photo": "101"}),
+            "photos[0].measured: expected either a side of a pair file or a photo of a photo file, got both",
+        ),
+        (
+            lambda raw: raw["photos"][0].update(measured={"count_mm": 0.001}),
+            "photos[0].measured.count_mm: expected units = 'counts' beside it, got 'mm'",
+        ),
+        (
+            lambda raw: raw["photos"][0].update(position=[440728.0, 985010.0, 480.0]),
+            "photos[0].position[2]: expected a station above the terrain (487.92 m), got 480",
+        ),
+        (
+            lambda raw: raw["photos"][0].update(polarity="negative"),
+            "models[0]: expected two positives or two negatives, got one of each",
+        ),
+        (
+            lambda raw: raw["photos"][1].update(position=raw["photos"][0]["position"]),
+            "models[0]: expected two stations apart, got both photographs from [",
+        ),
+        (
+            lambda raw: raw["models"][0].update(published={"base": [0.0, 0.0, 0.0]}),
+            "models[0].published.base: expected a vector, got zero",
+        ),
+        (
+            lambda raw: raw["models"][0].update(standard_points={"7": "x"}),
+            "models[0].standard_points.7: expected a position 1 to 6 or a to i, got '7'",
+        ),
+        (
+            lambda raw: raw["models"][0].update(standard_points={"1": "x", "2": "x"}),
+            "models[0].standard_points.1: expected a point of its own, got 'x' at 2 positions",
+        ),
+        (
+            lambda raw: raw.update(grid_plate={"spacing_mm": 30.0, "lines": 9}),
+            "grid_plate.spacing_mm: expected crosses within 110 mm of the middle, got 120 mm",
+        ),
+        (
+            lambda raw: raw.update(grid_plate={"name": "101"}),
+            "photos[0].name: expected another name than that of the grid plate, got '101'",
+        ),
+        (
+            lambda raw: raw.update(work=["bridge"], models=raw["models"][:1]),
+            "models: expected base inside and outside in turn, as bridging needs, got one of them alone",
+        ),
     ],
 )
 def test_a_mistake_of_each_kind_is_one_sentence(change, mistake):

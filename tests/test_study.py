@@ -123,6 +123,35 @@ MISTAKES = {
     "one level": ({"factor": [{"name": "f", "path": "comparator.pointings", "levels": [1]}]}, "two different levels"),
     "no path": ({"factor": [{"name": "f", "levels": [1, 2]}]}, "expected the path"),
     "a range in a full design": ({"factor": [{"name": "f", "path": "plan.bx", "range": [1, 2]}]}, "latin-hypercube"),
+    "a range beside levels": (
+        {
+            "design": "latin-hypercube",
+            "samples": 4,
+            "factor": [{"name": "f", "path": "plan.bx", "range": [1, 2], "levels": [1, 2]}],
+        },
+        "expected a path and a range from low to high alone, got 1 to 2",
+    ),
+    "a range of nothing": (
+        {"design": "latin-hypercube", "samples": 4, "factor": [{"name": "f", "path": "plan.bx", "range": [2, 2]}]},
+        "expected a path and a range from low to high alone, got 2 to 2",
+    ),
+    "groups beside levels": (
+        {"factor": [BY_COMPARATOR["factor"][0] | {"groups": {"one": {"comparator.pointings": 1}}}]},
+        "expected either path and levels or groups, got both",
+    ),
+    "a hypercube of no size": (
+        {"design": "latin-hypercube", "factor": [{"name": "f", "path": "film.irregular_um", "range": [1, 2]}]},
+        "samples: expected the number of cells",
+    ),
+    "too many cells": (
+        {
+            "factor": [
+                {"name": f"f{i}", "path": "film.irregular_um", "levels": [k / 100 for k in range(101)]}
+                for i in range(3)
+            ]
+        },
+        "expected levels that make at most",
+    ),
     "a name twice": ({"factor": [BY_COMPARATOR["factor"][0]] * 2}, "every name once"),
     "no replicates": ({"replicates": None}, "replicates: expected how often"),
     "zero replicates": ({"replicates": 0}, "replicates: expected a whole number from 1"),

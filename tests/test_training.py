@@ -1,5 +1,7 @@
 """Training (issue 8): exercises hold what they promise, grades say why, and a journal that was edited is found."""
 
+from dataclasses import replace
+
 import pytest
 from msgspec.structs import replace as changed
 
@@ -135,6 +137,17 @@ BAD = {
     'measure = "minutes"': ('measure = "minuets"', r"criterion\[6\]\.measure: expected one of"),
     'measure = "not-opposed"\ndone': ('measure = "parallax-left"\ndone', r"step\[4\]\.measure: .* the truth"),
     'fails = "cleared"': ('fails = "clear"', r"faulty\[1\]\.fails: expected one of complete"),
+    'id = "at-rest"': ('id = "complete"', "criterion: expected every id once, got 'complete' twice"),
+    'reference = { script = "reference.a7s" }': (
+        'reference = { script = "reference.a7s", procedure = "interior" }',
+        "reference: expected a script or a procedure, got both",
+    ),
+    'opening = { script = "opening.a7s" }': ("opening = {}", "opening: expected a script or a procedure, got neither"),
+    'script = "faulty-by2-left.a7s"': (
+        'procedure = "guess"',
+        r"faulty\[0\]\.procedure: expected one of .*, got 'guess'",
+    ),
+    "minutes = 60": ('minutes = 60\nhandout = "sweets"', "handout: expected one of .*, got 'sweets'"),
     "away = 0.02": ('away = "far"', r"criterion\[4\]\.options\.away: expected a number, got \"far\""),
 }
 
@@ -190,3 +203,40 @@ def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parall
         assert missing_after(b"PROJ1:BY 0.4;:WHE:Y 0.4", b'REC "1011",BY1') == 3.0
         assert missing_after(b'REC "1011",BY2') == 2.0
         assert missing_after(b'REC "1011"') == 1.0
+
+
+def test_an_answer_that_is_missing_or_no_number_is_told_and_measures_nothing(parallax, tmp_path):
+    """What is answered is measured against what was kept back; blanks and capitals of words do not matter."""
+    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+        room.desk.open("client2", time=5.0).feed(b'DRIV:X 20;:REC "1011"\n', 6.0)
+        blank = room.account({})
+        hidden = {"base": 92.5, "height": 300.0, "sign": ["minus", "-"]}
+
+    def found(name, answers, **options):
+        account = replace(blank, written=answers, hidden=hidden)
+        return measure_of(Measured(measure=name, options=options)).of(account)
+
+    both = {"keys": ["base", "height"]}
+    assert found("answers-off", {"base": "92", "height": "301"}, **both) == Found(
+        1.0, "height was answered 301, the furthest off"
+    )
+    assert found("answers-off", {"base": "92"}, **both) == Found(None, "height: not answered")
+    assert found("answers-off", {"base": "x", "height": "1"}, **both) == Found(None, "base: expected a number, got 'x'")
+    assert found("answers-off", {"base": "92", "height": "inf"}, **both) == Found(
+        None, "height: expected a number, got 'inf'"
+    )
+    assert found("answer-off", {"base": "92"}, key="base", true="base") == Found(0.5, "base was answered 92")
+    assert found("answer-off", {}, key="base", true="base") == Found(None, "base: not answered")
+    assert found("answer-off", {"base": "x"}, key="base", true="base") == Found(
+        None, "base: expected a number, got 'x'"
+    )
+    assert found("answer-off", {"base": "1"}, key="base", true="nowhere").value is None
+    assert found("answer-wrong", {"sign": " Minus"}, keys=["sign"]) == Found(0.0, "sign: right")
+    assert found("answer-wrong", {"sign": "plus"}, keys=["sign", "base"]) == Found(
+        2.0, "not answered: base; sign is not plus"
+    )
+    place = {"point": "1", "keys": ["x", "y"]}
+    assert found("place-by-scales", {"x": "1"}, **place) == Found(None, "expected numbers for x and y")
+    assert found("place-by-scales", {"x": "1", "y": "2"}, **place | {"point": "2"}) == Found(
+        None, "nothing was registered at 2"
+    )

@@ -1,0 +1,118 @@
+"""What a study says it found, in words and in tables for a terminal, of tallies whose answer is known."""
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from a7sim.study.findings import MOST_DENSITIES, document_of
+from a7sim.study.loading import study_of
+from a7sim.study.tables import of_study
+from a7sim.study.tally import Tally
+from tests.test_study import BY_COMPARATOR
+
+RESPONSE = "strip_plan_at_checks_m"
+POINTINGS = {"name": "pointings", "path": "comparator.pointings", "levels": [1, 4]}
+KIND = {"name": "kind", "path": "comparator.kind", "levels": ["mono", "stereo"]}
+NOISE = 0.01 * np.random.default_rng(1).standard_normal((40, 8))
+
+
+def found(folder, values, **changes):
+    """The document of a study of one response whose cells have replicates ``(cells, n)``, and its tables as text."""
+    laid = study_of(BY_COMPARATOR | {"responses": [RESPONSE]} | changes, folder)
+    values = np.asarray(values, dtype=float)
+    tally = Tally.empty(len(laid.cells), 1)
+    for i, each in enumerate(values):
+        tally.add(i, each[None, :])
+    document = document_of(laid, tally)
+    console = Console(width=200)
+    with console.capture() as printed:
+        console.print(of_study(document))
+    return document, printed.get()
+
+
+@pytest.mark.parametrize(
+    ("changes", "values", "answer"),
+    [
+        ({"factor": []}, 2.0 + NOISE[:1], " on the average."),
+        ({}, np.full((2, 8), 2.0), ": 2 m on the average in every cell"),
+        ({}, 2.0 + NOISE[:2] - NOISE[:2].mean(axis=1, keepdims=True), "; no factor was seen to matter."),
+        ({}, np.array([[2.0], [3.0]]) + NOISE[:2], "; it depends on pointings (p < 0.001, partial eta² 1.00)."),
+        ({}, np.array([[2.0], [np.nan]]) + NOISE[:2], " on the average"),
+        ({}, np.full((2, 8), np.nan), ": every session gave up."),
+    ],
+    ids=["one cell", "nothing varies", "no effect", "an effect", "a cell gave up", "all gave up"],
+)
+def test_the_answer_says_what_the_numbers_are(tmp_path, changes, values, answer):
+    document, printed = found(tmp_path, values, **changes)
+    assert answer in document["answer"][0]
+    assert document["in_a_sentence"] == document["answer"][0]
+    assert document["answer"][0] in " ".join(printed.split())
+    lost = int(np.isnan(values).sum())
+    assert [f"{lost} sessions gave up" in each for each in document["answer"][1:]] == ([True] if lost else [])
+    assert printed.count("all gave up") == sum(np.isnan(each).all() for each in values)
+
+
+def test_the_table_of_cells_shows_mean_spread_and_the_difference_from_the_first(tmp_path):
+    document, printed = found(tmp_path, np.array([[2.0], [3.0]]) + NOISE[:2])
+    rows = [line.split() for line in printed.splitlines()]
+    (comparison,) = document["comparisons"]
+    for cell, beside in zip(
+        document["cells"], ([], [f"{comparison['difference']:+.3g}", f"{comparison['p_adjusted']:.3f}"]), strict=True
+    ):
+        spread = cell["responses"][RESPONSE]
+        numbers = [f"{spread['mean']:.4g}", f"{spread['mean_interval'][1] - spread['mean']:.2g}", f"{spread['sd']:.3g}"]
+        numbers += [f"{spread['quantiles']['0.5']['value']:.4g}", *beside]
+        row = next(row for row in rows if row[:3] == [str(cell["cell"]), "pointings", cell["levels"]["pointings"]])
+        assert row[3 : 4 + len(numbers)] == ["8", *numbers]
+
+
+def test_factors_varied_one_at_a_time_have_an_analysis_each(tmp_path):
+    values = np.array([[2.0], [3.0], [2.0]]) + NOISE[:3]
+    document, printed = found(tmp_path, values, factor=[POINTINGS, KIND], design="one-at-a-time")
+    assert [[source["source"] for source in each["sources"]] for each in document["variance"]] == [
+        ["pointings", "remaining"],
+        ["kind", "remaining"],
+    ]
+    assert "it depends on pointings (" in document["answer"][0]
+    assert "kind" not in document["answer"][0].split("depends")[1]
+    tested = document["variance"][0]["sources"][0]
+    assert f"{tested['F']:.2f}" in printed
+
+
+@pytest.mark.parametrize(
+    ("slope", "words"),
+    [
+        (-1.0, "alone it follows film (100 % of the variance between cells, falling with it)"),
+        (0.0, "no factor was seen to matter"),
+    ],
+)
+def test_a_hypercube_says_which_way_a_factor_works_or_that_none_does(tmp_path, slope, words):
+    hypercube = {
+        "design": "latin-hypercube",
+        "samples": 40,
+        "factor": [{"name": "film", "path": "film.irregular_um", "range": [0.0, 5.0]}],
+    }
+    laid = study_of(BY_COMPARATOR | {"responses": [RESPONSE]} | hypercube, tmp_path)
+    films = np.array([[cell.settings["film.irregular_um"]] for cell in laid.cells])
+    document, printed = found(tmp_path, 9.0 + slope * films + NOISE, **hypercube)
+    assert words in document["answer"][0]
+    (effects,) = document["main_effects"]
+    assert f"{effects['factors'][0]['share']:.3f}" in printed
+    assert f"{effects['chance']:.3f}" in printed
+    assert document["variance"] == []
+
+
+def test_curves_are_drawn_of_no_more_levels_than_can_be_told_apart(tmp_path):
+    levels = list(range(1, MOST_DENSITIES + 2))
+    for count in (MOST_DENSITIES, MOST_DENSITIES + 1):
+        document, _ = found(tmp_path, 2.0 + NOISE[:count], factor=[POINTINGS | {"levels": levels[:count]}])
+        assert len(document["densities"]) == (count <= MOST_DENSITIES)
+        assert len(document["levels"]) == count
+
+
+@pytest.mark.parametrize(("half_width", "reached"), [(1e-6, False), (1.0, True)])
+def test_a_precision_that_is_not_reached_is_said(tmp_path, half_width, reached):
+    precision = {"response": RESPONSE, "half_width": half_width}
+    document, printed = found(tmp_path, 2.0 + NOISE[:2], precision=precision)
+    assert document["precision_reached"] is reached
+    assert ("The precision asked for is not reached." in printed) is not reached

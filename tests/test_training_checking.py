@@ -1,0 +1,100 @@
+"""`a7sim train check` of exercises that are wrong: one sentence a fault, with its place and what was expected."""
+
+import shutil
+
+import pytest
+from msgspec.structs import replace as changed
+
+from a7sim.training.checking import checked
+from a7sim.training.exercise import Faulty, Played, Shelved, Step
+from a7sim.training.shelf import find_exercise
+
+
+@pytest.fixture(scope="module")
+def parallax():
+    return find_exercise("4")
+
+
+def wrong(shelved, **changes):
+    return changed(shelved, exercise=changed(shelved.exercise, **changes))
+
+
+def faults_of(shelved):
+    found = checked(shelved)
+    assert all("\n" not in fault and "expected " in fault for fault in found.faults)
+    return found.faults
+
+
+def test_all_that_is_missing_of_the_form_is_said_at_once_and_nothing_is_played(parallax, tmp_path):
+    first, *others = parallax.exercise.criteria
+    bare = wrong(
+        Shelved(parallax.exercise, tmp_path),
+        hints=parallax.exercise.hints[:1],
+        faulty=[],
+        steps=[],
+        criteria=[changed(first, weight=first.weight + 5.0), *others],
+        opening=None,
+    )
+    found = checked(bare)
+    assert found.reference_points is None
+    assert found.faults == (
+        "text.md: expected the exercise in plain words, found none",
+        "hint: expected 2 hints or more, got 1",
+        "faulty: expected 2 faulty ones or more, got 0",
+        "step: expected a checklist, got no step",
+        "criterion: expected weights that add up to 100, got 105",
+        "reference.a7s: expected a script beside the exercise, found none",
+    )
+
+
+def test_an_exercise_that_everybody_passes_is_found_out(parallax):
+    """No criterion is required and no points are: the reference for a faulty one, and who does nothing, both pass."""
+    exercise = parallax.exercise
+    by2_left = next(each for each in exercise.faulty if each.script == "faulty-by2-left.a7s")
+    lenient = wrong(
+        parallax,
+        pass_points=0.0,
+        criteria=[changed(each, required=False) for each in exercise.criteria],
+        faulty=[
+            Faulty(script="reference.a7s", fails="at-rest", why="it does not"),
+            changed(by2_left, fails="complete"),
+        ],
+        steps=[
+            changed(exercise.steps[0], text="never", done=-1.0),
+            Step(text="already", measure=exercise.steps[0].measure, options=exercise.steps[0].options, done=1000.0),
+        ],
+    )
+    faults = faults_of(lenient)
+    for sentence in (
+        "reference.a7s: expected it to fail, got 100 points",
+        "reference.a7s: expected at-rest to fail, got nothing",
+        "faulty-by2-left.a7s: expected complete to fail, got at-rest",
+        "expected who does nothing not to pass, got a pass",
+        "step 'never': expected the reference to tick it, got ",
+        "step 'already': expected it to be still to do after the opening, got it ticked",
+    ):
+        assert any(fault.startswith(sentence) for fault in faults), (sentence, faults)
+
+
+def test_limits_below_what_the_eye_can_do_and_bands_the_wrong_way_round_are_found_out(parallax, tmp_path):
+    """Found before anything is played: the reference cannot come to its end, which is the last that is said."""
+    folder = tmp_path / "04-parallax"
+    shutil.copytree(parallax.folder, folder)
+    lines = (folder / "reference.a7s").read_text(encoding="utf-8").splitlines()
+    (folder / "reference.a7s").write_text("\n".join([*lines[:1], "> COUNter?", "< nonsense"]) + "\n", encoding="utf-8")
+    limits = {"cleared": (1e-3, 2e-3), "on-the-ground": (50.0, 40.0)}
+    criteria = [
+        changed(each, excellent=limits[each.id][0], passing=limits[each.id][1]) if each.id in limits else each
+        for each in parallax.exercise.criteria
+    ]
+    faults = faults_of(wrong(Shelved(parallax.exercise, folder), criteria=criteria))
+    assert len(faults) == 4
+    for fault, band in zip(faults[:2], ("excellent", "pass"), strict=True):
+        assert fault.startswith(f"cleared: expected {band} no better than eye and least count, ")
+    assert faults[2] == "on-the-ground: expected excellent no worse than pass, got 50 and 40"
+    assert faults[3].startswith("reference: expected it to come to its end: ")
+
+
+def test_a_reference_that_fails_is_told_with_what_it_fails(parallax):
+    (fault, *_) = faults_of(wrong(parallax, reference=Played(script="faulty-half.a7s"), faulty=[]))[1:]
+    assert fault.startswith("reference: expected it to pass, got complete: ")
