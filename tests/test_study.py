@@ -203,7 +203,7 @@ def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
     ],
 )
 def test_chunks_are_as_large_as_pays(opening, each, settled):
-    """Rule: what costs much to open is worked long, up to a limit, and what costs nothing to open for about twenty seconds."""
+    """Rule: what costs much to open is worked long, to a limit; what costs nothing, for about twenty seconds."""
     size = _Size(Pace())
     for _ in range(8):
         size.learn(size.best, opening + each * size.best)
