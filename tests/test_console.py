@@ -10,6 +10,7 @@ import pytest
 from a7sim.console.app import Console
 from a7sim.console.drum_panels import Elements, Wheeled
 from a7sim.console.eyepiece import Drawing
+from a7sim.console.looking import MAGNIFICATIONS
 from a7sim.console.panels import Book
 from a7sim.console.seat import Seat
 from a7sim.console.window import Eyepiece
@@ -213,6 +214,31 @@ def test_in_free_hand_a_click_in_the_left_picture_brings_that_place_under_the_ma
             moved = {axis: float(console.dials.counters[axis]) - float(at_wheels[axis]) for axis in "XYZ"}
             assert moved["X"] > 0.0 and moved["Z"] == 0.0
             assert abs(moved["Y"]) == pytest.approx(moved["X"], abs=0.02), "half-blocks are square: 4 across, 2 x 2 up"
+
+    played(sit_down())
+
+
+def test_what_the_eyes_see_comes_back_after_every_way_to_see_it() -> None:
+    """Eyes, merging, magnification and drawing go round; at the ends of magnifying nothing changes."""
+    console = at_akwanga()
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.look_on()
+            for key, seen in (
+                ("e", lambda view: view.eyes),
+                ("a", lambda view: view.merged),
+                ("v", lambda view: view.drawing),
+            ):
+                first, ways = seen(console.view), []
+                while not ways or ways[-1] != first:
+                    await person.press(key)
+                    ways.append(seen(console.view))
+                assert len(set(ways)) == len(ways) > 2
+            for key, end in (("m", MAGNIFICATIONS[-1]), ("M", MAGNIFICATIONS[0])):
+                await person.press(*[key] * (len(MAGNIFICATIONS) + 1))
+                assert console.view.magnification == end
 
     played(sit_down())
 

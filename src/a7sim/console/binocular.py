@@ -7,7 +7,7 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal
 from textual.timer import Timer
 
-from a7sim.console.eyepiece import Drawing, anaglyph, drawn, picture_size, vignetted, with_mark
+from a7sim.console.eyepiece import Drawing, anaglyph, drawn, is_drawn_as, picture_size, vignetted, with_mark
 from a7sim.console.news import Look, Sight
 from a7sim.console.window import Eyepiece
 
@@ -80,10 +80,11 @@ class Binocular(Horizontal):
         return Look(columns, rows, view.magnification, eyes, point if view.drawing is Drawing.WORDS else None)
 
     def draw(self, sight: Sight) -> None:
-        """Draw the pictures that the eyes see."""
+        """Draw the pictures that the eyes see, unless they were asked for before the drawing was another."""
         self._sight = sight
         view = self.view
-        pictures = {eye: vignetted(greys) for eye, greys in sight.pictures.items()}
+        fitting = {eye: greys for eye, greys in sight.pictures.items() if is_drawn_as(view.drawing, greys)}
+        pictures = {eye: vignetted(greys) for eye, greys in fitting.items()}
         both = view.in_one and len(pictures) == 2
         if both and view.merged == "anaglyph":
             self._eyes[1].show(with_mark(anaglyph(pictures[1], pictures[2]), self._mark), in_colours=True)

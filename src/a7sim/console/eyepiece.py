@@ -59,6 +59,12 @@ def picture_size(drawing: Drawing, columns: int, rows: int) -> tuple[int, int]:
     return columns * across, rows * down
 
 
+def is_drawn_as(drawing: Drawing, greys: Greys) -> bool:
+    """Return whether a picture fills whole cells in a drawing, as one that was asked for another way may not."""
+    (rows, columns), (across, down) = greys.shape, _CELLS[drawing]
+    return bool(columns % across == 0 and rows % down == 0)
+
+
 @lru_cache(maxsize=16)
 def _vignette(rows: int, columns: int) -> npt.NDArray[np.float32]:
     y, x = np.ogrid[-1.0 : 1.0 : rows * 1j, -1.0 : 1.0 : columns * 1j]
