@@ -408,6 +408,16 @@ def test_one_pair_that_cannot_be_oriented_does_not_spoil_the_batch():
         relative_orientation(image1, image2, C, C)
 
 
+def test_a_pair_without_measurements_changes_no_step_of_the_others():
+    """Where a pair's rays are no numbers, pairs far from zero still take steps no longer than any alone."""
+    image1, image2, *_ = pairs_of(np.random.default_rng(3), 40.0, NINE, batch=(40,))
+    alone = relative_poses(image1, image2, C, C)
+    nothing = np.full_like(image1[..., :1], np.nan)
+    beside = relative_poses(*(np.concatenate([image, nothing], axis=-1) for image in (image1, image2)), C, C)
+    np.testing.assert_array_equal(beside.converged, [*alone.converged, False])
+    np.testing.assert_array_equal(beside.iterations[:-1], alone.iterations)
+
+
 def test_five_points_orient_without_any_control():
     image1, image2, expected, *_ = pairs_of(np.random.default_rng(1), 2.0, NINE[:, [0, 2, 3, 5, 6]])
     found = relative_orientation(image1, image2, C, C)

@@ -17,6 +17,8 @@ from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.normal_equations import (
     LARGEST_CONDITION,
     Work,
+    all_of,
+    any_of,
     conditions_of,
     discrepancies_of,
     form_equations,
@@ -177,7 +179,7 @@ def _resolved(images: tuple[Array, Array], c1: float, c2: float, tolerance: floa
     rays = _loaded(images, c1, c2, work)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # singular pairs of a batch
         found = _oriented(rays, (0, 0), tolerance, work)
-        if found.converged.all():
+        if all_of(found.converged):
             return found
         return _tried_again(found, rays, tolerance)
 
@@ -236,7 +238,7 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Work
             places, rays = going if places is None else places[going], rays[..., going]
             state, work = state.of(going), Work(rays.shape[2], going.shape)
     hopeless = first >= HOPELESS * LARGEST_CONDITION
-    if not hopeless.any():
+    if not any_of(hopeless):
         return done
     condition = np.where(hopeless, first, done.condition)
     return replace(done, condition=condition, converged=np.asarray(done.converged & ~hopeless))
@@ -295,18 +297,20 @@ def _iterated(
     per_square = 1.0 / (rays.shape[2] * rays[0, 2].flat[0] * rays[1, 2].flat[0])
     corrections = solved(work, (DAMPING * per_square) * work.normal[5, 5])
     size = np.abs(corrections).max(axis=0)
-    if active.ndim and not active.all():
+    all_active = all_of(active)
+    if not all_active:
         corrections *= active
-    if size.max() > LARGEST_TURN:
+    if any_of(size > LARGEST_TURN):
         corrections *= np.minimum(1.0, LARGEST_TURN / np.maximum(size, LARGEST_TURN))
     R = turned_by(state.rotations, corrections, work, level)
     left = size * (2.0 * size + np.sqrt(per_square * np.abs(work.reduced[5, 5])))
     from_far = state.far | (size > (FAR if level else FAR_LATER))
     far = active & from_far & (size > NEAR)
-    if chords and far.any():
+    if chords and any_of(far):
         R, left = _chords(R, left, np.minimum(size, LARGEST_TURN), far, _Chord.of_all(rays, work, size), CHORDS)
     goes_on = active & ~(left < tolerance) & np.isfinite(size)
-    return _Iteration(R, goes_on, from_far, np.where(active, size, state.before), state.iterations + active)
+    before = size if all_active else np.where(active, size, state.before)
+    return _Iteration(R, goes_on, from_far, before, state.iterations + active)
 
 
 @dataclass(frozen=True)
