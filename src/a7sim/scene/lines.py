@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.geometry import Array, length_of
+from a7sim.geometry import Array, dots
 from a7sim.mistakes import Mistake
 from a7sim.scenario.schema import Line
 from a7sim.scene.coverage import within_band
@@ -46,10 +46,11 @@ def distance_from(chain: Array, plan: Array, within: float) -> Array:
     near = ((np.maximum(begins, ends) >= low) & (np.minimum(begins, ends) <= high)).all(axis=0)
     nearest = np.full(places.shape[1], np.inf)
     for begin, end in zip(begins[:, near].T, ends[:, near].T, strict=True):
-        piece = end - begin
-        share = np.clip(piece @ (places - begin[:, None]) / max(piece @ piece, _POINT_M2), 0.0, 1.0)
-        nearest = np.minimum(nearest, length_of(places - begin[:, None] - piece[:, None] * share))
-    return nearest.reshape(plan.shape[1:])
+        piece, offset = end - begin, places - begin[:, None]
+        share = np.clip(piece @ offset / max(piece @ piece, _POINT_M2), 0.0, 1.0)
+        offset -= piece[:, None] * share
+        nearest = np.minimum(nearest, dots(offset, offset))
+    return np.sqrt(nearest).reshape(plan.shape[1:])
 
 
 def lines_of(lines: Sequence[Line]) -> dict[str, GroundLine]:

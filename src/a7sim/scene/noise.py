@@ -24,7 +24,7 @@ def _corners(x0: Array, y0: Array, salt: int) -> list[list[Array]]:
         return [[_hashed(x0 + i, y0 + j, salt) for j in (0, 1)] for i in (0, 1)]
     knots = _hashed(low_x + np.arange(across)[:, None], low_y + np.arange(up), salt).ravel()
     at = ((x0 - low_x) * up + (y0 - low_y)).astype(np.intp)
-    return [[knots[at + (i * up + j)] for j in (0, 1)] for i in (0, 1)]
+    return [[knots.take(at + (i * up + j)) for j in (0, 1)] for i in (0, 1)]
 
 
 def _hashed(i: Array, j: Array, salt: int) -> Array:
