@@ -4,6 +4,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from a7sim.documents import Document
     from a7sim.session import Watcher
+    from a7sim.session.resuming import Begun
 
 DURABILITY = click.option(
     "--durability",
@@ -63,7 +65,7 @@ _SAME_RESULTS_AS = {"operate": "run"}
 
 
 def chosen(
-    scenario: str,
+    scenario: str | None,
     seed: int | None,
     settings: tuple[str, ...],
     skill: str | None,
@@ -71,6 +73,8 @@ def chosen(
     others: Mapping[str, str | None] | None = None,
 ) -> tuple[Scenario, int]:
     """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
+    if scenario is None:
+        raise Mistake(f"{click.get_current_context().info_name}: expected SCENARIO or --resume DIR, got none")
     overrides = _overrides(settings, {**(others or {}), "observer.skill": skill})
     loaded = load_scenario(scenario, overrides)
     if perfect_observer:
@@ -106,10 +110,20 @@ def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> di
     return overrides | {key: f'"{value}"' for key, value in texts.items() if value is not None}
 
 
-def resumed_alone(*beside: str) -> None:
-    """See that --resume comes without all that the journal says. Raises Mistake."""
+def resumed(folder: Path, *beside: str) -> "Begun":
+    """Return the session of the command under way that --resume goes on with.
+
+    Raises Mistake where anything but what is named stands `beside` it, since the journal says what was asked for.
+    """
+    from a7sim.session.resuming import begun_in
+
+    _see_that_resume_stands_alone(beside)
+    return begun_in(folder, click.get_current_context().info_name or "")
+
+
+def _see_that_resume_stands_alone(beside: tuple[str, ...]) -> None:
     ctx = click.get_current_context()
-    allowed = {"resume", "as_document", "quiet", *beside}
+    allowed = {"resume", "durability", "as_document", "quiet", *beside}
     for name in ctx.params:
         if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             said = next(each for each in ctx.command.params if each.name == name)

@@ -14,7 +14,7 @@ from a7sim.cli.operators import (
     of_a_scenario,
     of_an_orientation,
     of_results,
-    resumed_alone,
+    resumed,
     watched,
 )
 from a7sim.mistakes import Mistake
@@ -60,17 +60,13 @@ def command(
     """
     from a7sim.session.combinations import run_combinations
     from a7sim.session.journal import Keeping
-    from a7sim.session.resuming import begun_in
     from a7sim.session.tables import of_session, of_strips
     from a7sim.session.ways import run_all_ways
 
     every_case = strips == "all"
     if resume is not None:
-        resumed_alone("durability")
-        begun = begun_in(resume, "run")
-        loaded, seed, every_case, out = begun.scenario, begun.seed, begun.setting("strips") == "all", resume
-    elif scenario is None:
-        raise Mistake("run: expected SCENARIO or --resume DIR, got none")
+        session = resumed(resume)
+        loaded, seed, every_case, out = session.scenario, session.seed, session.setting("strips") == "all", resume
     else:
         others = {"plan.case": case, "plan.method": method}
         loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer, others)

@@ -12,7 +12,7 @@ import click
 from a7sim.cli import options
 from a7sim.cli.links import token_from
 from a7sim.cli.names import a_scenario
-from a7sim.cli.operators import chosen, of_a_journal, of_a_scenario, resumed_alone
+from a7sim.cli.operators import chosen, of_a_journal, of_a_scenario, resumed
 from a7sim.cli.options import TOKEN_VARIABLE
 from a7sim.documents import Document, as_json, head
 from a7sim.instrument import Autograph
@@ -29,13 +29,12 @@ from a7sim.scenario import Scenario
 from a7sim.session.durable import Durability, JournalStopped
 from a7sim.session.folder import prepare_folder
 from a7sim.session.journal import Journal, Keeping, header_of
-from a7sim.session.resuming import Begun, begun_in, served_again
+from a7sim.session.resuming import Begun, served_again
 
 USUAL = Address("127.0.0.1", 5025)
 
 _OF_THE_DOOR = (
     *("tcp", "rfc2217", "pty", "baud", "listen_anyway", "token_file", "clients", "idle", "fault", "fault_seed"),
-    "durability",
 )
 """What a session that is served again may be told anew."""
 
@@ -106,10 +105,7 @@ def command(
     _refuse_open_doors(doors, listen_anyway, token)
     terms = Terms(baud, faults_of(fault) if fault is not None else None, fault_seed, idle, most_clients=clients)
     if resume is not None:
-        resumed_alone(*_OF_THE_DOOR)
-        served = _served_again(begun_in(resume, "serve"), token, Keeping(durability, resumes=True))
-    elif scenario is None:
-        raise Mistake("serve: expected SCENARIO or --resume DIR, got none")
+        served = _served_again(resumed(resume, *_OF_THE_DOOR), token, Keeping(durability, resumes=True))
     else:
         loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
         if out is not None:

@@ -50,7 +50,7 @@ def distance_from(chain: Array, plan: Array, within: float) -> Array:
         share = np.clip(piece @ offset / max(piece @ piece, _POINT_M2), 0.0, 1.0)
         offset -= piece[:, None] * share
         nearest = np.minimum(nearest, dots(offset, offset))
-    return np.sqrt(nearest).reshape(plan.shape[1:])
+    return np.asarray(np.sqrt(nearest).reshape(plan.shape[1:]))
 
 
 def lines_of(lines: Sequence[Line]) -> dict[str, GroundLine]:

@@ -18,8 +18,8 @@ from a7sim.scenario import Scenario, rephrased
 from a7sim.scene import Scene
 from a7sim.session.analytical import StripResult
 from a7sim.session.crowd import open_crowd
-from a7sim.session.folder import MODELS, RESULTS, prepare_folder, write_whole
-from a7sim.session.journal import Journal, header_of
+from a7sim.session.folder import MODELS, RESULTS, write_whole
+from a7sim.session.journal import Journal, Keeping, header_of
 from a7sim.session.results import models_csv, of_hours, of_request
 from a7sim.session.running import Watcher, open_session, run
 from a7sim.session.sitting import sitting
@@ -33,7 +33,12 @@ Places = dict[str, tuple[float, float, float]]
 
 
 def run_bridge(
-    scenario: Scenario, seed: int, out: Path | None = None, watcher: Watcher | None = None, force: bool = False
+    scenario: Scenario,
+    seed: int,
+    out: Path | None = None,
+    watcher: Watcher | None = None,
+    force: bool = False,
+    keeping: Keeping | None = None,
 ) -> Document:
     """Bridge a strip, work the same models independently, and return both on the ground; with `out`, leave the files.
 
@@ -42,13 +47,13 @@ def run_bridge(
     plotter that cannot bridge, and for a folder that cannot be used, before anything is written.
     """
     watcher = watcher or Watcher()
+    keeping = keeping or Keeping()
     if len(scenario.models) < 2 or "outside" not in {model.base for model in scenario.models}:
         raise Mistake("models: expected a strip with base inside and outside in turn, as bridging needs")
-    journal = Journal()
+    journal = Journal(keeping)
     session = open_session(scenario, seed, journal.heard)
     job = session.job
-    if out is not None:
-        prepare_folder(out, force)
+    keeping.prepare(out, force, (INDEPENDENT,))
     done: list[Document] = []
     places: dict[str, Places] = {}
     document = head("bridge") | of_request(scenario)
@@ -70,8 +75,14 @@ def run_bridge(
         "strip": _on_ground(bridged_strip([*places.values()]), ground_of(scenario, session.scene), scenario),
         "hours": round(session.person.clock.now / 3600.0, 3),
     }
+    folder = out / INDEPENDENT if out else None
     alone = run(
-        rephrased(scenario, "a7sim bridge", "a7sim run"), seed, out / INDEPENDENT if out else None, watcher, force
+        rephrased(scenario, "a7sim bridge", "a7sim run"),
+        seed,
+        folder,
+        watcher,
+        force or keeping.resumes,
+        keeping=keeping.of_part(folder),
     )
     document |= {"status": alone["status"], "message": alone["message"]}
     document["independent"] = {"strip": alone.get("strip", {}), "hours": alone["operator"]["hours"]}

@@ -1,7 +1,7 @@
 """The twenty-five strips of the thesis: every case of one model with every case of the next (thesis 4.3)."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from a7sim.scenario import Scenario, rephrased
 from a7sim.scenario.schema import StripPlan
 from a7sim.scene import build_scene
 from a7sim.session import results
-from a7sim.session.folder import JOURNAL, RESULTS, STRIPS, prepare_folder, write_whole
+from a7sim.session.folder import RESULTS, STRIPS, write_whole
 from a7sim.session.journal import Keeping, begin_folder, header_of
 from a7sim.session.running import Watcher, job_of, run
 from a7sim.session.strips import ground_of, grounded, models_of, of_grounded
@@ -23,6 +23,9 @@ from a7sim.standard_points import CASES
 
 MOST_STRIPS = 700
 """Strips of one command: five cases in up to four models."""
+
+
+FOLDER_OF_CASE = "case-{}"
 
 
 @dataclass(frozen=True)
@@ -50,21 +53,20 @@ def run_combinations(
     watcher = watcher or Watcher()
     see_that_strips_can_be_made(scenario)
     keeping = keeping or Keeping()
+    keeping.prepare(out, force, map(FOLDER_OF_CASE.format, CASES))
     if out is not None and not keeping.resumes:
-        prepare_folder(out, force)
         begin_folder(out, header_of("run", scenario, seed, strips="all"))
     document = results.header(scenario, seed) | {"case": "all", "status": "complete", "message": ""}
     sessions: dict[str, Document] = {}
     for case in CASES:
-        folder = out / f"case-{case}" if out is not None else None
-        begun = folder is not None and (folder / JOURNAL).exists()
+        folder = out / FOLDER_OF_CASE.format(case) if out is not None else None
         sessions[case] = run(
             in_case(scenario, case),
             seed,
             folder,
             watcher,
             force or keeping.resumes,
-            keeping=replace(keeping, resumes=keeping.resumes and begun),
+            keeping=keeping.of_part(folder),
         )
         if sessions[case]["status"] != "complete":
             document |= {"status": sessions[case]["status"], "message": f"case {case}: {sessions[case]['message']}"}

@@ -1,10 +1,12 @@
 """Compiling a model: an operator draws contours and lines, and the session lays them beside the true ground."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 
 import a7sim
@@ -16,8 +18,8 @@ from a7sim.operator.map_lines import CONTOUR, Errand, Traced, Tracing
 from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, plotted
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
-from a7sim.session.folder import GEOJSON, SVG, prepare_folder
-from a7sim.session.journal import Journal, header_of
+from a7sim.session.folder import GEOJSON, SVG
+from a7sim.session.journal import Journal, Keeping, header_of
 from a7sim.session.map_sheet import as_geojson, as_svg
 from a7sim.session.results import of_request
 from a7sim.session.running import Session, Watcher, open_session
@@ -47,6 +49,11 @@ class Wanted:
     map_scale: float | None = None
     tremor_um: float | None = None
 
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> "Wanted":
+        """Return what the settings of a journal ask for."""
+        return msgspec.convert(dict(settings), cls)
+
 
 def compile_model(
     scenario: Scenario,
@@ -55,18 +62,19 @@ def compile_model(
     out: Path | None = None,
     watcher: Watcher | None = None,
     force: bool = False,
+    keeping: Keeping | None = None,
 ) -> Document:
     """Let the operator compile a model and return the document of results; with `out`, leave map and files there.
 
     `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for what cannot be compiled.
     """
     watcher = watcher or Watcher()
+    keeping = keeping or Keeping()
     _see_that_it_can_be(scenario, wanted)
-    journal = Journal()
+    journal = Journal(keeping)
     session = open_session(scenario, seed, journal.heard)
     order = _order(wanted, scenario, session.scene)
-    if out is not None:
-        prepare_folder(out, force)
+    keeping.prepare(out, force)
     document = head("compile") | {
         **of_request(scenario),
         "software": f"a7sim {a7sim.__version__}",

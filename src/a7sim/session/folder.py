@@ -1,5 +1,6 @@
 """The folder that a session leaves."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from a7sim.mistakes import Mistake
@@ -36,8 +37,8 @@ FILES = (
 )
 
 
-def prepare_folder(out: Path, force: bool) -> None:
-    """Make a folder for a session's files. Raises Mistake when it exists, unless forced."""
+def prepare_folder(out: Path, force: bool, parts: Iterable[str] = ()) -> None:
+    """Make a folder for a session's files, without any of its parts'. Raises Mistake where it exists, unless forced."""
     try:
         if out.exists() and not out.is_dir():
             raise Mistake(f"{out}: expected a folder, got a file")
@@ -46,8 +47,9 @@ def prepare_folder(out: Path, force: bool) -> None:
                 f"{out}: expected a folder that does not exist yet, got one that does (--force writes into it)"
             )
         out.mkdir(parents=True, exist_ok=True)
-        for name in FILES:
-            (out / name).unlink(missing_ok=True)
+        for folder in (out, *(out / part for part in parts)):
+            for name in FILES:
+                (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise Mistake(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
 

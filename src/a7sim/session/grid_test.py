@@ -20,8 +20,8 @@ from a7sim.operator.seat import side, wrapped
 from a7sim.reduction import Adjustment
 from a7sim.reduction.grid_test import UNKNOWNS
 from a7sim.scenario import Condition, Scenario
-from a7sim.session.folder import RESIDUALS, prepare_folder
-from a7sim.session.journal import Journal, header_of
+from a7sim.session.folder import RESIDUALS
+from a7sim.session.journal import Journal, Keeping, header_of
 from a7sim.session.results import of_request
 from a7sim.session.running import Watcher, open_session
 from a7sim.session.sitting import sitting
@@ -40,6 +40,7 @@ def run_grid_test(
     out: Path | None = None,
     watcher: Watcher | None = None,
     force: bool = False,
+    keeping: Keeping | None = None,
 ) -> Document:
     """Test both projectors of a scenario's instrument and return the document; with `out`, leave the files there.
 
@@ -47,12 +48,12 @@ def run_grid_test(
     or the instrument cannot fill and for a folder that cannot be used, before anything is written.
     """
     watcher = watcher or Watcher()
-    journal = Journal()
+    keeping = keeping or Keeping()
+    journal = Journal(keeping)
     session = open_session(scenario, seed, journal.heard)
     autograph = session.autograph
     document = _header(scenario, seed, order, autograph)
-    if out is not None:
-        prepare_folder(out, force)
+    keeping.prepare(out, force)
     sheets: list[ProjectorSheet] = []
 
     def leaves() -> dict[str, str]:

@@ -1,7 +1,8 @@
 """The journal of a session as it is written: what crossed the link and what the operator wrote down, in order."""
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -16,7 +17,7 @@ from a7sim.scenario import Scenario, carried, hash_of
 from a7sim.scene import PICTURES
 from a7sim.session.checkpoints import EVERY, Checkpoint, as_lines, hash_of_state
 from a7sim.session.durable import Durability, DurableFile, JournalStopped, stopped
-from a7sim.session.folder import JOURNAL, SCENARIO_SUFFIX, STATES, TORN
+from a7sim.session.folder import JOURNAL, SCENARIO_SUFFIX, STATES, TORN, prepare_folder
 from a7sim.session.lines import SCHEMA_VERSION, Chain, Event, Journalled, read_journal
 
 _REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
@@ -72,6 +73,16 @@ class Keeping:
     resumes: bool = False
     states: bool = True
     """Whether states are kept beside the journal, for seeking in it; they are part of the truth."""
+
+    def prepare(self, folder: Path | None, force: bool, parts: Iterable[str] = ()) -> None:
+        """See that a session and its parts can be left in a folder, unless it is there already. Raises Mistake."""
+        if folder is not None and not self.resumes:
+            prepare_folder(folder, force, parts)
+
+    def of_part(self, folder: Path | None) -> "Keeping":
+        """Return how a session is kept that is part of another, which may have been cut off before this one began."""
+        begun = folder is not None and (folder / JOURNAL).exists()
+        return replace(self, resumes=self.resumes and begun)
 
 
 class Journal:

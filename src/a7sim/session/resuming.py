@@ -21,9 +21,14 @@ class Begun:
     scenario: Scenario
     seed: int
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What was asked for beside the scenario, by name."""
+        return dict(self.journalled.header["settings"])
+
     def setting(self, name: str) -> Any:
         """Return what was asked for beside the scenario, None where nothing was said of it."""
-        return self.journalled.header["settings"].get(name)
+        return self.settings.get(name)
 
 
 def begun_in(folder: Path, command: str) -> Begun:

@@ -25,7 +25,6 @@ from a7sim.session.folder import (
     OUTPUT_CARDS,
     RESULTS,
     STRIP,
-    prepare_folder,
     write_whole,
 )
 from a7sim.session.journal import Journal, Keeping, header_of
@@ -123,8 +122,7 @@ def run(
     journal = Journal(keeping)
     session = open_session(scenario, seed, journal.heard, cable)
     job = session.job
-    if out is not None and not keeping.resumes:
-        prepare_folder(out, force)
+    keeping.prepare(out, force)
     done: list[Document] = []
     document = results.header(scenario, seed) | {"status": "failed", "message": "", "models": done}
 

@@ -1,0 +1,101 @@
+"""Every command that seats an operator goes on where it was cut off, to the bytes that it would have left."""
+
+import shutil
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from a7sim.scenario import load_scenario
+from a7sim.session.bridge import INDEPENDENT, run_bridge
+from a7sim.session.journal import Keeping
+from a7sim.session.resuming import begun_in
+from tests.processes import said_here
+
+JOURNAL = "session.jsonl"
+HURRIED = {"plan.parallax_readings": "1"}
+NOT_LAID_RIGHT = ("--set", "photos.1.laid=upside down")
+
+
+def files_of(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def cut_off(whole, folder, share):
+    """Leave what a session that was killed leaves, whose journal had come to a share of its length."""
+    folder.mkdir()
+    data = (whole / JOURNAL).read_bytes()
+    header = data.index(b"\n") + 1
+    (folder / JOURNAL).write_bytes(data[: header + int(share * (len(data) - header))])
+    shutil.copy(whole / "session.scenario.json", folder)
+
+
+def without_what_was_torn(files):
+    return {name: data for name, data in files.items() if not name.endswith(".torn")}
+
+
+@pytest.mark.parametrize(
+    ("words", "ends_with"),
+    [
+        (("calibrate", "akwanga", "--points", 9, "--levels", 1, "--pointings", 1), 0),
+        (("compile", "akwanga", "--contour", 455, "--line", "road1", "--tremor", 3, *NOT_LAID_RIGHT), 1),
+        (("bridge", "bridge", "--seed", 3, *NOT_LAID_RIGHT), 1),
+    ],
+    ids=["calibrate", "compile", "bridge"],
+)
+def test_a_command_that_was_cut_off_goes_on_to_the_same_bytes_and_exit_code(tmp_path, capsys, words, ends_with):
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    before = said_here(capsys, *words, "--out", whole)
+    cut_off(whole, cut, 0.6)
+    after = said_here(capsys, words[0], "--resume", cut)
+    assert (before.returncode, after.returncode) == (ends_with, ends_with)
+    assert (after.stdout, after.stderr) == (before.stdout, before.stderr)
+    assert without_what_was_torn(files_of(cut)) == files_of(whole)
+
+
+@pytest.mark.parametrize("command", ["run", "bridge", "compile", "calibrate"])
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ((), "{command}: expected SCENARIO or --resume DIR, got none"),
+        (("--resume", "{folder}", "--seed", 7), "--resume: expected no --seed beside it, since the journal says what"),
+        (("--resume", "{folder}"), "{folder}/session.jsonl: expected the journal of a session: No such file"),
+    ],
+)
+def test_who_says_nothing_too_much_or_what_is_not_there_gets_one_sentence(tmp_path, capsys, command, words, sentence):
+    named = {"command": command, "folder": tmp_path}
+    done = said_here(capsys, command, *(str(word).format(**named) for word in words))
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert sentence.format(**named) in done.stderr
+
+
+@pytest.fixture(scope="module")
+def bridged(tmp_path_factory):
+    """The folder of two models bridged and then worked independently."""
+    scenario = load_scenario("bridge", HURRIED)
+    scenario = msgspec.structs.replace(scenario, models=scenario.models[:2])
+    out = tmp_path_factory.mktemp("bridged") / "whole"
+    run_bridge(scenario, 3, out)
+    return out
+
+
+@pytest.mark.slow
+def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridged, tmp_path):
+    cut = Path(shutil.copytree(bridged, tmp_path / "cut"))
+    (cut / "results.json").unlink()
+    shutil.rmtree(cut / INDEPENDENT)
+    cut_off(bridged / INDEPENDENT, cut / INDEPENDENT, 0.3)
+    begun = begun_in(cut, "bridge")
+    run_bridge(begun.scenario, begun.seed, cut, keeping=Keeping(resumes=True))
+    assert without_what_was_torn(files_of(cut)) == files_of(bridged)
+
+
+@pytest.mark.slow
+def test_what_a_folder_had_of_another_strip_is_not_gone_on_with(bridged, tmp_path):
+    """Cut off while bridging, in a folder that --force took and where other independent models had been."""
+    cut = tmp_path / "cut"
+    (cut / INDEPENDENT).mkdir(parents=True)
+    shutil.copy(bridged / JOURNAL, cut / INDEPENDENT)
+    Keeping().prepare(cut, force=True, parts=(INDEPENDENT,))
+    assert files_of(cut) == {}
+    assert Keeping(resumes=True).of_part(cut / INDEPENDENT) == Keeping(resumes=False)
