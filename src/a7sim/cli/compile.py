@@ -1,13 +1,10 @@
 """`a7sim compile`: the operator draws contours and lines of a model."""
 
-from pathlib import Path
-
 import click
 
 from a7sim.cli import options
 from a7sim.cli.names import a_scenario
-from a7sim.cli.operators import chosen, ended, of_a_journal, of_a_scenario, of_results, resumed, watched
-from a7sim.session.durable import Durability
+from a7sim.cli.operators import Asked, Kept, Told, ended, kept_in_a_folder, of_a_scenario, of_results, ordered, watched
 
 _POINTS = 400
 """About how many points and vertices an operator works on; the bar only needs the order of it."""
@@ -26,8 +23,7 @@ _POINTS = 400
 @options.map_scale
 @click.option("--tremor", type=options.Number(0.0, 500.0), metavar="UM", help="Tremor at photo scale.")
 @of_a_scenario
-@options.new_folder("journal, book, map and results")
-@of_a_journal
+@kept_in_a_folder("journal, book, map and results")
 @of_results
 def command(
     scenario: str | None,
@@ -37,16 +33,9 @@ def command(
     lines: tuple[str, ...],
     map_scale: float | None,
     tremor: float | None,
-    seed: int | None,
-    settings: tuple[str, ...],
-    skill: str | None,
-    perfect_observer: bool,
-    out: Path | None,
-    force: bool,
-    resume: Path | None,
-    durability: Durability,
-    as_document: bool,
-    quiet: bool,
+    asked: Asked,
+    kept: Kept,
+    told: Told,
 ) -> None:
     """Let the operator set up a model of SCENARIO, level it, and draw contours and lines from it.
 
@@ -54,16 +43,11 @@ def command(
     """
     from a7sim.session.compiled_tables import of_compilation
     from a7sim.session.compiling import Wanted, compile_model
-    from a7sim.session.journal import Keeping
 
-    if resume is not None:
-        session = resumed(resume)
-        loaded, seed, out = session.scenario, session.seed, resume
-        wanted = Wanted.of(session.settings)
-    else:
-        loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
-        wanted = Wanted(name, contours, interval, lines, map_scale, tremor)
-    keeping = Keeping(durability, resume is not None)
-    with watched(_POINTS, as_document, quiet) as watcher:
-        document = compile_model(loaded, seed, wanted, out, watcher, force, keeping)
-    ended(document, as_document, quiet, of_compilation)
+    order = ordered(scenario, asked, kept)
+    wanted = Wanted(name, contours, interval, lines, map_scale, tremor)
+    if order.begun_with is not None:
+        wanted = Wanted.of(order.begun_with)
+    with watched(_POINTS, told) as watcher:
+        document = compile_model(order.scenario, order.seed, wanted, kept.folder, watcher, kept.force, kept.keeping)
+    ended(document, told, of_compilation)

@@ -4,13 +4,16 @@ from pathlib import Path
 
 import click
 
+from a7sim.cli import options
 from a7sim.cli.links import of_a_link, token_from
 from a7sim.cli.names import a_scenario
 from a7sim.cli.operators import (
     POINTS_A_MODEL,
+    SESSION,
+    Asked,
+    Told,
     chosen,
     ended,
-    of_a_folder,
     of_a_scenario,
     of_an_orientation,
     of_results,
@@ -24,7 +27,7 @@ from a7sim.cli.operators import (
 @of_a_link
 @of_an_orientation
 @of_a_scenario
-@of_a_folder
+@options.new_folder(SESSION)
 @of_results
 def command(
     scenario: str,
@@ -33,14 +36,10 @@ def command(
     token_file: Path | None,
     case: str | None,
     method: str | None,
-    seed: int | None,
-    settings: tuple[str, ...],
-    skill: str | None,
-    perfect_observer: bool,
+    asked: Asked,
     out: Path | None,
     force: bool,
-    as_document: bool,
-    quiet: bool,
+    told: Told,
 ) -> None:
     """Let the operator work the served instrument of SCENARIO, with the same results as `a7sim run`.
 
@@ -52,9 +51,9 @@ def command(
     from a7sim.scripting import Operator
     from a7sim.session.tables import of_session
 
-    loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer, {"plan.case": case, "plan.method": method})
+    loaded, seed = chosen(scenario, asked, {"plan.case": case, "plan.method": method})
     token = token_from(token_file)
-    with watched(POINTS_A_MODEL * len(loaded.models), as_document, quiet) as watcher:
+    with watched(POINTS_A_MODEL * len(loaded.models), told) as watcher:
         operator = Operator(loaded, seed)
         document = operator.work(url, out, force=force, timeout=timeout, token=token, watcher=watcher)
-    ended(document, as_document, quiet, of_session)
+    ended(document, told, of_session)

@@ -4,8 +4,9 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 import msgspec
@@ -16,13 +17,14 @@ from a7sim.cli.complaints import name_of
 from a7sim.cli.names import OneOf
 from a7sim.mistakes import Mistake
 from a7sim.scenario import PROFILES, Observer, Request, Scenario, bare_name, load_scenario, requested
-from a7sim.session.durable import DURABILITIES
+from a7sim.session.durable import DURABILITIES, Durability
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from a7sim.documents import Document
     from a7sim.session import Watcher
+    from a7sim.session.journal import Keeping
     from a7sim.session.resuming import Begun
 
 DURABILITY = click.option(
@@ -34,13 +36,56 @@ DURABILITY = click.option(
 )
 _RESUME = click.option("--resume", type=options.PLACE, metavar="DIR", help="Go on with the session in DIR, cut off.")
 
-of_a_scenario = options.together(
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked for beside a scenario: seed, overrides of its values, and how good the operator is."""
+
+    seed: int | None
+    settings: tuple[str, ...]
+    skill: str | None
+    perfect_observer: bool
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Where a session is left, or went on from, and when its journal is on the disk."""
+
+    out: Path | None
+    force: bool
+    resume: Path | None
+    durability: Durability
+
+    @property
+    def folder(self) -> Path | None:
+        """Where the files are."""
+        return self.resume or self.out
+
+    @property
+    def keeping(self) -> "Keeping":
+        """How the journal is kept."""
+        from a7sim.session.journal import Keeping
+
+        return Keeping(self.durability, self.resume is not None)
+
+
+@dataclass(frozen=True)
+class Told:
+    """How results are told: as tables, as a document, or not at all."""
+
+    as_document: bool
+    quiet: bool
+
+
+of_a_scenario = options.gathered(
+    "asked",
+    Asked,
     options.seed(),
     click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario."),
     click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
     click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error."),
 )
-"""--seed, --set, --skill, --perfect-observer: what `chosen` takes."""
+"""--seed, --set, --skill, --perfect-observer, as `asked`."""
 
 of_an_orientation = options.together(
     click.option("--case", type=OneOf("ABCDE"), help="Standard points used (thesis)."),
@@ -48,14 +93,16 @@ of_an_orientation = options.together(
 )
 """--case, --method."""
 
-of_a_folder = options.new_folder("journal, book, tables and results")
-"""--out, --force, where a session is left."""
+SESSION = "journal, book, tables and results"
 
-of_a_journal = options.together(_RESUME, DURABILITY)
-"""--resume, --durability."""
 
-of_results = options.together(options.as_document, options.quiet())
-"""--json, --quiet: what `ended` takes."""
+def kept_in_a_folder(of: str = SESSION) -> options.Option[Any]:
+    """Return --out, --force, --resume, --durability, as `kept`, for a folder of what `of` says."""
+    return options.gathered("kept", Kept, options.new_folder(of), _RESUME, DURABILITY)
+
+
+of_results = options.gathered("told", Told, options.as_document, options.quiet())
+"""--json, --quiet, as `told`."""
 
 _NOT_OF_THE_RESULTS = {
     *("seed", "out", "force", "resume", "durability", "as_document", "quiet"),
@@ -64,23 +111,40 @@ _NOT_OF_THE_RESULTS = {
 _SAME_RESULTS_AS = {"operate": "run"}
 
 
-def chosen(
-    scenario: str | None,
-    seed: int | None,
-    settings: tuple[str, ...],
-    skill: str | None,
-    perfect_observer: bool,
-    others: Mapping[str, str | None] | None = None,
-) -> tuple[Scenario, int]:
+@dataclass(frozen=True)
+class Order:
+    """What an operator is to do: a scenario, its seed, and, where that goes on, what its journal says beside them."""
+
+    scenario: Scenario
+    seed: int
+    begun_with: Mapping[str, Any] | None = None
+
+    def setting(self, name: str, asked: Any) -> Any:
+        """Return what the journal of a session that goes on says under a name, or what is asked for of a new one."""
+        return asked if self.begun_with is None else self.begun_with.get(name)
+
+
+def ordered(scenario: str | None, asked: Asked, kept: Kept, others: Mapping[str, str | None] | None = None) -> Order:
+    """Return what the options order: a new session, or with --resume the one in its folder. Raises Mistake.
+
+    `others` are overrides of the scenario as texts by path.
+    """
+    if kept.resume is None:
+        return Order(*chosen(scenario, asked, others))
+    session = resumed(kept.resume)
+    return Order(session.scenario, session.seed, session.settings)
+
+
+def chosen(scenario: str | None, asked: Asked, others: Mapping[str, str | None] | None = None) -> tuple[Scenario, int]:
     """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
     if scenario is None:
         raise Mistake(f"{click.get_current_context().info_name}: expected SCENARIO or --resume DIR, got none")
-    overrides = _overrides(settings, {**(others or {}), "observer.skill": skill})
+    overrides = _overrides(asked.settings, {**(others or {}), "observer.skill": asked.skill})
     loaded = load_scenario(scenario, overrides)
-    if perfect_observer:
+    if asked.perfect_observer:
         loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
         overrides["observer"] = "perfect"
-    seed = loaded.seed if seed is None else seed
+    seed = loaded.seed if asked.seed is None else asked.seed
     return requested(loaded, Request(command_line=_command_line(bare_name(scenario), seed), settings=overrides)), seed
 
 
@@ -135,7 +199,7 @@ POINTS_A_MODEL = 130
 
 
 @contextmanager
-def watched(points: int, as_document: bool, quiet: bool) -> "Iterator[Watcher]":
+def watched(points: int, told: Told) -> "Iterator[Watcher]":
     """Show on a terminal how the operator gets on with about so many points."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -143,7 +207,7 @@ def watched(points: int, as_document: bool, quiet: bool) -> "Iterator[Watcher]":
     from a7sim.session import Watcher
 
     columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
-    unwatched = quiet or as_document or not sys.stderr.isatty()
+    unwatched = told.quiet or told.as_document or not sys.stderr.isatty()
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
         task = progress.add_task("sitting down", total=points)
         yield Watcher(
@@ -152,15 +216,15 @@ def watched(points: int, as_document: bool, quiet: bool) -> "Iterator[Watcher]":
         )
 
 
-def ended(document: "Document", as_document: bool, quiet: bool, tables: "Callable[[Document], RenderableType]") -> None:
+def ended(document: "Document", told: Told, tables: "Callable[[Document], RenderableType]") -> None:
     """Show the results, and end with exit code 1 where the operator gave up."""
     from rich.console import Console
 
     from a7sim.documents import as_json
 
-    if as_document:
+    if told.as_document:
         click.echo(as_json(document), nl=False)
-    elif not quiet:
+    elif not told.quiet:
         Console().print(tables(document))
     if document["status"] != "complete":
         click.echo(f"a7sim: the operator gave up: {document['message']}", err=True)

@@ -1,7 +1,9 @@
 """What several commands ask for, each option once: its name, its kind and what its help says; light to import."""
 
+import functools
 import math
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -54,6 +56,21 @@ def together(*options: Option[Any]) -> Option[Any]:
         for option in reversed(options):
             command = option(command)
         return command
+
+    return decorated
+
+
+def gathered(name: str, into: type[Any], *options: Option[Any]) -> Option[Any]:
+    """Return options whose values a command is given as one: a dataclass with a field for each, under a name."""
+
+    def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(command)
+        def called(*arguments: Any, **values: Any) -> Any:
+            given = {field.name: values.pop(field.name) for field in fields(into)}
+            return command(*arguments, **values, **{name: into(**given)})
+
+        with_options: Callable[..., Any] = together(*options)(called)
+        return with_options
 
     return decorated
 

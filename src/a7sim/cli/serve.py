@@ -12,7 +12,7 @@ import click
 from a7sim.cli import options
 from a7sim.cli.links import token_from
 from a7sim.cli.names import a_scenario
-from a7sim.cli.operators import chosen, of_a_journal, of_a_scenario, resumed
+from a7sim.cli.operators import Asked, Kept, chosen, kept_in_a_folder, of_a_scenario, resumed
 from a7sim.cli.options import TOKEN_VARIABLE
 from a7sim.documents import Document, as_json, head
 from a7sim.instrument import Autograph
@@ -26,8 +26,7 @@ from a7sim.link.loops import run
 from a7sim.link.serving import Doors, Server
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
-from a7sim.session.durable import Durability, JournalStopped
-from a7sim.session.folder import prepare_folder
+from a7sim.session.durable import JournalStopped
 from a7sim.session.journal import Journal, Keeping, header_of
 from a7sim.session.resuming import Begun, served_again
 
@@ -66,8 +65,7 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
     "--fault-seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Draws the faults."
 )
 @of_a_scenario
-@options.new_folder("the journal")
-@of_a_journal
+@kept_in_a_folder("the journal")
 @options.as_document
 @options.quiet()
 def command(
@@ -83,14 +81,8 @@ def command(
     idle: float,
     fault: str | None,
     fault_seed: int,
-    seed: int | None,
-    settings: tuple[str, ...],
-    skill: str | None,
-    perfect_observer: bool,
-    out: Path | None,
-    force: bool,
-    resume: Path | None,
-    durability: Durability,
+    asked: Asked,
+    kept: Kept,
     as_document: bool,
     quiet: bool,
 ) -> None:
@@ -104,13 +96,12 @@ def command(
     token = token_from(token_file)
     _refuse_open_doors(doors, listen_anyway, token)
     terms = Terms(baud, faults_of(fault) if fault is not None else None, fault_seed, idle, most_clients=clients)
-    if resume is not None:
-        served = _served_again(resumed(resume, *_OF_THE_DOOR), token, Keeping(durability, resumes=True))
+    if kept.resume is not None:
+        served = _served_again(resumed(kept.resume, *_OF_THE_DOOR), token, kept.keeping)
     else:
-        loaded, seed = chosen(scenario, seed, settings, skill, perfect_observer)
-        if out is not None:
-            prepare_folder(out, force)
-        served = _served_anew(loaded, seed, token, realtime, out, Keeping(durability))
+        loaded, seed = chosen(scenario, asked)
+        kept.keeping.prepare(kept.out, kept.force)
+        served = _served_anew(loaded, seed, token, realtime, kept)
     with served.journal:
         run(serve(served, doors, terms, Told(served.head, as_document, quiet)))
 
@@ -125,14 +116,12 @@ class Served:
     journal: Journal
 
 
-def _served_anew(
-    scenario: Scenario, seed: int, token: str | None, realtime: bool, out: Path | None, keeping: Keeping
-) -> Served:
+def _served_anew(scenario: Scenario, seed: int, token: str | None, realtime: bool, kept: Kept) -> Served:
     autograph = Autograph.of_scenario(scenario, seed)
-    journal = Journal(keeping)
-    desk = Desk(autograph, journal.heard if out else None, token, 0.0 if realtime else POLL_TAKES)
+    journal = Journal(kept.keeping)
+    desk = Desk(autograph, journal.heard if kept.out else None, token, 0.0 if realtime else POLL_TAKES)
     header = header_of("serve", scenario, seed, realtime=realtime, login=token is not None)
-    return Served(_head(scenario, seed), desk, _clock(realtime), journal.opened(out, header, desk))
+    return Served(_head(scenario, seed), desk, _clock(realtime), journal.opened(kept.out, header, desk))
 
 
 def _served_again(begun: Begun, token: str | None, keeping: Keeping) -> Served:

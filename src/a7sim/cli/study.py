@@ -21,7 +21,6 @@ from rich.text import Text
 
 from a7sim.cli import EXIT_DIFFERS, options
 from a7sim.cli.names import a_study
-from a7sim.cli.operators import of_results
 from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.study.auditing import audited
@@ -52,7 +51,8 @@ from a7sim.wording import counted
 @click.option("--scheduler", metavar="URL", help="Of dask, such as tcp://HOST:8786, whose workers work; else its own.")
 @click.option("--audit", type=options.COUNT, metavar="N", help="Work N picked sessions again over the link.")
 @options.new_folder("checkpoint, tables, page and results; a study cut off goes on there")
-@of_results
+@options.as_document
+@options.quiet()
 def command(
     study: str,
     replicates: int | None,
