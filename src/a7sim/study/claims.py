@@ -125,9 +125,7 @@ def _overall(verdicts: Sequence[Verdict]) -> Verdict:
 
 def _in_brackets(tests: Sequence[Document]) -> str:
     """Return in short the test with the largest effect."""
-    most = max(tests, key=_size, default=None)
-    if most is None:
-        return ""
+    most = max(tests, key=_size)
     response = most["response"]
     if "on" in most:
         low, high = most["correlation_interval"]
