@@ -148,11 +148,11 @@ def test_a_claim_is_printed_with_its_verdict_and_every_answer(tmp_path, claim, v
 def test_each_response_of_a_hypercube_has_its_own_effects_everywhere(tmp_path):
     hypercube = {
         "design": "latin-hypercube",
-        "samples": 8,
+        "samples": 12,
         "factor": [{"name": "film", "path": "film.irregular_um", "range": [0.0, 5.0]}],
         "responses": [RESPONSE, "strip_height_at_checks_m"],
     }
-    document, printed = found(tmp_path, 2.0 + NOISE[:8], **hypercube)
+    document, printed = found(tmp_path, 2.0 + NOISE[:12], **hypercube)
     assert [each["response"] for each in document["main_effects"]] == hypercube["responses"]
     assert printed.count("of that, chance") == 2
     page, _ = markdown_of(document, "figures")
