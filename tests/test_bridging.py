@@ -14,6 +14,7 @@ from a7sim.operator.bridging import bridged
 from a7sim.operator.crew import NobodyGoesOn
 from a7sim.reduction import similarity_by_quaternion
 from a7sim.scenario import ScenarioError, load_scenario
+from a7sim.scenario.schema import GroundPoint
 from a7sim.session.bridge import bridged_strip, run_bridge
 from a7sim.session.crowd import open_crowd
 from a7sim.session.ways import documents_of_all_ways, run_all_ways
@@ -207,3 +208,33 @@ def test_who_gives_up_a_bridge_says_why_and_leaves_the_models_that_stand(tmp_pat
         row = [model["model"], model["base"], f"{model['elements']['bx']:.2f}", f"{model['scale']:.5f}"]
         assert row in [line.split()[:4] for line in said.stdout.splitlines()]
     assert "independent" not in document and not (tmp_path / "out" / "independent").exists()
+
+
+@pytest.fixture(scope="module")
+def with_control():
+    """Two models whose standard points are control, and the degree of a strip's polynomials."""
+    scenario = scenario_of(2, **{"strip.polynomial": "2"})
+    (scene,) = open_crowd(scenario, (1,)).scenes
+    places = {name: at for name, at in scene.ground_points.items() if name in {f"{i}" for i in range(2000, 2100)}}
+    ground = [
+        GroundPoint(point=name, X=round(float(x), 3), Y=round(float(y), 3), Z=round(float(z), 3), role="control")
+        for name, (x, y, z) in places.items()
+    ]
+    return msgspec.structs.replace(scenario, ground=ground)
+
+
+def test_the_command_bridges_to_its_end_and_shows_what_polynomials_do_beside_the_similarity(monkeypatch, with_control):
+    """In both ways, and with more unknowns the control never fits worse; where nothing is to be kept, nothing is."""
+    monkeypatch.setattr("a7sim.cli.bridge.chosen", lambda *_: (with_control, 1))
+    said = a7sim_here("bridge", "bridge")
+    assert (said.returncode, said.stderr) == (0, "")
+    rows = {
+        tuple(line.split(" 9 control ")[0].split()): line.split()
+        for line in said.stdout.splitlines()
+        if " 9 control " in line
+    }
+    for way in ("bridged", "independent"):
+        by_similarity, by_polynomials = rows[way,], rows[f"{way},", "polynomial"]
+        for alone, bent in zip(by_similarity[-2:], by_polynomials[-2:], strict=True):
+            assert float(bent) <= float(alone) + 0.001
+    assert "hours at the instrument bridging" in said.stdout

@@ -168,6 +168,15 @@ def test_a_control_card_off_its_columns_is_found(tmp_path, off):
         read_cards(deck(tmp_path, text))
 
 
+def test_blank_cards_mean_nothing(tmp_path):
+    spaced = deck_lines_of(read_cards(deck(tmp_path, DECK.replace("\n", "\n\n"))))
+    assert spaced == deck_lines_of(read_cards(deck(tmp_path)))
+
+
+def deck_lines_of(read):
+    return deck_lines(read.ground, read.models)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "where"),
     [
@@ -189,6 +198,13 @@ def test_a_control_card_off_its_columns_is_found(tmp_path, off):
         ("  -1\n", "  -2\n", "line 4, columns 1-4"),
         ("  -1\n", "  -1    1\n", "line 4, column 5"),
         ("   7   26.000", "   102   26.000", "line 10, column"),
+        ("  -2\n", "  -2\n  -2\n", "line 8: expected a centre and tie points after the card"),
+        (DECK.splitlines()[0], DECK.splitlines()[0] + " " * 60 + "1", "line 1, column"),
+        (
+            "".join(DECK.splitlines(keepends=True)[11:]),
+            "".join(DECK.splitlines(keepends=True)[7:10]),
+            "line 12, columns 1-4: expected the next model, got 1 again",
+        ),
     ],
 )
 def test_a_bad_card_is_named_by_file_line_and_column(tmp_path, old, new, where):
@@ -217,6 +233,12 @@ def test_files_that_are_no_decks_are_refused(tmp_path):
         read_cards(tmp_path / "bytes.txt")
 
 
+def without_centres(model):
+    for centre in model.centres:
+        model = model.without(centre)
+    return model
+
+
 def test_what_does_not_fit_a_card_is_refused():
     models, ground = strip_of(np.random.default_rng(1), 2)
     with pytest.raises(Mistake, match="nine columns"):
@@ -226,6 +248,8 @@ def test_what_does_not_fit_a_card_is_refused():
     named = Model("left", models[0].points, models[0].coordinates)
     with pytest.raises(Mistake, match="at most 4 digits"):
         deck_lines(ground, [named])
+    with pytest.raises(Mistake, match=r"expected one common projection centre \(<photo>:centre\)"):
+        deck_lines(ground, [without_centres(model) for model in strip_of(np.random.default_rng(1), 3)[0]])
 
 
 def test_free_format_models_end_with_minus_99():

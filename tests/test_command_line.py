@@ -13,11 +13,13 @@ import click
 import pytest
 from click.shell_completion import BashComplete
 
-from a7sim.cli import cli, doctor
+from a7sim.cli import cli, doctor, main
 from a7sim.cli.options import PLOTTERS
+from a7sim.cli.prompt import data_folder
 from a7sim.cli.verbs import Verbs
 from a7sim.manual import VARIANTS
 from a7sim.shelves import names_of
+from tests.processes import a7sim_here
 
 ROOT = Path(__file__).parents[1]
 BIN = Path(sys.executable).parent
@@ -162,6 +164,28 @@ FLOWN = ("--c", "152.676", "--photo-scale", "8000", "--photo-base", "91")
         (["compile", "akwanga", "--line", "nope"], "--line: expected one of road1, track1, got nope"),
         (["compile", "akwanga"], "compile: expected a --contour, an --interval or a --line to be drawn, got none"),
         (["send", "tcp://127.0.0.1:1", "--timeout", "nan"], "--timeout: expected a finite number, got nan"),
+        (
+            ["record", "a7sim://akwanga", "--seed", "1", "--out", "x"],
+            "--seed: expected a --scenario beside it, got none",
+        ),
+        (
+            ["record", "a7sim://akwanga", "--tcp", "8.8.8.8:1", "--out", "x"],
+            "--tcp 8.8.8.8:1: expected an address of this machine alone",
+        ),
+        (
+            ["record", "a7sim://akwanga", "--scenario", "akwanga", "--tcp", "8.8.8.8:1", "--out", "x"],
+            "--tcp 8.8.8.8:1: expected an address of this machine alone",
+        ),
+        (
+            ["train", "start", "1", "--serve", "--link", "tcp://127.0.0.1:1"],
+            "train start: expected one of --script, --link and --serve, got several",
+        ),
+        (["train", "start", "1", "--student", " "], "--student: expected a name of 1 to"),
+        (["train", "start", "99"], "99: expected the number of an exercise, its folder, or one of 01-counters, "),
+        (
+            ["reduce", "interior", "x.csv", "--camera", "x.toml", "--flying-height", "300", "--ground-height", "300"],
+            "--flying-height: expected more than the ground height of 300 m, got 300",
+        ),
         (["completion", "tcsh"], "SHELL: expected one of bash, zsh, fish, got 'tcsh'"),
     ],
 )
@@ -447,3 +471,63 @@ def test_doctor_tells_what_the_terminal_can_do(typed, monkeypatch, environment, 
     terminal = json.loads(typed("doctor", "--json")[1])["terminal"]
     assert (terminal["columns"], terminal["lines"], terminal["room_for_console"]) == (79, 24, False)
     assert terminal["colours"] == colours
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt(), 130, "a7sim: interrupted\n"),
+        (click.Abort(), 130, "a7sim: interrupted\n"),
+        (click.UsageError("No such thing."), 2, "a7sim: no such thing"),
+        (
+            OSError(28, "No space left on device", "out.csv"),
+            2,
+            "a7sim: out.csv: expected to be able to write and read: No",
+        ),
+        (BrokenPipeError(), 1, ""),
+    ],
+    ids=["Ctrl-C", "a question not answered", "a wrong word", "a full disk", "a reader who went away"],
+)
+def test_whatever_ends_a_command_is_said_in_a_sentence_and_raised_where_it_is_debugged(monkeypatch, error, code, said):
+    def ends(*_, **__):
+        raise error
+
+    monkeypatch.setattr(cli, "main", ends)
+    ended = a7sim_here("doctor")
+    assert (ended.returncode, ended.stdout) == (code, "")
+    assert ended.stderr.startswith(said) and ended.stderr.count("\n") == bool(said)
+    monkeypatch.setattr(sys, "argv", ["a7sim", "doctor", "--debug"])
+    with pytest.raises(type(error)):
+        main()
+
+
+def test_a_preparation_prints_as_a_document_what_it_prints_as_a_sheet(typed):
+    asked = ["prepare", *FLOWN, "--heights", "430.24", "487.92", "--map-scale", "2500"]
+    _, sheet, _ = typed(*asked)
+    code, printed, err = typed(*asked, "--json")
+    document = json.loads(printed)
+    assert (code, err, document["command"]) == (0, "", "prepare")
+    assert document.keys() >= {"flight"} or len(document) > 3
+    assert sheet
+
+
+@pytest.mark.parametrize(
+    ("platform", "environment", "folder"),
+    [
+        ("linux", {}, ".local/share/a7sim"),
+        ("linux", {"XDG_DATA_HOME": "data"}, "data/a7sim"),
+        ("darwin", {}, "Library/Application Support/a7sim"),
+        ("win32", {}, "AppData/Local/a7sim"),
+        ("win32", {"LOCALAPPDATA": "local"}, "local/a7sim"),
+    ],
+)
+def test_what_a7sim_keeps_lies_where_the_platform_keeps_such_things(
+    monkeypatch, tmp_path, platform, environment, folder
+):
+    monkeypatch.setattr(sys, "platform", platform)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    for name in ("XDG_DATA_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, str(tmp_path / value))
+    assert data_folder() == tmp_path / folder

@@ -10,8 +10,10 @@ import pytest
 from a7sim.console.app import Console
 from a7sim.console.drum_panels import Elements, Wheeled
 from a7sim.console.eyepiece import Drawing
+from a7sim.console.keymap import deeds_of
 from a7sim.console.looking import MAGNIFICATIONS
 from a7sim.console.panels import Book
+from a7sim.console.prints import Pointed
 from a7sim.console.seat import Seat
 from a7sim.console.window import Eyepiece
 from a7sim.instrument import build_autograph
@@ -433,5 +435,75 @@ def test_another_theme_repaints_drums_and_mark() -> None:
             console.theme = "contrast"
             await pilot.pause()
             assert colours() == ("#000000", "#ffff00")
+
+    played(sit_down())
+
+
+def test_a_question_that_is_left_says_nothing_and_changes_nothing() -> None:
+    """Escape at any of them; what is answered afterwards is done as ever."""
+    heard: list[LinkEvent] = []
+    console = at_akwanga(heard.append)
+
+    def said() -> list[str]:
+        asking = [event.text for event in heard if event.direction == ">"]
+        return [line for line in asking if "?" not in line]
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            before, lines = console.dials, said()
+            for key in "lrnd":
+                await person.press(key)
+                assert console.screen is not console.main
+                await person.press("escape")
+                assert console.screen is console.main
+            for choice in ("left projector: lay", "height gear", "plan gear"):
+                await person.press("l")
+                await person.choose(choice)
+                await person.press("escape")
+                assert console.screen is console.main
+            assert (console.dials, said()) == (before, lines)
+            await person.press("l")
+            await person.choose("plan gear")
+            await person.type_in("1-2-1")
+            await person.press("n")
+            await person.type_in("all is well")
+            assert said()[len(lines) :] == ['GEAR:PLAN "1-2-1"', 'NOTE "all is well"']
+            assert person.message() == "noted: all is well"
+
+    played(sit_down())
+
+
+def test_every_deed_is_in_the_palette_under_its_group_and_keys() -> None:
+    console = at_akwanga()
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.settle()
+            listed = {each.title: each for each in console.get_system_commands(console.screen)}
+            for deed in deeds_of(watching=False):
+                assert listed[deed.about].help.startswith(f"{deed.group}, ")
+            listed["a smaller step"].callback()
+            finer = console.hands.step
+            listed["a larger step"].callback()
+            assert console.hands.step > finer
+
+    played(sit_down())
+
+
+def test_a_point_clicked_in_a_sketch_is_driven_to() -> None:
+    console = at(with_model())
+
+    async def sit_down() -> None:
+        async with console.run_test(size=(100, 30)) as pilot:
+            person = Person(pilot)
+            await person.look_on()
+            before = dict(console.dials.counters)
+            console.post_message(Pointed(1, "1013"))
+            await person.settle()
+            assert person.message() == "near point 1013"
+            assert dict(console.dials.counters) != before
 
     played(sit_down())

@@ -691,3 +691,23 @@ def test_a_record_of_an_unknown_instrument_is_told_and_not_verified(tmp_path, ca
     done = said_here(capsys, "replay", tmp_path, "--verify")
     assert done.returncode == 2
     assert "expected a session whose scenario is known" in done.stderr
+
+
+def test_a_client_that_goes_needs_no_journal_that_can_be_written_and_any_other_word_does(tmp_path, monkeypatch):
+    """Who goes is not held up by a full disk; nothing else is acknowledged that is not written."""
+    with Journal().opened(tmp_path, header_of_unknown("record", instrument="a7"), None) as journal:
+
+        def full(*_, **__):
+            raise JournalStopped("the disk is full")
+
+        monkeypatch.setattr(journal, "_write", full)
+        journal.heard(LinkEvent(1.0, "client1", "-", ""))
+        with pytest.raises(JournalStopped, match="the disk is full"):
+            journal.heard(LinkEvent(2.0, "client1", ">", "*IDN?"))
+
+
+def test_what_a_replay_only_tells_is_not_told_where_it_is_to_be_quiet(tmp_path, capsys):
+    with Journal().opened(tmp_path, header_of_unknown("record", instrument="a7"), None) as journal:
+        journal.heard(LinkEvent(1.0, "client1", ">", "*IDN?"))
+    told = said_here(capsys, "replay", tmp_path, "--quiet")
+    assert (told.returncode, told.stdout) == (0, "")

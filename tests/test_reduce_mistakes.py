@@ -257,3 +257,35 @@ def test_help_loads_no_scipy_and_names_every_command():
         if arguments == ["reduce", "--help"]:
             for command in ("interior", "relative", "centres", "similarity", "connect", "strip", "absolute", "block"):
                 assert f"\n  {command} " in done.stdout
+
+
+PAIRS = "model,point,xl,yl,xr,yr\n" + "".join(
+    f"1,{name},{x},{y},{x - 90.0},{y}\n"
+    for name, x, y in ((1, 0, 0), (2, 90, 0), (3, 0, 80), (4, 90, 80), (5, 0, -80), (6, 90, -80))
+)
+MODELS = "model,point,X,Y,Z\n1,5,0,1,2\n2,5,0,1,2\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (
+            ("absolute", "models.csv", "--ground", "ground.csv"),
+            "column model: expected one model, got 2; `reduce strip`",
+        ),
+        (("strip", "models.csv"), "expected ground points (--ground), which only cards bring with them, got none"),
+        (
+            ("strip", "pairs.csv", "--ground", "ground.csv"),
+            "expected the principal distance (--c) of the pairs, got none",
+        ),
+        (
+            ("strip", "turned.csv", "--ground", "ground.csv", "--c", "152"),
+            "got a mean x-parallax of -90.000 mm (is the pair given right to left?)",
+        ),
+    ],
+)
+def test_what_a_strip_lacks_is_said_with_the_file(said, tmp_path, words, sentence):
+    turned = PAIRS.replace("xl,yl,xr,yr", "xr,yr,xl,yl")
+    for name, text in (("models.csv", MODELS), ("pairs.csv", PAIRS), ("turned.csv", turned)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    one_sentence(said(*words), words[1], sentence)

@@ -145,6 +145,8 @@ def test_counts_mirrored_by_the_comparator_are_mirrored_back(tmp_path):
         ("photo,point,x,y\nleft,a,1,two\n", ["line 2", "column y", "'two'"]),
         ("photo,point,x,y\n# remark\nleft,a,1,2\nleft,a,3,4\n", ["line 4", "line 3"]),
         ("photo,point,x,y\nright,a,1,2\n", ["'left'", "none"]),
+        ('photo,point,x,y\nleft,"a""b",1,2\n', ["column point", "without quotes"]),
+        ("photo,point,x,y\nleft,a,1,200\n", ["format", "(1.0, 200.0) for point a"]),
     ],
 )
 def test_a_bad_file_is_named_with_line_and_column(tmp_path, content, words):
@@ -156,3 +158,21 @@ def test_a_bad_file_is_named_with_line_and_column(tmp_path, content, words):
     assert "\n" not in message
     for word in ["bad.csv", *words]:
         assert word in message
+
+
+@pytest.mark.parametrize(
+    ("scale", "moved", "words"),
+    [
+        ({}, [], "expected 3 or more of the fiducials"),
+        ({"1": 1.0, "2": 1.0, "3": 1.0, "4": 1.0}, ["1", "3"], "fiducials that lie as in the camera"),
+    ],
+    ids=["none measured", "two confused"],
+)
+def test_counts_without_their_fiducials_or_with_confused_ones_are_refused(tmp_path, scale, moved, words):
+    camera = load_scenario("akwanga").camera
+    other = dict(zip(moved, reversed(moved), strict=True))
+    named = [(other.get(f.name, f.name), f) for f in camera.fiducials if f.name in scale]
+    rows = [f"p,{name},{1000 + 100 * f.x},{5000 + 100 * f.y}" for name, f in named] + ["p,P,3000,4000"]
+    (tmp_path / "counts.csv").write_text("photo,point,x,y\n" + "\n".join(rows), encoding="utf-8")
+    with pytest.raises(Mistake, match=words):
+        measured_marks(Measured(file=str(tmp_path / "counts.csv"), units="counts"), "p", camera)

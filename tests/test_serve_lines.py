@@ -17,6 +17,7 @@ from a7sim.link.client import Client
 from a7sim.link.conversation import Terms
 from a7sim.link.faults import Cut, Faults, Noise, faults_of
 from a7sim.link.serving import Doors
+from a7sim.link.wires import MOST_UNREAD
 from a7sim.manual import VARIANTS
 from a7sim.mistakes import Mistake
 from tests.door import with_model
@@ -113,6 +114,18 @@ def test_a_terminal_whose_client_does_not_read_begins_anew(link):
         os.close(far)
         with serial.Serial(str(link), timeout=PATIENCE) as port:
             assert Client(port).ask("*IDN?") == IDENTITY
+
+
+def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
+    """More than is kept for a client: it is heard no further until it has read, and nothing is lost."""
+    count = 3 * MOST_UNREAD // len(IDENTITY)
+    with Served(doors=Doors(pty=[link])) as served, at(served) as port:
+        sender = threading.Thread(target=port.write, args=(b"*IDN?\n" * count,))
+        sender.start()
+        assert served.until(lambda: served.server._terminals[0]._clogged)
+        assert port.read(count * (len(IDENTITY) + 1)) == f"{IDENTITY}\n".encode() * count
+        sender.join()
+        assert not served.server._terminals[0]._clogged
 
 
 def test_a_terminal_long_silent_frees_its_lock_and_stays(link):

@@ -131,6 +131,49 @@ def test_two_points_or_points_in_a_line_make_no_similarity(solved):
         solved(np.zeros((3, 4)), line)
 
 
+def test_one_point_of_each_member_goes_as_it_goes_among_others():
+    rng = np.random.default_rng(9)
+    points, targets = rng.standard_normal((2, 3, 5, 4))
+    for found, one in (
+        (similarity_by_quaternion(points, targets), points[:, 2]),
+        (similarity_by_quaternion(points[..., 0], targets[..., 0]), points[:, 2, 0]),
+    ):
+        np.testing.assert_allclose(found.applied_to(one), found.applied_to(found.points)[:, 2], atol=1e-12)
+
+
+@pytest.mark.parametrize("solved", [similarity_by_iteration, similarity_by_quaternion])
+def test_one_set_of_points_is_laid_on_each_of_many_and_many_on_one(solved):
+    rng = np.random.default_rng(10)
+    one = rng.standard_normal((3, 5))
+    many = np.einsum("ijm,jn->inm", any_rotation(rng, 2), one) + 0.1 * rng.standard_normal((3, 5, 2))
+    for points, targets in ((one, many), (many, one)):
+        together = solved(points, targets)
+        for i in range(2):
+            alone = solved(*(each[..., i] if each.ndim == 3 else each for each in (points, targets)))
+            np.testing.assert_allclose(together.rotation[..., i], alone.rotation, atol=1e-8)
+            np.testing.assert_allclose(together.scale[i], alone.scale, rtol=1e-8)
+
+
+def test_an_iteration_that_does_not_come_to_rest_says_so():
+    rng = np.random.default_rng(10)
+    points, targets = rng.standard_normal((3, 5)), rng.standard_normal((3, 5, 2))
+    with pytest.raises(Undetermined, match="the similarity of 5 points does not come to rest in 100 iterations"):
+        similarity_by_iteration(points, targets)
+
+
+def test_the_iteration_ends_at_the_best_attitude_wherever_it_starts():
+    """Half a turn from the best the normal equations are at rest, too, where they are not to stay."""
+    points = np.array([[3.0, 0, 0], [-3, 0, 0], [0, 2, 0], [0, -2, 0], [0, 0, 1], [0, 0, -1]]).T
+    turn = rotation(0.3, -0.2, 1.1)
+    half_turns = [np.diag(signs) for signs in ((1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))]
+    for start in [np.eye(3), turn, *(turn @ half for half in half_turns)]:
+        found = similarity_by_iteration(points, 2.0 * turn @ points, start=start)
+        np.testing.assert_allclose(found.rotation, turn, atol=1e-9)
+    both = np.stack([points, points], axis=-1)
+    found = similarity_by_iteration(both, 2.0 * np.einsum("ij,jnm->inm", turn, both), start=turn @ half_turns[0])
+    np.testing.assert_allclose(found.rotation, np.stack([turn, turn], axis=-1), atol=1e-9)
+
+
 # --- real strips --------------------------------------------------------------------------------------------------
 
 
@@ -366,6 +409,55 @@ def test_models_that_make_no_strip_are_refused():
         formed_strip([])
     with pytest.raises(Mistake, match="twice"):
         Model("m", ("1", "1"), np.zeros((3, 2)))
+    with pytest.raises(ValueError, match="coordinates of 2 points, got 3"):
+        Model("m", ("1", "2"), np.zeros((3, 3)))
+
+
+def having(name, *centres):
+    return Model(name, centres, np.zeros((3, len(centres))))
+
+
+@pytest.mark.parametrize(
+    ("models", "sentence"),
+    [
+        (
+            [having("m", "1:centre"), having("n", "1:centre"), having("o", "1:centre")],
+            "centre 1:centre: expected at most two models of a strip to share it, got m, n, o",
+        ),
+        (
+            [
+                having("m", "1:centre", "2:centre"),
+                having("n", "2:centre", "3:centre"),
+                having("o", "3:centre", "1:centre"),
+            ],
+            "expected a strip with two ends, got models in a ring",
+        ),
+    ],
+    ids=["a branch", "a ring"],
+)
+def test_a_branch_or_a_ring_is_no_strip(models, sentence):
+    with pytest.raises(Mistake) as told:
+        in_order(models)
+    assert str(told.value) == sentence
+
+
+def test_models_joined_at_a_centre_have_one_in_common_and_points_below_it():
+    rng = np.random.default_rng(3)
+    points, centres = flight(rng, photographs=3)
+    first, second = perfect_models(rng, points, centres)
+    for method in ("centre", "heights"):
+        ground_alone = first.without("1:centre")
+        with pytest.raises(Mistake, match=r"one common projection centre \(<photo>:centre\), got none"):
+            formed_strip([ground_alone, second], method)
+    places = np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, -50], [5, -10, -40]]).T
+    names = ("1:centre", "1a", "1b", "1c")
+    level = [
+        Model("m", ("0:centre", *names), np.hstack([[[-90.0], [0], [0]], places])),
+        Model("n", names, 2.0 * places),
+    ]
+    assert float(formed_strip(level, "centre").joins[0].scale) == pytest.approx(0.5)
+    with pytest.raises(Undetermined, match="points below the centre, got one at its height"):
+        formed_strip(level, "heights")
 
 
 # --- absolute orientation -----------------------------------------------------------------------------------------
@@ -412,6 +504,29 @@ def test_left_handed_axes_are_warned_of_with_and_without_centres(partial):
         assert any("left-handed" in text for text in absolute_orientation(model, swapped).warnings)
 
 
+def test_three_points_of_control_tell_left_handed_axes_by_the_model_upside_down():
+    """A triangle and its mirror image fit alike: only what is up and what is down can tell."""
+    points = {"1": [0.0, 0.0, 100.0], "2": [3000.0, 0.0, 120.0], "3": [0.0, 2000.0, 90.0]}
+    points = {name: np.array(place) for name, place in points.items()}
+    model, ground = tilted_model(np.random.default_rng(1), points), grounded(points, lambda name: "control")
+    assert absolute_orientation(model, ground).warnings == ()
+    swapped = absolute_orientation(model, Ground(ground.points, ground.coordinates[[1, 0, 2]], ground.roles))
+    assert np.abs(swapped.fit.residuals).max() < 1e-6
+    (warning,) = swapped.warnings
+    assert "the model comes out upside down, its heights inverted" in warning
+
+
+def test_control_that_is_whole_gives_the_attitude_to_what_is_used_besides():
+    """A model that stands on its side comes to rest, too, where heights and plan alone stand beside three points."""
+    rng = np.random.default_rng(12)
+    points, _ = flight(rng, photographs=4)
+    model = tilted_model(rng, points)
+    on_its_side = Model(model.name, model.points, rotation(1.4, 0.3, 0.2) @ model.coordinates)
+    roles = {"0a": "control", "1c": "control", "3a": "control", "2c": "height", "0c": "plan"}
+    found = absolute_orientation(on_its_side, grounded(points, lambda name: roles.get(name, "check")))
+    assert np.nanmax(np.abs(found.fit.residuals)) < 1e-6
+
+
 def test_one_model_of_a_batch_is_warned_of_as_if_it_were_alone():
     rng = np.random.default_rng(7)
     points, _ = flight(rng, photographs=4)
@@ -438,6 +553,10 @@ def test_ground_points_the_model_has_not_are_named_and_wrong_roles_refused():
     assert warnings == ("ground points that the model has not: 77z",)
     with pytest.raises(Mistake, match="role"):
         Ground(("1",), np.zeros((3, 1)), ("guess",))
+    with pytest.raises(Mistake, match="ground point 1: expected every point once, got it twice"):
+        Ground(("1", "1"), np.zeros((3, 2)), ("control", "check"))
+    with pytest.raises(ValueError, match="as many names, coordinates and roles, got 1, 2, 1"):
+        Ground(("1",), np.zeros((3, 2)), ("control",))
     with pytest.raises(Mistake, match="gap"):
         Ground(("1",), np.array([[np.nan], [0.0], [0.0]]), ("plan",))
 
@@ -600,6 +719,7 @@ def test_one_model_as_a_block_is_its_absolute_orientation():
     assert block.scales[0] == pytest.approx(float(alone.similarity.scale), rel=1e-9)
     np.testing.assert_allclose(block.translations[:, 0], alone.similarity.translation, atol=1e-6)
     assert block.s0 == pytest.approx(float(alone.similarity.s0), rel=1e-6)
+    assert block.sigmas[0, 0] == pytest.approx(float(alone.similarity.sigma_scale), rel=1e-6)
 
 
 def test_blocks_that_hang_loose_are_refused():
@@ -621,6 +741,11 @@ def test_blocks_that_hang_loose_are_refused():
         block_adjustment([three], heaped)
     with pytest.raises(Mistake, match="500"):
         block_adjustment([], ground)
+    with pytest.raises(Mistake, match="every model once"):
+        block_adjustment([models[0], models[0]], ground)
+    plan = Ground(("0_0", "3_2"), ground.among(("0_0", "3_2")).coordinates, ("control", "control"))
+    with pytest.raises(Undetermined, match="three control points in height, got 2"):
+        block_adjustment(models, plan)
 
 
 @pytest.mark.slow

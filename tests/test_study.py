@@ -152,6 +152,16 @@ MISTAKES = {
         },
         "expected levels that make at most",
     ),
+    "a response twice": ({"responses": ["strip_plan_at_checks_m"] * 2}, "responses: expected every response once"),
+    "a height gear that is not there": (
+        {
+            "scenario": "akwanga",
+            "settings": {},
+            "factor": [{"name": "f", "path": "plan.height_gear", "levels": ["1:1", "1:9999"]}],
+            "responses": ["hours"],
+        },
+        "height_gear",
+    ),
     "a name twice": ({"factor": [BY_COMPARATOR["factor"][0]] * 2}, "every name once"),
     "no replicates": ({"replicates": None}, "replicates: expected how often"),
     "zero replicates": ({"replicates": 0}, "replicates: expected a whole number from 1"),

@@ -8,11 +8,14 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import ExitStack, contextmanager
+from types import SimpleNamespace
 
 import pytest
 
 from a7sim.documents import as_json
 from a7sim.mistakes import Mistake
+from a7sim.study import by_mpi
 from a7sim.study.checkpoint import checkpoint_in, save
 from a7sim.study.executors import opened
 from a7sim.study.findings import document_of
@@ -174,3 +177,43 @@ def test_mpi_alone_is_one_sentence_that_says_how_to_start_it():
     told = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
     assert "expected two processes or more (mpiexec -n 5 a7sim study" in told.stderr
+
+
+def the_world_of(monkeypatch, processes, executor):
+    """Stand in for mpi4py in one process of so many, which is given an executor in the first and none in another."""
+
+    @contextmanager
+    def pool(world, root, env):
+        assert (world.Get_size(), root, env) == (processes, 0, {"THREADS": "1"})
+        yield executor
+
+    world = SimpleNamespace(Get_size=lambda: processes)
+    there = {
+        "mpi4py.MPI": SimpleNamespace(COMM_WORLD=world),
+        "mpi4py.futures": SimpleNamespace(MPICommExecutor=pool),
+    }
+    monkeypatch.setattr(by_mpi, "import_module", there.__getitem__)
+
+
+def test_over_mpi_the_first_process_asks_all_the_others(monkeypatch):
+    executor = object()
+    the_world_of(monkeypatch, 5, executor)
+    with by_mpi.on_mpi({"THREADS": "1"}) as asked:
+        assert asked == (executor, 4)
+
+
+def test_over_mpi_another_process_works_and_ends_without_a_word(monkeypatch):
+    """It must not go on: the first one alone says what comes of the study."""
+    the_world_of(monkeypatch, 5, None)
+    with pytest.raises(SystemExit) as ended, ExitStack() as stack:
+        stack.enter_context(by_mpi.on_mpi({"THREADS": "1"}))
+    assert ended.value.code == 0
+
+
+def test_a_process_that_was_started_alone_is_told_how_to_start_more(monkeypatch):
+    the_world_of(monkeypatch, 1, object())
+    with (
+        pytest.raises(Mistake, match=r"two processes or more \(mpiexec -n 5 .*\), got this one alone"),
+        ExitStack() as stack,
+    ):
+        stack.enter_context(by_mpi.on_mpi({"THREADS": "1"}))

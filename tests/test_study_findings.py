@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from a7sim.study.figures import of_response
 from a7sim.study.findings import MOST_DENSITIES, document_of
 from a7sim.study.loading import study_of
+from a7sim.study.page import markdown_of
 from a7sim.study.tables import of_study
 from a7sim.study.tally import Tally
 from tests.test_study import BY_COMPARATOR
@@ -17,12 +19,13 @@ NOISE = 0.01 * np.random.default_rng(1).standard_normal((40, 8))
 
 
 def found(folder, values, **changes):
-    """The document of a study of one response whose cells have replicates ``(cells, n)``, and its tables as text."""
+    """The document of a study whose responses all have replicates ``(cells, n)``, and its tables as text."""
     laid = study_of(BY_COMPARATOR | {"responses": [RESPONSE]} | changes, folder)
     values = np.asarray(values, dtype=float)
-    tally = Tally.empty(len(laid.cells), 1)
+    responses = len(laid.responses)
+    tally = Tally.empty(len(laid.cells), responses)
     for i, each in enumerate(values):
-        tally.add(i, each[None, :])
+        tally.add(i, np.tile(each, (responses, 1)))
     document = document_of(laid, tally)
     console = Console(width=200)
     with console.capture() as printed:
@@ -116,3 +119,85 @@ def test_a_precision_that_is_not_reached_is_said(tmp_path, half_width, reached):
     document, printed = found(tmp_path, 2.0 + NOISE[:2], precision=precision)
     assert document["precision_reached"] is reached
     assert ("The precision asked for is not reached." in printed) is not reached
+
+
+CLAIM = {"says": "One pointing does.", "about": "the second pointing", "factor": "pointings", "responses": [RESPONSE]}
+
+
+@pytest.mark.parametrize(
+    ("claim", "values", "verdict", "answer"),
+    [
+        ({"differ": [["1"], ["4"]]}, np.array([[2.0], [3.0]]) + NOISE[:2], "matters", ", 4 minus 1: +"),
+        ({"alike": ["1", "4"]}, np.array([[2.0], [3.0]]) + NOISE[:2], "matters", ", 4 minus 1: +"),
+        ({"differ": [["1"], ["4"]]}, [[2.0], [3.0]], "is left open", "p unknown: left open by so many replicates."),
+    ],
+    ids=["they differ", "they are not alike", "one replicate"],
+)
+def test_a_claim_is_printed_with_its_verdict_and_every_answer(tmp_path, claim, values, verdict, answer):
+    document, printed = found(tmp_path, values, claim=[CLAIM | claim])
+    printed = " ".join(printed.split())
+    (said,) = document["claims"]
+    assert said["verdict"] == verdict
+    assert f"the second pointing {verdict} Claim: One pointing does." in printed
+    assert document["in_a_sentence"].startswith(f"The second pointing {verdict}")
+    (sentence,) = said["answer"]
+    assert answer in sentence
+    assert " ".join(sentence.split()) in printed
+
+
+def test_each_response_of_a_hypercube_has_its_own_effects_everywhere(tmp_path):
+    hypercube = {
+        "design": "latin-hypercube",
+        "samples": 12,
+        "factor": [{"name": "film", "path": "film.irregular_um", "range": [0.0, 5.0]}],
+        "responses": [RESPONSE, "strip_height_at_checks_m"],
+    }
+    document, printed = found(tmp_path, 2.0 + NOISE[:12], **hypercube)
+    assert [each["response"] for each in document["main_effects"]] == hypercube["responses"]
+    assert printed.count("of that, chance") == 2
+    page, _ = markdown_of(document, "figures")
+    assert page.count("What each factor weighs alone") == 2
+
+
+def test_a_page_says_loudly_that_all_gave_up_and_that_a_precision_is_not_reached(tmp_path):
+    precision = {"response": RESPONSE, "half_width": 1e-6}
+    page, figures = markdown_of(found(tmp_path, np.full((2, 8), np.nan), precision=precision)[0], "figures")
+    assert "**Every session gave up.**" in page
+    assert "**The precision asked for is not reached.**" in page
+    assert figures == {}
+
+
+@pytest.mark.parametrize(
+    ("factor", "places"),
+    [
+        (POINTINGS, {"counts": "pointings", "at": {"1": 1, "4": 4}}),
+        (
+            {"name": "heights", "path": "strip.polynomial", "levels": [2, 3]},
+            {"counts": "heights", "at": {"2": 2, "3": 3}},
+        ),
+    ],
+)
+def test_numbers_have_their_places_on_an_axis(tmp_path, factor, places):
+    document, _ = found(tmp_path, 2.0 + NOISE[:2], factor=[factor])
+    assert document["places"] == {factor["name"]: places}
+
+
+def test_pairs_of_numbers_lie_as_far_apart_as_they_are(tmp_path):
+    levels = {"name": "levels", "path": "plan.centre_levels", "levels": [[4900.0, 5100.0], [4800.0, 5200.0]]}
+    at_the_plotter = {"scenario": "akwanga", "settings": {}, "responses": ["hours"]}
+    document, _ = found(tmp_path, 2.0 + NOISE[:2], factor=[levels], **at_the_plotter)
+    (places,) = document["places"].values()
+    assert places == {"counts": "separation of levels", "at": {"4900 - 5100": 200.0, "4800 - 5200": 400.0}}
+
+
+def test_levels_far_apart_are_drawn_on_a_logarithmic_axis_and_too_many_cells_not_one_by_one(tmp_path, monkeypatch):
+    factor = {"name": "film", "path": "film.irregular_um", "levels": [0.1, 1.0]}
+    document, _ = found(tmp_path, 2.0 + NOISE[:2], factor=[factor])
+    document["densities"] = []
+    drawn = {}
+    for most in (2, 1):
+        monkeypatch.setattr("a7sim.study.figures.MOST_CELLS_DRAWN", most)
+        drawn[most] = [each.caption for each in of_response(document, document["responses"][0])]
+    assert len(drawn[2]) == 2
+    assert drawn[1] == drawn[2][:1]
+    assert "against film" in drawn[1][0]

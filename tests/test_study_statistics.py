@@ -164,3 +164,21 @@ def test_a_density_holds_nearly_all_and_is_nothing_where_nothing_varies():
     assert list(found["densities"]) == ["f"]
     assert np.trapezoid(found["densities"]["f"], found["places"]) == pytest.approx(1.0, abs=0.02)
     assert densities({"same": np.full(10, 2.0)}) == {}
+
+
+def test_too_few_values_say_nothing_instead_of_something():
+    """One value has no spread, two no regression, nothing no quantile: nan, never an error or a narrow interval."""
+    one, two = np.array([2.0]), np.array([[1.0, 2.0]])
+    assert np.isnan(mean_interval(2.0, 0.0, 1)).all()
+    assert np.isnan(sd_interval(one, 1, (0,))).all()
+    value, interval = quantile_with_interval(np.array([]), 0.5)
+    assert np.isnan([value, *interval]).all()
+    alone = compared(one, np.array([1.0]))
+    assert alone.pairs == 1
+    assert np.isnan([alone.difference, *alone.interval, alone.p]).all()
+    same, rising = np.ones((1, 5)), np.arange(5.0)[None]
+    for values, on, count in ((two, two, 2), (same, rising, 5), (rising, same, 5)):
+        found = dependence(values, on)
+        assert found.replicates == count
+        assert np.isnan([found.slope, *found.interval, found.correlation, *found.correlation_interval, found.p]).all()
+    assert variance_by_factor(np.array([[1.0, np.nan], [2.0, 3.0]]), ["f"]) == []

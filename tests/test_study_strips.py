@@ -267,6 +267,14 @@ MISTAKES = {
     "another bench": ({"settings": {"work": ["plotter", "comparator"]}}, "work at the plotter alone"),
     "a wrong factor": ({"claim": [STUDY["claim"][0] | {"factor": "model 3"}]}, "a factor of model 1, model 2"),
     "a wrong level": ({"claim": [STUDY["claim"][0] | {"differ": [["A"], ["F"]]}]}, "a level of A, B, C, D, E"),
+    "a level against itself": (
+        {"claim": [STUDY["claim"][0] | {"differ": [["A"], ["B", "A"]]}]},
+        "claim 1: expected every level once, got 'A' twice",
+    ),
+    "a level against none": (
+        {"claim": [STUDY["claim"][0] | {"differ": [["A"], []]}]},
+        "a level or more in both groups of differ",
+    ),
     "a wrong response": ({"claim": [STUDY["claim"][1] | {"depends_on": ["iterations"]}]}, "claim 1: expected a respon"),
     "two kinds": ({"claim": [STUDY["claim"][0] | {"alike": ["B", "C"]}]}, "got differ and alike"),
     "a strip in one model": ({"responses": ["hours@1"]}, "a response of models before @"),

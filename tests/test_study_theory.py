@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from a7sim.geometry import GON
 from a7sim.manual import LEAST_COUNT
@@ -14,6 +15,7 @@ from a7sim.study import theory
 from a7sim.study.findings import document_of
 from a7sim.study.loading import study_of
 from a7sim.study.page import page_of
+from a7sim.study.tables import of_study
 from a7sim.study.tally import Tally
 from a7sim.study.theory import (
     ROUNDING,
@@ -134,7 +136,8 @@ def test_what_theory_leaves_out_is_said():
     assert [each.split()[0] for each in limits_of(worn)] == ["film", "faults", "slips,"]
 
 
-def test_a_study_has_theory_in_its_document_and_on_its_page(tmp_path):
+def studied(folder):
+    """The document of three replicates of two cells."""
     raw = {
         "schema_version": 1,
         "title": "t",
@@ -144,14 +147,29 @@ def test_a_study_has_theory_in_its_document_and_on_its_page(tmp_path):
         "responses": ["centre_Z_error", "hours"],
         "replicates": 3,
     }
-    laid = study_of(raw, tmp_path)
+    laid = study_of(raw, folder)
     tally = Tally.empty(2, 2)
     for cell in range(2):
         tally.add(cell, np.array([[0.9, 1.0, 1.1], [9.0, 8.0, 7.0]]))
-    document = document_of(laid, tally)
+    return document_of(laid, tally)
+
+
+def test_a_study_has_theory_in_its_document_and_on_its_page(tmp_path):
+    document = studied(tmp_path)
     spread = document["cells"][0]["responses"]["centre_Z_error"]
     assert spread["ratio"] == pytest.approx(math.hypot(1.0, 0.1) / spread["theory"])
     assert "theory" not in document["cells"][0]["responses"]["hours"]
     assert "It leaves out film that shrinks unevenly" in document["theory"]
     page = Page(page_of(document))
     assert page.table("Means, standard deviations and quantiles").rows[0][-1] == f"{spread['ratio']:.4g}"
+
+
+def test_a_study_prints_what_theory_says_and_how_far_it_is_from_that(tmp_path):
+    document = studied(tmp_path)
+    console = Console(width=250)
+    with console.capture() as printed:
+        console.print(of_study(document))
+    text = " ".join(printed.get().split())
+    assert " ".join(document["theory"].split()) in text
+    spread = document["cells"][0]["responses"]["centre_Z_error"]
+    assert f"{spread['theory']:.3g} {spread['ratio']:.3g}" in text

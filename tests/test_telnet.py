@@ -78,6 +78,7 @@ def test_an_option_that_is_asked_twice_is_answered_once():
         (11, b"\xff", b"\xff"),
         (12, b"\x03", b"\x03"),
         (0, b"", b"a7sim"),
+        (6, b"", b"\x00"),
     ],
 )
 def test_com_port_settings_are_taken_and_told(option, value, answer):
@@ -96,3 +97,18 @@ def test_a_subnegotiation_without_end_keeps_little_and_ends_with_its_end():
     assert telnet.received(b"\xff\xfa\x2c\x01" + b"x" * 1_000_000) == (b"", b"")
     assert len(telnet._sub) == LONGEST_SUBNEGOTIATION
     assert telnet.received(b"\xff\xf0*TST?\n")[0] == b"*TST?\n"
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [com_port(8, b""), com_port(99, b"\x01"), com_port(5, b""), b"\xff\xfa\x2c\xff\xf0", b"\xff\xfa\x18\x01\xff\xf0"],
+    ids=["flow control is suspended", "an unknown option", "a control of nothing", "no option", "another negotiation"],
+)
+def test_what_asks_nothing_that_it_knows_gets_no_answer_and_the_data_after_it_come_through(sent):
+    assert Telnet().received(sent + b"*TST?\n") == (b"*TST?\n", b"")
+
+
+def test_a_command_in_the_midst_of_a_subnegotiation_is_passed_over():
+    within = com_port(1, (115200).to_bytes(4, "big"))
+    with_nop = within[:6] + b"\xff\xf1" + within[6:]
+    assert Telnet().received(with_nop) == Telnet().received(within)

@@ -110,6 +110,39 @@ def test_answers_are_those_that_the_exercise_asks_for(train):
     assert train("watch", 1, "--every", "0.1")[0] == 0
 
 
+def test_hints_and_answers_are_documents_where_they_are_asked_for(train):
+    train("start", 1, "--seed", 1, "--script", EXERCISES / "01-counters" / "reference.a7s")
+    hint = json.loads(train("hint", 1, "--json")[1])
+    first = find_exercise("1").exercise.hints[0]
+    assert (hint["exercise"], hint["hint"], hint["cost"], hint["text"]) == ("01-counters", 1, first.cost, first.text)
+    answer = json.loads(train("answer", "play=0.07", "--json")[1])
+    assert (answer["exercise"], answer["answers"]) == ("01-counters", {"play": "0.07"})
+
+
+def test_a_closed_attempt_takes_neither_hints_nor_answers(train, tmp_path):
+    (tmp_path / "nothing.a7s").write_text("scenario akwanga\n*CLS\n")
+    train("start", "--exam", "--script", tmp_path / "nothing.a7s")
+    assert "expected --exam, since an exam is under way" in train("start", "exam")[2]
+    train("verify")
+    for words in (("hint",), ("answer", "x=1")):
+        code, _, err = train(*words)
+        assert code == 2 and "expected an attempt that is open, got one that is closed" in err
+
+
+def test_a_report_on_nobody_and_a_script_that_does_not_come_out_are_told(train, tmp_path):
+    assert train("report", "--to", "csv")[2] == "a7sim: student ada: expected attempts to report on, found none\n"
+    (tmp_path / "wrong.a7s").write_text("scenario akwanga\nexpect COUN:X? = 9.5\n")
+    code, out, err = train("start", 4, "--script", tmp_path / "wrong.a7s")
+    assert code == 2 and "[ ]" in out and "9.5" in err
+    assert "address of this machine alone" in train("start", 5, "--link", "tcp://8.8.8.8:1")[2]
+
+
+def test_whoever_says_no_name_is_the_one_who_logged_in(train, monkeypatch):
+    monkeypatch.delenv("A7SIM_STUDENT")
+    monkeypatch.setattr("getpass.getuser", lambda: "grace")
+    assert train("report", "--to", "csv")[2].startswith("a7sim: student grace: ")
+
+
 def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
     at_the_references_seed(train)
     (journal,) = (tmp_path / "home").rglob("session.jsonl")

@@ -40,9 +40,14 @@ def see_that_claims_can_be_tested(study: Study, cells: Sequence[Cell]) -> None:
             known = list(dict.fromkeys(cell.levels.get(claim.factor, "") for cell in cells))
             if known == [""]:
                 raise Mistake(f"{where}: expected a factor of {', '.join(cells[0].levels)}, got {claim.factor!r}")
-            for level in _levels(claim):
+            if [] in (claim.differ or []):
+                raise Mistake(f"{where}: expected a level or more in both groups of differ, got none in one")
+            levels = _levels(claim)
+            for level in levels:
                 if level not in known:
                     raise Mistake(f"{where}: expected a level of {', '.join(known)}, got {level!r}")
+                if levels.count(level) > 1:
+                    raise Mistake(f"{where}: expected every level once, got {level!r} twice")
 
 
 def _listed(kinds: Sequence[str]) -> str:
@@ -125,9 +130,7 @@ def _overall(verdicts: Sequence[Verdict]) -> Verdict:
 
 def _in_brackets(tests: Sequence[Document]) -> str:
     """Return in short the test with the largest effect."""
-    most = max(tests, key=_size, default=None)
-    if most is None:
-        return ""
+    most = max(tests, key=_size)
     response = most["response"]
     if "on" in most:
         low, high = most["correlation_interval"]

@@ -1,0 +1,124 @@
+"""Whoever stands between clients and an instrument and writes down what they say: `a7sim record`, in this process."""
+
+import socket
+import struct
+import threading
+from contextlib import contextmanager
+
+from a7sim.link import between
+from a7sim.link.between import LOOKS_EVERY_S, Between
+from a7sim.link.clock import WallClock
+from a7sim.mistakes import Mistake
+from tests.served import PATIENCE
+
+AT_ONCE = struct.pack("ii", 1, 0)
+"""Of SO_LINGER: a connection that is closed is reset."""
+
+
+class Recorder:
+    """A Between that serves a door in a thread, what it heard, and why it ended."""
+
+    def __init__(self, door):
+        self.port = door.getsockname()[1]
+        self.heard = []
+        self.trouble = None
+        self.stop = threading.Event()
+        self._is_there = threading.Condition()
+        between_them = Between("a7sim://akwanga", self._listen, WallClock(), self.stop)
+        self.thread = threading.Thread(target=self._serve, args=(between_them, door))
+        self.thread.start()
+
+    def _serve(self, between_them, door):
+        try:
+            between_them.serve(door)
+        except Mistake as mistake:
+            self.trouble = str(mistake)
+
+    def _listen(self, event):
+        with self._is_there:
+            self.heard.append((event.direction, event.text))
+            self._is_there.notify_all()
+
+    def until(self, direction, text):
+        """Wait until it heard something."""
+        with self._is_there:
+            assert self._is_there.wait_for(lambda: (direction, text) in self.heard, PATIENCE), self.heard
+
+    def client(self):
+        return socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE)
+
+
+@contextmanager
+def recording():
+    with socket.create_server(("127.0.0.1", 0)) as door:
+        recorder = Recorder(door)
+        try:
+            yield recorder
+        finally:
+            recorder.stop.set()
+            recorder.thread.join(PATIENCE)
+            assert not recorder.thread.is_alive()
+
+
+def test_what_says_nothing_is_passed_on_and_not_written_down_and_what_is_too_long_not_kept():
+    """A line without an end is let go piece by piece, so that nobody's memory grows, and is one line all the same."""
+    with recording() as recorder, recorder.client() as client:
+        client.sendall(b"\n \r\n*OPC?\n" + b"x" * 5000)
+        recorder.until("<", "1")
+        client.sendall(b"x\nSYST:ERR:NEXT?\n")
+        recorder.until("<", '-363,"Input buffer overrun;expected at most 4096 bytes a line"')
+    assert [each for each in recorder.heard if each[0] in ">!"] == [
+        (">", "*OPC?"),
+        ("!", "(a line of more than 4096 bytes)"),
+        (">", "SYST:ERR:NEXT?"),
+    ]
+    assert recorder.trouble is None
+
+
+def test_a_client_that_is_cut_off_is_written_down_as_gone_and_the_next_is_let_in():
+    with recording() as recorder:
+        with recorder.client() as client:
+            recorder.until("+", "")
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, AT_ONCE)
+        recorder.until("-", "")
+        with recorder.client() as client:
+            client.sendall(b"*OPC?\n")
+            recorder.until("<", "1")
+    assert recorder.trouble is None
+
+
+class Broken:
+    """A line to an instrument that breaks as soon as something is asked."""
+
+    in_waiting = 0
+
+    def __init__(self):
+        self.asked = threading.Event()
+
+    def write(self, data):
+        self.asked.set()
+
+    def read(self, size):
+        if self.asked.wait(LOOKS_EVERY_S):
+            raise OSError(5, "Input/output error")
+        return b""
+
+    def close(self):
+        pass
+
+
+def test_a_line_to_the_instrument_that_breaks_ends_it_in_a_sentence(monkeypatch):
+    monkeypatch.setattr(between, "open_port", lambda *_: Broken())
+    with recording() as recorder, recorder.client() as client:
+        client.sendall(b"*OPC?\n")
+        recorder.thread.join(PATIENCE)
+        assert recorder.trouble == "a7sim://akwanga: the line to the instrument broke"
+
+
+def test_it_stops_with_a_client_still_there():
+    with recording() as recorder, recorder.client() as client:
+        client.sendall(b"*OPC?\n")
+        recorder.until("<", "1")
+        recorder.stop.set()
+        recorder.thread.join(PATIENCE)
+        assert recorder.heard[-1] == ("-", "")
