@@ -223,9 +223,10 @@ def with_control():
     return msgspec.structs.replace(scenario, ground=ground)
 
 
+@pytest.mark.slow
 def test_the_command_bridges_to_its_end_and_shows_what_polynomials_do_beside_the_similarity(monkeypatch, with_control):
     """In both ways, and with more unknowns the control never fits worse; where nothing is to be kept, nothing is."""
-    monkeypatch.setattr("a7sim.cli.bridge.chosen", lambda *_: (with_control, 1))
+    monkeypatch.setattr("a7sim.cli.operators.chosen", lambda *_: (with_control, 1))
     said = a7sim_here("bridge", "bridge")
     assert (said.returncode, said.stderr) == (0, "")
     rows = {
