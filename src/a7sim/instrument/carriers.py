@@ -42,7 +42,7 @@ class Carrier:
         return np.asarray(np.einsum("ji,j...->i...", self._turn, carrier - shift))
 
     def point(self, name: str) -> Array | None:
-        """Return where an image point lies on the carrier ``(2,)``, None where the picture has none such; not to write."""
+        """Return where an image point lies on the carrier ``(2,)``, None where there is none such; not to write."""
         if name not in self._points:
             film = self.photograph.points.get(name)
             if film is None:

@@ -172,7 +172,7 @@ class Watch:
     def all_well(self, who: Who, seen: Array) -> bool:
         """Whether all displacements ``(k, m)`` in um are seen and small, and none ever grew; if not, ask on."""
         now = np.abs(seen)
-        well = not self._any_grew and bool((now <= RUNNING_AWAY_UM).all())
+        well = not self._any_grew and bool(now.max(initial=0.0) <= RUNNING_AWAY_UM)
         if well:
             put(now, who, self._before)
         return well

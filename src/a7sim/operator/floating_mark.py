@@ -87,11 +87,11 @@ class FloatingMark:
         begun = np.full((3, crew.sessions), np.nan)
         for looks in range(MOST_LOOKS):
             seen = self.looked(who, point)
-            keep = crew.goes_on(who)
-            if not watch.all_well(who, seen):
+            well = watch.all_well(who, seen)
+            if not well:
                 self._see_what_runs_away(who, point, seen, watch, begun, clearing)
+            if crew.reasons or not well:
                 keep = crew.goes_on(who) & ~np.isnan(seen).any(axis=0)
-            if not keep.all():
                 who, seen = who[keep], seen.compress(keep, axis=-1)
             if not who.size:
                 return _together(settled)
@@ -112,8 +112,8 @@ class FloatingMark:
             if drum is not None:
                 amounts, at_end = drum.to_turn(who, seen[3] * scale, scale, at_rest)
                 moving |= amounts != 0.0
-                on = ~at_end
-                if not on.all():
+                if at_end.any():
+                    on = ~at_end
                     who, wheels, amounts, moving = who[on], wheels.compress(on, axis=-1), amounts[on], moving[on]
             settled.append(who[~moving])
             who = who[moving]
