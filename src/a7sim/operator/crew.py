@@ -164,6 +164,8 @@ class Crew:
 
     def looked_at(self, who: Who, point: str, look: Callable[[Who, str], Array]) -> Array:
         """Return what `look` gives ``(..., m)`` of the points that those at a point really look at."""
+        if self._slips.all_points_right:
+            return look(who, point)
         groups = [(them, look(them, name)) for them, name in self.pointing_at(who, point)]
         if len(groups) <= 1:
             return groups[0][1] if groups else look(who, point)
