@@ -13,7 +13,7 @@ from a7sim.session.compiling import WITHIN_HALF
 from tests.processes import a7sim_here
 
 SEED = 1985
-HEIGHT = 455.0
+HEIGHT = 471.0
 CONTROL = {"C1", "C2", "C3", "C4"}
 """Points of control in model 1."""
 

@@ -14,7 +14,7 @@ from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.condition import FAULTS_OF, condition_of, local_coefficients
 from a7sim.instrument.language import Desk
 from a7sim.instrument.local_errors import smooth_local_errors
-from a7sim.instrument.projection import beside_the_centre, place_on_carrier, pose
+from a7sim.instrument.projection import beside_the_centre, place_on_carrier, pose, turned_by
 from a7sim.instrument.spindles import Counter, Runout, Spindle
 from a7sim.manual import A7, VARIANTS
 from a7sim.scenario import (
@@ -306,7 +306,7 @@ def test_driven_to_a_reading_a_slipping_counter_shows_it_and_the_mark_is_somewhe
 def test_an_eccentric_rod_passes_its_cardan_at_its_eccentricity(x, y, across, along, kappa):
     """The straight line from the mark to where the rod holds the carrier misses the centre by just so much."""
     mark, c, eccentricity = np.array([x, y, -300.0]), 150.0, np.array([along, across])
-    centre, turned = pose(0.05, -0.03, kappa, np.array([3.0, -2.0, 1.0]), np.zeros(3))
+    centre, turned = pose(turned_by(0.05, -0.03, kappa, np.zeros(3)), np.array([3.0, -2.0, 1.0]))
     image = place_on_carrier(mark, centre, turned, c, np.zeros(2), rod=eccentricity)
     held = centre + turned @ np.array([*image, -c])
     direction = (mark - held) / length_of(mark - held)
@@ -326,10 +326,10 @@ def test_one_mark_and_many_are_brought_to_the_same_places():
     angles, phi, rods = rng.uniform(-0.1, 0.1, (3, 7)), rng.uniform(-0.1, 0.1, 7), rng.uniform(-0.1, 0.1, (2, 7))
     missed, c, point = 0.01 * places, rng.uniform(148.0, 152.0, 7), 0.02 * places[:2]
     local = np.stack([smooth_local_errors(np.random.default_rng(i)) for i in range(7)], axis=-1)
-    centres, turned = pose(*angles, places, missed, phi)
+    centres, turned = pose(turned_by(*angles, missed), places, phi)
     found = place_on_carrier(marks, centres, turned, c, point, local, rods)
     for i in range(7):
-        centre, camera = pose(*angles[:, i], places[:, i], missed[:, i], phi[i])
+        centre, camera = pose(turned_by(*angles[:, i], missed[:, i]), places[:, i], phi[i])
         alone = place_on_carrier(marks[:, i], centre, camera, c[i], point[:, i], local[:, :, i], rods[:, i])
         np.testing.assert_allclose(alone, found[:, i], rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(centre, centres[:, i], atol=1e-12)

@@ -1,9 +1,10 @@
 """The assembled plotter: projectors, carriages, fittings, pictures, and the view through the eyepieces."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -12,7 +13,7 @@ from a7sim.geometry import GON, Array, length_of, mxv, transposed
 from a7sim.instrument.carriers import Carrier
 from a7sim.instrument.condition import INSTRUMENT_STREAM, condition_of, local_coefficients, zero_error
 from a7sim.instrument.optics import as_they_act, projector_seen, view, wheel_senses
-from a7sim.instrument.projection import place_of_centre, place_on_carrier, pose
+from a7sim.instrument.projection import Turned, place_of_centre, place_on_carrier, pose, turned_by
 from a7sim.instrument.recorder import Recorder, Registration
 from a7sim.instrument.refusals import OutOfRange, SettingsConflict, UnknownName
 from a7sim.instrument.spindles import Counter, Runout, Spindle
@@ -27,6 +28,9 @@ MARK_RADIUS_MM = 0.02
 MOVE_CENTRES = ("bx", "by1", "by2", "bz1", "bz2", "common_phi")
 COUNTED_FROM_ZERO = ("phi1", "phi2", "omega1", "omega2", "common_phi")
 """Tilts, whose counters do not read zero where they are none."""
+
+CAMERAS_KEPT = 64
+"""Of the tilts at which they stood last: bx, by and bz move a camera and do not turn it."""
 
 State = dict[str, Any]
 """How an instrument stands, as data that JSON can hold."""
@@ -85,8 +89,10 @@ class Autograph:
         self.base_mode = variant.base_modes[0]
         self.fittings = RIGHT_FITTINGS["positive", self.base_mode]
         self._poses: dict[int, tuple[Array, Array]] = {}
+        self._mark: Array | None = None
         self._nominal_centres: dict[int, tuple[float, float, float]] = {}
         projectors = {n: self._projector_condition(n) for n in (1, 2)}
+        self._axes = {n: tuple(1e-3 * um for um in each.axes_um) for n, each in projectors.items()}
         self._principal_points = {n: 1e-3 * np.array(each.principal_point_um) for n, each in projectors.items()}
         self._local = {n: local_coefficients(each) for n, each in projectors.items()}
         self._rods = {n: 1e-3 * np.array(each.rod_um) if any(each.rod_um) else None for n, each in projectors.items()}
@@ -260,6 +266,7 @@ class Autograph:
         }
         self.register_again(state)
         self._taken.clear()
+        self._mark = None
         self._forget_poses()
 
     def register_again(self, state: State) -> None:
@@ -327,6 +334,7 @@ class Autograph:
         self._refuse_if_rods_cannot(carriages={axis: position})
         before = spindle.at
         spindle.turn_to(position)
+        self._mark = None
         self._takes(axis, abs(position - before) / self.variant.rates.carriage)
         self._counters[axis].passed(before, position, self._rng)
 
@@ -353,20 +361,22 @@ class Autograph:
         base_mode: str | None = None,
     ) -> None:
         """Refuse what brings a rod beyond its limit, or further beyond it where `reset` has left it so."""
+        here = [each.at for each in self._carriages.values()]
+        there = [carriages.get(axis, each.at) for axis, each in self._carriages.items()] if carriages else here
         for projector in (1, 2):
-            inclination = self._rod_inclination(projector, carriages or {}, elements or {}, base_mode or self.base_mode)
+            inclination = self._rod_inclination(projector, there, elements or {}, base_mode or self.base_mode)
             if inclination <= self.variant.rod_limit_gon:
                 continue
-            if inclination > self._rod_inclination(projector, {}, {}, self.base_mode):
+            if inclination > self._rod_inclination(projector, here, {}, self.base_mode):
                 raise OutOfRange(
                     f"expected space rods within {self.variant.rod_limit_gon:.0f} gon of the plumb line, "
                     f"got {inclination:.0f} gon at projector {projector}"
                 )
 
     def _rod_inclination(
-        self, projector: int, carriages: Mapping[str, float], elements: Mapping[str, float], base_mode: str
+        self, projector: int, carriages: Sequence[float], elements: Mapping[str, float], base_mode: str
     ) -> float:
-        at_x, at_y, at_z = [carriages.get(axis, self._carriages[axis].at) for axis in "XYZ"]
+        at_x, at_y, at_z = carriages
         x, y, z = (
             self._nominal_centre(projector, elements, base_mode)
             if elements or base_mode != self.base_mode
@@ -464,12 +474,12 @@ class Autograph:
     def pose(self, projector: int) -> tuple[Array, Array]:
         """Return where a projector really stands: centre ``(3,)`` in mm and rotation ``(3, 3)``."""
         if projector not in self._poses:
-            omega, phi, kappa = (self._really(f"{name}{projector}") * GON for name in ("omega", "phi", "kappa"))
+            tilts = [self._really(f"{name}{projector}") * GON for name in ("omega", "phi", "kappa")]
             share = self._share_of_base(projector, self.base_mode)
-            base = (self._really(name) for name in ("bx", f"by{projector}", f"bz{projector}"))
-            missed = 1e-3 * np.array(self._projector_condition(projector).axes_um)
+            base = [self._really(name) for name in ("bx", f"by{projector}", f"bz{projector}")]
             common_phi = self._really("common_phi") * GON if "common_phi" in self._spindles else None
-            self._poses[projector] = pose(omega, phi, kappa, place_of_centre(share, *base), missed, common_phi)
+            camera = _camera(*tilts, self._axes[projector])
+            self._poses[projector] = pose(camera, place_of_centre(share, *base), common_phi)
         return self._poses[projector]
 
     def _really(self, name: str) -> float:
@@ -480,9 +490,10 @@ class Autograph:
         return position - self.variant.elements[name].zero if name in COUNTED_FROM_ZERO else position
 
     def mark_in_model(self) -> Array:
-        """Return where the floating mark really stands in the instrument frame, ``(3,)`` in mm."""
-        carriage = np.array([self._carriages[axis].position for axis in "XYZ"])
-        return np.asarray(self._guides @ carriage)
+        """Return where the floating mark really stands in the instrument frame, ``(3,)`` in mm; not to write."""
+        if self._mark is None:
+            self._mark = self._guides @ np.array([self._carriages[axis].position for axis in "XYZ"])
+        return self._mark
 
     def readings_at(self, place: Array) -> dict[str, float]:
         """Return what the counters would show, unrounded, with the mark at a place ``(3,)`` of the frame.
@@ -577,6 +588,14 @@ class Autograph:
         if len(self.variant.fittings) == len(POSITIONS_OF):
             return self.fittings
         return as_they_act(self.fittings, polarity, self.base_mode, self.variant.fittings)
+
+
+@lru_cache(maxsize=CAMERAS_KEPT)
+def _camera(omega: float, phi: float, kappa: float, missed: tuple[float, ...]) -> Turned:
+    """Return a camera turned by angles in radians; not to write."""
+    camera = turned_by(omega, phi, kappa, np.array(missed))
+    camera.rotation.flags.writeable = False
+    return camera
 
 
 def _runout_of(condition: Condition, axis: str, lead: float) -> Runout | None:

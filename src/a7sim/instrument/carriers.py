@@ -29,6 +29,7 @@ class Carrier:
     def _set(self) -> None:
         self._turn = plane_rotation((self.laid[2] + self.centring[2]) * GON)
         self._shift = np.array([self.laid[0] + self.centring[0], self.laid[1] + self.centring[1]])
+        self._points: dict[str, Array] = {}
 
     def on_carrier(self, film: Array) -> Array:
         """Return film places ``(2, ...)`` in mm as places on the carrier about its collimating centre."""
@@ -41,9 +42,13 @@ class Carrier:
         return np.asarray(np.einsum("ji,j...->i...", self._turn, carrier - shift))
 
     def point(self, name: str) -> Array | None:
-        """Return where an image point lies on the carrier ``(2,)``, or None where the picture has none such."""
-        film = self.photograph.points.get(name)
-        return None if film is None else self._turn @ film + self._shift
+        """Return where an image point lies on the carrier ``(2,)``, None where there is none such; not to write."""
+        if name not in self._points:
+            film = self.photograph.points.get(name)
+            if film is None:
+                return None
+            self._points[name] = self._turn @ film + self._shift
+        return self._points[name]
 
     def fiducial_displacements(self) -> list[tuple[str, float, float]]:
         """Return name, dx, dy in mm of every fiducial from its collimating mark."""

@@ -3,6 +3,8 @@
 Angles are radians, lengths mm in the instrument frame; vectors have shape ``(3, ...)``.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -15,7 +17,8 @@ def place_of_centre(share: npt.ArrayLike, bx: npt.ArrayLike, by: npt.ArrayLike, 
 
     `share` tells how the base is laid off: 0 and 1 for the two centres of an A7, -1/2 and 1/2 for those of an A8.
     """
-    return np.array(np.broadcast_arrays(np.asarray(share) * np.asarray(bx), -np.asarray(by), bz), dtype=float)
+    place = np.asarray(share) * np.asarray(bx), -np.asarray(by), np.asarray(bz)
+    return np.array(np.broadcast_arrays(*place) if any(each.ndim for each in place) else place, dtype=float)
 
 
 def tilted(place: Array, common_phi: npt.ArrayLike) -> Array:
@@ -23,21 +26,30 @@ def tilted(place: Array, common_phi: npt.ArrayLike) -> Array:
     return mxv(rotation(0.0, common_phi, 0.0), place)
 
 
-def pose(
-    omega: npt.ArrayLike,
-    phi: npt.ArrayLike,
-    kappa: npt.ArrayLike,
-    place: Array,
-    missed: Array,
-    common_phi: npt.ArrayLike | None = None,
-) -> tuple[Array, Array]:
-    """Return centre ``(3, ...)`` and rotation ``(3, 3, ...)`` of a projector whose axes meet at a place of the frame.
+class Turned(NamedTuple):
+    """A camera turned about its axes, wherever they meet."""
 
-    `missed` ``(3, ...)`` is by how much the axes miss the projection centre, in the camera's axes: it goes round with
-    the camera. The common Phi turns the frame with all that stands on it, `Ry(Phi) R`.
-    """
+    rotation: Array
+    """``(3, 3, ...)``."""
+    missed: Array
+    """By how much the axes miss the projection centre, in the camera's axes ``(3, ...)``, mm."""
+    gone_round: Array
+    """The same in the frame's axes: it goes round with the camera."""
+
+
+def turned_by(omega: npt.ArrayLike, phi: npt.ArrayLike, kappa: npt.ArrayLike, missed: Array) -> Turned:
+    """Return a camera with these tilts whose axes miss the projection centre by so much ``(3, ...)`` in mm."""
     turned = rotation(omega, phi, kappa)
-    centre = place + mxv(turned, missed) - missed
+    return Turned(turned, missed, mxv(turned, missed))
+
+
+def pose(camera: Turned, place: Array, common_phi: npt.ArrayLike | None = None) -> tuple[Array, Array]:
+    """Return centre ``(3, ...)`` and rotation ``(3, 3, ...)`` of a camera whose axes meet at a place of the frame.
+
+    The common Phi turns the frame with all that stands on it, `Ry(Phi) R`.
+    """
+    turned = camera.rotation
+    centre = place + camera.gone_round - camera.missed
     if common_phi is None:
         return centre, turned
     return tilted(centre, common_phi), mxm(rotation(0.0, common_phi, 0.0), turned)

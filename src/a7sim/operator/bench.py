@@ -128,7 +128,7 @@ class Bench:
 
     def _come_to(self, who: Who, point: str) -> None:
         """Go to a point, or by mistake to a standard point near it."""
-        near = neighbours(self.seat.model.standard_points, point)
+        near = neighbours(self.seat.model.standard_points, point) if self.crew.mistakes_points else []
         self.crew.come_to(who, point, {name: self.pricked(who, name) for name in near})
 
     # --- monocular pointing ---------------------------------------------------------------------------

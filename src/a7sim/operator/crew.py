@@ -134,10 +134,15 @@ class Crew:
 
     # --- slips ----------------------------------------------------------------------------------------
 
+    @property
+    def mistakes_points(self) -> bool:
+        """Whether anybody may go to another point than the one that is meant."""
+        return self._slips.possible("wrong point")
+
     def come_to(self, who: Who, point: str, near: Mapping[str, npt.NDArray[np.bool_]]) -> None:
         """Go to a point, or by mistake to one near it; who can find which of these ``(m,)`` on their prints."""
         self.come_back(who)
-        if not self._slips.possible("wrong point"):
+        if not self.mistakes_points:
             return
         factors = self._slip_factors(who)
         for i, session in enumerate(who):
@@ -159,6 +164,8 @@ class Crew:
 
     def looked_at(self, who: Who, point: str, look: Callable[[Who, str], Array]) -> Array:
         """Return what `look` gives ``(..., m)`` of the points that those at a point really look at."""
+        if self._slips.all_points_right:
+            return look(who, point)
         groups = [(them, look(them, name)) for them, name in self.pointing_at(who, point)]
         if len(groups) <= 1:
             return groups[0][1] if groups else look(who, point)

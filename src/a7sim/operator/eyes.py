@@ -104,11 +104,12 @@ class Eyes:
         watch = Watch(2, self.crew.sessions)
         for looks in range(MOST_LOOKS):
             seen = self.seen(who, hand, point)
-            lost = np.isnan(seen[0]) | watch.running_away(who, seen).any(axis=0)
-            if lost.any():
-                self._look_again_with_levers_right(who, hand, point, seen, lost)
-                self._ran_away(who[lost], hand, point)
-                who, seen = who[~lost], seen[:, ~lost]
+            if not watch.all_well(who, seen):
+                lost = np.isnan(seen[0]) | watch.running_away(who, seen).any(axis=0)
+                if lost.any():
+                    self._look_again_with_levers_right(who, hand, point, seen, lost)
+                    self._ran_away(who[lost], hand, point)
+                    who, seen = who[~lost], seen[:, ~lost]
             steps = (seen + among(errors, who)) * (1e-3 * among(seat.z, who) / seat.c)
             moving = ~(np.abs(steps) < self.at_rest_mm(looks)).all(axis=0)
             who = who[moving]
@@ -167,6 +168,14 @@ class Watch:
         self._before = np.full((displacements, sessions), np.inf)
         self._times = np.zeros((displacements, sessions), dtype=int)
         self._any_grew = False
+
+    def all_well(self, who: Who, seen: Array) -> bool:
+        """Whether all displacements ``(k, m)`` in um are seen and small, and none ever grew; if not, ask on."""
+        now = np.abs(seen)
+        well = not self._any_grew and bool(now.max(initial=0.0) <= RUNNING_AWAY_UM)
+        if well:
+            put(now, who, self._before)
+        return well
 
     def growing(self, who: Who) -> Truths:
         """Return which of the displacements ``(k, m)`` had grown when they were last seen."""

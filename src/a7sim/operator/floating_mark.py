@@ -87,19 +87,11 @@ class FloatingMark:
         begun = np.full((3, crew.sessions), np.nan)
         for looks in range(MOST_LOOKS):
             seen = self.looked(who, point)
-            unseen = np.isnan(seen)
-            lost = unseen.any(axis=0)
-            vanished = watch.growing(who) & lost
-            running_away = watch.running_away(who, np.where(unseen, 0.0, seen) if lost.any() else seen)
-            running_away[3] &= clearing is not None
-            away = (vanished | running_away)[2:]
-            if away.any():
-                mended = self._look_again_with_levers_right(who, point, seen, away, begun)
-                running_away[:, mended] = False
-                lost = np.isnan(seen).any(axis=0)
-                self._see_that_it_fuses(who, point, running_away, clearing)
-            keep = ~lost & crew.goes_on(who)
-            if not keep.all():
+            well = watch.all_well(who, seen)
+            if not well:
+                self._see_what_runs_away(who, point, seen, watch, begun, clearing)
+            if crew.reasons or not well:
+                keep = crew.goes_on(who) & ~np.isnan(seen).any(axis=0)
                 who, seen = who[keep], seen.compress(keep, axis=-1)
             if not who.size:
                 return _together(settled)
@@ -120,8 +112,8 @@ class FloatingMark:
             if drum is not None:
                 amounts, at_end = drum.to_turn(who, seen[3] * scale, scale, at_rest)
                 moving |= amounts != 0.0
-                on = ~at_end
-                if not on.all():
+                if at_end.any():
+                    on = ~at_end
                     who, wheels, amounts, moving = who[on], wheels.compress(on, axis=-1), amounts[on], moving[on]
             settled.append(who[~moving])
             who = who[moving]
@@ -145,6 +137,20 @@ class FloatingMark:
         self.crew.spend(who, self.crew.observer.seconds_to_look, "looking")
         lx, ly, rx, ry = self.crew.looked_at(who, point, self.seat.hands.seen_by_both)
         return np.array([(lx + rx) / 2.0, (ly + ry) / 2.0, lx - rx, ly - ry])
+
+    def _see_what_runs_away(
+        self, who: Who, point: str, seen: Array, watch: Watch, begun: Array, clearing: Clearing | None
+    ) -> None:
+        """Put right the levers of those whose parallaxes grow, as far as these are wrong, else let them give up."""
+        unseen = np.isnan(seen)
+        vanished = watch.growing(who) & unseen.any(axis=0)
+        running_away = watch.running_away(who, np.where(unseen, 0.0, seen))
+        running_away[3] &= clearing is not None
+        away = (vanished | running_away)[2:]
+        if away.any():
+            mended = self._look_again_with_levers_right(who, point, seen, away, begun)
+            running_away[:, mended] = False
+            self._see_that_it_fuses(who, point, running_away, clearing)
 
     def _look_again_with_levers_right(
         self, who: Who, point: str, seen: Array, parallaxes_grow: Truths, begun: Array

@@ -1,5 +1,6 @@
 """Hands at the end of a line: one person's, in lines of text over the link."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -11,6 +12,8 @@ from a7sim.link.headers import FITTING_NODES, header, short
 from a7sim.manual import NOT_VISIBLE, POSITIONS_OF
 from a7sim.operator.hands import Truths
 from a7sim.operator.person import Person
+
+_NOT_VISIBLE = float(NOT_VISIBLE)
 
 
 class LineHands:
@@ -97,7 +100,7 @@ class LineHands:
         return np.array([before == after])
 
     def turn(self, who: Who, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
-        turned = ";".join(f"{axis} {amount:.4f}" for axis, amount in zip("XYZ", wheels[:, 0], strict=False))
+        turned = ";".join(f"{axis} {amount:.4f}" for axis, amount in zip("XYZ", wheels[:, 0].tolist(), strict=False))
         line = f"WHE:{turned}"
         if element is not None and amounts is not None:
             line += f";:{header(element)}:TURN {amounts[0]:.5f}"
@@ -110,9 +113,7 @@ class LineHands:
         return self._looked(f'EYEP1? "{point}";:EYEP2? "{point}"')
 
     def _looked(self, question: str) -> Array:
-        seen = np.array(self._numbers(question))[:, None]
-        seen[seen == float(NOT_VISIBLE)] = np.nan
-        return seen
+        return np.array([[math.nan if each == _NOT_VISIBLE else each] for each in self._numbers(question)])
 
     def record(self, who: Who, point: str) -> None:
         self._send(f'REC "{point}"')

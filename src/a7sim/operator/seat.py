@@ -39,7 +39,7 @@ class Seat:
         self.z = np.zeros(crew.sessions)
         """How far the mark stood below the base line when the counters were last read."""
         self.c = job.certificate.c
-        self._plane = np.ones(2)
+        self._plane = _by_dimensions(np.ones(2))
         """Units of the X and Y counters a mm."""
         self._settings = {name: np.zeros(crew.sessions) for name in STEADY}
         self._left_at: dict[str, Array] = {}
@@ -74,7 +74,7 @@ class Seat:
         gear = self.job.plan.height_gear
         self.manual = VARIANTS[self.hands.variant()]
         self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
-        self._plane = np.array([self.manual.scales[axis].units_per_mm for axis in "XY"])
+        self._plane = _by_dimensions(np.array([self.manual.scales[axis].units_per_mm for axis in "XY"]))
         return gear
 
     def _count_from_origin(self, who: Who, axes: str) -> None:
@@ -298,21 +298,26 @@ class Seat:
 
     def in_units(self, shift: Array) -> Array:
         """Return shifts ``(2, ...)`` in mm as so much of the X and Y counters."""
-        return np.asarray(self._plane.reshape((2,) + (1,) * (shift.ndim - 1)) * shift)
+        return np.asarray(self._plane[shift.ndim] * shift)
 
     def in_mm(self, counted: Array) -> Array:
         """Return differences ``(2, ...)`` of X and Y readings in mm."""
-        return np.asarray(counted / self._plane.reshape((2,) + (1,) * (counted.ndim - 1)))
+        return np.asarray(counted / self._plane[counted.ndim])
 
     @property
     def units(self) -> Array:
         """Units a mm ``(3,)`` of the X, Y and Z counters."""
-        return np.array([*self._plane, self.units_per_mm])
+        return np.array([*self._plane[1], self.units_per_mm])
 
     def on_carrier(self, who: Who, hand: int, print_place: Array) -> Array:
         """Return places of paper prints ``(2, m)`` as the swing of their photograph turns them."""
         swing = wrapped(self._settings[f"kappa{self.projector(hand)}"][who]) * GON
         return mxv(plane_rotation(swing), print_place)
+
+
+def _by_dimensions(units: Array) -> Mapping[int, Array]:
+    """Return units a mm ``(2,)`` by how many dimensions what they go with has: points, sessions of each, or neither."""
+    return {1: units, 2: units[:, None], 3: units[:, None, None]}
 
 
 def wrapped(gon: Array) -> Array:

@@ -7,6 +7,7 @@ in error is added by the procedures.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -81,6 +82,11 @@ class Look:
         """Size in the model by size in the photographs."""
         return self.spacing / self.pitch
 
+    @cached_property
+    def compared(self) -> Array:
+        """Displacements in plan ``(2, n)`` of the places at which the pictures are compared, mm in the model."""
+        return self.patch(_PATCH)
+
     def patch(self, side: int) -> Array:
         """Return displacements in plan ``(2, n)`` over so many picture elements each way, mm in the model."""
         at = self.spacing * (np.arange(side) - (side - 1) / 2.0)
@@ -99,7 +105,7 @@ class Look:
 
         `surface` is height, slope in X, slope in Y in the model, and y-parallax at photo scale.
         """
-        plan = self.patch(_PATCH)
+        plan = self.compared
         raised = np.concatenate([plan, [surface[0] + surface[1:3] @ plan]])
         seen = self.shown @ raised
         seen[0, 1] += surface[3] / 2.0
@@ -168,7 +174,7 @@ class StereoView:
         if reach:
             per_element = look.pitch / look.parallax_by_height
             heights = start[0] + np.arange(-reach, reach + per_element, 0.75 * per_element)
-            tried = [_correlation(*_compared(look, np.array([h, *start[1:]]))[:2]) for h in heights]
+            tried = [_correlation(look, np.array([h, *start[1:]])) for h in heights]
             start[0] = heights[int(np.argmax(tried))]
         return _matched(look, start)
 
@@ -178,21 +184,23 @@ def _matched(look: Look, surface: Array) -> Surface:
     scale = np.array([1.0, 10.0, 10.0, 1.0])
     for _ in range(_MOST_STEPS):
         left, right, left_slopes, right_slopes, plan = _compared(look, surface)
-        if left.size < _PATCH or not left.std() * right.std():
+        if left.size < _PATCH:
             return Surface(0.0, np.zeros(2), 0.0, 0.0)
-        by_height = (left_slopes * look.shown[0, :, 2:]).sum(axis=0) / left.std() - (
+        left_spread, right_spread = left.std(), right.std()
+        if not left_spread * right_spread:
+            return Surface(0.0, np.zeros(2), 0.0, 0.0)
+        by_height = (left_slopes * look.shown[0, :, 2:]).sum(axis=0) / left_spread - (
             right_slopes * look.shown[1, :, 2:]
-        ).sum(axis=0) / right.std()
-        by_parallax = (left_slopes[1] / left.std() + right_slopes[1] / right.std()) / 2.0
+        ).sum(axis=0) / right_spread
+        by_parallax = (left_slopes[1] / left_spread + right_slopes[1] / right_spread) / 2.0
         design = np.array([by_height, by_height * plan[0], by_height * plan[1], by_parallax, np.ones(left.size)]).T
-        misfit = (left - left.mean()) / left.std() - (right - right.mean()) / right.std()
+        misfit = (left - left.mean()) / left_spread - (right - right.mean()) / right_spread
         step = np.linalg.lstsq(design, -misfit, rcond=None)[0][:4]
         surface = surface + step
         surface[1:3] = np.clip(surface[1:3], -_STEEPEST, _STEEPEST)
         if np.abs(step * scale).max() < _AT_REST:
             break
-    correlation = _correlation(*_compared(look, surface)[:2])
-    return Surface(float(surface[0]), surface[1:3].copy(), float(surface[3]), correlation)
+    return Surface(float(surface[0]), surface[1:3].copy(), float(surface[3]), _correlation(look, surface))
 
 
 def _compared(look: Look, surface: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -200,27 +208,59 @@ def _compared(look: Look, surface: Array) -> tuple[Array, Array, Array, Array, A
 
     Places that the mark covers or that lie outside either picture are left out.
     """
+    between, plan = _seen_by_both(look, surface)
+    sense = np.array([[1.0], [-1.0]])
+    left_slopes, right_slopes = (each.slopes * sense / look.pitch for each in between)
+    return between[0].greys, between[1].greys, left_slopes, right_slopes, plan
+
+
+def _seen_by_both(look: Look, surface: Array) -> tuple[list["_Between"], Array]:
+    """Return where both pictures show a surface free of the mark, and the places ``(2, n)``."""
     plan, seen = look.places(surface)
     columns, rows, plain = look.elements_at(seen)
     keep = plain.all(axis=0)
-    greys, slopes = [], []
-    for eye in (0, 1):
-        grey, slope = _interpolated(look.pictures[eye], columns[eye, keep], rows[eye, keep])
-        greys.append(grey)
-        slopes.append(slope * np.array([[1.0], [-1.0]]) / look.pitch)
-    return greys[0], greys[1], slopes[0], slopes[1], plan[:, keep]
+    between = [_Between.of(look.pictures[eye], columns[eye, keep], rows[eye, keep]) for eye in (0, 1)]
+    return between, plan[:, keep]
 
 
-def _interpolated(picture: Array, columns: Array, rows: Array) -> tuple[Array, Array]:
-    """Return greys ``(n,)`` between picture elements and how they change by column and row ``(2, n)``."""
-    j, i = columns.astype(np.intp), rows.astype(np.intp)
-    u, v = columns - j, rows - i
-    a, b, c, d = picture[i, j], picture[i, j + 1], picture[i + 1, j], picture[i + 1, j + 1]
-    upper, lower = a + (b - a) * u, c + (d - c) * u
-    return upper + (lower - upper) * v, np.array([(b - a) * (1.0 - v) + (d - c) * v, lower - upper])
+@dataclass(frozen=True)
+class _Between:
+    """Places ``(n,)`` between picture elements: how far to the right and down, and the changes of grey about them."""
+
+    to_right: Array
+    down: Array
+    upper: Array
+    upper_change: Array
+    lower: Array
+    lower_change: Array
+
+    @classmethod
+    def of(cls, picture: Array, columns: Array, rows: Array) -> "_Between":
+        j, i = columns.astype(np.intp), rows.astype(np.intp)
+        first, width, elements = i * picture.shape[1] + j, picture.shape[1], picture.ravel()
+        a, c = elements.take(first), elements.take(first + width)
+        return cls(columns - j, rows - i, a, elements.take(first + 1) - a, c, elements.take(first + (width + 1)) - c)
+
+    @cached_property
+    def _ends(self) -> tuple[Array, Array]:
+        upper = self.upper + self.upper_change * self.to_right
+        return upper, self.lower + self.lower_change * self.to_right - upper
+
+    @property
+    def greys(self) -> Array:
+        """Greys ``(n,)``."""
+        upper, difference = self._ends
+        return upper + difference * self.down
+
+    @property
+    def slopes(self) -> Array:
+        """How they change by column and row ``(2, n)``."""
+        return np.array([self.upper_change * (1.0 - self.down) + self.lower_change * self.down, self._ends[1]])
 
 
-def _correlation(left: Array, right: Array) -> float:
+def _correlation(look: Look, surface: Array) -> float:
+    """Return how the greys of a surface in both pictures are correlated."""
+    left, right = (each.greys for each in _seen_by_both(look, surface)[0])
     spread = float(left.std() * right.std()) if left.size >= _PATCH else 0.0
     return float(((left - left.mean()) * (right - right.mean())).mean()) / spread if spread > 0.0 else 0.0
 
@@ -234,5 +274,5 @@ def rectified(look: Look, surface: Surface, side: int) -> tuple[npt.NDArray[np.b
     seen = look.shown[0] @ np.concatenate([plan, [surface.height + surface.slope @ plan]])
     columns, rows, inside = look.elements_at(seen)
     grey = np.zeros(inside.size)
-    grey[inside] = _interpolated(look.pictures[0], columns[inside], rows[inside])[0]
+    grey[inside] = _Between.of(look.pictures[0], columns[inside], rows[inside]).greys
     return inside, grey, plan

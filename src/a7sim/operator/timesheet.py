@@ -1,6 +1,8 @@
 """Where the time of a crew went: simulated seconds by activity and by act."""
 
+from collections import defaultdict
 from collections.abc import Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import Literal
 
@@ -29,17 +31,14 @@ class Timesheet:
     """Seconds ``(sessions,)`` by activity and by act; either sums to all the time that was spent."""
 
     def __init__(self, sessions: int) -> None:
-        self._sessions = sessions
-        self.by_activity: dict[str, Array] = {}
-        self.by_act: dict[str, Array] = {}
+        self.by_activity: dict[str, Array] = defaultdict(partial(np.zeros, sessions))
+        self.by_act: dict[str, Array] = defaultdict(partial(np.zeros, sessions))
 
     def spend(self, who: Who, seconds: float, form: str, act: Act) -> None:
         """Write down that those who act spent so many seconds each."""
         activity = _OF_ACT.get(act) or _OF_FORM.get(form, form)
-        for column, name in ((self.by_activity, activity), (self.by_act, act)):
-            if name not in column:
-                column[name] = np.zeros(self._sessions)
-            add(seconds, who, column[name])
+        add(seconds, who, self.by_activity[activity])
+        add(seconds, who, self.by_act[act])
 
     def activities_of(self, session: int) -> dict[str, float]:
         """Return the seconds of one session by activity, in the order in which they were first taken up."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import LinkEvent
@@ -20,8 +21,7 @@ PLAIN = ("drive", "wheel", "set", "turn")
 """Deeds that move a drum or a carriage."""
 
 
-@dataclass(frozen=True, slots=True)
-class Deed:
+class Deed(Struct, frozen=True, gc=False):
     """Something done at the instrument, with where a handle stood before and after, as its counter counts.
 
     `what` is 'set' or 'turn' of an element, 'drive' or 'wheel' of an axis, 'preset', 'fit', 'base', 'gear', 'load',
@@ -95,7 +95,10 @@ class Witness:
         self.now, self.client = event.time, event.client
         if event.direction == "-" and event.client == OPENING:
             self.began, self.opened = event.time, True
-        if event.direction == ">" and any(word in event.text.lower() for word in ("note", "fid")):
+        if event.direction != ">":
+            return
+        said = event.text.lower()
+        if "note" in said or "fid" in said:
             for unit in program_of(event.text.encode("latin-1", "replace")):
                 self._take_note(unit)
 

@@ -4,13 +4,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from msgspec import Struct
+
 import a7sim
 from a7sim.instrument.autograph import Autograph, State
 from a7sim.instrument.language.engine import Engine
 
 
-@dataclass(frozen=True, slots=True)
-class LinkEvent:
+class LinkEvent(Struct, frozen=True, gc=False):
     """What happened on the link, in order: simulated time in s, the client, and what it was.
 
     `direction` is '>' for a line to the instrument and '<' for one from it; '+' where a client comes and '-' where it

@@ -1,21 +1,21 @@
 """A line taken apart against the command table: what follows from its text alone, kept for when it comes again."""
 
-from dataclasses import dataclass
 from functools import lru_cache
+
+from msgspec import Struct
 
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
-from a7sim.instrument.language.syntax import Parameter, Unit, unit_of, units_of
+from a7sim.instrument.language.syntax import Mnemonic, Parameter, Unit, mnemonics_of, unit_of, units_of
 from a7sim.instrument.language.table import Call, Command, Handler
 
 LONGEST_KEPT_LINE = 100
 """Bytes of a line that is kept taken apart; longer ones seldom come twice."""
 
-LINES_KEPT = 256
+LINES_KEPT, HEADERS_KEPT = 256, 512
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(Struct, frozen=True):
     """A unit whose command is known."""
 
     text: str
@@ -30,8 +30,7 @@ class Step:
         return self.bare or self.command.call(self.given, self.suffix, client)
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
+class Fault(Struct, frozen=True):
     """A unit that can be no command's."""
 
     number: ErrorNumber
@@ -44,6 +43,7 @@ def text_of(line: bytes) -> str:
 
 
 Program = tuple[Step | Fault, ...]
+Path = tuple[Mnemonic, ...]
 
 
 def program_of(line: bytes) -> Program:
@@ -51,8 +51,7 @@ def program_of(line: bytes) -> Program:
     return _kept(line) if len(line) <= LONGEST_KEPT_LINE else _taken_apart(line)
 
 
-@dataclass(frozen=True, slots=True)
-class Question:
+class Question(Struct, frozen=True):
     """A line that is nothing but a query, always means the same and need not wait: what a client polls."""
 
     text: str
@@ -78,17 +77,24 @@ def _kept_question(received: bytes, cr_ends_line: bool) -> Question | None:
 
 def _taken_apart(line: bytes) -> Program:
     program: list[Step | Fault] = []
-    level: tuple[tuple[str, int | None], ...] = ()
+    level: Path = ()
     for text in units_of(text_of(line)):
         try:
             unit = unit_of(text)
-            path = unit.mnemonics if unit.common or unit.rooted else level + unit.mnemonics
-            command, suffix = COMMANDS.find(path, unit.query)
-            level = level if unit.common else path[:-1]
+            command, suffix, level = _found(unit.header, unit.query, level)
             program.append(_step(text, unit, command, suffix))
         except LanguageError as error:
             program.append(Fault(error.number, error.detail))
     return tuple(program)
+
+
+@lru_cache(maxsize=HEADERS_KEPT)
+def _found(header: str, query: bool, level: Path) -> tuple[Command, int, Path]:
+    """Return the command that a header names below a level, its suffix, and the level of what follows."""
+    common, rooted = header[0] == "*", header[0] == ":"
+    path = mnemonics_of(header) if common or rooted else level + mnemonics_of(header)
+    command, suffix = COMMANDS.find(path, query)
+    return command, suffix, level if common else path[:-1]
 
 
 _kept = lru_cache(maxsize=LINES_KEPT)(_taken_apart)

@@ -2,8 +2,8 @@
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from functools import lru_cache
+
+from msgspec import Struct
 
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 
@@ -16,25 +16,23 @@ _NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _NEVER = re.compile(r"[^ -~\t]")
 
-HEADERS_KEPT = 512
+Mnemonic = tuple[str, int | None]
+"""In capitals, and its numeric suffix."""
 
 
-@dataclass(frozen=True, slots=True)
-class Text:
+class Text(Struct, frozen=True, gc=False):
     """A parameter in quotes."""
 
     value: str
 
 
-@dataclass(frozen=True, slots=True)
-class Word:
+class Word(Struct, frozen=True, gc=False):
     """A parameter of letters and digits, in capitals."""
 
     value: str
 
 
-@dataclass(frozen=True, slots=True)
-class Number:
+class Number(Struct, frozen=True, gc=False):
     """A number with its unit in capitals, '' where none came."""
 
     value: float
@@ -44,16 +42,13 @@ class Number:
 Parameter = Text | Word | Number
 
 
-@dataclass(frozen=True, slots=True)
-class Unit:
-    """One program message unit; mnemonics in capitals with their numeric suffixes, None where none came.
+class Unit(Struct, frozen=True, gc=False):
+    """One program message unit: its header as it came, without the question mark, and what follows it.
 
     The parameters stay as they came until the header is known: a header that is none is the first thing wrong.
     """
 
-    mnemonics: tuple[tuple[str, int | None], ...]
-    rooted: bool
-    common: bool
+    header: str
     query: bool
     data: str
 
@@ -98,18 +93,17 @@ def unit_of(text: str) -> Unit:
     rest = text[header.end() :]
     if rest and rest[0] not in " \t":
         raise LanguageError(ErrorNumber.SYNTAX_ERROR, f"expected a blank after {header[0]}, got {rest[:10]}")
-    name = header[1]
-    return Unit(_mnemonics(name), name[0] == ":", name[0] == "*", header[2] == "?", rest.strip())
+    return Unit(header[1], header[2] == "?", rest.strip())
 
 
-@lru_cache(maxsize=HEADERS_KEPT)
-def _mnemonics(name: str) -> tuple[tuple[str, int | None], ...]:
-    if name[0] == "*":
-        return ((name.upper(), None),)
-    return tuple(map(_mnemonic, name.lstrip(":").split(":")))
+def mnemonics_of(header: str) -> tuple[Mnemonic, ...]:
+    """Return the mnemonics of a header in capitals with their suffixes, None where none came. Raises LanguageError."""
+    if header[0] == "*":
+        return ((header.upper(), None),)
+    return tuple(map(_mnemonic, header.lstrip(":").split(":")))
 
 
-def _mnemonic(text: str) -> tuple[str, int | None]:
+def _mnemonic(text: str) -> Mnemonic:
     found = _MNEMONIC.fullmatch(text)
     if found is None or len(found[2]) > 9:
         raise LanguageError(ErrorNumber.UNDEFINED_HEADER, text[:20])

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Protocol
 
+from msgspec import Struct
+
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 from a7sim.instrument.language.syntax import Number, Parameter, Text, Word
 
@@ -25,8 +27,7 @@ class Client(Protocol):
 Handler = Callable[[Any, "Call"], str | bytes | None]
 
 
-@dataclass(frozen=True, slots=True)
-class Call:
+class Call(Struct, frozen=True, gc=False):
     """A command with its header suffix and its parameters, checked and in base units."""
 
     suffix: int

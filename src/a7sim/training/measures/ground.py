@@ -1,6 +1,7 @@
 """Measures of models beside the ground and beside each other: heights, distances, scale carried on, what was kept."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from itertools import combinations
 
@@ -56,9 +57,12 @@ def _turned_there(deeds: Sequence[Deed], reading: Reading) -> bool:
 
     At the console whatever is in hand is registered, so that it is named says nothing.
     """
-    before = [each for each in deeds if each.place < reading.place]
-    came = [each.place for each in before if each.name in PLAN_AXES and abs(each.after - each.before) >= ARRIVAL]
-    return any(each.name in reading.named and each.place > max(came, default=-1) for each in before)
+    for deed in reversed(deeds[: bisect_left(deeds, reading.place, key=lambda each: each.place)]):
+        if deed.name in reading.named:
+            return True
+        if deed.name in PLAN_AXES and abs(deed.after - deed.before) >= ARRIVAL:
+            return False
+    return False
 
 
 def mean_shown(readings: Sequence[Reading]) -> Array:

@@ -32,7 +32,7 @@ def autograph_of(engine: "Engine") -> "Autograph":
 
 def fixed(value: float, decimals: int = 2) -> str:
     """Return a number with its decimals, never as minus zero."""
-    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+    return f"{value:z.{decimals}f}"
 
 
 def text_within(text: str) -> str:
