@@ -493,6 +493,7 @@ class Autograph:
         """Return where the floating mark really stands in the instrument frame, ``(3,)`` in mm; not to write."""
         if self._mark is None:
             self._mark = self._guides @ np.array([self._carriages[axis].position for axis in "XYZ"])
+            self._mark.flags.writeable = False
         return self._mark
 
     def readings_at(self, place: Array) -> dict[str, float]:

@@ -48,6 +48,7 @@ class Carrier:
             if film is None:
                 return None
             self._points[name] = self._turn @ film + self._shift
+            self._points[name].flags.writeable = False
         return self._points[name]
 
     def fiducial_displacements(self) -> list[tuple[str, float, float]]:
