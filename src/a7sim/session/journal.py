@@ -18,7 +18,7 @@ from a7sim.scene import PICTURES
 from a7sim.session.checkpoints import EVERY, Checkpoint, as_lines, hash_of_state
 from a7sim.session.durable import Durability, DurableFile, JournalStopped, stopped
 from a7sim.session.folder import JOURNAL, SCENARIO_SUFFIX, STATES, TORN, prepare_folder
-from a7sim.session.lines import SCHEMA_VERSION, Chain, Event, Journalled, read_journal
+from a7sim.session.lines import SCHEMA_VERSION, Chain, Event, Journalled, is_begun, read_journal
 
 _REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
 
@@ -81,7 +81,7 @@ class Keeping:
 
     def of_part(self, folder: Path | None) -> "Keeping":
         """Return how a session is kept that is part of another, which may have been cut off before this one began."""
-        begun = folder is not None and (folder / JOURNAL).exists()
+        begun = folder is not None and is_begun(folder / JOURNAL)
         return replace(self, resumes=self.resumes and begun)
 
 

@@ -117,6 +117,15 @@ def read_journal(path: Path) -> Journalled:
     return Journalled(path, _header(path, lines[0]), lines, torn, crc)
 
 
+def is_begun(path: Path) -> bool:
+    """Return whether there is a journal with a whole line: its header, from which a session goes on."""
+    try:
+        with path.open("rb") as file:
+            return file.readline().endswith(b"\n")
+    except FileNotFoundError:
+        return False
+
+
 def _header(path: Path, line: bytes) -> dict[str, Any]:
     header = msgspec.json.decode(line)
     if header.get("schema_version") not in READABLE:
