@@ -91,6 +91,23 @@ def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridg
 
 
 @pytest.mark.slow
+def test_results_of_a_bridge_say_so_where_it_was_interrupted_among_the_independent_models(
+    bridged, tmp_path, monkeypatch
+):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    cut = Path(shutil.copytree(bridged, tmp_path / "cut"))
+    begun = begun_in(cut, "bridge")
+    monkeypatch.setattr("a7sim.session.bridge.run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_bridge(begun.scenario, begun.seed, cut, keeping=Keeping(resumes=True))
+    results = msgspec.json.decode((cut / "results.json").read_bytes())
+    assert results["status"] == "interrupted"
+    assert results["bridged"]["strip"]
+
+
+@pytest.mark.slow
 def test_what_a_folder_had_of_another_strip_is_not_gone_on_with(bridged, tmp_path):
     """Cut off while bridging, in a folder that --force took and where other independent models had been."""
     cut = tmp_path / "cut"

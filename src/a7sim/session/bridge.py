@@ -43,8 +43,9 @@ def run_bridge(
     """Bridge a strip, work the same models independently, and return both on the ground; with `out`, leave the files.
 
     There the files of bridging are those of `run`, and the independent models have a folder of their own.
-    `status` is 'complete', or 'does not fit' with the `message` of the operator who gave up. Raises Mistake for a
-    plotter that cannot bridge, and for a folder that cannot be used, before anything is written.
+    `status` is 'complete', or 'does not fit' with the `message` of the operator who gave up; in the folder it is
+    'interrupted' until the independent models are worked, too. Raises Mistake for a plotter that cannot bridge, and for
+    a folder that cannot be used, before anything is written.
     """
     watcher = watcher or Watcher()
     keeping = keeping or Keeping()
@@ -75,6 +76,8 @@ def run_bridge(
         "strip": _on_ground(bridged_strip([*places.values()]), ground_of(scenario, session.scene), scenario),
         "hours": round(session.person.clock.now / 3600.0, 3),
     }
+    document |= {"status": "interrupted", "message": "the session was interrupted among the independent models"}
+    _leave(document, out)
     folder = out / INDEPENDENT if out else None
     alone = run(
         rephrased(scenario, "a7sim bridge", "a7sim run"),
@@ -86,9 +89,13 @@ def run_bridge(
     )
     document |= {"status": alone["status"], "message": alone["message"]}
     document["independent"] = {"strip": alone.get("strip", {}), "hours": alone["operator"]["hours"]}
+    _leave(document, out)
+    return document
+
+
+def _leave(document: Document, out: Path | None) -> None:
     if out is not None:
         write_whole(out / RESULTS, as_json(document))
-    return document
 
 
 @dataclass(frozen=True)
