@@ -32,9 +32,7 @@ from a7sim.session.resuming import Begun, served_again
 
 USUAL = Address("127.0.0.1", 5025)
 
-_OF_THE_DOOR = (
-    *("tcp", "rfc2217", "pty", "baud", "listen_anyway", "token_file", "clients", "idle", "fault", "fault_seed"),
-)
+_OF_THE_DOOR = "tcp", "rfc2217", "pty", "baud", "listen_anyway", "token_file", "clients", "idle", "fault", "fault_seed"
 """What a session that is served again may be told anew."""
 
 _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")

@@ -24,7 +24,6 @@ from a7sim.standard_points import CASES
 MOST_STRIPS = 700
 """Strips of one command: five cases in up to four models."""
 
-
 FOLDER_OF_CASE = "case-{}"
 
 
