@@ -34,7 +34,12 @@ DURABILITY = click.option(
     show_default=True,
     help="When the journal is on the disk: every line, every registration and the rest within 0.2 s, or never.",
 )
-_RESUME = click.option("--resume", type=options.PLACE, metavar="DIR", help="Go on with the session in DIR, cut off.")
+_RESUME = click.option(
+    "--resume",
+    type=options.PLACE,
+    metavar="DIR",
+    help="Go on with the session in DIR, cut off; its journal says what was asked for.",
+)
 
 
 @dataclass(frozen=True)

@@ -44,8 +44,6 @@ def command(
 ) -> None:
     """Let the operator set up the models of SCENARIO, a file or the name of one that comes with a7sim.
 
-    A session that was cut off goes on with --resume, and nothing else: its journal says what was asked for.
-
     Example: a7sim run akwanga --case E --seed 7 --out runs/akwanga-e
     """
     from a7sim.session.combinations import run_combinations

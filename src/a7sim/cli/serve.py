@@ -101,7 +101,7 @@ def command(
         kept.keeping.prepare(kept.out, kept.force)
         served = _served_anew(loaded, seed, token, realtime, kept)
     with served.journal:
-        run(serve(served, doors, terms, Told(served.head, as_document, quiet)))
+        run(serve(served, doors, terms, Announcements(served.head, as_document, quiet)))
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def _clock(realtime: bool, now: float = 0.0) -> Clock | WallClock:
     return WallClock(now=now) if realtime else Clock(now)
 
 
-async def serve(served: Served, doors: Doors, terms: Terms, told: "Told") -> None:
+async def serve(served: Served, doors: Doors, terms: Terms, told: "Announcements") -> None:
     """Serve an instrument until the process is told to stop. Raises JournalStopped where nothing can be written."""
     stopped = asyncio.Event()
     broken: list[JournalStopped] = []
@@ -167,7 +167,7 @@ async def serve(served: Served, doors: Doors, terms: Terms, told: "Told") -> Non
 
 
 @dataclass(frozen=True)
-class Told:
+class Announcements:
     """What is printed once every door is open."""
 
     head: Document

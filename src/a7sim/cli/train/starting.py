@@ -8,7 +8,7 @@ import click
 
 from a7sim.cli import options
 from a7sim.cli.names import an_exercise
-from a7sim.cli.serve import USUAL, Served, Told, serve
+from a7sim.cli.serve import USUAL, Served, Announcements, serve
 from a7sim.cli.train.options import named, of_a_student, progress_in
 from a7sim.cli.train.sitting_down import sit_down
 from a7sim.documents import head
@@ -127,4 +127,4 @@ def _tell_of_papers(checklist: Checklist) -> None:
 def _serve(room: Room, address: Address) -> None:
     first = head("train start") | {"scenario": room.shelved.exercise.title, "variant": room.scenario.instrument.variant}
     served = Served(first, room.desk, room.clock, Journal())
-    run(serve(served, Doors([address]), Terms(), Told(first, as_document=False, quiet=False)))
+    run(serve(served, Doors([address]), Terms(), Announcements(first, as_document=False, quiet=False)))
