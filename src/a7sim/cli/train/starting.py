@@ -8,7 +8,7 @@ import click
 
 from a7sim.cli import options
 from a7sim.cli.names import an_exercise
-from a7sim.cli.serve import USUAL, Served, Announcements, serve
+from a7sim.cli.serve import USUAL, Announcements, Served, serve
 from a7sim.cli.train.options import named, of_a_student, progress_in
 from a7sim.cli.train.sitting_down import sit_down
 from a7sim.documents import head
