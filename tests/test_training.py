@@ -35,10 +35,11 @@ def test_a_criterion_that_decides_nothing_is_found_out(parallax, limits, mutatio
     assert {each.split(":")[0] for each in dead} == {"time"}
 
 
-def test_exercises_are_numbered_once():
+def test_exercises_are_numbered_once_and_found_by_that():
     numbers = [each.exercise.number for each in EXERCISES]
     assert len(numbers) == len(set(numbers)) and numbers == sorted(numbers)
     assert all(each.name.startswith(f"{each.exercise.number:02d}-") for each in EXERCISES)
+    assert [find_exercise(str(number)) for number in numbers] == EXERCISES
 
 
 @pytest.fixture(scope="module")

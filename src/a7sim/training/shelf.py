@@ -27,24 +27,28 @@ class ExerciseError(Mistake):
 
 def all_exercises() -> list[Shelved]:
     """Return the exercises that come with a7sim, by their numbers."""
-    shelf = next((each for each in SHELVES if each.is_dir()), None)
-    folders = sorted(path.parent for path in shelf.glob(f"*/{FILE}")) if shelf else []
-    return sorted(map(read_exercise, folders), key=lambda each: each.exercise.number)
+    return [read_exercise(folder) for folder in _folders()]
 
 
 def find_exercise(name: str) -> Shelved:
     """Return an exercise by its number, the name of its folder or a part of it, or a folder. Raises Mistake."""
     if (Path(name) / FILE).is_file():
         return read_exercise(Path(name))
-    there = all_exercises()
+    there = _folders()
     if name.isdecimal():
-        found = [each for each in there if each.exercise.number == int(name)]
+        found = [each for each in there if int(each.name.partition("-")[0]) == int(name)]
     else:
         found = [each for each in there if each.name == name] or [each for each in there if name and name in each.name]
     if len(found) != 1:
         known = ", ".join(each.name for each in found or there)
         raise Mistake(f"{name}: expected the number of an exercise, its folder, or one of {known}")
-    return found[0]
+    return read_exercise(found[0])
+
+
+def _folders() -> list[Path]:
+    """Return the folders of the exercises that come with a7sim: number, hyphen, name, in their order."""
+    shelf = next((each for each in SHELVES if each.is_dir()), None)
+    return sorted(path.parent for path in shelf.glob(f"[0-9][0-9]-*/{FILE}")) if shelf else []
 
 
 def read_exercise(folder: Path) -> Shelved:
