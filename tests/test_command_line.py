@@ -507,8 +507,14 @@ def test_a_preparation_prints_as_a_document_what_it_prints_as_a_sheet(typed):
     code, printed, err = typed(*asked, "--json")
     document = json.loads(printed)
     assert (code, err, document["command"]) == (0, "", "prepare")
-    assert document.keys() >= {"flight"} or len(document) > 3
-    assert sheet
+    rows = [line.split()[0] for line in sheet.splitlines() if line.startswith("1:")]
+    assert rows == [f"1:{each['number']:.0f}" for each in document["scales"]]
+    for said in (
+        f"Flown {document['flight']['flying_height']} m above",
+        f"Optimum model scale 1:{document['optimum']['number']:.1f}",
+        *(f"{each['bx']:.2f}" for each in document["scales"]),
+    ):
+        assert said in sheet
 
 
 @pytest.mark.parametrize(
