@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from figures import Figure, Target, tell
 
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import LONGEST_LINE, Desk
+from a7sim.instrument.language import MAX_LINE_LENGTH, Desk
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.status import QUEUE_LENGTH, Status
 from a7sim.instrument.language.table import Choice, Quantity, short_form
@@ -132,7 +132,7 @@ class Fuzzed:
 
 def counted(line):
     """Return how many queries and how many commands a line holds, by nothing but its quotes and semicolons."""
-    if len(line) > LONGEST_LINE:
+    if len(line) > MAX_LINE_LENGTH:
         return 0, 1
     bare = _QUOTED.sub(lambda found: "x" * len(found[0]), line.removesuffix(b"\r").decode("latin-1"))
     units = [unit.strip(" \t") for unit in bare.split(";")]

@@ -13,7 +13,7 @@ from a7sim.geometry import GON
 from a7sim.link.client import Client
 from a7sim.link.headers import header, recorded_as, short
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.manual import RIGHT_FITTINGS
+from a7sim.manual import REQUIRED_FITTINGS
 from a7sim.training.attempts import open_
 from a7sim.training.handouts import handed_out
 from a7sim.training.room import entered
@@ -254,7 +254,7 @@ def fittings(driver, otherwise):
                 lying[projector - 1] = name
         driver.wait(200, "to lay pictures takes its time")
         driver.say(f"BASE:MODE {short(base)}")
-        for fitting, position in RIGHT_FITTINGS[polarity, base].as_words().items():
+        for fitting, position in REQUIRED_FITTINGS[polarity, base].as_words().items():
             if (letter, fitting) != forgotten.get(otherwise):
                 driver.say(f"FITT:{nodes[fitting]} {short(position)}")
         if otherwise != "blind" or letter == "A":

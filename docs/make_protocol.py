@@ -14,8 +14,8 @@ from pathlib import Path
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk, Engine, ErrorNumber
 from a7sim.instrument.language.commands import COMMANDS
-from a7sim.instrument.language.commands.carriages import LARGEST_READING
-from a7sim.instrument.language.commands.pictures import LARGEST_PICTURE
+from a7sim.instrument.language.commands.carriages import MAX_READING
+from a7sim.instrument.language.commands.pictures import MAX_PICTURE
 from a7sim.instrument.language.table import Choice, Command, Quantity, QuotedOrNumber, short_form
 from a7sim.instrument.refusals import Refusal
 from a7sim.link.clock import Clock
@@ -133,7 +133,7 @@ BOUNDS = {
     "STATus:QUEStionable:ENABle": "0 to 65535",
     "GEAR:HEIGht": "more than 0 to 100",
     "GEAR:PLAN": "more than 0 to 100",
-    "EYEPiece<n>:PICTure?": f"1 to {LARGEST_PICTURE} columns and rows, magnification 0.1 to 100",
+    "EYEPiece<n>:PICTure?": f"1 to {MAX_PICTURE} columns and rows, magnification 0.1 to 100",
 }
 """Limits that hold for both plotters and have no MIN, MAX and DEF."""
 
@@ -256,7 +256,7 @@ def _limits(quantity, engine, number):
     except Refusal:
         return "not on it"
     unit = quantity.unit_there(engine) if quantity.unit_there else quantity.unit
-    if high == LARGEST_READING:
+    if high == MAX_READING:
         return f"±{high:.2f} {unit}".strip()
     return f"{low:.10g} to {high:.10g} {unit}".strip() + f" ({usual:.10g})"
 

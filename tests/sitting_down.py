@@ -11,7 +11,7 @@ from textual.widgets import Input, OptionList
 
 from a7sim.console.app import Console
 from a7sim.console.eyepiece import Drawing, picture_size
-from a7sim.console.hands import LADDER
+from a7sim.console.hands import STEP_SIZES
 from a7sim.console.seat import Seat
 from a7sim.console.sheet import JobSheet
 from a7sim.console.window import Eyepiece
@@ -105,7 +105,7 @@ class Person:
 
     async def turn(self, amount: float, forward: str, back: str, finest: float = 0.01) -> None:
         """Turn by an amount, step by step from the largest rung of the ladder to the finest that is wanted."""
-        for step in sorted(LADDER, reverse=True):
+        for step in sorted(STEP_SIZES, reverse=True):
             times = int(abs(amount) / step + 1e-6) if step > finest * 1.5 else round(abs(amount) / step)
             if step < finest or not times:
                 continue
@@ -115,7 +115,7 @@ class Person:
 
     async def step_of(self, step: float) -> None:
         """Take a step of the ladder."""
-        away = LADDER.index(step) - self.console.hands.rung
+        away = STEP_SIZES.index(step) - self.console.hands.rung
         await self.press(*["]" if away > 0 else "["] * abs(away))
 
     def message(self) -> str:

@@ -6,7 +6,7 @@ import threading
 from contextlib import contextmanager
 
 from a7sim.link import between
-from a7sim.link.between import LOOKS_EVERY_S, Between
+from a7sim.link.between import POLL_INTERVAL_S, Between
 from a7sim.link.clock import WallClock
 from a7sim.mistakes import Mistake
 from tests.served import PATIENCE
@@ -99,7 +99,7 @@ class Broken:
         self.asked.set()
 
     def read(self, size):
-        if self.asked.wait(LOOKS_EVERY_S):
+        if self.asked.wait(POLL_INTERVAL_S):
             raise OSError(5, "Input/output error")
         return b""
 

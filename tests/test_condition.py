@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from a7sim.geometry import GON, length_of, rotation
 from a7sim.instrument import Autograph, build_autograph
-from a7sim.instrument.condition import FAULTS_OF, condition_of, local_coefficients
+from a7sim.instrument.condition import FAULT_SIGMAS, condition_of, local_coefficients
 from a7sim.instrument.language import Desk
 from a7sim.instrument.local_errors import smooth_local_errors
 from a7sim.instrument.projection import beside_the_centre, place_on_carrier, pose, turned_by
@@ -122,7 +122,7 @@ def test_a_name_is_its_table():
 
 
 def test_classes_grow_worse_in_every_fault():
-    new, serviced, worn = (dataclasses.astuple(FAULTS_OF[each]) for each in CLASSES)
+    new, serviced, worn = (dataclasses.astuple(FAULT_SIGMAS[each]) for each in CLASSES)
     for better, middle, worse in zip(new, serviced, worn, strict=True):
         assert better <= middle <= worse
         assert better < worse
@@ -131,10 +131,10 @@ def test_classes_grow_worse_in_every_fault():
 def test_faults_are_drawn_with_the_size_of_their_class():
     drawn = [condition_of(instrument("worn"), seed) for seed in range(400)]
     tilts = np.array([each.left.omega_zero_gon for each in drawn])
-    assert tilts.std() == pytest.approx(FAULTS_OF["worn"].tilt_zero_gon, rel=0.12)
+    assert tilts.std() == pytest.approx(FAULT_SIGMAS["worn"].tilt_zero_gon, rel=0.12)
     assert abs(tilts.mean()) < 3.0 * tilts.std() / 20.0
     local = np.array([each.right.local_um for each in drawn])
-    low, high = FAULTS_OF["worn"].local_um
+    low, high = FAULT_SIGMAS["worn"].local_um
     assert low <= local.min() < local.max() <= high
 
 

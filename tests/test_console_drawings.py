@@ -12,7 +12,7 @@ from a7sim.cli import main
 from a7sim.console import eyepiece
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
 from a7sim.console.eyepiece import Drawing, Run
-from a7sim.console.hands import LADDER, Hands
+from a7sim.console.hands import STEP_SIZES, Hands
 from a7sim.console.keymap import deeds_of, default_keymap, load_keymap, pressed, sample
 from a7sim.console.seat import best_drawing, speaks_utf8
 from a7sim.console.sketches import marked, pricked
@@ -123,7 +123,7 @@ def test_two_eyes_say_which_image_is_higher() -> None:
 
 
 def test_the_ladder_has_ends() -> None:
-    assert Hands().stepping(-99).step == LADDER[0] and Hands().stepping(99).step == LADDER[-1]
+    assert Hands().stepping(-99).step == STEP_SIZES[0] and Hands().stepping(99).step == STEP_SIZES[-1]
 
 
 def test_hands_say_lines_of_the_language() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from a7sim.console.hands import LADDER
+from a7sim.console.hands import STEP_SIZES
 from a7sim.instrument.language import LinkEvent
 from tests.door import with_photographs
 from tests.served import Served
@@ -78,14 +78,14 @@ class Observer:
 
     def __init__(self, terminal: Terminal) -> None:
         self.terminal = terminal
-        self.rung = LADDER.index(1.0)
+        self.rung = STEP_SIZES.index(1.0)
 
     def turn(self, amount: Decimal, finest: float, forward: str, back: str) -> Decimal:
         """Turn by the rungs of the ladder as many steps as come nearest to an amount; return how much was turned."""
         left, keys = abs(amount), list[str]()
-        for rung in reversed(range(LADDER.index(finest), len(LADDER))):
-            step = Decimal(str(LADDER[rung]))
-            times = int(left / step + (Decimal("0.5") if LADDER[rung] == finest else 0))
+        for rung in reversed(range(STEP_SIZES.index(finest), len(STEP_SIZES))):
+            step = Decimal(str(STEP_SIZES[rung]))
+            times = int(left / step + (Decimal("0.5") if STEP_SIZES[rung] == finest else 0))
             if times:
                 keys += ["]" if rung > self.rung else "["] * abs(rung - self.rung)
                 keys += [forward if amount > 0 else back] * times

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from a7sim.geometry import GON, at_level, ray_of, rotation
 from a7sim.instrument import Autograph, OutOfRange, SettingsConflict, build_autograph
 from a7sim.instrument.spindles import Counter, Spindle
-from a7sim.manual import A7, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element
+from a7sim.manual import A7, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Element
 from a7sim.scenario import Condition, ProjectorCondition, load_scenario
 from a7sim.scenario.schema import Camera, Fiducial
 from a7sim.scene import Marks, Photograph, build_scene
@@ -40,7 +40,7 @@ def plotter(left=None, right=None, condition=None, polarity="positive"):
     a7.load(1, "L")
     a7.load(2, "R")
     a7.set_element("bx", 180.0)
-    a7.fittings = RIGHT_FITTINGS[polarity, "inside"]
+    a7.fittings = REQUIRED_FITTINGS[polarity, "inside"]
     return a7
 
 
@@ -241,7 +241,7 @@ def test_a_collar_that_does_not_belong_to_the_picture_reverses_its_wheel(polarit
 def test_with_base_out_and_its_fittings_the_left_eye_sees_the_left_hand_photograph_unturned(polarity):
     a7 = plotter(left={"P": (-60.0, 20.0)}, right={"P": (30.0, 20.0)}, polarity=polarity)
     a7.set_base_mode("outside")
-    a7.fittings = RIGHT_FITTINGS[polarity, "outside"]
+    a7.fittings = REQUIRED_FITTINGS[polarity, "outside"]
     a7.drive("X", 58.0)
     a7.drive("Y", 38.0)
     assert a7.eyepiece(1, "P") == pytest.approx((1000.0, 1000.0))

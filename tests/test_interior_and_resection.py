@@ -17,9 +17,9 @@ from a7sim.reduction.corrections import (
     without_distortion,
     without_refraction,
 )
-from a7sim.reduction.interior import FEWEST_FIDUCIALS, UNKNOWNS, plane_fit, principal_distance_for_film
+from a7sim.reduction.interior import MIN_FIDUCIALS, UNKNOWNS, plane_fit, principal_distance_for_film
 from a7sim.reduction.least_squares import adjusted
-from a7sim.reduction.resection import LARGEST_CONDITION, _coefficients, resection
+from a7sim.reduction.resection import MAX_CONDITION, _coefficients, resection
 from a7sim.scenario.schema import Camera, Fiducial
 from a7sim.scene.camera import distorted, lowered_by_curvature, refracted
 from tests.examples import examples
@@ -104,7 +104,7 @@ def test_any_fit_comes_back_from_its_fiducials(seed, kind):
 @given(SEEDS, st.sampled_from(KINDS))
 def test_a_batch_of_fits_is_its_members_and_order_does_not_matter(seed, kind):
     rng = np.random.default_rng(seed)
-    n = FEWEST_FIDUCIALS[kind] + 3
+    n = MIN_FIDUCIALS[kind] + 3
     measured = EIGHT[:, :n, None] * 1.001 + 3.0 + 0.02 * rng.standard_normal((2, n, 5))
     together = plane_fit(measured, EIGHT[:, :n], kind)
     order = rng.permutation(n)
@@ -144,7 +144,7 @@ def test_unequal_shrinkage_goes_in_by_its_mean():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_too_few_fiducials_are_named(kind):
-    fewest = FEWEST_FIDUCIALS[kind]
+    fewest = MIN_FIDUCIALS[kind]
     with pytest.raises(Undetermined, match=rf"expected {fewest} fiducials or more .* {kind}, got {fewest - 1}"):
         plane_fit(EIGHT[:, : fewest - 1], EIGHT[:, : fewest - 1], kind)
 
@@ -290,7 +290,7 @@ def condition_at(ground, centre, turn):
 @example(42895, 4, 0.59375)
 def test_any_camera_comes_back_from_four_points_or_more_unless_it_is_by_their_danger_cylinder(seed, n, tilt):
     ground, image, centre, turn = photographs(np.random.default_rng(seed), n, tilt)
-    if condition_at(ground, centre, turn) >= LARGEST_CONDITION:
+    if condition_at(ground, centre, turn) >= MAX_CONDITION:
         with pytest.raises(Undetermined, match="danger cylinder"):
             resection(image, ground, C)
         return

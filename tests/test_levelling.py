@@ -7,7 +7,7 @@ import pytest
 from a7sim.geometry import GON, rotation
 from a7sim.manual import A7, A8
 from a7sim.operator.job import ModelJob
-from a7sim.operator.levelling import MOST_ROUNDS, turned_by_common_phi, turned_together
+from a7sim.operator.levelling import MAX_ROUNDS, turned_by_common_phi, turned_together
 from a7sim.scenario import load_scenario
 from a7sim.session.crowd import open_crowd
 from a7sim.session.tables import of_session
@@ -91,7 +91,7 @@ def test_a_person_with_errors_comes_within_what_is_tolerated_too():
     (document,) = open_crowd(scenario_of(), [7]).documents()
     found = document["models"][0]["absolute_orientation"]
     assert found["agrees"]
-    assert 2 <= len(found["rounds"]) <= MOST_ROUNDS + 1
+    assert 2 <= len(found["rounds"]) <= MAX_ROUNDS + 1
     assert found["rounds"][0]["height_rms_m"] > 10.0 * found["rounds"][-1]["height_rms_m"]
     of_session(document)
 

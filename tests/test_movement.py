@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import MOST_KEPT_BACK, Desk
-from a7sim.instrument.language.desk import POLL_TAKES
+from a7sim.instrument.language import MAX_BUFFERED_BYTES, Desk
+from a7sim.instrument.language.desk import POLL_SECONDS
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.manual import VARIANTS, Rates
@@ -167,7 +167,7 @@ def test_who_waits_by_looking_at_the_status_lets_time_pass(query):
         port.write(b"*CLS;DRIV:X 5;*OPC\n")
         assert clock.now == 0.0
         port.write(query.encode() + b"\n")
-        assert (len(port.readline()), clock.now) == (2, POLL_TAKES)
+        assert (len(port.readline()), clock.now) == (2, POLL_SECONDS)
         for _ in range(8):
             port.write(query.encode() + b"\n")
         port.write(b"*ESR?;*ESR?\n")
@@ -197,7 +197,7 @@ def test_in_process_nothing_ever_blocks_and_the_clock_runs_on():
 
 def test_a_flood_in_process_is_obeyed_to_its_end(engine):
     lines = b"DRIV:X 10;*WAI;X 0;*OPC?\n" * 6000
-    assert len(lines) > 2 * MOST_KEPT_BACK
+    assert len(lines) > 2 * MAX_BUFFERED_BYTES
     with InProcessSerial(desk=engine.desk, timeout=1) as port:
         port.write(lines)
         assert port.in_waiting == 2 * 6000
@@ -211,7 +211,7 @@ def test_input_kept_back_is_bounded_and_what_is_lost_is_said_once(engine):
         engine.feed(b"COUN:X?\n" * 1000, 1.0)
     assert engine.feed(b"*TST?\nCOUN", 2.0) == b""
     held = engine.feed(b"", 5.0)
-    assert held == b"50.00\n" * (MOST_KEPT_BACK // 8)
+    assert held == b"50.00\n" * (MAX_BUFFERED_BYTES // 8)
     assert engine.feed(b":X?\nCOUN:X?;:SYST:ERR:COUN?;:SYST:ERR?\n", 6.0).startswith(b"50.00;1;-363,")
 
 

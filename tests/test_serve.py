@@ -11,12 +11,12 @@ import pytest
 
 import a7sim
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import LARGEST_REPLY, LONGEST_LINE, Desk
+from a7sim.instrument.language import MAX_LINE_LENGTH, MAX_REPLY, Desk
 from a7sim.instrument.language.status import QUEUE_LENGTH
-from a7sim.instrument.language.syntax import LONGEST_NUMBER
+from a7sim.instrument.language.syntax import MAX_NUMBER_LENGTH
 from a7sim.link.conversation import Terms
-from a7sim.link.serving import MOST_TURNED_AWAY, Doors
-from a7sim.link.wires import LARGEST_READ, MOST_UNREAD, QUICK_ACKNOWLEDGEMENT
+from a7sim.link.serving import MAX_REJECTION_NOTICES, Doors
+from a7sim.link.wires import MAX_READ, MAX_UNREAD, QUICK_ACKNOWLEDGEMENT
 from a7sim.manual import VARIANTS
 from tests.served import ANYWHERE, PATIENCE, Line, Served
 
@@ -189,8 +189,8 @@ def test_the_journal_never_holds_a_token_right_or_wrong():
 @pytest.mark.parametrize(
     ("line", "number"),
     [
-        ("NOTE '" + "x" * LONGEST_LINE + "'", -363),
-        ("DRIV:X " + "0" * LONGEST_NUMBER + "1", -104),
+        ("NOTE '" + "x" * MAX_LINE_LENGTH + "'", -363),
+        ("DRIV:X " + "0" * MAX_NUMBER_LENGTH + "1", -104),
         ("DRIV:X " + "1" * 4000 + "!", -104),
         ("DRIV:X 1E99999", -222),
         ("PROJ3:KAPP?", -114),
@@ -227,7 +227,7 @@ def test_the_replies_to_a_line_are_bounded(served):
     client.send(f"EYEP:{line}\n".encode())
     size = len("#71048576") + 1024 * 1024
     expected = 3 * size + 2 + 1
-    assert expected < LARGEST_REPLY < 4 * size
+    assert expected < MAX_REPLY < 4 * size
     while expected:
         expected -= len(client.socket.recv(min(65536, expected)))
     assert client.ask("SYST:ERR?;*ESR?").startswith('-430,"Query DEADLOCKED;')
@@ -237,7 +237,7 @@ def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
     with Served(terms=Terms(most_clients=3)) as served:
         lines = [served.line() for _ in range(3)]
         assert [line.ask("*TST?") for line in lines] == ["0"] * 3
-        for _ in range(2 * MOST_TURNED_AWAY):
+        for _ in range(2 * MAX_REJECTION_NOTICES):
             served.line()
         assert [line.ask("*TST?") for line in lines] == ["0"] * 3
         lines[0].close()
@@ -282,8 +282,8 @@ def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
                 gone = True
         assert other.ask("*IDN?") == IDENTITY
         unread, unheard = map(max, zip(*kept, strict=True))
-        assert MOST_UNREAD < unread < 2 * MOST_UNREAD
-        assert unheard <= LARGEST_READ
+        assert MAX_UNREAD < unread < 2 * MAX_UNREAD
+        assert unheard <= MAX_READ
 
 
 def _kept(wire):
@@ -291,7 +291,7 @@ def _kept(wire):
 
 
 def test_a_client_that_reads_late_gets_every_reply_in_order(served):
-    count = 20 * MOST_UNREAD // len(IDENTITY)
+    count = 20 * MAX_UNREAD // len(IDENTITY)
     line = served.line()
     sender = threading.Thread(target=line.send, args=(b"*IDN?\n" * count,))
     sender.start()

@@ -17,7 +17,7 @@ from a7sim.link.client import Client
 from a7sim.link.conversation import Terms
 from a7sim.link.faults import Cut, Faults, Noise, faults_of
 from a7sim.link.serving import Doors
-from a7sim.link.wires import MOST_UNREAD
+from a7sim.link.wires import MAX_UNREAD
 from a7sim.manual import VARIANTS
 from a7sim.mistakes import Mistake
 from tests.door import with_model
@@ -118,7 +118,7 @@ def test_a_terminal_whose_client_does_not_read_begins_anew(link):
 
 def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
     """More than is kept for a client: it is heard no further until it has read, and nothing is lost."""
-    count = 3 * MOST_UNREAD // len(IDENTITY)
+    count = 3 * MAX_UNREAD // len(IDENTITY)
     with Served(doors=Doors(pty=[link])) as served, at(served) as port:
         sender = threading.Thread(target=port.write, args=(b"*IDN?\n" * count,))
         sender.start()

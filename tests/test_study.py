@@ -7,7 +7,7 @@ from a7sim.mistakes import Mistake
 from a7sim.study.cells import cells_of
 from a7sim.study.checkpoint import save
 from a7sim.study.executors import opened
-from a7sim.study.loading import SHELVES, load_study, study_of
+from a7sim.study.loading import SEARCH_PATH, load_study, study_of
 from a7sim.study.running import Pace, _Size, work
 from a7sim.study.schema import Factor, Study
 from a7sim.study.tally import Tally
@@ -61,7 +61,7 @@ def test_settings_of_a_cell_reach_its_scenario_and_leave_the_others_alone(tmp_pa
     assert one.work == four.work == ["comparator"]
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for shelf in SHELVES for path in shelf.glob("*.toml")))
+@pytest.mark.parametrize("name", sorted(path.stem for shelf in SEARCH_PATH for path in shelf.glob("*.toml")))
 def test_every_study_that_comes_with_a7sim_can_be_laid_out(name):
     assert len(load_study(name).cells) > 1
 

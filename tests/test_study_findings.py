@@ -5,7 +5,7 @@ import pytest
 from rich.console import Console
 
 from a7sim.study.figures import of_response
-from a7sim.study.findings import MOST_DENSITIES, document_of
+from a7sim.study.findings import MAX_DENSITIES, document_of
 from a7sim.study.loading import study_of
 from a7sim.study.page import markdown_of
 from a7sim.study.tables import of_study
@@ -106,10 +106,10 @@ def test_a_hypercube_says_which_way_a_factor_works_or_that_none_does(tmp_path, s
 
 
 def test_curves_are_drawn_of_no_more_levels_than_can_be_told_apart(tmp_path):
-    levels = list(range(1, MOST_DENSITIES + 2))
-    for count in (MOST_DENSITIES, MOST_DENSITIES + 1):
+    levels = list(range(1, MAX_DENSITIES + 2))
+    for count in (MAX_DENSITIES, MAX_DENSITIES + 1):
         document, _ = found(tmp_path, 2.0 + NOISE[:count], factor=[POINTINGS | {"levels": levels[:count]}])
-        assert len(document["densities"]) == (count <= MOST_DENSITIES)
+        assert len(document["densities"]) == (count <= MAX_DENSITIES)
         assert len(document["levels"]) == count
 
 

@@ -6,7 +6,7 @@ from scipy.stats import qmc
 
 from a7sim.study.cells import cells_of
 from a7sim.study.findings import document_of
-from a7sim.study.latin import FEWEST_CELLS, main_effects, share_of_chance
+from a7sim.study.latin import MIN_CELLS, main_effects, share_of_chance
 from a7sim.study.loading import study_of
 from a7sim.study.page import page_of
 from a7sim.study.tables import of_study
@@ -69,7 +69,7 @@ def test_cells_without_a_number_are_left_out_and_too_few_are_not_taken_apart():
     means[::5] = np.nan
     kept = np.isfinite(means)
     assert main_effects(means, {"u": u, "v": v}) == main_effects(means[kept], {"u": u[kept], "v": v[kept]})
-    assert main_effects(u[: FEWEST_CELLS - 1], {"u": u[: FEWEST_CELLS - 1]}) == []
+    assert main_effects(u[: MIN_CELLS - 1], {"u": u[: MIN_CELLS - 1]}) == []
     assert main_effects(np.ones(50), {"u": u}) == []
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from a7sim.link.telnet import LONGEST_SUBNEGOTIATION, Telnet
+from a7sim.link.telnet import MAX_SUBNEGOTIATION_LENGTH, Telnet
 
 WILL_BINARY, WONT_BINARY = b"\xff\xfb\x00", b"\xff\xfc\x00"
 
@@ -95,7 +95,7 @@ def test_a_control_that_was_set_is_told_when_it_is_asked():
 def test_a_subnegotiation_without_end_keeps_little_and_ends_with_its_end():
     telnet = Telnet()
     assert telnet.received(b"\xff\xfa\x2c\x01" + b"x" * 1_000_000) == (b"", b"")
-    assert len(telnet._sub) == LONGEST_SUBNEGOTIATION
+    assert len(telnet._sub) == MAX_SUBNEGOTIATION_LENGTH
     assert telnet.received(b"\xff\xf0*TST?\n")[0] == b"*TST?\n"
 
 

@@ -21,12 +21,12 @@ from typing import Any
 from a7sim.mistakes import Mistake
 from a7sim.wording import counted
 
-LONGEST_FILE = 20_000_000
+MAX_FILE_BYTES = 20_000_000
 """Bytes; a longer file is refused before it is read."""
 
-LONGEST_NAME = 64
+MAX_NAME_LENGTH = 64
 
-LARGEST_NUMBER = 1e12
+MAX_NUMBER = 1e12
 """Nothing that is measured in mm, m or counts is larger."""
 
 DECIMALS = 6
@@ -87,11 +87,11 @@ class Table:
         ]
 
     def _text(self, line: int, column: str, cell: str) -> str:
-        if 0 < len(cell) <= LONGEST_NAME and cell.isprintable():
+        if 0 < len(cell) <= MAX_NAME_LENGTH and cell.isprintable():
             return cell
         shown = repr(cell[:40]) if cell else "nothing"
         raise Mistake(
-            f"{self.path}, {self.unit} {line}, column {column}: expected a name of 1 to {LONGEST_NAME} characters, "
+            f"{self.path}, {self.unit} {line}, column {column}: expected a name of 1 to {MAX_NAME_LENGTH} characters, "
             f"got {shown}"
         )
 
@@ -102,7 +102,7 @@ class Table:
             value = float(cell)
         except ValueError:
             value = math.nan
-        if not abs(value) <= LARGEST_NUMBER or "_" in cell:
+        if not abs(value) <= MAX_NUMBER or "_" in cell:
             raise Mistake(f"{self.path}, {self.unit} {line}, column {column}: expected a number, got {cell[:40]!r}")
         return value
 
@@ -117,12 +117,12 @@ def read_text(path: str | Path) -> str:
     path = Path(path)
     try:
         with path.open("rb") as file:
-            content = file.read(LONGEST_FILE + 1)
+            content = file.read(MAX_FILE_BYTES + 1)
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise Mistake(f"{path}: expected a readable file: {why}") from error
-    if len(content) > LONGEST_FILE:
-        raise Mistake(f"{path}: expected a file of at most {LONGEST_FILE} bytes, got more")
+    if len(content) > MAX_FILE_BYTES:
+        raise Mistake(f"{path}: expected a file of at most {MAX_FILE_BYTES} bytes, got more")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -156,7 +156,7 @@ POSITIONS_OF: Mapping[str, tuple[str, str]] = MappingProxyType(
 )
 """The two positions that every fitting has."""
 
-RIGHT_FITTINGS: Mapping[tuple[str, str], Fittings] = MappingProxyType(
+REQUIRED_FITTINGS: Mapping[tuple[str, str], Fittings] = MappingProxyType(
     {
         ("negative", "inside"): Fittings("inside", "back", "right", "in", "in"),
         ("negative", "outside"): Fittings("outside", "front", "right", "in", "in"),

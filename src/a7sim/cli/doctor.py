@@ -20,7 +20,7 @@ from a7sim.shelves import Kind, names_of
 
 EXIT_MISSING = 1
 
-SMALLEST = (80, 24)
+MIN_TERMINAL = (80, 24)
 """Columns and lines that the console needs."""
 
 NOT_FOR_USERS = ("all", "dev", "docs")
@@ -105,7 +105,7 @@ def _of_terminal() -> dict[str, Any]:
         "lines": size.lines,
         "colours": _colours(),
         "unicode": encoding.replace("-", "").startswith("utf"),
-        "room_for_console": size.columns >= SMALLEST[0] and size.lines >= SMALLEST[1],
+        "room_for_console": size.columns >= MIN_TERMINAL[0] and size.lines >= MIN_TERMINAL[1],
     }
 
 

@@ -10,10 +10,10 @@ from a7sim.cli.options import TOKEN_VARIABLE, Number, together, token_file
 from a7sim.link.opening import TIMEOUT_S
 from a7sim.mistakes import Mistake
 
-LONGEST_TOKEN = 1000
+MAX_TOKEN_LENGTH = 1000
 """Characters: a line of the language has room for it, even if all are quotes that have to be doubled."""
 
-_SENDABLE = re.compile(f"[ -~]{{1,{LONGEST_TOKEN}}}")
+_SENDABLE = re.compile(f"[ -~]{{1,{MAX_TOKEN_LENGTH}}}")
 
 _TIMEOUT = click.option(
     "--timeout",
@@ -42,5 +42,5 @@ def token_from(file: Path | None) -> str | None:
 def _token(text: str, where: str) -> str:
     token = text.strip()
     if not _SENDABLE.fullmatch(token):
-        raise Mistake(f"{where}: expected a token of 1 to {LONGEST_TOKEN} printable ASCII characters on one line")
+        raise Mistake(f"{where}: expected a token of 1 to {MAX_TOKEN_LENGTH} printable ASCII characters on one line")
     return token

@@ -15,7 +15,7 @@ from a7sim.link.exchange import say
 
 HISTORY = "send-history"
 
-LONGEST_HISTORY = 1000
+MAX_HISTORY = 1000
 """Lines."""
 
 _LEAVING = ("exit", "quit", "bye")
@@ -77,7 +77,7 @@ def _editing(headers: list[str]) -> Iterator[None]:
     history = data_folder() / HISTORY
     with suppress(OSError):
         readline.read_history_file(history)
-    readline.set_history_length(LONGEST_HISTORY)
+    readline.set_history_length(MAX_HISTORY)
     try:
         yield
     finally:

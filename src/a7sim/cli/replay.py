@@ -22,7 +22,7 @@ from a7sim.session.scripts import SUFFIX, find_script, read_script
 from a7sim.session.seeking import line_sought
 from a7sim.wording import counted
 
-_MOST_PARTS = 20
+_MAX_PARTS = 20
 
 
 @click.command("replay")
@@ -152,7 +152,7 @@ def _tell(journalled: Journalled, difference: Difference, parts: tuple[Differing
     click.echo(f"a7sim: {journalled.where(difference.line)}: the first difference", err=True)
     click.echo(f"a7sim: the journal has      {difference.journalled or 'nothing'}", err=True)
     click.echo(f"a7sim: the instrument says  {difference.replayed or 'nothing'}", err=True)
-    for part in parts[:_MOST_PARTS]:
+    for part in parts[:_MAX_PARTS]:
         click.echo(f"a7sim: state, {part.part}: {part.was} in the journal, {part.is_now} now", err=True)
 
 

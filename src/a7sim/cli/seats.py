@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from a7sim.session.chair import Chair
     from a7sim.session.shelf import Left
 
-SHELF = "sessions"
+SESSIONS_FOLDER = "sessions"
 
 
 class InProcess:
@@ -29,7 +29,7 @@ class InProcess:
     def __init__(self, name: str, scenario: Scenario, seed: int | None, out: Path | None, go_on: bool | None) -> None:
         self._name, self._scenario = name, scenario
         self._seed = scenario.seed if seed is None else seed
-        self._folder = out or data_folder() / SHELF / bare_name(name)
+        self._folder = out or data_folder() / SESSIONS_FOLDER / bare_name(name)
         self._go_on = go_on
         self._clock, self._wall = Clock(), WallClock()
         self._left: Left | None = None

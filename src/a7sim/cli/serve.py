@@ -17,7 +17,7 @@ from a7sim.cli.options import TOKEN_VARIABLE
 from a7sim.documents import Document, as_json, head
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import Desk
-from a7sim.instrument.language.desk import POLL_TAKES
+from a7sim.instrument.language.desk import POLL_SECONDS
 from a7sim.link.addresses import Address, address_of
 from a7sim.link.clock import Clock, WallClock
 from a7sim.link.conversation import Terms
@@ -117,7 +117,7 @@ class Served:
 def _served_anew(scenario: Scenario, seed: int, token: str | None, realtime: bool, kept: Kept) -> Served:
     autograph = Autograph.of_scenario(scenario, seed)
     journal = Journal(kept.keeping)
-    desk = Desk(autograph, journal.heard if kept.out else None, token, 0.0 if realtime else POLL_TAKES)
+    desk = Desk(autograph, journal.heard if kept.out else None, token, 0.0 if realtime else POLL_SECONDS)
     header = header_of("serve", scenario, seed, realtime=realtime, login=token is not None)
     return Served(_head(scenario, seed), desk, _clock(realtime), journal.opened(kept.out, header, desk))
 

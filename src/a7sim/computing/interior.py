@@ -22,7 +22,7 @@ from a7sim.scenario.validation import mistakes_of_form
 CORRECTIONS = ("lens", "refraction", "curvature")
 """Corrections of image coordinates; any of them brings these to the principal point."""
 
-WORST_FIDUCIAL_MM = 5.0
+MAX_FIDUCIAL_MM = 5.0
 """Film does not displace a fiducial by more; a confused or mirrored one stands further off."""
 
 
@@ -116,7 +116,7 @@ def _picture(
 def _refuse_confused(fit: PlaneFit, names: Sequence[str]) -> None:
     off = np.hypot(*fit.residuals)
     worst = int(np.argmax(off))
-    if off[worst] > WORST_FIDUCIAL_MM:
+    if off[worst] > MAX_FIDUCIAL_MM:
         raise Mistake(
             f"expected counts of the fiducials that lie as in the camera, got {names[worst]} {off[worst]:.1f} mm from "
             "its place (are two confused, or the axes mirrored?)"

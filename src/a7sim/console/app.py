@@ -12,7 +12,7 @@ from textual.screen import Screen
 
 from a7sim.console.binocular import Binocular, View
 from a7sim.console.book import Entry
-from a7sim.console.deeds import BEFORE_ANYTHING_ANSWERS, Deeds
+from a7sim.console.deeds import ACTIONS_WHILE_DISCONNECTED, Deeds
 from a7sim.console.dialogs import Choose
 from a7sim.console.dials import Dials
 from a7sim.console.drum_panels import Wheeled
@@ -127,7 +127,7 @@ class Console(Hearing, Deeds, App[None]):
     def key_pressed(self, event: events.Key) -> bool:
         """Do the deed of a key; return whether it has one."""
         name = self._by_key.get(pressed(event.key, event.character))
-        if self._early is not None and name not in BEFORE_ANYTHING_ANSWERS:
+        if self._early is not None and name not in ACTIONS_WHILE_DISCONNECTED:
             self._early.append(event)
         elif name is None:
             return False

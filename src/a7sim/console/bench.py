@@ -6,7 +6,7 @@ from typing import Any
 
 from a7sim.console.dialogs import Ask, Choose
 from a7sim.console.hands import title
-from a7sim.console.panels import LEVERS
+from a7sim.console.panels import FITTING_ROWS
 from a7sim.console.sheet import Centred, centre
 from a7sim.console.sitting import PROJECTORS, Sitting
 from a7sim.link.headers import FITTING_NODES, quoted, short
@@ -87,7 +87,7 @@ class BenchDeeds(Sitting):
     def _lever(self, name: str, at: str) -> tuple[str, Callable[[], Any]]:
         other = next(position for position in POSITIONS_OF[name] if position != at)
         line = f"FITT:{FITTING_NODES[name]} {short(other)}"
-        return f"{LEVERS[name]} {at}: put it {other}", partial(self._console.station.say, line)
+        return f"{FITTING_ROWS[name]} {at}: put it {other}", partial(self._console.station.say, line)
 
     def _height_gear(self) -> None:
         variant, _ = self._at()

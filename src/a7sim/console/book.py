@@ -46,15 +46,15 @@ class Entry:
         return replace(self, struck=True)
 
 
-AT_ONCE = 40
+BATCH_SIZE = 40
 """Registrations that are asked for in a line."""
 
 
 def read_book(client: Client, records: int) -> tuple[Entry, ...]:
     """Return so many registrations of the recorder, from the first, as they stand now."""
     entries: list[Entry] = []
-    for first in range(1, records + 1, AT_ONCE):
-        numbers = range(first, min(first + AT_ONCE, records + 1))
+    for first in range(1, records + 1, BATCH_SIZE):
+        numbers = range(first, min(first + BATCH_SIZE, records + 1))
         client.send(";".join(f"REC? {number}" for number in numbers))
         entries += [Entry.read(values(as_text(part))) for part in client.reply() or ()]
     return tuple(entries)

@@ -22,7 +22,7 @@ _TURNS = {
     "z_down": ("Z", -1),
 }
 _TAKEN = ("kappa", "phi", "omega", "by", "bz", "c", "bx", "common_phi")
-BEFORE_ANYTHING_ANSWERS = ("quit", "help")
+ACTIONS_WHILE_DISCONNECTED = ("quit", "help")
 
 
 class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeeds):
@@ -30,7 +30,7 @@ class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeed
 
     def do(self, name: str) -> None:
         """Do what a key or the palette asks for."""
-        if (self._console.dials is None and name not in BEFORE_ANYTHING_ANSWERS) or self.hands_off(name):
+        if (self._console.dials is None and name not in ACTIONS_WHILE_DISCONNECTED) or self.hands_off(name):
             return
         if name in _TURNS:
             self.move(*_TURNS[name])

@@ -12,7 +12,7 @@ from textual.strip import Strip
 from textual.timer import Timer
 
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
-from a7sim.console.hands import BARE, Hands
+from a7sim.console.hands import SIDELESS_ELEMENTS, Hands
 from a7sim.console.panels import Panel
 from a7sim.manual import Variant
 
@@ -135,7 +135,7 @@ class Elements(Panel):
     def _row(self, name: str, name_width: int, bar_width: int) -> Text:
         shown = "Phi" if name == "common_phi" else name
         row = Text(f"{shown:<{name_width}}", self.like("word"))
-        for element in [name] if name in BARE else [f"{name}1", f"{name}2"]:
+        for element in [name] if name in SIDELESS_ELEMENTS else [f"{name}1", f"{name}2"]:
             lit = self._hands is not None and element == self._hands.element
             reading = self._readings.get(element, "")
             row.append(f">{reading:>6} " if lit else f"{reading:>7} ", self.like("hand" if lit else "drum"))
@@ -156,7 +156,7 @@ class Elements(Panel):
             return None
         name = self._names[offset.y - 1]
         room = (self.content_size.width - 6) // 2
-        return name if name in BARE else f"{name}{1 if offset.x < 6 + room else 2}"
+        return name if name in SIDELESS_ELEMENTS else f"{name}{1 if offset.x < 6 + room else 2}"
 
     def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
         """Turn the drum under the mouse forward."""

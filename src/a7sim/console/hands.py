@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from a7sim.link.headers import header
 from a7sim.manual import Variant
 
-LADDER = (0.002, 0.01, 0.05, 0.1, 1.0, 10.0)
+STEP_SIZES = (0.002, 0.01, 0.05, 0.1, 1.0, 10.0)
 """Steps; the first turns a drum between two counts, as the eye wants it."""
 
-BARE = ("bx", "common_phi")
+SIDELESS_ELEMENTS = ("bx", "common_phi")
 """Elements that belong to no side."""
 
 SIDES = {1: "'", 2: '"'}
@@ -21,18 +21,18 @@ class Hands:
 
     name: str = "by"
     side: int = 1
-    rung: int = LADDER.index(1.0)
+    rung: int = STEP_SIZES.index(1.0)
     free: bool = False
 
     @property
     def step(self) -> float:
         """The present step, mm or gon or units of a counter."""
-        return LADDER[self.rung]
+        return STEP_SIZES[self.rung]
 
     @property
     def element(self) -> str:
         """The element in hand, such as by1 or bx."""
-        return self.name if self.name in BARE else f"{self.name}{self.side}"
+        return self.name if self.name in SIDELESS_ELEMENTS else f"{self.name}{self.side}"
 
     def on(self, variant: Variant) -> "Hands":
         """Return the hands at a plotter that may not have what they held."""
@@ -40,7 +40,7 @@ class Hands:
 
     def stepping(self, rungs: int) -> "Hands":
         """Return the hands with a larger or smaller step."""
-        return replace(self, rung=min(max(self.rung + rungs, 0), len(LADDER) - 1))
+        return replace(self, rung=min(max(self.rung + rungs, 0), len(STEP_SIZES) - 1))
 
     def turned(self, way: int) -> str:
         """Return the line that turns the element in hand by a step, forward or back."""

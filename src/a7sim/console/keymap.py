@@ -25,13 +25,13 @@ class Deed:
     group: str
 
 
-WATCHING = "watching"
+PLAYBACK_ACTIONS = "watching"
 """The group of what is done only while one watches."""
 
-LOOKING = ("eyes", "screen")
+VIEW_ACTIONS = ("eyes", "screen")
 """The groups of what is done at the instrument and while one watches."""
 
-DEEDS = (
+ACTIONS = (
     Deed("x_up", ("right",), "X handwheel, forward", "hands"),
     Deed("x_down", ("left",), "X handwheel, back", "hands"),
     Deed("y_up", ("up",), "Y handwheel, forward", "hands"),
@@ -58,14 +58,14 @@ DEEDS = (
     Deed("go_to", ("g",), "drive near a point of the sketch", "bench"),
     Deed("bench", ("l",), "pictures, base, fittings, gears", "bench"),
     Deed("say", (":",), "say a line of the command language", "bench"),
-    Deed("play", ("space",), "play and pause", WATCHING),
-    Deed("step_on", (".",), "on by a line that is said", WATCHING),
-    Deed("step_back", (",",), "back by a line that is said", WATCHING),
-    Deed("next_record", (">",), "on to the next registration", WATCHING),
-    Deed("last_record", ("<",), "back to the registration before", WATCHING),
-    Deed("faster", ("]",), "play faster", WATCHING),
-    Deed("slower", ("[",), "play slower", WATCHING),
-    Deed("jump", ("g",), "to a step, a time, or a note", WATCHING),
+    Deed("play", ("space",), "play and pause", PLAYBACK_ACTIONS),
+    Deed("step_on", (".",), "on by a line that is said", PLAYBACK_ACTIONS),
+    Deed("step_back", (",",), "back by a line that is said", PLAYBACK_ACTIONS),
+    Deed("next_record", (">",), "on to the next registration", PLAYBACK_ACTIONS),
+    Deed("last_record", ("<",), "back to the registration before", PLAYBACK_ACTIONS),
+    Deed("faster", ("]",), "play faster", PLAYBACK_ACTIONS),
+    Deed("slower", ("[",), "play slower", PLAYBACK_ACTIONS),
+    Deed("jump", ("g",), "to a step, a time, or a note", PLAYBACK_ACTIONS),
     Deed("magnify", ("m",), "magnify more", "eyes"),
     Deed("reduce", ("M",), "magnify less", "eyes"),
     Deed("eyes", ("e",), "both eyes, left, right", "eyes"),
@@ -84,24 +84,24 @@ DEEDS = (
 
 def deeds_of(watching: bool, film: bool = True) -> tuple[Deed, ...]:
     """Return what keys do at the instrument, or while one watches, be it a film or what is done now."""
-    played = {WATCHING} if film else set()
+    played = {PLAYBACK_ACTIONS} if film else set()
     return tuple(
         deed
-        for deed in DEEDS
-        if deed.group in LOOKING or (deed.group in played if watching else deed.group != WATCHING)
+        for deed in ACTIONS
+        if deed.group in VIEW_ACTIONS or (deed.group in played if watching else deed.group != PLAYBACK_ACTIONS)
     )
 
 
 def default_keymap() -> Keymap:
     """Return the keys that the console comes with."""
-    return {deed.name: deed.keys for deed in DEEDS}
+    return {deed.name: deed.keys for deed in ACTIONS}
 
 
 def sample() -> str:
     """Return a file of all keys as they are by default."""
     lines = ["# Keys of a7sim console: one or more for every deed; a deed that is left out keeps its own.", "[keys]"]
-    width = max(len(deed.name) for deed in DEEDS)
-    for deed in DEEDS:
+    width = max(len(deed.name) for deed in ACTIONS)
+    for deed in ACTIONS:
         keys = ", ".join(f"'{key}'" if '"' in key else f'"{key}"' for key in deed.keys)
         lines.append(f"{deed.name:<{width}} = [{keys}]  # {deed.about}")
     return "\n".join(lines) + "\n"

@@ -9,7 +9,7 @@ from a7sim.console.hands import Hands, title
 from a7sim.console.keymap import Keymap, shown
 from a7sim.link.client import Identity
 
-ROOMY = 100
+WIDE_COLUMNS = 100
 """Columns from which the masthead says all."""
 
 Hints = tuple[tuple[str, str], ...]
@@ -25,7 +25,7 @@ def masthead(identity: Identity, dials: Dials | None, job: str, seconds: float, 
         f"base {dials.base}" if dials else "",
         elapsed(seconds),
     ]
-    roomy = width >= ROOMY
+    roomy = width >= WIDE_COLUMNS
     return ("    " if roomy else "  ").join(part for part in parts if part) + (" at the instrument" if roomy else "")
 
 

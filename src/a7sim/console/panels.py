@@ -42,7 +42,7 @@ class Panel(Widget):
         self._likes.clear()
 
 
-LEVERS = {
+FITTING_ROWS = {
     "dove": "Dove",
     "triangulation": "triang.",
     "diapositive": "diap.",
@@ -73,7 +73,7 @@ class Fittings(Panel):
         if self._variant is None or self._dials is None:
             return Text()
         dials = self._dials
-        lines = [self._lever(LEVERS[name], POSITIONS_OF[name], at) for name, at in dials.fittings.items()]
+        lines = [self._lever(FITTING_ROWS[name], POSITIONS_OF[name], at) for name, at in dials.fittings.items()]
         lines.append(self._lever("base", self._variant.base_modes, dials.base))
         gears = Text(f"{'gears':<9}", self.like("word")).append(f"Z {dials.height_gear}  plan {dials.plan_gear}")
         return Text("\n", no_wrap=True).join([*lines, gears])

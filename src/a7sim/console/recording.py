@@ -5,7 +5,7 @@ from a7sim.console.dialogs import Ask
 from a7sim.console.sitting import Sitting
 from a7sim.link.headers import quoted, recorded_as
 
-WHY = "struck out at the console"
+STRIKE_REASON = "struck out at the console"
 
 
 class RecordingDeeds(Sitting):
@@ -47,7 +47,7 @@ class RecordingDeeds(Sitting):
         if last is None:
             console.say("there is nothing in the book to strike out")
             return
-        console.station.say(f"REC:STR {last.number},{quoted(WHY)}")
+        console.station.say(f"REC:STR {last.number},{quoted(STRIKE_REASON)}")
         console.entries = tuple(entry.struck_out() if entry is last else entry for entry in console.entries)
         console.say(f"struck out {last.number}: {last.point}")
         console.refresh_panels()

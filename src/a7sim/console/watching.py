@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from a7sim.console.dialogs import Ask
-from a7sim.console.keymap import LOOKING, WATCHING, deeds_of
+from a7sim.console.keymap import PLAYBACK_ACTIONS, VIEW_ACTIONS, deeds_of
 from a7sim.console.margins import keys_shown
 from a7sim.console.playback import Playback, jumped
 from a7sim.console.reaching import Presets
@@ -12,8 +12,8 @@ from a7sim.console.sitting import Sitting
 if TYPE_CHECKING:
     from a7sim.session.film import Frame
 
-_PLAYED = {deed.name for deed in deeds_of(watching=True) if deed.group == WATCHING}
-_LOOKED = {deed.name for deed in deeds_of(watching=True) if deed.group in LOOKING}
+_PLAYED = {deed.name for deed in deeds_of(watching=True) if deed.group == PLAYBACK_ACTIONS}
+_LOOKED = {deed.name for deed in deeds_of(watching=True) if deed.group in VIEW_ACTIONS}
 
 
 class WatchingDeeds(Sitting):

@@ -17,7 +17,7 @@ from a7sim.instrument.projection import Turned, place_of_centre, place_on_carrie
 from a7sim.instrument.recorder import Recorder, Registration
 from a7sim.instrument.refusals import OutOfRange, SettingsConflict, UnknownName
 from a7sim.instrument.spindles import Counter, Runout, Spindle
-from a7sim.manual import LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Element, Fittings, Gear, Variant
+from a7sim.manual import LEAST_COUNT, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Element, Fittings, Gear, Variant
 from a7sim.scenario.schema import FORMAT_MM, Condition, Instrument, ProjectorCondition, Scenario
 from a7sim.scene import build_scene
 from a7sim.scene.photograph import Photograph
@@ -29,7 +29,7 @@ MOVE_CENTRES = ("bx", "by1", "by2", "bz1", "bz2", "common_phi")
 COUNTED_FROM_ZERO = ("phi1", "phi2", "omega1", "omega2", "common_phi")
 """Tilts, whose counters do not read zero where they are none."""
 
-CAMERAS_KEPT = 64
+CAMERA_CACHE_SIZE = 64
 """Of the tilts at which they stood last: bx, by and bz move a camera and do not turn it."""
 
 State = dict[str, Any]
@@ -87,7 +87,7 @@ class Autograph:
         self._guides = guides_of(self._condition)
         self._carriers: dict[int, Carrier] = {}
         self.base_mode = variant.base_modes[0]
-        self.fittings = RIGHT_FITTINGS["positive", self.base_mode]
+        self.fittings = REQUIRED_FITTINGS["positive", self.base_mode]
         self._poses: dict[int, tuple[Array, Array]] = {}
         self._mark: Array | None = None
         self._nominal_centres: dict[int, tuple[float, float, float]] = {}
@@ -202,7 +202,7 @@ class Autograph:
         if self.base_mode != self.variant.base_modes[0]:
             self._takes("base mode", self.variant.rates.lever)
         self.base_mode = self.variant.base_modes[0]
-        self._fit(RIGHT_FITTINGS["positive", self.base_mode])
+        self._fit(REQUIRED_FITTINGS["positive", self.base_mode])
         for counter in self._counters.values():
             counter.clear()
         self._forget_poses()
@@ -591,7 +591,7 @@ class Autograph:
         return as_they_act(self.fittings, polarity, self.base_mode, self.variant.fittings)
 
 
-@lru_cache(maxsize=CAMERAS_KEPT)
+@lru_cache(maxsize=CAMERA_CACHE_SIZE)
 def _camera(omega: float, phi: float, kappa: float, missed: tuple[float, ...]) -> Turned:
     """Return a camera turned by angles in radians; not to write."""
     camera = turned_by(omega, phi, kappa, np.array(missed))

@@ -46,7 +46,7 @@ class Faults:
     counter_slip_share: float
 
 
-FAULTS_OF: Mapping[Upkeep, Faults] = MappingProxyType(
+FAULT_SIGMAS: Mapping[Upkeep, Faults] = MappingProxyType(
     {
         "new": Faults(
             local_um=(1.9, 3.8),
@@ -114,7 +114,7 @@ def condition_of(instrument: Instrument, seed: int) -> Condition:
     stated = instrument.condition
     listed = Condition(upkeep=stated) if isinstance(stated, str) else stated
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM, _FAULTS)))
-    total: Condition = _on_top(_drawn(FAULTS_OF[listed.upkeep], rng), listed) if listed.upkeep else listed
+    total: Condition = _on_top(_drawn(FAULT_SIGMAS[listed.upkeep], rng), listed) if listed.upkeep else listed
     left, right = (_with_pattern(each, rng) for each in (total.left, total.right))
     return msgspec.structs.replace(total, left=left, right=right)
 

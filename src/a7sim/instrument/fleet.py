@@ -19,7 +19,7 @@ from a7sim.instrument.condition import INSTRUMENT_STREAM, condition_of, local_co
 from a7sim.instrument.fleet_parts import AXES, Carriages, Carriers, Drums, Runouts, Truths, rounded
 from a7sim.instrument.projection import place_of_centre, place_on_carrier
 from a7sim.instrument.spindles import UNITS_A_DRUM
-from a7sim.manual import COUNTER_DECIMALS, LEAST_COUNT, POSITIONS_OF, RIGHT_FITTINGS, VARIANTS, Variant
+from a7sim.manual import COUNTER_DECIMALS, LEAST_COUNT, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Variant
 from a7sim.scenario.schema import Condition, Instrument, ProjectorCondition
 from a7sim.scene.photograph import Photograph
 
@@ -29,7 +29,7 @@ SHIFTS = ("bx", "by1", "by2", "bz1", "bz2")
 
 _RIGHT = {
     arrangement: {name: POSITIONS_OF[name].index(position) for name, position in fittings.as_words().items()}
-    for arrangement, fittings in RIGHT_FITTINGS.items()
+    for arrangement, fittings in REQUIRED_FITTINGS.items()
 }
 """Which of its two positions each fitting has by rights, by polarity and base."""
 
@@ -229,7 +229,7 @@ class Fleet:
             self._offsets[AXES.index(axis), who] = scale.at_origin
 
     def _put_right_fittings(self, who: Who) -> None:
-        for name, position in RIGHT_FITTINGS["positive", "inside"].as_words().items():
+        for name, position in REQUIRED_FITTINGS["positive", "inside"].as_words().items():
             self.set_fitting(who, name, position)
 
     # --- carriages, counters, gears -------------------------------------------------------------------

@@ -21,7 +21,7 @@ Truths = npt.NDArray[np.bool_]
 
 AXES = "XYZ"
 
-NEAR_A_TIE = 1e-6
+TIE_TOLERANCE = 1e-6
 """Of the last decimal."""
 
 
@@ -33,7 +33,7 @@ def rounded(values: Array, decimals: int) -> Array:
     scaled = values * 10.0**decimals
     nearest = np.rint(scaled)
     scaled -= nearest
-    ties = np.abs(scaled, out=scaled) > 0.5 - NEAR_A_TIE
+    ties = np.abs(scaled, out=scaled) > 0.5 - TIE_TOLERANCE
     nearest /= 10.0**decimals
     if ties.any():
         nearest[ties] = [round(value, decimals) for value in values[ties].tolist()]

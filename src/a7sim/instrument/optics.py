@@ -13,15 +13,15 @@ from functools import lru_cache
 import numpy as np
 
 from a7sim.geometry import GON, Array, plane_rotation
-from a7sim.manual import RIGHT_FITTINGS, Fittings
+from a7sim.manual import REQUIRED_FITTINGS, Fittings
 
-VIEWS_KEPT = 64
+VIEW_CACHE_SIZE = 64
 
 
-@lru_cache(maxsize=VIEWS_KEPT)
+@lru_cache(maxsize=VIEW_CACHE_SIZE)
 def as_they_act(fittings: Fittings, polarity: str, base: str, has: tuple[str, ...]) -> Fittings:
     """Return the fittings of an instrument that has only some: the others are built right for any picture."""
-    right = RIGHT_FITTINGS[polarity, base].as_words()
+    right = REQUIRED_FITTINGS[polarity, base].as_words()
     return replace(fittings, **{name: position for name, position in right.items() if name not in has})
 
 
@@ -31,13 +31,13 @@ def projector_seen(eyepiece: int, fittings: Fittings) -> int:
     return eyepiece if straight else 3 - eyepiece
 
 
-@lru_cache(maxsize=VIEWS_KEPT)
+@lru_cache(maxsize=VIEW_CACHE_SIZE)
 def view(fittings: Fittings, polarity: str, base: str, kappa_gon: float) -> Array:
     """Return the matrix ``(2, 2)`` from displacements on the carrier to those in the eyepiece, in mm; not to write.
 
     The optics stand still while the camera swings, so a swung picture is seen swung.
     """
-    right = RIGHT_FITTINGS[polarity, base]
+    right = REQUIRED_FITTINGS[polarity, base]
     mirrored = np.array(
         [
             1.0 if fittings.diapositive == right.diapositive else -1.0,
@@ -51,7 +51,7 @@ def view(fittings: Fittings, polarity: str, base: str, kappa_gon: float) -> Arra
 
 def wheel_senses(fittings: Fittings, polarity: str) -> dict[str, float]:
     """Return +1, or -1 where a collar does not belong to the picture, for the X and Y handwheels and the Z disc."""
-    right = RIGHT_FITTINGS[polarity, "inside"]
+    right = REQUIRED_FITTINGS[polarity, "inside"]
     return {
         "X": 1.0 if fittings.xcollar == right.xcollar else -1.0,
         "Y": 1.0 if fittings.ycollar == right.ycollar else -1.0,

@@ -5,13 +5,13 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from a7sim.instrument.language import LONGEST_LINE, LinkEvent, Listener, as_heard, without_token
+from a7sim.instrument.language import MAX_LINE_LENGTH, LinkEvent, Listener, as_heard, without_token
 from a7sim.link.clock import WallClock
 from a7sim.link.opening import open_port, told
 from a7sim.link.replies import NotAReply, Part, whole_reply
 from a7sim.mistakes import Mistake
 
-LOOKS_EVERY_S = 0.1
+POLL_INTERVAL_S = 0.1
 """How often somebody who waits looks whether to stop."""
 
 _AT_ONCE = 65536
@@ -34,7 +34,7 @@ class Between:
 
     def serve(self, door: socket.socket) -> None:
         """Let clients through until it is told to stop. Raises Mistake where the instrument or the listener fails."""
-        door.settimeout(LOOKS_EVERY_S)
+        door.settimeout(POLL_INTERVAL_S)
         while not self._stop.is_set():
             try:
                 client, _ = door.accept()
@@ -48,10 +48,10 @@ class Between:
     def _let_through(self, client: socket.socket) -> None:
         self._clients += 1
         name = f"client{self._clients}"
-        client.settimeout(LOOKS_EVERY_S)
+        client.settimeout(POLL_INTERVAL_S)
         gone = threading.Event()
         with told(self._url):
-            port = open_port(self._url, LOOKS_EVERY_S)
+            port = open_port(self._url, POLL_INTERVAL_S)
             try:
                 self._hear(name, "+", "")
                 replies = threading.Thread(
@@ -87,13 +87,13 @@ class Between:
                 return
             *lines, come = (come + more).split(b"\n")
             for line in lines:
-                if too_long or len(line.removesuffix(b"\r")) > LONGEST_LINE:
-                    self._hear(name, "!", f"(a line of more than {LONGEST_LINE} bytes)")
+                if too_long or len(line.removesuffix(b"\r")) > MAX_LINE_LENGTH:
+                    self._hear(name, "!", f"(a line of more than {MAX_LINE_LENGTH} bytes)")
                 elif line.strip(b" \t\r"):
                     self._hear(name, ">", without_token(line.removesuffix(b"\r").decode("latin-1"), None))
                 port.write(line + b"\n")
                 too_long = False
-            if len(come) > LONGEST_LINE + 1:
+            if len(come) > MAX_LINE_LENGTH + 1:
                 port.write(come)
                 come, too_long = b"", True
 

@@ -11,10 +11,10 @@ from a7sim.link.clock import Clock, WallClock
 from a7sim.link.faults import Cut, Faults, Noise
 from a7sim.link.pacing import Pace
 
-PIECE = 512
+CHUNK_BYTES = 512
 """Bytes of input, some dozens of lines, that are obeyed before the others have their turn."""
 
-MOST_ON_A_PACED_LINE = 4096
+MAX_PACED_BYTES = 4096
 """Bytes; more input is not read, and while more replies are on their way nothing is obeyed."""
 
 
@@ -84,7 +84,7 @@ class Conversation:
     def received(self, data: bytes) -> None:
         """Take bytes that the client sent."""
         self._heard_at = self._loop.time()
-        if self._plain and self._reading and len(data) <= PIECE:
+        if self._plain and self._reading and len(data) <= CHUNK_BYTES:
             replies = self._engine.replies_to(data, self._clock.now)
             if replies:
                 self._wire.write(b"".join(replies))
@@ -128,7 +128,7 @@ class Conversation:
     # --- how it goes on -------------------------------------------------------------------------------
 
     def _arrived(self, data: bytes) -> None:
-        if len(data) <= PIECE and not self._backlog and self._next is None and not self._holds_back():
+        if len(data) <= CHUNK_BYTES and not self._backlog and self._next is None and not self._holds_back():
             self._feed(data)
             if self._engine.waits_until is None and self._reading and not self._ended:
                 return
@@ -137,7 +137,7 @@ class Conversation:
         self._go_on_soon()
 
     def _holds_back(self) -> bool:
-        on_the_way = self._outgoing is not None and self._outgoing.size > MOST_ON_A_PACED_LINE
+        on_the_way = self._outgoing is not None and self._outgoing.size > MAX_PACED_BYTES
         return self._clogged or on_the_way or self._engine.waits_until is not None
 
     def _feed(self, data: bytes) -> None:
@@ -168,14 +168,14 @@ class Conversation:
         if self._engine.waits_until is not None:
             self._feed(b"")
         elif not self._holds_back():
-            piece, self._backlog = bytes(self._backlog[:PIECE]), self._backlog[PIECE:]
+            piece, self._backlog = bytes(self._backlog[:CHUNK_BYTES]), self._backlog[CHUNK_BYTES:]
             self._feed(piece)
         self._go_on_soon()
 
     def _go_on_reading(self) -> None:
         coming = self._incoming.size if self._incoming is not None else 0
         going = self._outgoing.size if self._outgoing is not None else 0
-        if coming > MOST_ON_A_PACED_LINE:
+        if coming > MAX_PACED_BYTES:
             self._pause()
         elif self._ended and not coming and not going and not self._backlog:
             self._wire.close()

@@ -10,7 +10,7 @@ from a7sim.mistakes import Mistake
 
 EXAMPLE = "drop-reply:0.01,delay:50ms,garble:0.001,disconnect:0.0005"
 
-LONGEST_DELAY = 60.0
+MAX_DELAY = 60.0
 """s."""
 
 _DELAY = re.compile(r"(\d+(?:\.\d+)?)(ms|s)")
@@ -57,8 +57,8 @@ def _probability(name: str, text: str) -> float:
 def _delay(text: str) -> float:
     found = _DELAY.fullmatch(text)
     seconds = float(found[1]) * (1e-3 if found[2] == "ms" else 1.0) if found else math.inf
-    if seconds > LONGEST_DELAY:
-        raise Mistake(f"--fault delay: expected up to {LONGEST_DELAY:g}s, such as 50ms or 1.5s, got {text!r}")
+    if seconds > MAX_DELAY:
+        raise Mistake(f"--fault delay: expected up to {MAX_DELAY:g}s, such as 50ms or 1.5s, got {text!r}")
     return seconds
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from serial import PortNotOpenError, SerialBase, SerialException, to_bytes
 
-from a7sim.instrument.language import MOST_KEPT_BACK, Desk, Engine
+from a7sim.instrument.language import MAX_BUFFERED_BYTES, Desk, Engine
 from a7sim.link.clock import Clock
 from a7sim.link.waiting import obeyed
 
@@ -75,8 +75,8 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         with self._alone:
             engine = self._opened()
             replies = b""
-            for start in range(0, len(received), MOST_KEPT_BACK):
-                replies += obeyed(engine, received[start : start + MOST_KEPT_BACK], self.clock)
+            for start in range(0, len(received), MAX_BUFFERED_BYTES):
+                replies += obeyed(engine, received[start : start + MAX_BUFFERED_BYTES], self.clock)
             if replies:
                 self._unread, self._read_up_to = self._unread[self._read_up_to :] + replies, 0
                 self._arrived.notify_all()

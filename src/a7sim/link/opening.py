@@ -9,9 +9,9 @@ import serial
 
 from a7sim.mistakes import Mistake
 
-FORMS = "a7sim://SCENARIO?seed=N, tcp://HOST:PORT, rfc2217://HOST:PORT, or the path of a device or pty"
+URL_FORMS = "a7sim://SCENARIO?seed=N, tcp://HOST:PORT, rfc2217://HOST:PORT, or the path of a device or pty"
 
-LARGEST_PORT = 65535
+MAX_PORT = 65535
 
 TIMEOUT_S = 5.0
 """How long a reply is waited for, unless somebody says otherwise."""
@@ -28,7 +28,7 @@ def open_port(url: str, timeout: float = TIMEOUT_S) -> Any:
     `socket://` is pyserial's name of `tcp://`. Raises Mistake in one sentence where it cannot be opened.
     """
     if not _is_named(url):
-        raise Mistake(f"expected {FORMS}, got {url!r}")
+        raise Mistake(f"expected {URL_FORMS}, got {url!r}")
     named = re.sub("^socket://", "tcp://", url, flags=re.IGNORECASE)
     try:
         return serial.serial_for_url(named, timeout=timeout)
@@ -49,7 +49,7 @@ def _is_named(url: str) -> bool:
     if "://" not in url:
         return url != "" and not _ADDRESS.fullmatch(url)
     found = _URL.fullmatch(url)
-    return found is not None and (found[3] is None or int(found[3]) <= LARGEST_PORT)
+    return found is not None and (found[3] is None or int(found[3]) <= MAX_PORT)
 
 
 def _reason(error: BaseException) -> str:

@@ -9,16 +9,16 @@ from pathlib import Path
 
 from a7sim.link.conversation import Conversation
 from a7sim.link.courtesy import Courtesy
-from a7sim.link.wires import MOST_UNREAD, Host
+from a7sim.link.wires import MAX_UNREAD, Host
 from a7sim.mistakes import Mistake
 
-LOOKS = 8
+POLLS_BEFORE_SLEEP = 8
 """A client that was answered mostly asks again at once: so often the wire looks before it sleeps until it is woken."""
 
-LARGEST_READ = 4096
+MAX_READ = 4096
 """Bytes that a terminal of Linux holds."""
 
-OF_ITS_KIND = "/dev/pts/"
+PTY_DIRECTORY = "/dev/pts/"
 """Where the links lead that may be overwritten."""
 
 
@@ -72,9 +72,9 @@ class PtyWire:
 
     def _readable(self) -> None:
         near, received = self._near, self._conversation.received
-        for _ in range(LOOKS):
+        for _ in range(POLLS_BEFORE_SLEEP):
             try:
-                data = os.read(near, LARGEST_READ)
+                data = os.read(near, MAX_READ)
             except (BlockingIOError, InterruptedError):
                 if not self._courtesy.yielded():
                     return
@@ -87,7 +87,7 @@ class PtyWire:
         self._unsent = self._unsent[self._sent(self._unsent) :]
         if not self._unsent:
             self._loop.remove_writer(self._near)
-        if self._clogged and len(self._unsent) <= MOST_UNREAD // 4:
+        if self._clogged and len(self._unsent) <= MAX_UNREAD // 4:
             self._clogged = False
             self._conversation.unclogged()
 
@@ -108,7 +108,7 @@ class PtyWire:
             data = data[sent:]
             self._loop.add_writer(self._near, self._writable)
         self._unsent += data
-        if not self._clogged and len(self._unsent) > MOST_UNREAD:
+        if not self._clogged and len(self._unsent) > MAX_UNREAD:
             self._clogged = True
             self._conversation.clogged()
 
@@ -142,7 +142,7 @@ class PtyWire:
 def _make_link(link: Path, device: str) -> None:
     temporary = link.with_name(f".{link.name}.{os.getpid()}")
     try:
-        if os.path.lexists(link) and not (link.is_symlink() and str(link.readlink()).startswith(OF_ITS_KIND)):
+        if os.path.lexists(link) and not (link.is_symlink() and str(link.readlink()).startswith(PTY_DIRECTORY)):
             raise Mistake(f"--pty {link}: expected nothing there or an old link to a terminal, got something else")
         if _is_served(link):
             raise Mistake(f"--pty {link}: expected a path of its own, got that of another instrument, which is served")

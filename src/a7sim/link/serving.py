@@ -12,14 +12,14 @@ from a7sim.link.addresses import Address
 from a7sim.link.clock import Clock, WallClock
 from a7sim.link.conversation import Conversation, Terms, Wire
 from a7sim.link.pty_wire import PtyWire
-from a7sim.link.wires import LARGEST_READ, TcpWire, TelnetWire
+from a7sim.link.wires import MAX_READ, TcpWire, TelnetWire
 from a7sim.mistakes import Mistake
 from a7sim.wording import counted
 
-MOST_TURNED_AWAY = 64
+MAX_REJECTION_NOTICES = 64
 """Clients at a time that are told why they are turned away; the others are just turned away."""
 
-ACCEPTED_AT_ONCE = 512
+LISTEN_BACKLOG = 512
 """Connections that may wait to be taken in, and are taken in before the clients have their turn."""
 
 
@@ -39,7 +39,7 @@ class Server:
         self.desk = desk
         self._clock = clock
         self._terms = terms
-        self._buffer = memoryview(bytearray(LARGEST_READ))
+        self._buffer = memoryview(bytearray(MAX_READ))
         self._wires: set[Wire] = set()
         self._turned_away: set[Wire] = set()
         self._listeners: list[asyncio.Server] = []
@@ -60,7 +60,7 @@ class Server:
         loop = asyncio.get_running_loop()
         try:
             listener = await loop.create_server(
-                lambda: wire(self, self._buffer), address.host, address.port, backlog=ACCEPTED_AT_ONCE
+                lambda: wire(self, self._buffer), address.host, address.port, backlog=LISTEN_BACKLOG
             )
         except OSError as error:
             raise Mistake(f"--{kind} {address}: expected an address to listen on: {_reason(error)}") from error
@@ -94,7 +94,7 @@ class Server:
         """Return a conversation for a wire, or why there is none, as a line."""
         most = self._terms.most_clients
         if len(self._wires) >= most:
-            if len(self._turned_away) >= MOST_TURNED_AWAY:
+            if len(self._turned_away) >= MAX_REJECTION_NOTICES:
                 wire.abort()
             self._turned_away.add(wire)
             text = entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {counted(most, 'client')} at a time")

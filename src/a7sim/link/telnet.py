@@ -10,7 +10,7 @@ BINARY, NO_GO_AHEAD, COM_PORT = 0, 3, 44
 WILLING = frozenset({BINARY, NO_GO_AHEAD, COM_PORT})
 """Options that both sides may have; an instrument does not echo."""
 
-LONGEST_SUBNEGOTIATION = 64
+MAX_SUBNEGOTIATION_LENGTH = 64
 """Bytes; what goes beyond is dropped."""
 
 TO_THE_CLIENT = 100
@@ -107,13 +107,13 @@ class Telnet:
     def _take_subnegotiation(self, byte: int) -> None:
         if byte == IAC:
             self._taker = self._take_command_within
-        elif len(self._sub) < LONGEST_SUBNEGOTIATION:
+        elif len(self._sub) < MAX_SUBNEGOTIATION_LENGTH:
             self._sub.append(byte)
 
     def _take_command_within(self, byte: int) -> None:
         self._taker = self._take_subnegotiation
         if byte == IAC:
-            self._sub += bytes([IAC])[: LONGEST_SUBNEGOTIATION - len(self._sub)]
+            self._sub += bytes([IAC])[: MAX_SUBNEGOTIATION_LENGTH - len(self._sub)]
         elif byte == SE:
             self._taker = self._take_data
             if self._sub[:1] == bytes([COM_PORT]) and len(self._sub) > 1:

@@ -8,10 +8,10 @@ from typing import Protocol, cast
 from a7sim.link.conversation import Conversation, Wire
 from a7sim.link.telnet import Telnet
 
-LARGEST_READ = 16 * 1024
+MAX_READ = 16 * 1024
 """Bytes taken from a socket at once."""
 
-MOST_UNREAD = 64 * 1024
+MAX_UNREAD = 64 * 1024
 """Bytes of replies that may wait for a client to read them before it is obeyed no more."""
 
 QUICK_ACKNOWLEDGEMENT: int | None = getattr(socket, "TCP_QUICKACK", None)
@@ -49,7 +49,7 @@ class TcpWire(asyncio.BufferedProtocol):
         """Begin a conversation, or turn the client away."""
         self._transport = cast(asyncio.Transport, transport)
         self._socket = self._transport.get_extra_info("socket")
-        self._transport.set_write_buffer_limits(high=MOST_UNREAD)
+        self._transport.set_write_buffer_limits(high=MAX_UNREAD)
         welcomed = self._host.welcome(self, self.serial)
         if isinstance(welcomed, Conversation):
             self._conversation = welcomed

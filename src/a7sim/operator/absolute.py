@@ -10,7 +10,7 @@ from a7sim.among import Who
 from a7sim.geometry import Array, length_of
 from a7sim.operator.bench import Bench
 from a7sim.operator.job import ModelJob
-from a7sim.operator.levelling import MOST_ROUNDS, Control, Fit, Levelling, LevellingRound, Settings
+from a7sim.operator.levelling import MAX_ROUNDS, Control, Fit, Levelling, LevellingRound, Settings
 from a7sim.operator.seat import counter_value
 
 TOLERATED_SHARE = 2e-4
@@ -105,14 +105,14 @@ class _InMetres:
     def _index_set(self, who: Who) -> Array:
         """Make the Z counter read heights, on the mean of the control; return how much more it reads ``(m,)``."""
         names = [self.control.names[i] for i in self.control.with_height]
-        self.bench.begin_round(who, MOST_ROUNDS + 1)
+        self.bench.begin_round(who, MAX_ROUNDS + 1)
         readings = self.bench.measure(who, names)[2][:, who]
         more = np.mean(self.control.ground[2, self.control.with_height][:, None] - readings, axis=0)
         return self.seat.shift_counter(who, "Z", more)
 
     def _read(self, who: Who) -> dict[str, Array]:
         """Measure control and all other points that are shown; X, Y in mm and Z in m ``(3, sessions)``."""
-        self.bench.begin_round(who, MOST_ROUNDS + 2)
+        self.bench.begin_round(who, MAX_ROUNDS + 2)
         wanted = dict.fromkeys([*self.control.names, *self.seat.model.other_points])
         names = [name for name in wanted if self.bench.pricked(who, name).all()]
         return dict(zip(names, np.moveaxis(self.bench.measure(who, names), 1, 0), strict=True))

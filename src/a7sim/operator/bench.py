@@ -20,11 +20,11 @@ from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.seat import Seat, side, wrapped
 from a7sim.operator.slips import neighbours
 
-MOST_POINTINGS = 12
+MAX_POINTINGS = 12
 AGREEMENT_MM = 0.01
 """Two pointings of a model point agree within this (thesis 3.5)."""
 
-FAINTEST_SLIP_MM = 0.03
+MIN_SLIP_MM = 0.03
 """A reading of by that differs less than this from its fellows is not taken for a blunder."""
 
 Numbers = npt.NDArray[np.intp]
@@ -295,11 +295,11 @@ class Bench:
         Of two that contradict each other nobody knows which is wrong: they are made again in turn.
         """
         crew, observer = self.crew, self.crew.observer
-        tolerance = FAINTEST_SLIP_MM + 5e-3 * observer.parallax_um * self.seat.z / self.seat.c
+        tolerance = MIN_SLIP_MM + 5e-3 * observer.parallax_um * self.seat.z / self.seat.c
         doubtful, lost = who, who[:0]
         readings = values.shape[1]
         bys = " and ".join("by'" if projector == 1 else 'by"' for projector in projectors)
-        for number in range(MOST_POINTINGS):
+        for number in range(MAX_POINTINGS):
             flat = values.reshape(-1, crew.sessions)[:, doubtful]
             deviations = np.abs(flat - np.median(flat, axis=0))
             worst = deviations.argmax(axis=0) if len(flat) > 2 else np.full(doubtful.size, number % len(flat))
@@ -440,7 +440,7 @@ class Bench:
         pointings: list[Array] = []
         entries: list[Numbers] = []
         repeating = who
-        while len(pointings) < MOST_POINTINGS and repeating.size:
+        while len(pointings) < MAX_POINTINGS and repeating.size:
             k = len(pointings)
             if k < 2:
                 error, slip = anew[:, k], slips[:, k]
@@ -461,7 +461,7 @@ class Bench:
                 repeating = without(found, agreed)
         if repeating.size:
             into[:, repeating] = np.median([each[:, repeating] for each in pointings], axis=0)
-        crew.remark(repeating, f"point {point}: no two of {MOST_POINTINGS} pointings agree, median taken")
+        crew.remark(repeating, f"point {point}: no two of {MAX_POINTINGS} pointings agree, median taken")
 
     def _pointing(self, who: Who, point: str, error: Array, slips: Array, readings: Array) -> tuple[Who, Numbers]:
         crew = self.crew

@@ -36,8 +36,8 @@ from a7sim.operator.work import (
     take_up_prints,
 )
 
-MOST_SCALINGS = 4
-MOST_REFINEMENTS = 4
+MAX_SCALINGS = 4
+MAX_REFINEMENTS = 4
 STILL_FALLING = 0.95
 """Residual parallaxes, or changes of the base, go on falling while they are below this share of the best so far."""
 
@@ -189,7 +189,7 @@ def carry_scale_on(bench: Bench, who: Who, model: ModelJob, before: Mapping[str,
     if not names:
         crew.give_up(who, f"{model.name}: none of its points 1, 3 and 5 was measured before, to carry the scale on")
         see_that_somebody_goes_on(bench)
-    for number in range(1, MOST_SCALINGS + 1):
+    for number in range(1, MAX_SCALINGS + 1):
         bench.begin_round(who, number)
         readings = bench.measure(who, names)[:, :, who]
         wanted = np.stack([before[name][:, who] for name in names], axis=1)
@@ -232,7 +232,7 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
     everybody = who = crew.everybody
     best = spread(seat.standing(who, unknowns), who, crew.sessions)
     least = np.full(crew.sessions, np.inf)
-    for number in range(1, MOST_REFINEMENTS + 1):
+    for number in range(1, MAX_REFINEMENTS + 1):
         bench.begin_round(who, number)
         seen = bench.parallaxes_seen(who, points)
         who = crew.still(who)
@@ -245,14 +245,14 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
         for name, kept in best.items():
             kept[better] = now[name][better]
         who = falling
-        if not who.size or number == MOST_REFINEMENTS:
+        if not who.size or number == MAX_REFINEMENTS:
             break
         corrections, _ = corrections_of(bench, who, model, seen.places, seen.p, unknowns, seat.bx(who))
         who = crew.still(who)
         seat.turn_elements(who, {name: (now[name] + corrections[name])[who] for name in unknowns})
     everybody = crew.still(everybody)
     seat.turn_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
-    bench.begin_round(everybody, MOST_REFINEMENTS + 1)
+    bench.begin_round(everybody, MAX_REFINEMENTS + 1)
     job = bench.job
     return assessed(
         bench, everybody, model, found, model.all_positions(), job.plan.parallax_readings, job.tolerated_parallax_mm

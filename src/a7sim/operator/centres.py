@@ -31,15 +31,15 @@ SUSPICIOUS_RMS = 0.19
 SLIPPED = 1.5
 """A point whose removal lowers a suspicious rms by this factor is pointed at again."""
 
-MOST_REPETITIONS = 3
+MAX_REPETITIONS = 3
 
-FEWEST_CROSSES = 9
+MIN_CROSSES = 9
 """Within the model, in two columns or more; the coarsest lines of the plate that have so many there are taken."""
 
 BESIDE_THE_MODEL = 0.1
 """Crosses are pointed at so far beside the base, as a share of it: further out carriages and rods may not go."""
 
-FEWEST_POINTS = 3
+MIN_POINTS = 3
 """For a centre by levels: one that does not fit two others can still be told, if not which."""
 
 Levels = npt.NDArray[np.float64]
@@ -139,15 +139,15 @@ def _by_levels(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Level
     groups = []
     for them, there in bench.alike(who, points, (hand,)):
         usual = [name for name in there if name in corners_and_nadirs]
-        chosen = usual if len(usual) >= FEWEST_POINTS else there
-        if len(chosen) >= FEWEST_POINTS:
+        chosen = usual if len(usual) >= MIN_POINTS else there
+        if len(chosen) >= MIN_POINTS:
             found = _of_points(bench, them, model, hand, chosen, levels)
             groups.append((crew.still(them), chosen, found))
         else:
             crew.give_up(
                 them,
                 f"{model.name}: {len(chosen)} of the standard points are pricked on the print of the {side(hand)} "
-                f"photograph: there must be {FEWEST_POINTS} for its perspective centre",
+                f"photograph: there must be {MIN_POINTS} for its perspective centre",
             )
     return _gathered(groups, crew.sessions)
 
@@ -204,7 +204,7 @@ def _one_set(bench: Bench, who: Who, hand: int, points: Sequence[str], levels: L
     pointings = np.stack([bench.point_with(crew.still(who), hand, points, level) for level in levels.tolist()], axis=1)
     looking = crew.still(who)
     bench.compute(looking)
-    for _ in range(MOST_REPETITIONS):
+    for _ in range(MAX_REPETITIONS):
         misread = _misread_points(pointings[..., looking], levels)
         looking, misread = looking[misread >= 0], misread[misread >= 0]
         if not looking.size:
@@ -245,7 +245,7 @@ def _by_grid_plate(bench: Bench, who: Who, model: ModelJob, hand: int, levels: L
     lie = lie_of_plate(bench, crew.still(who), projector, certificate, times=1)
     bench.eyes.take_prints({hand: prints_of(bench, crew.still(who), projector)})
     crosses = _crosses_in_model(bench, crew.still(who), hand, levels)
-    if len(crosses) < FEWEST_CROSSES:
+    if len(crosses) < MIN_CROSSES:
         crew.give_up(who, f"{model.name}: too few crosses of plate {plate.name} lie within the model for a centre")
         return _nowhere(crew.sessions)
     pointings = np.stack(
@@ -279,7 +279,7 @@ def _crosses_in_model(bench: Bench, who: Who, hand: int, levels: Levels) -> Cros
         return {name: place for (name, place), keep in zip(crosses.items(), inside, strict=True) if keep}
 
     sets = [*(in_model(plate.some_crosses(count)) for count in plate.even_counts), in_model(plate.crosses)]
-    enough = (each for each in sets if len(each) >= FEWEST_CROSSES and len({x for x, _ in each.values()}) > 1)
+    enough = (each for each in sets if len(each) >= MIN_CROSSES and len({x for x, _ in each.values()}) > 1)
     return next(enough, {})
 
 

@@ -31,7 +31,7 @@ from a7sim.operator.person import Person
 from a7sim.operator.stereo_view import COARSE_MM, FINE_MM, MIDDLING_MM, Look, StereoView, Surface, rectified
 from a7sim.wording import counted
 
-LONGEST_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
+MAX_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
 """From vertex to vertex."""
 
 SPOTS_MM = 25.0
@@ -40,15 +40,15 @@ SPOTS_MM = 25.0
 _SHARP_TURN, _GENTLE_TURN = 0.35, 0.12
 """Radians from vertex to vertex, beyond which steps are made shorter, and below which they are made longer."""
 
-_MOST_STRAYED, _SHARPEST = 0.6, 0.3
+_MAX_STRAYED, _SHARPEST = 0.6, 0.3
 """Of a correction, as a share of the step; and of a turn from vertex to vertex, as its cosine."""
 
-_MOST_VERTICES = 4000
-_MOST_LOOKS = 14
+_MAX_VERTICES = 4000
+_MAX_LOOKS = 14
 _NEAR_ENOUGH_MM = 0.15
 """A correction in plan that is left to the next vertex's turn of the wheels without another look."""
 
-_LONGEST_CORRECTION_MM = 3.0
+_MAX_CORRECTION_MM = 3.0
 _SAME_LINE_MM, _JOINED_MM, _STUB_MM = 2.5, 1.5, 10.0
 """From a line drawn before: where none is begun anew, and where one ends, as at a saddle of its own height; what is
 shorter and ends so is no line of its own."""
@@ -160,7 +160,7 @@ class Compilation:
         observer = self._bench.crew.observer
         self._bench.crew.spend(self._who, observer.seconds_to_look, "looking")
         seen = self._seen(looks=_WIDELY)
-        for _ in range(_MOST_LOOKS):
+        for _ in range(_MAX_LOOKS):
             if seen is None:
                 return None
             look, surface = seen
@@ -209,7 +209,7 @@ class Compilation:
         """Follow a contour from a place on it; return its vertices and how it ended."""
         vertices: list[Array] = []
         at, step, bend = start, FIRST_STEP_MM, 0.0
-        while len(vertices) < _MOST_VERTICES:
+        while len(vertices) < _MAX_VERTICES:
             wanted = step * _turned(at.heading, bend / 2.0)
             cut = self.area.shortened(at.place, wanted)
             if length_of(cut) < 1e-2:
@@ -245,7 +245,7 @@ class Compilation:
     ) -> _Vertex | None:
         """Bring the mark onto the contour at its height; with `into`, register it there with the hand's tremor."""
         expected = None if before is None else Surface(0.0, before.surface.slope, 0.0, 1.0)
-        for number in range(_MOST_LOOKS):
+        for number in range(_MAX_LOOKS):
             seen = self._seen(expected, _CLOSELY if number or before is not None else _WIDELY)
             if seen is None:
                 return None
@@ -257,7 +257,7 @@ class Compilation:
             far = float(length_of(back))
             expected = Surface(0.0, surface.slope, 0.0, 1.0)
             if far > _NEAR_ENOUGH_MM or look.pitch > MIDDLING_MM:
-                self._turn(back * min(1.0, _LONGEST_CORRECTION_MM / far))
+                self._turn(back * min(1.0, _MAX_CORRECTION_MM / far))
                 continue
             here = self._place() + back
             strike = np.array([-surface.slope[1], surface.slope[0]]) / np.sqrt(steepness)
@@ -268,7 +268,7 @@ class Compilation:
             if into is not None:
                 (along, across), error = self._tremor(look)
                 up = surface.slope / np.sqrt(steepness)
-                misjudged = np.clip(error / np.sqrt(steepness), -_LONGEST_CORRECTION_MM, _LONGEST_CORRECTION_MM)
+                misjudged = np.clip(error / np.sqrt(steepness), -_MAX_CORRECTION_MM, _MAX_CORRECTION_MM)
                 self._turn(back + along * strike + (across + misjudged) * up)
                 into.append(self._registered(name))
             return _Vertex(here, strike, surface)
@@ -298,7 +298,7 @@ class Compilation:
     def _line_followed(self, name: str, road: "_Road", end: Array) -> tuple[list[Array], Ending]:
         vertices: list[Array] = []
         step, bend = FIRST_STEP_MM, 0.0
-        while len(vertices) < _MOST_VERTICES:
+        while len(vertices) < _MAX_VERTICES:
             (along, across), error = self._tremor(road.look)
             shaken = road.offset + along * road.heading + across * _turned(road.heading, np.pi / 2.0)
             start = self._place()
@@ -395,7 +395,7 @@ def _strayed(before: _Vertex, wanted: Array, here: Array, heading: Array) -> boo
     """Return whether a correction led to where the line cannot have gone: perhaps another contour beyond a saddle."""
     step = float(length_of(wanted - before.place))
     return bool(
-        length_of(here - wanted) > _MOST_STRAYED * step + _NEAR_ENOUGH_MM or heading @ before.heading < _SHARPEST
+        length_of(here - wanted) > _MAX_STRAYED * step + _NEAR_ENOUGH_MM or heading @ before.heading < _SHARPEST
     )
 
 
@@ -415,4 +415,4 @@ def _angle(before: Array, after: Array) -> float:
 def _next_step(step: float, bend: float) -> float:
     if abs(bend) > _SHARP_TURN:
         return max(0.6 * step, SHORTEST_STEP_MM)
-    return min(1.3 * step, LONGEST_STEP_MM) if abs(bend) < _GENTLE_TURN else step
+    return min(1.3 * step, MAX_STEP_MM) if abs(bend) < _GENTLE_TURN else step

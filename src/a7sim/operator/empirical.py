@@ -22,8 +22,8 @@ from a7sim.operator.relative import RelativeOrientations, Rounds, assessed, merg
 from a7sim.reduction import Stand
 from a7sim.standard_points import CASES, FIGURE_4_1, PLACES, POSITIONS
 
-MOST_ROUNDS = 15
-MOST_PASSES = 5
+MAX_ROUNDS = 15
+MAX_PASSES = 5
 """Over the first four points in a round."""
 
 VISIBLE_SIGMAS = 2.5
@@ -32,7 +32,7 @@ VISIBLE_SIGMAS = 2.5
 VISIBLE_SIGMAS_AT_LAST = 2.0 * 6.0**0.5
 """At the last point the errors of all five come together: twice those of 1 and 2, or of 2, once the others'."""
 
-LARGEST_OVER_CORRECTION = 10.0
+MAX_OVER_CORRECTION = 10.0
 """Beyond it the last point says next to nothing of omega."""
 
 TRIES = 4
@@ -262,7 +262,7 @@ class _Clearing:
             self._look_at_checks(who)
             who, turning, n = self._over_correct(who)
             self._close_round(who, turning, settings, n)
-            if len(self.rounds) == MOST_ROUNDS:
+            if len(self.rounds) == MAX_ROUNDS:
                 ended = np.union1d(ended, self._clear_first_four(turning))
                 turning = turning[:0]
             ended = np.union1d(ended, without(who, np.flatnonzero(n)))
@@ -287,7 +287,7 @@ class _Clearing:
     def _clear_first_four(self, who: Who) -> Who:
         """Clear them over and over until on arriving each is seen to be clear."""
         clearing = who
-        for _ in range(MOST_PASSES):
+        for _ in range(MAX_PASSES):
             again = clearing[:0]
             for place, step in enumerate(self.steps[:4]):
                 cleared = self._clear(self._going(clearing), place, step)
@@ -316,7 +316,7 @@ class _Clearing:
         if not isinstance(self._over_corrected, str):
             return np.full(who.size, float(self._over_corrected))
         n = over_correction_by_coefficients(self._coefficients(who))
-        hopeless = ~((n > 0.0) & (n < LARGEST_OVER_CORRECTION))
+        hopeless = ~((n > 0.0) & (n < MAX_OVER_CORRECTION))
         self.crew.give_up(
             who[hopeless],
             f"{self.model.name}: the heights of the points leave omega open: what {self.steps[-1].element} does at "

@@ -10,7 +10,7 @@ from a7sim.operator.hands import Truths
 from a7sim.operator.levers import put_levers_right
 from a7sim.operator.seat import Seat, side
 
-MOST_LOOKS = 40
+MAX_LOOKS = 40
 """At one setting of the mark."""
 
 FINEST_MM, FINEST_SHARE = 0.0003, 0.15
@@ -23,8 +23,8 @@ SEARCH_RINGS = 3
 SEARCH_STEP_MM = 14.0
 """At photo scale: how far the operator looks around for a point that is not where the print shows it."""
 
-RUNNING_AWAY_UM = 150.0
-RUNNING_AWAY_LOOKS = 3
+DIVERGENCE_UM = 150.0
+DIVERGENCE_LOOKS = 3
 """What grows in so many looks in a row, though it is turned down, runs away."""
 
 
@@ -102,7 +102,7 @@ class Eyes:
         """Turn X and Y until the image seems to lie at the mark; errors ``(2, sessions)`` in um."""
         seat = self.seat
         watch = Watch(2, self.crew.sessions)
-        for looks in range(MOST_LOOKS):
+        for looks in range(MAX_LOOKS):
             seen = self.seen(who, hand, point)
             if not watch.all_well(who, seen):
                 lost = np.isnan(seen[0]) | watch.running_away(who, seen).any(axis=0)
@@ -172,7 +172,7 @@ class Watch:
     def all_well(self, who: Who, seen: Array) -> bool:
         """Whether all displacements ``(k, m)`` in um are seen and small, and none ever grew; if not, ask on."""
         now = np.abs(seen)
-        well = not self._any_grew and bool(now.max(initial=0.0) <= RUNNING_AWAY_UM)
+        well = not self._any_grew and bool(now.max(initial=0.0) <= DIVERGENCE_UM)
         if well:
             put(now, who, self._before)
         return well
@@ -184,14 +184,14 @@ class Watch:
     def running_away(self, who: Who, seen: Array) -> Truths:
         """Return which of the displacements ``(k, m)`` in um have grown in look after look."""
         now = np.abs(seen)
-        grown = (now > 1.4 * among(self._before, who)) & (now > RUNNING_AWAY_UM)
+        grown = (now > 1.4 * among(self._before, who)) & (now > DIVERGENCE_UM)
         put(now, who, self._before)
         if not grown.any() and not self._any_grew:
             return grown
         self._any_grew = True
         times = np.where(grown, among(self._times, who) + 1, 0)
         self._times[:, who] = times
-        return np.asarray(times >= RUNNING_AWAY_LOOKS)
+        return np.asarray(times >= DIVERGENCE_LOOKS)
 
 
 def _outward() -> Iterator[Array]:

@@ -8,11 +8,11 @@ import numpy.typing as npt
 
 from a7sim.among import Who, among, put, without
 from a7sim.geometry import Array
-from a7sim.operator.eyes import MOST_LOOKS, Eyes, Watch
+from a7sim.operator.eyes import MAX_LOOKS, Eyes, Watch
 from a7sim.operator.hands import Truths
 from a7sim.operator.levers import put_levers_right
 
-LONGEST_RISE_MM = 20.0
+MAX_RISE_MM = 20.0
 """The foot disc is not turned further than this between two looks."""
 
 RISES_TO_FUSE_MM = (0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0)
@@ -85,7 +85,7 @@ class FloatingMark:
         watch = Watch(4, crew.sessions)
         settled: list[Who] = []
         begun = np.full((3, crew.sessions), np.nan)
-        for looks in range(MOST_LOOKS):
+        for looks in range(MAX_LOOKS):
             seen = self.looked(who, point)
             well = watch.all_well(who, seen)
             if not well:
@@ -102,7 +102,7 @@ class FloatingMark:
             z, bx = among(seat.z, who), seat.bx(who)
             scale = 1e-3 * z / seat.c
             rise = (seen[2] + among(judgement.height, who)) * scale * z / np.abs(bx)
-            rise = np.minimum(np.maximum(rise, -LONGEST_RISE_MM), LONGEST_RISE_MM)
+            rise = np.minimum(np.maximum(rise, -MAX_RISE_MM), MAX_RISE_MM)
             along_the_rays = -rise / z * np.array([x - bx / 2.0, y])
             steps = (seen[:2] + among(judgement.plan, who)) * scale + along_the_rays
             at_rest = eyes.at_rest_mm(looks)

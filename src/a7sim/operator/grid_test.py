@@ -29,7 +29,7 @@ MARGIN_MM = 5.0
 
 WHOLE_LEVELS_MM = 5.0
 
-FARTHEST_OVER_NEAREST = 2.0
+MAX_DEPTH_RATIO = 2.0
 """Of the levels below the centre, where the carriages allow it."""
 
 PREPARED_HEIGHT_MM, PREPARED_BASE_MM = 300.0, 10.0
@@ -70,7 +70,7 @@ def level_heights(manual: Variant, c: float, outermost: float, levels: int) -> l
     reach = min(abs(end) for axis in "XY" for end in manual.carriages[axis]) - MARGIN_MM
     lowest, highest = manual.carriages["Z"]
     farthest = min(reach * c / outermost, -lowest - MARGIN_MM)
-    nearest = max(farthest / FARTHEST_OVER_NEAREST, -highest + MARGIN_MM)
+    nearest = max(farthest / MAX_DEPTH_RATIO, -highest + MARGIN_MM)
     far = math.floor(farthest / WHOLE_LEVELS_MM) * WHOLE_LEVELS_MM
     near = min(math.ceil(nearest / WHOLE_LEVELS_MM) * WHOLE_LEVELS_MM, far)
     wanted = np.linspace(near, far, levels) if levels > 1 else np.array([(near + far) / 2.0])

@@ -17,7 +17,7 @@ CENTRED_MM = 0.02
 MISPLACED_MM = 50.0
 """Beyond this a fiducial is not off its collimating mark, it is somewhere else."""
 
-MOST_ROUNDS = 6
+MAX_ROUNDS = 6
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def centre_picture(
     wanted = -np.array(certificate.principal_point)[:, None]
     found = InteriorOrientations(photograph, np.zeros(crew.sessions, dtype=np.intp), *np.zeros((3, crew.sessions)))
     centring = crew.still(who)
-    for round_ in range(1, MOST_ROUNDS + 1):
+    for round_ in range(1, MAX_ROUNDS + 1):
         names, displacements = fiducials_seen(bench, centring, projector)
         places = np.array([marks[name] for name in names]).T
         right = _rightly_laid(bench, centring, projector, photograph, displacements, places)

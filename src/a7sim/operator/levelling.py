@@ -21,9 +21,9 @@ from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import spread
 from a7sim.reduction import Ground, Undetermined, adjusted
 
-MOST_ROUNDS = 6
+MAX_ROUNDS = 6
 STILL_FALLING = 0.8
-FEWEST_PLAN, FEWEST_HEIGHTS = 2, 3
+MIN_PLAN, MIN_HEIGHTS = 2, 3
 
 Settings = Mapping[str, Array]
 
@@ -65,7 +65,7 @@ class Control:
     @property
     def is_enough(self) -> bool:
         """Whether there is enough for scale and levelling."""
-        return len(self.in_plan) >= FEWEST_PLAN and len(self.with_height) >= FEWEST_HEIGHTS
+        return len(self.in_plan) >= MIN_PLAN and len(self.with_height) >= MIN_HEIGHTS
 
     @property
     def ends(self) -> tuple[int, int]:
@@ -163,7 +163,7 @@ class Levelling:
         least = np.full(crew.sessions, np.inf)
         best = self.settings(who)
         height = 1e-3 * number * self.bench.job.plan.projection_height
-        for round_number in range(2, MOST_ROUNDS + 2):
+        for round_number in range(2, MAX_ROUNDS + 2):
             _note(rounds, who, fit, number)
             misfit = np.hypot(fit.rms(number), np.abs(fit.factor(number) - 1.0) * height)
             now, better = self.settings(who), misfit < least[who]
@@ -172,7 +172,7 @@ class Levelling:
                 kept[who[better]] = now[name][who[better]]
             least[who[better]] = misfit[better]
             who, fit = who[falling], fit.of(falling)
-            if not who.size or round_number > MOST_ROUNDS:
+            if not who.size or round_number > MAX_ROUNDS:
                 break
             settings = {name: values[who] for name, values in now.items()}
             upright = turned_upright(settings, self.model, self.seat.manual, fit.up, fit.factor(number))

@@ -6,11 +6,11 @@ from types import MappingProxyType
 import numpy as np
 
 from a7sim.among import Who
-from a7sim.manual import RIGHT_FITTINGS, Variant
+from a7sim.manual import REQUIRED_FITTINGS, Variant
 from a7sim.operator.hands import Truths
 from a7sim.operator.seat import Seat
 
-CALLED: Mapping[str, str] = MappingProxyType(
+FITTING_NAMES: Mapping[str, str] = MappingProxyType(
     {
         "dove": "Dove prisms",
         "triangulation": "triangulation lever",
@@ -23,7 +23,7 @@ CALLED: Mapping[str, str] = MappingProxyType(
 
 def right_fittings(manual: Variant, polarity: str, base: str) -> dict[str, str]:
     """Return by name where the fittings that a plotter has belong, for pictures of a polarity and a base."""
-    words = RIGHT_FITTINGS[polarity, base].as_words()
+    words = REQUIRED_FITTINGS[polarity, base].as_words()
     return {name: position for name, position in words.items() if name in manual.fittings}
 
 
@@ -43,5 +43,5 @@ def put_levers_right(seat: Seat, who: Who) -> Truths:
             hands.set_fitting(them, name, position)
             astray[wrong] |= hands.fitting(them, name) != position
             mended |= wrong
-            crew.remark(them, f"{model.name}: the {CALLED[name]} had been forgotten: put {position}")
+            crew.remark(them, f"{model.name}: the {FITTING_NAMES[name]} had been forgotten: put {position}")
     return mended & ~astray

@@ -10,7 +10,7 @@ from a7sim.operator.slips import Slip
 from a7sim.operator.timesheet import Timesheet
 from a7sim.scenario import Observer
 
-LONGEST_NOTE = 900
+MAX_NOTE_LENGTH = 900
 
 
 class DoesNotFit(Exception):
@@ -41,7 +41,7 @@ class Person:
     def note(self, text: str) -> None:
         """Write a note into the journal of the instrument."""
         printable = "".join(c if " " <= c <= "~" else "?" for c in text.replace('"', "'"))
-        self.client.send(f'NOTE "{printable[:LONGEST_NOTE]}"')
+        self.client.send(f'NOTE "{printable[:MAX_NOTE_LENGTH]}"')
 
     def give_up(self, text: str) -> DoesNotFit:
         """Write what does not fit into the book and return it as an error to raise."""

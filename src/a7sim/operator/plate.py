@@ -15,15 +15,15 @@ from a7sim.scenario import Camera
 Crosses = Mapping[str, tuple[float, float]]
 """Names and nominal places in mm."""
 
-LARGEST_SLIP_SIGMAS = 4.5
+MAX_SLIP_SIGMAS = 4.5
 """A cross that stands further from where its fellows put it is pointed at again; of 25 good ones 1 in 3000 does."""
 
-FAINTEST_SLIP_MM = 0.01
+MIN_SLIP_MM = 0.01
 """At photo scale: less is never taken for a slip."""
 
-MOST_REPETITIONS = 12
+MAX_REPETITIONS = 12
 
-_LEAST_REDUNDANCY_NUMBER = 0.05
+_MIN_REDUNDANCY_NUMBER = 0.05
 
 
 def places_of(crosses: Crosses) -> Array:
@@ -60,7 +60,7 @@ def point_at_crosses(bench: Bench, who: Who, hand: int, crosses: Crosses, level:
     _go_below(bench, who, hand)
     readings = bench.point_with(who, hand, names, level)
     looking = crew.still(who)
-    for _ in range(MOST_REPETITIONS):
+    for _ in range(MAX_REPETITIONS):
         misread = _misread(readings[:, :, looking], places_of(crosses)) if looking.size else np.zeros(0, dtype=np.intp)
         looking, misread = looking[misread >= 0], misread[misread >= 0]
         for place in np.unique(misread):
@@ -81,8 +81,8 @@ def _misread(readings: Array, crosses: Array) -> npt.NDArray[np.intp]:
     """Return which cross ``(m,)`` does not fit the others, -1 for none; a tilted plane is seen in perspective."""
     fit = plane_fit(readings, crosses, "projective")
     controlled = fit.adjustment.redundancy_numbers.reshape(fit.residuals.shape)
-    off = np.abs(fit.residuals) / np.sqrt(np.maximum(controlled, _LEAST_REDUNDANCY_NUMBER))
+    off = np.abs(fit.residuals) / np.sqrt(np.maximum(controlled, _MIN_REDUNDANCY_NUMBER))
     sigma = 1.4826 * np.median(off, axis=(0, 1))
     worst = off.max(axis=0)
-    suspicious = worst.max(axis=0) > np.maximum(LARGEST_SLIP_SIGMAS * sigma, FAINTEST_SLIP_MM)
+    suspicious = worst.max(axis=0) > np.maximum(MAX_SLIP_SIGMAS * sigma, MIN_SLIP_MM)
     return np.where(suspicious, worst.argmax(axis=0), -1)

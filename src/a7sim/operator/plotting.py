@@ -28,7 +28,7 @@ TABLE_GEARS: Mapping[str, float] = MappingProxyType({"1-1-1": 1.0, **PLAN_GEARS}
 ROUND_SCALE = 500.0
 """The map's scale number is made the nearest multiple of this."""
 
-MOST_CONTOURS = 100
+MAX_CONTOURS = 100
 
 
 @dataclass(frozen=True)
@@ -141,9 +141,9 @@ def _heights(order: Order, spots: Spots) -> tuple[float, ...]:
     heights = set(order.contours)
     if order.interval is not None:
         first, last = math.ceil(low / order.interval), math.floor(high / order.interval)
-        if last - first >= MOST_CONTOURS:
+        if last - first >= MAX_CONTOURS:
             raise Mistake(
-                f"--interval {order.interval:g}: expected at most {MOST_CONTOURS} contours from {low:.1f} to "
+                f"--interval {order.interval:g}: expected at most {MAX_CONTOURS} contours from {low:.1f} to "
                 f"{high:.1f} m, got {last - first + 1}"
             )
         if last < first and not heights and not order.errands:

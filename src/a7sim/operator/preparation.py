@@ -17,7 +17,7 @@ RATIO_AGREES = 2e-3
 """Share within which a model scale such as 1:3333 and a ratio of gears belong together."""
 
 FORMAT_MM = 230.0
-NARROWEST_WIDE_DEG, WIDEST_WIDE_DEG = 75.0, 100.0
+MIN_WIDE_DEG, WIDEST_WIDE_DEG = 75.0, 100.0
 """Field angles across the picture that are called wide (thesis 3.2.3.2)."""
 
 
@@ -89,7 +89,7 @@ class Flight:
     @property
     def angle(self) -> str:
         """Normal, wide or superwide."""
-        if self.field_angle_deg < NARROWEST_WIDE_DEG:
+        if self.field_angle_deg < MIN_WIDE_DEG:
             return "normal"
         return "wide" if self.field_angle_deg <= WIDEST_WIDE_DEG else "superwide"
 

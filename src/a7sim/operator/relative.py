@@ -21,8 +21,8 @@ from a7sim.reduction import Stand, Undetermined, element_corrections
 from a7sim.reduction.hallert import REGULAR_POINTS, regular_corrections
 from a7sim.standard_points import CASES, POSITIONS, determine_orientation
 
-MOST_ROUNDS = 12
-MOST_ROUGH_ROUNDS = 3
+MAX_ROUNDS = 12
+MAX_ROUGH_ROUNDS = 3
 STILL_FALLING = 0.8
 """Residuals go on falling while their rms is below this share of the best so far."""
 
@@ -264,7 +264,7 @@ def _oriented(
             noted = crew.notes(falling, settings, rounds[-2].settings if len(rounds) > 1 else {})
             seat.set_elements(falling, {n: (noted[n] + corrections[n])[falling] for n in unknowns})
         measuring = crew.still(np.sort(np.concatenate([falling, apart])))
-        measuring = measuring[done[measuring] < MOST_ROUNDS]
+        measuring = measuring[done[measuring] < MAX_ROUNDS]
     who = crew.still(who)
     seat.set_changed(who, {name: kept[who] for name, kept in best.settings.items()})
     _set_mean_on_by(bench, who, model, "by1" if method == "independent" else unknowns[3], best.mean)
@@ -382,7 +382,7 @@ def _bring_together(
     """Orient roughly, where images are too far apart for by, from the Y readings of each eye alone."""
     crew, seat = bench.crew, bench.seat
     crew.give_up(
-        who[rough_rounds[who] > MOST_ROUGH_ROUNDS],
+        who[rough_rounds[who] > MAX_ROUGH_ROUNDS],
         lambda session: f"{model.name}: the images of {apart[session]} stay too far apart to be fused",
     )
     for session in crew.still(who):

@@ -15,7 +15,7 @@ LAST_DIGIT = 0.01
 CERTAIN_GROSS = 0.5
 """Counter units by which a planted gross slip is off."""
 
-FAINTEST_CERTAIN = 0.05
+MIN_CERTAIN = 0.05
 """A slip other than of the last digit is not planted where it changes the reading by less, in counter units."""
 
 PLAUSIBLE = 10.0
@@ -24,7 +24,7 @@ PLAUSIBLE = 10.0
 _LATELY = 8
 """So many of the last slips may still wait for their entry in the book."""
 
-NEAREST = 2
+NEIGHBOUR_COUNT = 2
 """So many standard points are near enough to be taken for another."""
 
 
@@ -212,7 +212,7 @@ def _written_wrongly(shown: float, item: str) -> dict[SlipKind, list[float]]:
 
 
 def _plain_to_see(wrong: Mapping[SlipKind, Sequence[float]], shown: float) -> list[SlipKind]:
-    return [kind for kind, ways in wrong.items() if kind == "last digit" or abs(ways[-1] - shown) > FAINTEST_CERTAIN]
+    return [kind for kind, ways in wrong.items() if kind == "last digit" or abs(ways[-1] - shown) > MIN_CERTAIN]
 
 
 def transpositions(shown: float) -> list[float]:
@@ -236,4 +236,4 @@ def neighbours(standard_points: Mapping[str, str], point: str) -> list[str]:
     def distance(name: str) -> tuple[float, str]:
         return float(np.hypot(*(np.array(PLACES[positions[name]]) - here))), positions[name]
 
-    return sorted(positions, key=distance)[:NEAREST]
+    return sorted(positions, key=distance)[:NEIGHBOUR_COUNT]

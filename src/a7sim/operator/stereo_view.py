@@ -32,7 +32,7 @@ _PATCH = 31
 _MARK_RADIUS = 3.5
 """Picture elements about the middle that the mark covers, with what interpolation spreads of it."""
 
-_MOST_STEPS = 12
+_MAX_STEPS = 12
 _AT_REST = 2e-4
 _STEEPEST = 1.0
 _NUDGE_MM = 0.05
@@ -182,7 +182,7 @@ class StereoView:
 def _matched(look: Look, surface: Array) -> Surface:
     """Return the plane that makes both pictures agree best, by Gauss-Newton from a plane nearby."""
     scale = np.array([1.0, 10.0, 10.0, 1.0])
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         left, right, left_slopes, right_slopes, plan = _compared(look, surface)
         if left.size < _PATCH:
             return Surface(0.0, np.zeros(2), 0.0, 0.0)

@@ -20,8 +20,8 @@ from a7sim.reduction.strips import Model, Strip, is_centre
 ROLES = ("control", "plan", "height", "check")
 """Uses of a ground point: all three coordinates, X and Y only, Z only, none."""
 
-FEWEST_PLAN = 2
-FEWEST_HEIGHTS = 3
+MIN_PLAN = 2
+MIN_HEIGHTS = 3
 NEARLY_IN_A_LINE = 0.05
 """Breadth of the height control over its length, both as standard deviations, below which it is warned of."""
 MUCH_WORSE = 3.0
@@ -152,9 +152,9 @@ def fitted_to_ground(model: Model, ground: Ground) -> tuple[Similarity, GroundFi
     """Return the similarity of a model to its ground control and how it fits, as `absolute_orientation` finds them."""
     known = ground.among(model.points)
     plan, heights = int(known.used[0].sum()), int(known.used[2].sum())
-    if plan < FEWEST_PLAN or heights < FEWEST_HEIGHTS:
+    if plan < MIN_PLAN or heights < MIN_HEIGHTS:
         raise Undetermined(
-            f"expected at least {FEWEST_PLAN} control points in plan and {FEWEST_HEIGHTS} in height in the model, "
+            f"expected at least {MIN_PLAN} control points in plan and {MIN_HEIGHTS} in height in the model, "
             f"got {plan} and {heights}"
         )
     points = model.at(known.points)

@@ -21,10 +21,10 @@ from a7sim.reduction.similarity import similarity_columns, turn_by
 from a7sim.reduction.strips import Model
 from a7sim.wording import counted
 
-MOST_MODELS = 500
-MOST_ITERATIONS = 30
+MAX_MODELS = 500
+MAX_ITERATIONS = 30
 CONVERGED = 1e-10
-SMALLEST_PIVOT = 1e-11
+MIN_PIVOT = 1e-11
 """Of the scaled normal equations, relative to one: below it a model or a point is open."""
 UNKNOWNS_OF_A_MODEL = 7
 
@@ -94,14 +94,14 @@ def block_adjustment(models: Sequence[Model], ground: Ground, height_weight: flo
     count `height_weight` times those in plan. Models should be nearly level in their own systems, turned as they may
     be in plan. Raises Mistake for more than 500 models, Undetermined for a block that its ties and control leave open.
     """
-    if not 1 <= len(models) <= MOST_MODELS:
-        raise Mistake(f"expected 1 to {MOST_MODELS} models, got {len(models)}")
+    if not 1 <= len(models) <= MAX_MODELS:
+        raise Mistake(f"expected 1 to {MAX_MODELS} models, got {len(models)}")
     if len({model.name for model in models}) != len(models):
         raise Mistake("expected every model once, got one twice")
     e = _equations(tuple(models), ground)
     scales, turns, shifts, free = _level_start(e)
     weights = np.repeat([1.0, 1.0, height_weight], e.model_of.size)
-    for iteration in range(1, MOST_ITERATIONS + 1):
+    for iteration in range(1, MAX_ITERATIONS + 1):
         design, missing = _linearised(e, scales, turns, shifts, free)
         normal, scale, solution = _solved(design, missing, weights)
         step = solution[: UNKNOWNS_OF_A_MODEL * len(models)].reshape((len(models), UNKNOWNS_OF_A_MODEL)).T
@@ -116,7 +116,7 @@ def block_adjustment(models: Sequence[Model], ground: Ground, height_weight: flo
         if max(moves) < CONVERGED:
             return _result(e, ground, (scales, turns, shifts, free), weights, iteration, normal, scale)
     raise Undetermined(
-        f"the block of {counted(len(models), 'model')} does not come to rest in {MOST_ITERATIONS} iterations"
+        f"the block of {counted(len(models), 'model')} does not come to rest in {MAX_ITERATIONS} iterations"
     )
 
 
@@ -255,7 +255,7 @@ def _solved(design: Any, right: Array, weights: Array) -> tuple[Any, Array, Arra
         )
     except RuntimeError as error:
         raise Undetermined("the ties and the control leave some of the block's unknowns open") from error
-    if np.abs(factors.U.diagonal()).min() < SMALLEST_PIVOT:
+    if np.abs(factors.U.diagonal()).min() < MIN_PIVOT:
         raise Undetermined("the ties and the control leave some of the block's unknowns open")
     return normal, scale, np.asarray(factors.solve((weighted.T @ right) / scale) / scale)
 

@@ -12,7 +12,7 @@ from a7sim.geometry import Array
 from a7sim.reduction.least_squares import Undetermined, adjusted
 from a7sim.reduction.resection import Resection, resection
 
-FEWEST_POINTS = 2
+MIN_POINTS = 2
 
 A8_MIDDLE = 200.0
 """Reading of the A8's X and Y scales at the middle of the base; they count one unit to 2 mm."""
@@ -51,7 +51,7 @@ def perspective_centre(low: Array, high: Array, level_low: float, level_high: fl
     pointings that do not move between the levels.
     """
     n = low.shape[1]
-    if n < FEWEST_POINTS:
+    if n < MIN_POINTS:
         raise Undetermined(f"expected two points or more for a perspective centre, got {n}")
     shift = high - low
     zero, one = np.zeros_like(low[0]), np.ones_like(low[0])
@@ -92,7 +92,7 @@ def perspective_centre_of_levels(pointings: Array, levels: npt.ArrayLike) -> Per
     slope = np.einsum("k,ckn...->cn...", off, pointings) / (off @ off)
     low, high = (mean + slope * (level - levels.mean()) for level in (lowest, highest))
     centre = perspective_centre(low, high, lowest, highest)
-    if k == FEWEST_POINTS:
+    if k == MIN_POINTS:
         return centre
     lines = mean[:, None] + slope[:, None] * off.reshape((k, *(1,) * (pointings.ndim - 2)))
     squares = ((pointings - lines) ** 2).sum(axis=(0, 1, 2))

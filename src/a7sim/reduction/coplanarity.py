@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from a7sim.geometry import Array, angles_of, dots, length_of, mxm, mxv, rotation, transposed
 from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
-from a7sim.reduction.normal_equations import LARGEST_CONDITION
+from a7sim.reduction.normal_equations import MAX_CONDITION
 from a7sim.reduction.relative_poses import RelativePoses, relative_poses
 from a7sim.wording import counted
 
@@ -128,10 +128,10 @@ def _why(poses: RelativePoses, n: int) -> str:
     first = int(np.flatnonzero(~poses.converged)[0])
     which = "" if poses.converged.ndim == 0 else f" of pair {first}"
     condition = float(poses.condition.flat[first])
-    if not condition < LARGEST_CONDITION:
+    if not condition < MAX_CONDITION:
         return (
             f"the {n} points{which} leave the relative orientation open: they lie on a line or a critical surface, "
-            f"or on one nearly (condition number {condition:.1e}, at most {LARGEST_CONDITION:.0e})"
+            f"or on one nearly (condition number {condition:.1e}, at most {MAX_CONDITION:.0e})"
         )
     return (
         f"no relative orientation brings the rays of all {n} points{which} together before both cameras "

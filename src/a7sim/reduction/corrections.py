@@ -11,8 +11,8 @@ import numpy.typing as npt
 from a7sim.geometry import EARTH_RADIUS_M, Array, image_of, length_of, ray_of, refraction_constant
 from a7sim.reduction.least_squares import Undetermined
 
-MOST_ITERATIONS = 20
-SMALLEST_STEP_MM = 1e-12
+MAX_ITERATIONS = 20
+MIN_STEP_MM = 1e-12
 
 
 def about_principal_point(image: Array, principal_point: npt.ArrayLike) -> Array:
@@ -97,7 +97,7 @@ def _drawn_in(image: Array, first: Array, coefficients: Sequence[npt.ArrayLike])
     """Return the points whose radius r satisfies ``r (first + k1 r^2 + k2 r^4 + ...) = r of the image``, by Newton."""
     outer = length_of(image)
     r = outer / first
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         value, slope = r * first, np.broadcast_to(first, r.shape).copy()
         for order, k in enumerate(coefficients, start=1):
             value = value + np.asarray(k) * r ** (2 * order + 1)
@@ -106,7 +106,7 @@ def _drawn_in(image: Array, first: Array, coefficients: Sequence[npt.ArrayLike])
             break
         step = (value - outer) / slope
         r = r - step
-        if np.abs(step).max(initial=0.0) <= SMALLEST_STEP_MM:
+        if np.abs(step).max(initial=0.0) <= MIN_STEP_MM:
             return np.asarray(image * np.where(outer > 0.0, r / np.where(outer > 0.0, outer, 1.0), 1.0))
     raise Undetermined(
         f"expected image points within the radius that the distortion can reach, got one at {outer.max():.1f} mm"

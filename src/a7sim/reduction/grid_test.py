@@ -20,13 +20,13 @@ UNKNOWNS = ("c", "x0", "y0", "omega", "phi", "kappa", "bx", "by", "bz")
 HELD_AT_ONE_LEVEL = ("bx", "by", "bz")
 """At one level a shift of the centre looks like one of the principal point, and its height like c."""
 
-FEWEST_CROSSES = 5
+MIN_CROSSES = 5
 
-MOST_ITERATIONS = 30
-SMALLEST_STEP_MM = 1e-9
+MAX_ITERATIONS = 30
+MIN_STEP_MM = 1e-9
 """On the plate."""
 
-LARGEST_CONDITION = 1e5
+MAX_CONDITION = 1e5
 """Of the scaled normal equations. At levels 200 and 400 mm below the centre it is some 2e2, at 300 and 310 mm 2e4."""
 
 
@@ -107,8 +107,8 @@ def grid_test(
     Undetermined for fewer than five crosses and for crosses or levels that leave something open.
     """
     k, n = readings.shape[1:3]
-    if n < FEWEST_CROSSES:
-        raise Undetermined(f"expected {FEWEST_CROSSES} crosses or more for a grid test, got {n}")
+    if n < MIN_CROSSES:
+        raise Undetermined(f"expected {MIN_CROSSES} crosses or more for a grid test, got {n}")
     batch = readings.shape[3:]
     lie = lie or PlateLie(*np.zeros((5, *batch)))
     heights = np.asarray(heights, dtype=float)
@@ -130,20 +130,20 @@ def grid_test(
 
 def _adjusted(seen: Array, mark: Array, start: Array, sought: list[int]) -> tuple[Adjustment, Array, int]:
     now = start.copy()
-    for iteration in range(1, MOST_ITERATIONS + 1):
+    for iteration in range(1, MAX_ITERATIONS + 1):
         computed, design = _computed(mark, now)
         observed = (seen - computed).reshape(-1, *seen.shape[3:])
         step = adjusted(design[:, sought], observed)
-        if not (step.condition < LARGEST_CONDITION).all():
+        if not (step.condition < MAX_CONDITION).all():
             raise Undetermined(
                 "expected crosses and levels that tell principal distance, principal point and element zeros apart, "
-                f"got a condition number of {step.condition.max():.1e} (at most {LARGEST_CONDITION:.0e})"
+                f"got a condition number of {step.condition.max():.1e} (at most {MAX_CONDITION:.0e})"
             )
         now[sought] += step.unknowns
-        if np.abs(np.einsum("nu...,u...->n...", design[:, sought], step.unknowns)).max() <= SMALLEST_STEP_MM:
+        if np.abs(np.einsum("nu...,u...->n...", design[:, sought], step.unknowns)).max() <= MIN_STEP_MM:
             return step, now, iteration
     raise Undetermined(
-        f"expected readings of this plate in this projector, got none that fit in {MOST_ITERATIONS} rounds"
+        f"expected readings of this plate in this projector, got none that fit in {MAX_ITERATIONS} rounds"
     )
 
 

@@ -16,8 +16,8 @@ from a7sim.geometry import (
 )
 from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, coplanarity, finished, rays_of
 from a7sim.reduction.least_squares import Undetermined, adjusted
-from a7sim.reduction.normal_equations import LARGEST_CONDITION
-from a7sim.reduction.relative_poses import FEWEST_POINTS, MOST_ITERATIONS, TOLERANCE
+from a7sim.reduction.normal_equations import MAX_CONDITION
+from a7sim.reduction.relative_poses import MAX_ITERATIONS, MIN_POINTS, TOLERANCE
 from a7sim.wording import counted
 
 Scalars = float | Array
@@ -121,8 +121,8 @@ def orientation_by_parallaxes(
     mean scale of the model.
     """
     n, batch = image1.shape[1], image1.shape[2:]
-    if n < FEWEST_POINTS:
-        raise Undetermined(f"expected at least {FEWEST_POINTS} points to orient a pair of photographs, got {n}")
+    if n < MIN_POINTS:
+        raise Undetermined(f"expected at least {MIN_POINTS} points to orient a pair of photographs, got {n}")
     names = (
         ("kappa1", "kappa2", "phi1", "phi2", f"omega{omega}")
         if unknowns == "independent"
@@ -134,7 +134,7 @@ def orientation_by_parallaxes(
     centre2[0] = 1.0
     iterations = np.zeros(batch, dtype=np.int64)
     active, before = np.ones(batch, dtype=bool), np.ones(batch)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         turns = rotation(*angles[0]), rotation(*angles[1])
         points, parallaxes = stereoscopic_intersection(
             centre1[:, None],
@@ -160,7 +160,7 @@ def orientation_by_parallaxes(
             break
     turns = rotation(*angles[0]), rotation(*angles[1])
     condition = coplanarity(rays_of(image1, c1), rays_of(image2, c2), *turns, centre2)
-    if active.any() or not (step.condition < LARGEST_CONDITION).all() or not (condition.ahead > 0.0).all():
+    if active.any() or not (step.condition < MAX_CONDITION).all() or not (condition.ahead > 0.0).all():
         raise Undetermined(
             f"the y-parallaxes of {n} points do not orient the pair (condition number "
             f"{float(np.max(step.condition)):.1e}, {counted(int(iterations.max()), 'iteration')})"

@@ -18,12 +18,12 @@ UNKNOWNS = {
 Affine without e and f; conformal x' = a x - b y + tx, y' = b x + a y + ty.
 """
 
-FEWEST_FIDUCIALS = {"conformal": 2, "affine": 3, "projective": 4}
+MIN_FIDUCIALS = {"conformal": 2, "affine": 3, "projective": 4}
 
 _PLACES = {"a": (0, 0), "b": (0, 1), "c": (1, 0), "d": (1, 1), "tx": (0, 2), "ty": (1, 2), "e": (2, 0), "f": (2, 1)}
 
-MOST_ITERATIONS = 30
-SMALLEST_STEP = 1e-12
+MAX_ITERATIONS = 30
+MIN_STEP = 1e-12
 """Of the fitted places, relative to the spread of the fiducials."""
 
 
@@ -109,8 +109,8 @@ def plane_fit(measured: Array, calibrated: Array, kind: str = "affine") -> Plane
     if kind not in UNKNOWNS:
         raise ValueError(f"expected one of {', '.join(UNKNOWNS)}, got {kind!r}")
     n = measured.shape[1]
-    if n < FEWEST_FIDUCIALS[kind]:
-        raise Undetermined(f"expected {FEWEST_FIDUCIALS[kind]} fiducials or more for a fit that is {kind}, got {n}")
+    if n < MIN_FIDUCIALS[kind]:
+        raise Undetermined(f"expected {MIN_FIDUCIALS[kind]} fiducials or more for a fit that is {kind}, got {n}")
     calibrated = calibrated.reshape((*calibrated.shape, *(1,) * (measured.ndim - calibrated.ndim)))
     measured, calibrated = np.broadcast_arrays(measured, calibrated)
     from_measured, source = _normalised(measured)
@@ -201,7 +201,7 @@ def _refined(unknowns: Array, source: Array, target: Array, basis: Array) -> tup
     shares = np.einsum("iju,jn...->iun...", basis, homogeneous)
     iterations = np.zeros(source.shape[2:], dtype=int)
     moving = np.ones(source.shape[2:], dtype=bool)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         u, v, w = np.einsum("ij...,jn...->in...", _homogeneous(unknowns, basis), homogeneous)
         if not (w > 0.0).all():
             raise Undetermined("the fitted vanishing line passes between them")
@@ -210,11 +210,11 @@ def _refined(unknowns: Array, source: Array, target: Array, basis: Array) -> tup
         step = adjusted(design, np.concatenate([target[0] - fitted[0], target[1] - fitted[1]]))
         unknowns = unknowns + step.unknowns
         iterations = iterations + moving
-        moving = np.abs(np.einsum("nu...,u...->n...", design, step.unknowns)).max(axis=0) > SMALLEST_STEP
+        moving = np.abs(np.einsum("nu...,u...->n...", design, step.unknowns)).max(axis=0) > MIN_STEP
         if not moving.any():
             break
     else:
-        raise Undetermined(f"the fit does not settle in {MOST_ITERATIONS} iterations")
+        raise Undetermined(f"the fit does not settle in {MAX_ITERATIONS} iterations")
     return Adjustment(
         unknowns, step.cofactors, step.residuals, step.redundancy, step.s0, step.condition, design
     ), iterations

@@ -16,7 +16,7 @@ class Undetermined(ValueError):
     """The observations do not determine the unknowns."""
 
 
-LARGEST_CONDITION = 1e13
+MAX_CONDITION = 1e13
 """Of the scaled normal equations, in the 1-norm; beyond it half the digits of a solution are noise."""
 
 
@@ -76,7 +76,7 @@ def adjusted(design: Array, observed: Array, redundancy: int | None = None, weig
     normal = np.einsum("nu...,nv...->uv...", weighted, design) / (scale[:, None] * scale[None, :])
     inverse = inverse_of_definite(normal)
     condition = np.abs(normal).sum(axis=0).max(axis=0) * np.abs(inverse).sum(axis=0).max(axis=0)
-    if not (condition < LARGEST_CONDITION).all():
+    if not (condition < MAX_CONDITION).all():
         raise Undetermined(
             f"the {n} observations leave some of the {u} unknowns open (condition number {np.nanmax(condition):.1e})"
         )

@@ -6,7 +6,7 @@ import numpy.typing as npt
 from a7sim.geometry import Array, mxv
 from a7sim.reduction.turns import TurningWork, aligned
 
-LARGEST_CONDITION = 3e5
+MAX_CONDITION = 3e5
 """Of the scaled normal equations for turns about the axes of the base. Six standard points have some 3e2, the weak pair
 of reference 07 has 8e3; points on a line or on a critical surface, measured to 5 um, have 2e6 and more. Beyond 3e5 such
 errors turn a camera by half a degree."""
@@ -56,7 +56,7 @@ def conditions_of(work: Work) -> Array:
     normal, pivots = work.normal[:5, :5], work.reduced[:5, :5].diagonal().T
     shares = np.divide(pivots, normal.diagonal().T, out=work.shares)
     bound = np.array(CONDITION_BY_DETERMINANT / shares.prod(axis=0))
-    doubtful = ~((bound > 0.0) & (bound < LARGEST_CONDITION))
+    doubtful = ~((bound > 0.0) & (bound < MAX_CONDITION))
     if any_of(doubtful):
         bound[doubtful] = _condition(normal[..., doubtful]) if normal.ndim > 2 else _condition(normal)
     return bound

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from a7sim.geometry import Array, dots, mxm, rotation, transposed
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.normal_equations import (
-    LARGEST_CONDITION,
+    MAX_CONDITION,
     Work,
     all_of,
     any_of,
@@ -32,8 +32,8 @@ from a7sim.reduction.normal_equations import (
 )
 from a7sim.reduction.turns import aligned, turned_by
 
-FEWEST_POINTS = 5
-MOST_ITERATIONS = 30
+MIN_POINTS = 5
+MAX_ITERATIONS = 30
 TOLERANCE = 1e-10
 """Radians: iterations end when the next correction would be below it: the product of the last one with itself and with
 the rms discrepancy. What is then left of perfect images is below 1e-10, of measured ones below 1e-9."""
@@ -44,7 +44,7 @@ NEAR_ITERATIONS = 3
 HOPELESS = 10.0
 """Pairs whose first equations are worse than that by as much are refused whatever they come to."""
 
-LARGEST_S0 = 0.005
+MAX_S0 = 0.005
 """Of c: a solution found from quarter turns that leaves more is none."""
 
 FAR = 0.055
@@ -53,7 +53,7 @@ NEAR = 3e-4
 """Radians: in pairs whose first correction is larger than FAR, or a later one than FAR_LATER, the same normal equations
 are solved for what is left, too, until corrections are smaller than NEAR."""
 
-LARGEST_TURN = 0.4
+MAX_TURN = 0.4
 """Radians, in one step: farther away the linear equations say nothing."""
 
 DAMPING = 0.5
@@ -111,8 +111,8 @@ def relative_poses(image1: Array, image2: Array, c1: float, c2: float, tolerance
     quarter turns, and their iterations are added up. Raises Undetermined for fewer than five points.
     """
     n = image1.shape[1]
-    if n < FEWEST_POINTS:
-        raise Undetermined(f"expected at least {FEWEST_POINTS} points to orient a pair of photographs, got {n}")
+    if n < MIN_POINTS:
+        raise Undetermined(f"expected at least {MIN_POINTS} points to orient a pair of photographs, got {n}")
     batch = image1.shape[2:]
     if not batch:
         return _resolved((image1, image2), c1, c2, tolerance, Work(n, ()))
@@ -159,7 +159,7 @@ def _oriented_from_near(
         for i in range(NEAR_ITERATIONS):
             state = _iterated(state, rays, tolerance, work, level=i == 0, chords=False)
             if i == 0:
-                sound = conditions_of(work) < HOPELESS * LARGEST_CONDITION
+                sound = conditions_of(work) < HOPELESS * MAX_CONDITION
             if not (state.active & ~state.far).any():
                 break
         poses = _assessed(state, work)
@@ -187,12 +187,12 @@ def _resolved(images: tuple[Array, Array], c1: float, c2: float, tolerance: floa
 def _tried_again(found: RelativePoses, rays: Array, tolerance: float) -> RelativePoses:
     """Try pairs that refused from swings of quarter turns."""
     for swings in QUARTER_TURNS[1:]:
-        open_ = ~found.converged & ~(found.condition >= LARGEST_CONDITION)
+        open_ = ~found.converged & ~(found.condition >= MAX_CONDITION)
         if not open_.any():
             break
         some = rays[..., open_] if rays.ndim > 3 else rays
         again = _oriented(some, swings, tolerance, Work(some.shape[2], some.shape[3:]))
-        again = replace(again, converged=again.converged & (again.s0 < LARGEST_S0 * -rays[0, 2].flat[0]))
+        again = replace(again, converged=again.converged & (again.s0 < MAX_S0 * -rays[0, 2].flat[0]))
         found = _replaced(found, open_, again)
     return found
 
@@ -219,12 +219,12 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Work
     level = swings == (0, 0)
     state = _start(swings, batch)
     places = None
-    for i in range(MOST_ITERATIONS):
+    for i in range(MAX_ITERATIONS):
         state = _iterated(state, rays, tolerance, work, level=level and i == 0)
         if i == 0:
             first = conditions_of(work)
         rest = np.count_nonzero(state.active)
-        last = rest == 0 or i == MOST_ITERATIONS - 1
+        last = rest == 0 or i == MAX_ITERATIONS - 1
         if last or 2 * rest < state.active.size:
             poses = _assessed(state, work)
             if places is None:
@@ -237,7 +237,7 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Work
             going = np.flatnonzero(state.active)
             places, rays = going if places is None else places[going], rays[..., going]
             state, work = state.of(going), Work(rays.shape[2], going.shape)
-    hopeless = first >= HOPELESS * LARGEST_CONDITION
+    hopeless = first >= HOPELESS * MAX_CONDITION
     if not any_of(hopeless):
         return done
     condition = np.where(hopeless, first, done.condition)
@@ -300,14 +300,14 @@ def _iterated(
     all_active = all_of(active)
     if not all_active:
         corrections *= active
-    if any_of(size > LARGEST_TURN):
-        corrections *= np.minimum(1.0, LARGEST_TURN / np.maximum(size, LARGEST_TURN))
+    if any_of(size > MAX_TURN):
+        corrections *= np.minimum(1.0, MAX_TURN / np.maximum(size, MAX_TURN))
     R = turned_by(state.rotations, corrections, work, level)
     left = size * (2.0 * size + np.sqrt(per_square * np.abs(work.reduced[5, 5])))
     from_far = state.far | (size > (FAR if level else FAR_LATER))
     far = active & from_far & (size > NEAR)
     if chords and any_of(far):
-        R, left = _chords(R, left, np.minimum(size, LARGEST_TURN), far, _Chord.of_all(rays, work, size), CHORDS)
+        R, left = _chords(R, left, np.minimum(size, MAX_TURN), far, _Chord.of_all(rays, work, size), CHORDS)
     goes_on = active & ~(left < tolerance) & np.isfinite(size)
     before = size if all_active else np.where(active, size, state.before)
     return _Iteration(R, goes_on, from_far, before, state.iterations + active)
@@ -378,9 +378,9 @@ def _assessed(state: _Iteration, work: Work) -> RelativePoses:
     n = work.shape[0]
     condition = conditions_of(work)
     squares = work.reduced[5, 5]
-    s0 = np.sqrt(np.maximum(squares, 0.0) / (n - FEWEST_POINTS)) if n > FEWEST_POINTS else np.zeros_like(condition)
+    s0 = np.sqrt(np.maximum(squares, 0.0) / (n - MIN_POINTS)) if n > MIN_POINTS else np.zeros_like(condition)
     R, before_both = (state.rotations, True) if _all_ahead(work) else _facing(state.rotations, work.turned)
-    sound = (condition < LARGEST_CONDITION) & np.isfinite(state.before)
+    sound = (condition < MAX_CONDITION) & np.isfinite(state.before)
     converged = ~state.active & sound & before_both
     return RelativePoses(R, np.asarray(s0), np.asarray(condition), state.iterations, np.asarray(converged))
 

@@ -8,20 +8,20 @@ import numpy.typing as npt
 from a7sim.geometry import Array, angles_of, dots, image_of, length_of, mxm, mxv, transposed
 from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
 
-FEWEST_POINTS = 3
+MIN_POINTS = 3
 
 ELEMENTS = ("omega", "phi", "kappa", "X", "Y", "Z")
 """Order of the unknowns: radians, and the unit of the ground."""
 
-MOST_ITERATIONS = 30
-SMALLEST_STEP = 1e-12
+MAX_ITERATIONS = 30
+MIN_STEP = 1e-12
 """Of the image points, relative to the principal distance."""
 
-LARGEST_CONDITION = 1e7
+MAX_CONDITION = 1e7
 """Of the scaled normal equations. A wide-angle photograph has some 1e2, a field of four degrees 4e6; by the danger
 cylinder images rounded to 1 um have 1e7 and more, and centres that are wrong by a twentieth of the height."""
 
-SMALLEST_TRIANGLE = 1e-6
+MIN_TRIANGLE = 1e-6
 """Height over base of the widest triangle of ground points; below it they count as on a line."""
 
 _SAME_IMAGE = 1e-5
@@ -74,7 +74,7 @@ def resection(image: Array, ground: Array, c: npt.ArrayLike) -> Resection:
     Undetermined for fewer than three points, points on a line and a centre on the points' danger cylinder.
     """
     n = image.shape[1]
-    if n < FEWEST_POINTS:
+    if n < MIN_POINTS:
         raise Undetermined(f"expected three ground points or more for a resection, got {n}")
     ground = ground.reshape((*ground.shape, *(1,) * (image.ndim - ground.ndim)))
     ground = np.broadcast_to(ground, (3, *image.shape[1:]))
@@ -92,7 +92,7 @@ def resection(image: Array, ground: Array, c: npt.ArrayLike) -> Resection:
 def _refined(seen: Array, local: Array, turn: Array, centre: Array) -> tuple[Array, Array, Adjustment, Array]:
     iterations = np.zeros(seen.shape[2:], dtype=int)
     moving = np.ones(seen.shape[2:], dtype=bool)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         computed = image_of(local, centre[:, None], turn[:, :, None], 1.0)
         design = _coefficients(local - centre[:, None], computed, turn)
         try:
@@ -105,18 +105,18 @@ def _refined(seen: Array, local: Array, turn: Array, centre: Array) -> tuple[Arr
         turn = mxm(_turned_by(step.unknowns[:3]), turn)
         centre = centre + step.unknowns[3:]
         iterations = iterations + moving
-        moving = ~(np.abs(np.einsum("nu...,u...->n...", design, step.unknowns)).max(axis=0) <= SMALLEST_STEP)
+        moving = ~(np.abs(np.einsum("nu...,u...->n...", design, step.unknowns)).max(axis=0) <= MIN_STEP)
         if not moving.any():
             break
     else:
         raise Undetermined(
             f"expected ground points that fix the centre, got {np.count_nonzero(moving)} of {moving.size} resections "
-            f"that do not settle in {MOST_ITERATIONS} iterations: a danger cylinder, or images of other points"
+            f"that do not settle in {MAX_ITERATIONS} iterations: a danger cylinder, or images of other points"
         )
-    if not (step.condition < LARGEST_CONDITION).all():
+    if not (step.condition < MAX_CONDITION).all():
         raise Undetermined(
             f"expected ground points that fix the centre, got {seen.shape[1]} with the centre on or by their danger "
-            f"cylinder (condition number {step.condition.max():.1e}, at most {LARGEST_CONDITION:.0e})"
+            f"cylinder (condition number {step.condition.max():.1e}, at most {MAX_CONDITION:.0e})"
         )
     return turn, centre, step, iterations
 
@@ -187,7 +187,7 @@ def _closed_start(seen: Array, local: Array) -> tuple[Array, Array]:
         candidates = _misfit(seen, local, turns, centres)
     if not np.isfinite(candidates).any(axis=0).all():
         raise Undetermined("expected images that some camera can have of the ground points, got none it could")
-    if seen.shape[1] == FEWEST_POINTS:
+    if seen.shape[1] == MIN_POINTS:
         tilt = np.where(candidates <= np.maximum(_SAME_IMAGE, candidates.min(axis=0)), 1.0 - turns[2, 2], np.inf)
         candidates = tilt
     best = candidates.argmin(axis=0)[None]
@@ -218,7 +218,7 @@ def _widest_three(local: Array) -> Array:
     off = np.cross(arms, np.broadcast_to(base, arms.shape), axis=0)
     off = length_of(off) / dots(base, base)
     third = off.argmax(axis=0)
-    if not (off.max(axis=0) > SMALLEST_TRIANGLE).all():
+    if not (off.max(axis=0) > MIN_TRIANGLE).all():
         raise Undetermined("expected three ground points that are not on a line, got points on a line")
     return np.array([first, second, third])
 

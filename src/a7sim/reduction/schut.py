@@ -5,8 +5,8 @@ import numpy as np
 from a7sim.geometry import Array, mxm
 from a7sim.reduction.coplanarity import RelativeOrientation, coplanarity, finished, rays_of
 from a7sim.reduction.least_squares import Undetermined, adjusted
-from a7sim.reduction.normal_equations import LARGEST_CONDITION
-from a7sim.reduction.relative_poses import FEWEST_POINTS, MOST_ITERATIONS, TOLERANCE
+from a7sim.reduction.normal_equations import MAX_CONDITION
+from a7sim.reduction.relative_poses import MAX_ITERATIONS, MIN_POINTS, TOLERANCE
 from a7sim.reduction.turns import turn_about
 from a7sim.wording import counted
 
@@ -20,15 +20,15 @@ def orientation_by_schut(image1: Array, image2: Array, c1: float, c2: float, bx:
     are in mm of one image coordinate of a vertical pair, exact where the photographs are vertical.
     """
     n, batch = image1.shape[1], image1.shape[2:]
-    if n < FEWEST_POINTS:
-        raise Undetermined(f"expected at least {FEWEST_POINTS} points to orient a pair of photographs, got {n}")
+    if n < MIN_POINTS:
+        raise Undetermined(f"expected at least {MIN_POINTS} points to orient a pair of photographs, got {n}")
     rays1, rays2 = rays_of(image1, c1), rays_of(image2, c2)
     left = np.broadcast_to(np.eye(3).reshape((3, 3, *(1,) * len(batch))), (3, 3, *batch))
     right, base = left, left[0]
     unit = np.full((n, *batch), np.hypot(c1, c2))
     iterations = np.zeros(batch, dtype=np.int64)
     active, before = np.ones(batch, dtype=bool), np.ones(batch)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         condition = coplanarity(rays1, rays2, left, right, base)
         design = np.concatenate([condition.by_turn2, condition.by_base[1:]]) / unit
         step = adjusted(np.swapaxes(design, 0, 1), -condition.discrepancies / unit)
@@ -42,7 +42,7 @@ def orientation_by_schut(image1: Array, image2: Array, c1: float, c2: float, bx:
         if not active.any():
             break
     meets = (coplanarity(rays1, rays2, left, right, base).ahead > 0.0).all()
-    if active.any() or not (step.condition < LARGEST_CONDITION).all() or not meets:
+    if active.any() or not (step.condition < MAX_CONDITION).all() or not meets:
         raise Undetermined(
             f"Schut's equations do not orient the {n} points (condition number {float(np.max(step.condition)):.1e}, "
             f"{counted(int(iterations.max()), 'iteration')})"

@@ -12,19 +12,19 @@ import numpy.typing as npt
 
 from a7sim.geometry import Array, angles_of, length_of, mxm, mxv, rotation, transposed
 from a7sim.reduction.least_squares import (
-    LARGEST_CONDITION,
+    MAX_CONDITION,
     Adjustment,
     Undetermined,
     adjusted,
     inverse_of_definite,
 )
 
-FEWEST_POINTS = 3
+MIN_POINTS = 3
 SIMILARITY_UNKNOWNS = ("scale", "omega", "phi", "kappa", "TX", "TY", "TZ")
 """Order of the unknowns in the statistics of a similarity; angles in radians."""
 
-MOST_ITERATIONS = 100
-LONGEST_TURN = 0.5
+MAX_ITERATIONS = 100
+MAX_TURN = 0.5
 """Radians a step; the linearised equations know nothing beyond."""
 SCALE_FOLLOWS = 0.1
 """Radians: while the turns are longer the first scale is kept, for a fit out of turn shrinks it to nothing."""
@@ -157,14 +157,14 @@ def similarity_by_iteration(
         row_weights = row_weights.reshape((-1, *(1,) * (points.ndim - 2)))
     extent = np.sqrt((X**2).sum(axis=(0, 1)) / max(int(rows.sum()), 1))
     kicks, full = 0, bool(present.all())
-    for iteration in range(1, MOST_ITERATIONS + 1):
+    for iteration in range(1, MAX_ITERATIONS + 1):
         turned = np.einsum("ij...,jn...->in...", turn, x)
         discrepancies = np.where(known, X - scale * turned - shift[:, None], 0.0)
         design = similarity_columns(turned, scale, np.eye(3))
         step = adjusted(_rows(design, rows), _rows(discrepancies[:, :, None], rows)[:, 0], weights=row_weights).unknowns
         angle = length_of(step[1:4])
-        damping = np.minimum(1.0, LONGEST_TURN / np.maximum(angle, 1e-300))
-        near = angle < (SCALE_FOLLOWS if full else LONGEST_TURN)
+        damping = np.minimum(1.0, MAX_TURN / np.maximum(angle, 1e-300))
+        near = angle < (SCALE_FOLLOWS if full else MAX_TURN)
         turn = mxm(turn_by(step[1:4] * damping), turn)
         scale = np.where(near, np.maximum(scale + step[0], scale / 3.0), first_scale if full else scale)
         shift = shift + step[4:]
@@ -177,7 +177,7 @@ def similarity_by_iteration(
             kicks += 1
             off = turn_by(np.where(on_a_saddle, 1.0, 0.0) * np.array([0.3, 0.6, 0.9]).reshape((3, *(1,) * near.ndim)))
             turn = mxm(off, turn)
-    raise Undetermined(f"the similarity of {n} points does not come to rest in {MOST_ITERATIONS} iterations")
+    raise Undetermined(f"the similarity of {n} points does not come to rest in {MAX_ITERATIONS} iterations")
 
 
 def _of_one_shape(points: Array, targets: Array) -> tuple[Array, Array]:
@@ -273,8 +273,8 @@ def _curvature(k: Array) -> Array:
 
 def _in_closed_form(points: Array, targets: Array, weights: Array | None) -> tuple[Array, Array, Array]:
     n = points.shape[1]
-    if n < FEWEST_POINTS:
-        raise Undetermined(f"expected at least {FEWEST_POINTS} common points, got {n}")
+    if n < MIN_POINTS:
+        raise Undetermined(f"expected at least {MIN_POINTS} common points, got {n}")
     if weights is None:
         centre_x, centre_X = points.sum(axis=1) / n, targets.sum(axis=1) / n
         x, X = points - centre_x[:, None], targets - centre_X[:, None]
@@ -299,7 +299,7 @@ def _in_closed_form(points: Array, targets: Array, weights: Array | None) -> tup
     curvature = _curvature(k)
     inverse = inverse_of_definite(curvature)
     condition = np.abs(curvature).sum(axis=0).max(axis=0) * np.abs(inverse).sum(axis=0).max(axis=0)
-    if not (condition < LARGEST_CONDITION).all():
+    if not (condition < MAX_CONDITION).all():
         raise Undetermined(f"the {n} points lie in a line: the turn about it is open")
     w = mxv(inverse, np.array([k[2, 1] - k[1, 2], k[0, 2] - k[2, 0], k[1, 0] - k[0, 1]])) / 2.0
     d, a, b, c = q  # q (1, w): one step of Newton makes good what the characteristic equation lost

@@ -17,7 +17,7 @@ STUDENT = {1: 636.6, 2: 31.6, 3: 12.9, 4: 8.61, 5: 6.87, 6: 5.96, 7: 5.41, 8: 5.
            15: 4.07, 20: 3.85, 30: 3.65, 60: 3.46, 120: 3.37}  # fmt: skip
 """The same by degrees of freedom, where the standard deviation is estimated from the other observations."""
 
-LEAST_CONTROL = 1e-6
+MIN_CONTROL = 1e-6
 """Redundancy number below which a residual says nothing."""
 
 
@@ -54,7 +54,7 @@ def standardised_residuals(adjustment: Adjustment, sigma: float | None = None) -
     follows Student's distribution with one degree of freedom less than the redundancy. Where r vanishes, so does it.
     """
     share = adjustment.redundancy_numbers
-    seen = share > LEAST_CONTROL
+    seen = share > MIN_CONTROL
     squares = np.where(seen, adjustment.residuals**2 / np.where(seen, share, 1.0), 0.0)
     if sigma is not None:
         variance = np.broadcast_to(sigma**2, squares.shape)

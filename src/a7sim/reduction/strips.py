@@ -15,7 +15,7 @@ from a7sim.reduction.similarity import Similarity, similarity_by_quaternion
 CENTRE = ":centre"
 """Ending of the name of a projection centre: ``<photo>:centre``."""
 
-FEWEST_COMMON = 3
+MIN_COMMON = 3
 """Points in common, the centre counted, that join two models."""
 
 JoinMethod = Literal["points", "centre", "heights"]
@@ -156,9 +156,9 @@ def joined(before: Model, new: Model, method: JoinMethod = "points") -> Join:
     """
     there = set(before.points)
     common = tuple(sorted(name for name in new.points if name in there))
-    if len(common) < FEWEST_COMMON:
+    if len(common) < MIN_COMMON:
         raise Mistake(
-            f"models {before.name} and {new.name}: expected at least {FEWEST_COMMON} common points with the centre, "
+            f"models {before.name} and {new.name}: expected at least {MIN_COMMON} common points with the centre, "
             f"got {len(common)} ({', '.join(common) or 'none'})"
         )
     source, target = new.at(common), before.at(common)

@@ -20,7 +20,7 @@ from a7sim.session.lines import read_journal
 
 COLUMNS, LINES = 100, 32
 
-LONGEST_PAUSE_S = 2.0
+MAX_PAUSE_S = 2.0
 """A player need not wait longer than this where an operator thinks."""
 
 _NOTE = 'NOTE "'
@@ -44,7 +44,7 @@ def cast_of(kept: Kept, speed: float) -> str:
         "width": COLUMNS,
         "height": LINES,
         "duration": round(max((line.time for line in lines), default=0.0) / speed, 6),
-        "idle_time_limit": LONGEST_PAUSE_S,
+        "idle_time_limit": MAX_PAUSE_S,
         "title": f"a7sim: {kept.document['scenario']}, seed {kept.document['seed']}",
         "env": {"TERM": "xterm-256color"},
     }

@@ -16,7 +16,7 @@ from a7sim.report.kept import Kept
 from a7sim.sheets import sheet
 from a7sim.wording import counted
 
-BESIDE_THE_POINT = frozenset(
+EXCLUDED_KEYS = frozenset(
     {
         "schema_version",
         "rounds",
@@ -45,7 +45,7 @@ _NAMED_BY = ("model", "photo", "models", "name", "number")
 
 ABSENT = "-"
 
-NARROWEST = 8
+MIN_WIDTH = 8
 """Characters of a value on one line of a terminal, however many sessions stand side by side."""
 
 
@@ -96,7 +96,7 @@ def _facts(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, str]]:
         for key, each in value.items():
             if key == "slips":
                 yield from _slips(each, (*path, key))
-            elif key not in BESIDE_THE_POINT:
+            elif key not in EXCLUDED_KEYS:
                 yield from _facts(each, (*path, key))
     elif isinstance(value, list) and all(isinstance(each, Mapping) for each in value):
         for i, each in enumerate(value, start=1):
@@ -135,7 +135,7 @@ def table_of(sessions: Sequence[Kept], rows: Sequence[Row], width: int) -> Rende
     if not rows:
         return Text(f"{len(sessions)} sessions of a7sim {sessions[0].command}, all the same")
     leaves = max(len(row.fact.rpartition(".")[2]) for row in rows)
-    each_value = max(NARROWEST, (width - leaves - 2) // len(sessions) - 2)
+    each_value = max(MIN_WIDTH, (width - leaves - 2) // len(sessions) - 2)
     parts: list[RenderableType] = [Text(f"{i}: {kept.folder}") for i, kept in enumerate(sessions, start=1)]
     for group, members in groupby(rows, key=lambda row: row.fact.rpartition(".")[0]):
         table = sheet("", *map(str, range(1, len(sessions) + 1)), left=range(len(sessions) + 1), fold=range(1, 99))

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from a7sim.mistakes import Mistake
-from a7sim.scenario.loading import SHELVES
+from a7sim.scenario.loading import SEARCH_PATH
 from a7sim.scenario.requests import RequestedScenario
 from a7sim.scenario.schema import Scenario
 
@@ -55,9 +55,9 @@ def _naming(data: dict[str, Any], name: Any) -> dict[str, Any]:
 
 def _shelved(file: str) -> str:
     path = Path(file).resolve()
-    return path.name if path.parent in [shelf.resolve() for shelf in SHELVES] else str(path)
+    return path.name if path.parent in [shelf.resolve() for shelf in SEARCH_PATH] else str(path)
 
 
 def _found(file: str) -> str:
-    shelved = (shelf / file for shelf in SHELVES if Path(file).name == file)
+    shelved = (shelf / file for shelf in SEARCH_PATH if Path(file).name == file)
     return str(next((path for path in shelved if path.is_file()), file))

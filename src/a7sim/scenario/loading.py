@@ -18,7 +18,7 @@ from a7sim.scenario.skills import PROFILES
 from a7sim.scenario.validation import mistakes_of_form
 from a7sim.shelves import names_of, shelves_of
 
-SHELVES = shelves_of("scenarios")
+SEARCH_PATH = shelves_of("scenarios")
 """Where the scenarios are that come with a7sim."""
 
 
@@ -42,7 +42,7 @@ def find_scenario(name: str | Path) -> Path:
             return path
     except OSError as error:
         raise ScenarioError(str(name)[:200], [f"expected a readable file: {error.strerror}"]) from error
-    for shelf in SHELVES:
+    for shelf in SEARCH_PATH:
         found = shelf / f"{path.name.removesuffix('.toml')}.toml"
         if path.parent in (Path(), Path("scenarios")) and found.is_file():
             return found
@@ -53,7 +53,7 @@ def find_scenario(name: str | Path) -> Path:
 def bare_name(name: str | Path) -> str:
     """Return what a scenario is called wherever it stands: its bare name if it comes with a7sim, else its file's."""
     path = find_scenario(name).resolve()
-    return path.stem if path.parent in [shelf.resolve() for shelf in SHELVES] else path.name
+    return path.stem if path.parent in [shelf.resolve() for shelf in SEARCH_PATH] else path.name
 
 
 def load_scenario(

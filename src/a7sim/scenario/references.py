@@ -8,13 +8,13 @@ from typing import Any
 
 from a7sim.standard_points import POSITIONS, determine_orientation
 
-LEAST_SEPARATION = 1.0
+MIN_SEPARATION = 1.0
 """Counter units between the two levels of a perspective centre."""
 
-FARTHEST_CROSS_MM = 110.0
+MAX_CROSS_MM = 110.0
 """Along either axis: the plate is a picture of 230 mm with a margin."""
 
-FEWEST_IN_PLAN, FEWEST_IN_HEIGHT = 2, 3
+MIN_IN_PLAN, MIN_IN_HEIGHT = 2, 3
 """Points of control that place a strip on the ground (S)."""
 
 
@@ -43,17 +43,16 @@ def _mistakes_in_levels(plan: Mapping[str, Any]) -> Iterator[str]:
     if method == "two levels" and len(levels) > 2:
         yield f"plan.centre_levels: expected two levels, got {len(levels)} (centre_method = 'levels' takes more)"
     for low, high in pairwise(sorted(levels)):
-        if high - low < LEAST_SEPARATION:
-            yield f"plan.centre_levels: expected levels {LEAST_SEPARATION:g} or more apart, got {low:g} and {high:g}"
+        if high - low < MIN_SEPARATION:
+            yield f"plan.centre_levels: expected levels {MIN_SEPARATION:g} or more apart, got {low:g} and {high:g}"
 
 
 def _mistakes_in_grid_plate(raw: Mapping[str, Any]) -> Iterator[str]:
     plate = _table(raw, "grid_plate")
     outermost = (_number(plate.get("lines"), 9) - 1.0) / 2.0 * _number(plate.get("spacing_mm"), 25.0)
-    if outermost > FARTHEST_CROSS_MM:
+    if outermost > MAX_CROSS_MM:
         yield (
-            f"grid_plate.spacing_mm: expected crosses within {FARTHEST_CROSS_MM:g} mm of the middle, got "
-            f"{outermost:g} mm"
+            f"grid_plate.spacing_mm: expected crosses within {MAX_CROSS_MM:g} mm of the middle, got {outermost:g} mm"
         )
     name = plate.get("name", "grid")
     for index, photo in enumerate(_tables(raw, "photos")):
@@ -95,9 +94,9 @@ def _mistakes_in_control(raw: Mapping[str, Any]) -> Iterator[str]:
             f"strip.polynomial: expected {degree + 1} points of ground control in plan and {2 * degree + 1} in height "
             f"for degree {degree}, got {plan} and {heights}"
         )
-    elif "comparator" in _ways(raw) and (plan < FEWEST_IN_PLAN or heights < FEWEST_IN_HEIGHT):
+    elif "comparator" in _ways(raw) and (plan < MIN_IN_PLAN or heights < MIN_IN_HEIGHT):
         yield (
-            f"ground: expected {FEWEST_IN_PLAN} points of control in plan and {FEWEST_IN_HEIGHT} in height for a "
+            f"ground: expected {MIN_IN_PLAN} points of control in plan and {MIN_IN_HEIGHT} in height for a "
             f"strip by comparator, got {plan} and {heights}"
         )
 

@@ -11,7 +11,7 @@ from a7sim.scenario.schema import Camera
 from a7sim.scene.camera import fall_off
 from a7sim.scene.coverage import within_band
 from a7sim.scene.emulsion import Emulsion
-from a7sim.scene.houses import NOWHERE, Houses, houses_along
+from a7sim.scene.houses import NO_HOUSES, Houses, houses_along
 from a7sim.scene.lines import GroundLine, distance_from, with_lines
 from a7sim.scene.noise import value_noise
 from a7sim.scene.photograph import Content, Marks
@@ -67,7 +67,7 @@ class Depicted:
     @cached_property
     def houses(self) -> Houses:
         """The houses, laid out when somebody first looks."""
-        return NOWHERE if self.houses_seed is None else houses_along(self.lines, self.ground, self.houses_seed)
+        return NO_HOUSES if self.houses_seed is None else houses_along(self.lines, self.ground, self.houses_seed)
 
     def grey(self, plan: Array, element: float) -> Array:
         """Return the grey ``(...)`` of places ``(2, ...)`` in m, in picture elements that are so wide on the ground."""

@@ -16,7 +16,7 @@ HOUSES_STREAM = 8
 HAMLET_EVERY_M, HAMLET_M = 220.0, 45.0
 """About how far hamlets lie from each other along a line, and how far they spread each way [assumptions]."""
 
-_FEWEST, _MOST = 3, 7
+_MIN_HOUSES, _MAX_HOUSES = 3, 7
 """Houses of a hamlet."""
 
 _LONG_M, _DEEP_M = (9.0, 15.0), (8.0, 11.0)
@@ -66,7 +66,7 @@ class Houses:
         return roofed.reshape(grey.shape)
 
 
-NOWHERE = Houses(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
+NO_HOUSES = Houses(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
 """No house."""
 
 
@@ -78,7 +78,7 @@ def houses_along(lines: Iterable[GroundLine], ground: Ground, seed: int) -> Hous
     lines = tuple(lines)
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(HOUSES_STREAM,)))
     plots = [_plots(line, rng) for line in lines]
-    drawn = Houses(*(np.concatenate(each, axis=-1) for each in zip(*plots, strict=True))) if plots else NOWHERE
+    drawn = Houses(*(np.concatenate(each, axis=-1) for each in zip(*plots, strict=True))) if plots else NO_HOUSES
     reach = drawn.reach
     free = ~ground.under_water(drawn.middle)
     for line in lines:
@@ -98,7 +98,7 @@ def _plots(line: GroundLine, rng: np.random.Generator) -> tuple[Array, Array, Ar
     mileage = np.concatenate([[0.0], np.cumsum(pieces)])
     hamlets = np.arange(HAMLET_EVERY_M * rng.uniform(0.2, 0.6), mileage[-1], HAMLET_EVERY_M)
     hamlets = hamlets + HAMLET_EVERY_M * rng.uniform(-0.25, 0.25, hamlets.size)
-    at = np.repeat(hamlets, rng.integers(_FEWEST, _MOST, hamlets.size, endpoint=True))
+    at = np.repeat(hamlets, rng.integers(_MIN_HOUSES, _MAX_HOUSES, hamlets.size, endpoint=True))
     at = np.clip(at + rng.uniform(-HAMLET_M, HAMLET_M, at.size), 0.0, mileage[-1])
     half = np.array([rng.uniform(*_LONG_M, at.size), rng.uniform(*_DEEP_M, at.size)]) / 2.0
     side = rng.choice([-1.0, 1.0], at.size)

@@ -13,9 +13,9 @@ from a7sim.scenario.schema import FORMAT_MM, Camera, Measured
 from a7sim.scene.camera import fiducial_places
 from a7sim.scene.photograph import Marks
 
-FEWEST_FIDUCIALS = 3
+MIN_FIDUCIALS = 3
 
-WORST_FIDUCIAL_MM = 5.0
+MAX_FIDUCIAL_MM = 5.0
 """Film and a badly known count do not displace a fiducial by more; a confused one stands further off."""
 
 
@@ -57,20 +57,20 @@ def _from_counts(
     count_mm: float | None,
 ) -> tuple[Marks, Marks]:
     seen = [name for name in names if name in found]
-    if len(seen) < FEWEST_FIDUCIALS:
+    if len(seen) < MIN_FIDUCIALS:
         raise Mistake(
-            f"{path}, column point: expected {FEWEST_FIDUCIALS} or more of the fiducials {', '.join(names)} "
+            f"{path}, column point: expected {MIN_FIDUCIALS} or more of the fiducials {', '.join(names)} "
             f"among the counts, got {len(seen)}"
         )
     counts = np.array([found[name] for name in seen]).T
     places = calibrated[:, [names.index(name) for name in seen]]
     to_film = _laid_over(counts, places, count_mm)
     off = np.abs(to_film(counts) - places).max(axis=0)
-    if not (off < WORST_FIDUCIAL_MM).all():
+    if not (off < MAX_FIDUCIAL_MM).all():
         worst = seen[int(np.nanargmax(np.nan_to_num(off, nan=np.inf)))]
         raise Mistake(
             f"{path}, column point: expected counts of the fiducials that lie as in the camera, "
-            f"got {worst} more than {WORST_FIDUCIAL_MM:.0f} mm from its place"
+            f"got {worst} more than {MAX_FIDUCIAL_MM:.0f} mm from its place"
         )
     others = [name for name in found if name not in names]
     all_points = np.array([found[name] for name in others]).reshape(-1, 2).T

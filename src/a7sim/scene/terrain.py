@@ -12,7 +12,7 @@ Truths = npt.NDArray[np.bool_]
 
 _WAVES = 7
 
-_MOST_ROUNDS, _SETTLED_M = 8, 0.01
+_MAX_ROUNDS, _SETTLED_M = 8, 0.01
 """Rounds in which a ray is brought to the ground; every one leaves a tenth of the error, or less."""
 
 
@@ -58,7 +58,7 @@ class Ground:
 
     def _met(self, centre: Array, rays: Array, level: Array) -> Array:
         """Return where rays ``(3, n)`` meet the ground, from a height ``(1,)`` near which they do."""
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(_MAX_ROUNDS):
             met = centre + (level - centre[2]) / rays[2] * rays
             ground = self.height(met[0], met[1])
             settled = np.abs(ground - level).max() < _SETTLED_M

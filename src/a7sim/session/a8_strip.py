@@ -66,7 +66,7 @@ def laid(photograph: Photograph, names: tuple[str, ...], observer: Observer, rng
 
 
 @dataclass(frozen=True)
-class A8:
+class A8Setup:
     """An A8 and the person in its chair, for one session."""
 
     projectors: tuple[Projector, Projector]
@@ -165,7 +165,7 @@ def strip_on_a8(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
         for stream in (INSTRUMENT_STREAM, OPERATOR_STREAM)
     )
     test = scenario.instrument.grid_test
-    a8 = A8(
+    a8 = A8Setup(
         (Projector.drawn(test, faults), Projector.drawn(test, faults)),
         scenario.observer,
         plan.bx,

@@ -14,7 +14,7 @@ import msgspec
 
 from a7sim.instrument.autograph import State
 
-EVERY = 2000
+LINES_PER_CHECKPOINT = 2000
 """Events of the link from checkpoint to checkpoint, where no line waits then."""
 
 

@@ -10,8 +10,8 @@ from a7sim.reduction import Stand, Undetermined, element_corrections
 UNKNOWNS = ("kappa1", "kappa2", "phi1", "phi2", "omega2")
 """Of the paper P, which has omega" in place of omega'."""
 
-MOST_ROUNDS = 20
-CLEARED = 1e-10
+MAX_ROUNDS = 20
+CONVERGED_MM = 1e-10
 """Radians: the rounds end when every correction is smaller."""
 
 
@@ -76,7 +76,7 @@ def cleared(
     level = np.array([still, still, swing])
     stand = Cleared(c, (level, level), bx, 0)
     clearing = np.ones(swing.shape, dtype=bool)
-    for i in range(1, MOST_ROUNDS + 1):
+    for i in range(1, MAX_ROUNDS + 1):
         points, parallaxes = stand.seen(left, right)
         enlargement = -points[2] / c[0]
         one, two = (
@@ -87,7 +87,7 @@ def cleared(
         kappa1, kappa2, phi1, phi2, omega2 = np.where(clearing, step, 0.0)
         turns = np.array([still, phi1, kappa1]), np.array([omega2, phi2, kappa2])
         stand = Cleared(c, (stand.angles[0] + turns[0], stand.angles[1] + turns[1]), bx, i)
-        clearing = clearing & ~(np.abs(step).max(axis=0) < CLEARED)
+        clearing = clearing & ~(np.abs(step).max(axis=0) < CONVERGED_MM)
         if not clearing.any():
             return stand
-    raise Undetermined(f"the y-parallaxes of {left.shape[1]} points are not cleared in {MOST_ROUNDS} rounds")
+    raise Undetermined(f"the y-parallaxes of {left.shape[1]} points are not cleared in {MAX_ROUNDS} rounds")

@@ -21,7 +21,7 @@ from a7sim.session.running import Watcher, job_of, run
 from a7sim.session.strips import ground_of, grounded, models_of, of_grounded
 from a7sim.standard_points import CASES
 
-MOST_STRIPS = 700
+MAX_STRIPS = 700
 """Strips of one command: five cases in up to four models."""
 
 FOLDER_OF_CASE = "case-{}"
@@ -87,9 +87,9 @@ def in_case(scenario: Scenario, case: str) -> Scenario:
 def see_that_strips_can_be_made(scenario: Scenario) -> None:
     """Raise Mistake for a scenario of too many models or without ground control."""
     strips = len(CASES) ** len(scenario.models)
-    if strips > MOST_STRIPS:
+    if strips > MAX_STRIPS:
         raise Mistake(
-            f"--strips all: expected at most {MOST_STRIPS} strips, got {len(scenario.models)} models: {strips}"
+            f"--strips all: expected at most {MAX_STRIPS} strips, got {len(scenario.models)} models: {strips}"
         )
     if not any(point.role != "check" for point in scenario.ground):
         raise Mistake("--strips all: expected ground control in the scenario, got none")

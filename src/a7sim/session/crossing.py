@@ -14,7 +14,7 @@ from a7sim.reduction.absolute import fitted_to_ground, root_mean_square
 from a7sim.scenario.schema import StripPlan
 from a7sim.session.strips import grounded, models_of, of_grounded
 
-AT_ONCE = 64
+CHUNK_SIZE = 64
 """Replicates on one array, so that memory stays small."""
 
 Replicate = Mapping[str, Document]
@@ -35,8 +35,8 @@ def crossed(replicates: Sequence[Replicate], models: int, ground: Ground, plan: 
     if a model is of such a one. No digit of a replicate depends on those beside it. Raises Mistake for models that make
     no strip.
     """
-    for first in range(0, len(replicates), AT_ONCE):
-        some = replicates[first : first + AT_ONCE]
+    for first in range(0, len(replicates), CHUNK_SIZE):
+        some = replicates[first : first + CHUNK_SIZE]
         strips = _on_arrays(some, models, ground, plan)
         for i, each in enumerate(some):
             yield [

@@ -29,7 +29,7 @@ _DRAWS = re.compile(r"EYEP\w*:PICT\w*\?|COUN\?;:PROJ1:", re.IGNORECASE)
 
 _POINT = re.compile(r'(?:EYEP\w*(?::STER\w*)?\?|REC(?:ORD)?)\s+"((?:[^"]|"")+)"', re.IGNORECASE)
 
-LEAP = 200
+MAX_REPLAYED_LINES = 200
 """Lines that are said again rather than a checkpoint behind them sought."""
 
 _LOOKED_BACK = 200
@@ -117,7 +117,7 @@ class Film:
     def _leaps_to(self, end: int) -> bool:
         """Whether it is quicker to go on from a checkpoint than from here."""
         at = bisect_left(self._checkpoints, end) - 1
-        return end < self._next or (at >= 0 and self._checkpoints[at] - self._next > LEAP)
+        return end < self._next or (at >= 0 and self._checkpoints[at] - self._next > MAX_REPLAYED_LINES)
 
     def run_on(self, enough: Callable[[], bool]) -> Frame:
         """Run on, a step at least if there is one, until that is enough."""

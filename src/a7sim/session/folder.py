@@ -15,7 +15,7 @@ GEOJSON, SVG = "map.geojson", "map.svg"
 RESIDUALS = "residuals.csv"
 REPORT = "report.html"
 MODELS_OF_WAY, STRIP_OF_WAY = "{}-models.csv", "{}-strip.csv"
-WAYS = ("comparator", "A8", "bridge")
+METHODS = ("comparator", "A8", "bridge")
 FILES = (
     JOURNAL,
     Path(JOURNAL).with_suffix(SCENARIO_SUFFIX).name,
@@ -33,7 +33,7 @@ FILES = (
     SVG,
     REPORT,
     RESULTS,
-    *(name.format(way.lower()) for way in WAYS for name in (MODELS_OF_WAY, STRIP_OF_WAY)),
+    *(name.format(way.lower()) for way in METHODS for name in (MODELS_OF_WAY, STRIP_OF_WAY)),
 )
 
 

@@ -15,14 +15,14 @@ from a7sim.mistakes import Mistake
 from a7sim.operator.book import Entry
 from a7sim.scenario import Scenario, carried, hash_of
 from a7sim.scene import PICTURES
-from a7sim.session.checkpoints import EVERY, Checkpoint, as_lines, hash_of_state
+from a7sim.session.checkpoints import LINES_PER_CHECKPOINT, Checkpoint, as_lines, hash_of_state
 from a7sim.session.durable import Durability, DurableFile, JournalStopped, stopped
 from a7sim.session.folder import JOURNAL, SCENARIO_SUFFIX, STATES, TORN, prepare_folder
 from a7sim.session.lines import SCHEMA_VERSION, Chain, Event, Journalled, is_begun, read_journal
 
 _REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
 
-_LONGEST_SHOWN = 300
+_MAX_SHOWN_LENGTH = 300
 
 
 def registers(line: str) -> bool:
@@ -163,7 +163,7 @@ class Journal:
             return
         at_once, self._time = False, event.time
         if event.direction == ">":
-            if self._since_checkpoint >= EVERY and self._desk is not None and self._desk.quiet:
+            if self._since_checkpoint >= LINES_PER_CHECKPOINT and self._desk is not None and self._desk.quiet:
                 self._checkpoint(event.time, self._desk)
             at_once = registers(event.text)
         self._since_checkpoint += 1
@@ -270,7 +270,7 @@ def set_aside(there: Journalled) -> None:
 
 
 def _not_the_same(there: Journalled, number: int, line: bytes) -> str:
-    was, is_now = (each[:_LONGEST_SHOWN].decode("utf-8", "replace") for each in (there.lines[number - 1], line))
+    was, is_now = (each[:_MAX_SHOWN_LENGTH].decode("utf-8", "replace") for each in (there.lines[number - 1], line))
     if number == 1:
         return f"{there.where(number)}: expected a session of {software()} and its scenario, got another: {was}"
     return f"{there.where(number)}: expected what this session does again, {is_now}, got another's, {was}"

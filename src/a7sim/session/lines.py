@@ -11,7 +11,7 @@ from a7sim.mistakes import Mistake
 
 SCHEMA_VERSION = 3
 
-READABLE = (2, 3)
+READABLE_VERSIONS = (2, 3)
 """Schema versions that are read; version 2 had the whole scenario in its header."""
 
 _END_OF_LINE = b',"crc":"%08x"}'
@@ -128,7 +128,7 @@ def is_begun(path: Path) -> bool:
 
 def _header(path: Path, line: bytes) -> dict[str, Any]:
     header = msgspec.json.decode(line)
-    if header.get("schema_version") not in READABLE:
+    if header.get("schema_version") not in READABLE_VERSIONS:
         raise Mistake(f"{path}, line 1: {_other_version(header)}")
     return dict(header)
 
@@ -139,13 +139,13 @@ def _damage(line: bytes, number: int) -> str:
             header = msgspec.json.decode(line)
         except (msgspec.DecodeError, UnicodeDecodeError):
             header = None
-        if isinstance(header, dict) and header.get("schema_version", SCHEMA_VERSION) not in READABLE:
+        if isinstance(header, dict) and header.get("schema_version", SCHEMA_VERSION) not in READABLE_VERSIONS:
             return _other_version(header)
     return "expected the checksum that follows from the lines before and this one, got another: the journal is damaged"
 
 
 def _other_version(header: dict[str, Any]) -> str:
     return (
-        f"expected a journal of schema_version {' or '.join(map(str, READABLE))}, got {header['schema_version']!r}: "
-        f"this version of a7sim cannot replay or resume it"
+        f"expected a journal of schema_version {' or '.join(map(str, READABLE_VERSIONS))}, "
+        f"got {header['schema_version']!r}: this version of a7sim cannot replay or resume it"
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk, Engine, Listener
-from a7sim.instrument.language.engine import LONGEST_LINE
+from a7sim.instrument.language.engine import MAX_LINE_LENGTH
 from a7sim.link.clock import Clock
 from a7sim.link.replies import Part, as_text, whole_reply
 from a7sim.link.waiting import obeyed
@@ -73,7 +73,7 @@ def _fresh(script: Script, listener: Listener | None) -> Desk:
 def _said(statement: Statement) -> str:
     if isinstance(statement, Wait):
         return f"wait {statement.seconds:g}"
-    return (statement.query if isinstance(statement, Expect) else statement.text)[: LONGEST_LINE + 1]
+    return (statement.query if isinstance(statement, Expect) else statement.text)[: MAX_LINE_LENGTH + 1]
 
 
 def _asks_for_errors(statement: Statement | None) -> bool:

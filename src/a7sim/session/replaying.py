@@ -8,9 +8,9 @@ from typing import Any
 import msgspec
 
 from a7sim.instrument import Autograph, build_autograph
-from a7sim.instrument.language import LONGEST_LINE, Desk, LinkEvent
-from a7sim.instrument.language.desk import POLL_TAKES
-from a7sim.instrument.language.logins import THE_TOKEN
+from a7sim.instrument.language import MAX_LINE_LENGTH, Desk, LinkEvent
+from a7sim.instrument.language.desk import POLL_SECONDS
+from a7sim.instrument.language.logins import TOKEN_PLACEHOLDER
 from a7sim.link.clock import Clock
 from a7sim.link.waiting import obeyed
 from a7sim.mistakes import Mistake
@@ -98,8 +98,8 @@ class Replay:
         self.desk = Desk(
             autograph,
             self._heard,
-            THE_TOKEN if settings.get("login") else None,
-            0.0 if settings.get("realtime") else POLL_TAKES,
+            TOKEN_PLACEHOLDER if settings.get("login") else None,
+            0.0 if settings.get("realtime") else POLL_SECONDS,
             str(header.get("software", "")).removeprefix("a7sim "),
         )
         self.time = 0.0
@@ -237,7 +237,7 @@ def _bytes_of(event: Event) -> bytes:
     if event.dir == "~":
         return b""
     if event.dir == "!":
-        return b"x" * (LONGEST_LINE + 1) + b"\n"
+        return b"x" * (MAX_LINE_LENGTH + 1) + b"\n"
     return event.text.encode("latin-1", "replace") + (b"\r\n" if event.text.endswith("\r") else b"\n")
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from a7sim.files import read_text
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
-from a7sim.scenario.loading import SHELVES
+from a7sim.scenario.loading import SEARCH_PATH
 
 SUFFIX = ".a7s"
 
@@ -103,7 +103,7 @@ def find_script(name: str) -> Path:
     path = Path(name)
     if path.is_file():
         return path
-    shelves = [shelf / "scripts" for shelf in SHELVES]
+    shelves = [shelf / "scripts" for shelf in SEARCH_PATH]
     for shelf in shelves:
         found = shelf / f"{path.name.removesuffix(SUFFIX)}{SUFFIX}"
         if path.parent == Path() and found.is_file():

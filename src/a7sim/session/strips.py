@@ -25,7 +25,7 @@ from a7sim.scenario import Scenario
 from a7sim.scene import Scene
 
 FIRST_FREE_NUMBER = 9001
-LONGEST_CARD_NUMBER = 5
+MAX_CARD_NUMBER_LENGTH = 5
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def card_numbers(names: Iterable[str]) -> dict[str, str]:
 
 def _is_card_number(name: str) -> bool:
     name = name.removesuffix(CENTRE)
-    return name.isascii() and name.isdigit() and len(name) <= LONGEST_CARD_NUMBER and int(name) > 0
+    return name.isascii() and name.isdigit() and len(name) <= MAX_CARD_NUMBER_LENGTH and int(name) > 0
 
 
 def _numbered(model: Model, key: Mapping[str, str]) -> Model:

@@ -73,7 +73,7 @@ def true_elements(
     else:
         turned_left = _laid_onto(truth.base, set_base)
         omega2 = variant.tilts(elements, 2)[0] * GON
-        for _ in range(_MOST_TURNS):
+        for _ in range(_MAX_TURNS):
             cameras = {left: turned_left, right: mxm(turned_left, truth.rotation)}
             turned_left = mxm(_about(set_base, omega2 - angles_of(cameras[2])[0]), turned_left)
         true = {}
@@ -84,7 +84,7 @@ def true_elements(
     return true
 
 
-_MOST_TURNS = 12
+_MAX_TURNS = 12
 
 
 def _base_of(elements: Elements, model: ModelJob) -> Array:

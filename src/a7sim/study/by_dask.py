@@ -12,9 +12,9 @@ from typing import Any
 
 import a7sim
 from a7sim.mistakes import Mistake
-from a7sim.study.executors import GOES_ON
+from a7sim.study.executors import RESUME_HINT
 
-PATIENCE_S = 5.0
+WORKER_TIMEOUT_S = 5.0
 """How long a scheduler has to answer, and to have a worker."""
 
 _URL = re.compile(r"(tcp|tls|ws|wss|ucx)://[^/\s]+:\d+/?")
@@ -51,7 +51,7 @@ def on_dask(scheduler: str | None, workers: int) -> Iterator[tuple[Executor, int
         else:
             address = _checked(scheduler)
         try:
-            client = until.enter_context(distributed.Client(address, timeout=PATIENCE_S, set_as_default=False))
+            client = until.enter_context(distributed.Client(address, timeout=WORKER_TIMEOUT_S, set_as_default=False))
         except (OSError, ValueError) as error:
             raise Mistake(f"--scheduler: expected one that answers at {scheduler}, got none in 5 s") from error
         at_once = _at_once(client, scheduler)
@@ -60,7 +60,7 @@ def on_dask(scheduler: str | None, workers: int) -> Iterator[tuple[Executor, int
         try:
             yield executor, at_once
         except (distributed.scheduler.KilledWorker, distributed.CancelledError, CancelledError) as error:
-            raise Mistake(f"dask lost its scheduler, or one worker after the other; {GOES_ON}") from error
+            raise Mistake(f"dask lost its scheduler, or one worker after the other; {RESUME_HINT}") from error
 
 
 def dask_setup(worker: object) -> None:
@@ -77,7 +77,7 @@ def _checked(scheduler: str) -> str:
 def _at_once(client: Any, scheduler: str | None) -> int:
     """Return how many chunks a cluster works at once, having seen that all its workers have the a7sim that asks."""
     try:
-        client.wait_for_workers(1, timeout=PATIENCE_S)
+        client.wait_for_workers(1, timeout=WORKER_TIMEOUT_S)
     except TimeoutError as error:
         raise Mistake(f"--scheduler: expected workers at {scheduler}, got a scheduler without any") from error
     try:

@@ -7,7 +7,7 @@ from importlib import import_module
 
 from a7sim.mistakes import Mistake
 
-START = "mpiexec -n 5 a7sim study ... --executor mpi"
+MPI_COMMAND = "mpiexec -n 5 a7sim study ... --executor mpi"
 """How four workers and the one that asks are started."""
 
 
@@ -26,7 +26,7 @@ def on_mpi(environment: Mapping[str, str]) -> Iterator[tuple[Executor, int]]:
         raise Mistake(f"--executor mpi: expected MPI and mpi4py (pip install 'a7sim[mpi]'): {why}") from missing
     processes = MPI.COMM_WORLD.Get_size()
     if processes < 2:
-        raise Mistake(f"--executor mpi: expected two processes or more ({START}), got this one alone")
+        raise Mistake(f"--executor mpi: expected two processes or more ({MPI_COMMAND}), got this one alone")
     with futures.MPICommExecutor(MPI.COMM_WORLD, root=0, env=dict(environment)) as executor:
         if executor is not None:
             yield executor, processes - 1

@@ -8,7 +8,7 @@ from typing import Any
 from a7sim.mistakes import Mistake
 from a7sim.session.crossing import cases_of_strips
 from a7sim.standard_points import CASES
-from a7sim.study.schema import MOST_CELLS, Factor, Settings, Study
+from a7sim.study.schema import MAX_CELLS, Factor, Settings, Study
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ def cells_of(study: Study) -> list[Cell]:
     for factor in study.factor:
         _see_that_it_varies(factor, study.design)
     rows = _hypercube(study) if study.design == "latin-hypercube" else _rows(study)
-    if len(rows) > MOST_CELLS:
-        raise Mistake(f"factor: expected levels that make at most {MOST_CELLS} cells, got {len(rows)}")
+    if len(rows) > MAX_CELLS:
+        raise Mistake(f"factor: expected levels that make at most {MAX_CELLS} cells, got {len(rows)}")
     names = [factor.name for factor in study.factor]
     return [
         Cell(
@@ -54,8 +54,8 @@ def cells_of(study: Study) -> list[Cell]:
 def cells_of_strips(cells: Sequence[Cell], models: Sequence[str]) -> list[Cell]:
     """Return cells of which each stands for all strips that its models, each in every case, make; numbered anew."""
     combinations = cases_of_strips(tuple(CASES), len(models))
-    if len(cells) * len(combinations) > MOST_CELLS:
-        raise Mistake(f"strips: expected at most {MOST_CELLS} cells, got {len(cells) * len(combinations)}")
+    if len(cells) * len(combinations) > MAX_CELLS:
+        raise Mistake(f"strips: expected at most {MAX_CELLS} cells, got {len(cells) * len(combinations)}")
     both = enumerate(product(cells, combinations), start=1)
     return [
         Cell(

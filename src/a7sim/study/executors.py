@@ -15,7 +15,7 @@ from a7sim.mistakes import Mistake
 Kind = Literal["process", "pool", "dask", "mpi"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-GOES_ON = "the same command goes on where a checkpoint was left (--out)"
+RESUME_HINT = "the same command goes on where a checkpoint was left (--out)"
 """What to do about a study that ended too early."""
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -78,7 +78,7 @@ def _pool(workers: int) -> Iterator[Executor]:
         except BaseException as error:
             ours.close()
             if isinstance(error, BrokenExecutor):
-                raise Mistake(f"a worker of the study was lost (killed, or out of memory); {GOES_ON}") from error
+                raise Mistake(f"a worker of the study was lost (killed, or out of memory); {RESUME_HINT}") from error
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)

@@ -18,12 +18,12 @@ WIDTH_IN = 9.0
 """Of all figures, so that their letters are equally large on a page."""
 _INCHES_A_ROW, _INCHES_BESIDE, _INCHES_HIGH = 0.36, 1.2, 3.9
 _SIGNS = ((LEFT, "-"), (RIGHT, "-"), (TRUE, "-"), (LEFT, "--"), (RIGHT, "--"), (TRUE, "--"), (SOFT, "-"), (SOFT, "--"))
-MOST_CELLS_DRAWN = 60
+MAX_CELLS_DRAWN = 60
 """More than these cannot be told apart in a figure; tables have all."""
 _STEEP = 10.0
 """Ratio of the farthest places from which an axis is logarithmic."""
 _UNITS = ("m", "mm", "gon")
-_MOST_IN_A_MAP, _MOST_BESIDE = 10, 3
+_MAX_IN_A_MAP, _MAX_BESIDE = 10, 3
 
 
 def of_response(document: Document, response: Document) -> Iterator[Picture]:
@@ -32,11 +32,11 @@ def of_response(document: Document, response: Document) -> Iterator[Picture]:
     cells = [cell for cell in document["cells"] if cell["responses"][name]["count"]]
     if _is_a_map(document, cells):
         yield heat_map(document, response)
-    if places := [each for each in document["places"] if _levels(document, name, each)][:_MOST_BESIDE]:
+    if places := [each for each in document["places"] if _levels(document, name, each)][:_MAX_BESIDE]:
         yield against_places(document, response, places)
-    if curves := [each for each in document["densities"] if each["response"] == name][:_MOST_BESIDE]:
+    if curves := [each for each in document["densities"] if each["response"] == name][:_MAX_BESIDE]:
         yield of_densities(curves, response)
-    if len(cells) <= MOST_CELLS_DRAWN:
+    if len(cells) <= MAX_CELLS_DRAWN:
         yield intervals(cells, response)
 
 
@@ -112,7 +112,7 @@ def of_densities(curves: Sequence[Document], response: Document) -> Picture:
 def _is_a_map(document: Document, cells: Sequence[Document]) -> bool:
     counts = [len({cell["levels"][factor] for cell in document["cells"]}) for factor in document["factors"]]
     whole = len(cells) == len(document["cells"]) and document["design"] == "full"
-    return whole and len(counts) == 2 and max(counts) <= _MOST_IN_A_MAP
+    return whole and len(counts) == 2 and max(counts) <= _MAX_IN_A_MAP
 
 
 def heat_map(document: Document, response: Document) -> Picture:
@@ -237,7 +237,7 @@ def _dependences(document: Document, tests: Sequence[Document]) -> Iterator[Pict
     """Yield for every response its means against those on which it is said to depend."""
     responses = {each["name"]: each for each in document["responses"]}
     for name in dict.fromkeys(test["response"] for test in tests):
-        of = [test for test in tests if test["response"] == name][:_MOST_BESIDE]
+        of = [test for test in tests if test["response"] == name][:_MAX_BESIDE]
         words = with_unit(responses[name])
         title = f"{sentence(words)} against what it is said to depend on"
         text = "; ".join(f"{test['on']}: r = {test['correlation']:.2f}" for test in of)

@@ -32,7 +32,7 @@ from a7sim.study.tally import Tally
 from a7sim.study.theory import beside_theory, of_theory
 
 SIGNIFICANT = 1.0 - CONFIDENCE
-MOST_DENSITIES = 8
+MAX_DENSITIES = 8
 """Levels of a factor whose curves can be told apart."""
 
 
@@ -209,7 +209,7 @@ def _densities(laid: Laid, tally: Tally) -> Iterator[Document]:
     for j, response in enumerate(laid.responses):
         values = _replicates(laid, tally, j)
         for factor, levels in laid.factors.items():
-            if len(levels) > MOST_DENSITIES:
+            if len(levels) > MAX_DENSITIES:
                 continue
             of_levels = {
                 level: values[[i for i, cell in enumerate(laid.cells) if cell.levels[factor] == level]].ravel()

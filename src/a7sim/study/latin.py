@@ -17,10 +17,10 @@ import numpy.typing as npt
 from a7sim.geometry import Array
 from a7sim.study.statistics import CONFIDENCE, Interval
 
-FEWEST_CELLS = 10
+MIN_CELLS = 10
 """Fewer are not taken apart."""
 
-MOST_DEGREES = 8
+MAX_DEGREES = 8
 CELLS_A_COEFFICIENT = 5
 """Polynomials have as many degrees as leave so many cells for each coefficient."""
 
@@ -51,10 +51,10 @@ def main_effects(means: Array, factors: Mapping[str, Array | Sequence[str]]) -> 
     known = np.isfinite(means)
     means = means[known]
     values = {name: np.asarray(each)[known] for name, each in factors.items()}
-    degrees = max(1, min(MOST_DEGREES, means.size // (CELLS_A_COEFFICIENT * max(1, len(values)))))
+    degrees = max(1, min(MAX_DEGREES, means.size // (CELLS_A_COEFFICIENT * max(1, len(values)))))
     curves = {name: _curve(each, degrees) for name, each in values.items()}
     coefficients = 1 + sum(each.shape[1] for each in curves.values())
-    if means.size < max(FEWEST_CELLS, coefficients + 2) or not np.ptp(means) > 0.0:
+    if means.size < max(MIN_CELLS, coefficients + 2) or not np.ptp(means) > 0.0:
         return []
     from scipy.stats import f  # noqa: PLC0415
 

@@ -23,7 +23,7 @@ from a7sim.study.responses import Response, response_of
 from a7sim.study.schema import Study
 from a7sim.study.simulating import Task
 
-SHELVES = shelves_of("studies")
+SEARCH_PATH = shelves_of("studies")
 """Where the studies are that come with a7sim."""
 
 
@@ -87,11 +87,11 @@ def find_study(name: str | Path) -> Path:
     path = Path(name)
     if path.is_file():
         return path
-    for shelf in SHELVES:
+    for shelf in SEARCH_PATH:
         found = shelf / f"{path.name.removesuffix('.toml')}.toml"
         if path.parent in (Path(), Path("studies")) and found.is_file():
             return found
-    known = ", ".join(sorted({file.stem for shelf in SHELVES for file in shelf.glob("*.toml")}))
+    known = ", ".join(sorted({file.stem for shelf in SEARCH_PATH for file in shelf.glob("*.toml")}))
     raise StudyError(str(name)[:200], [f"expected the file of a study or one of {known}, found {what_is_at(path)}"])
 
 

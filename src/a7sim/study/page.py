@@ -9,9 +9,9 @@ from a7sim.report.page import Chapter, Folded, Heading, Paragraph, Part, Sheet, 
 from a7sim.study import figures
 from a7sim.study.findings import in_words
 
-_MOST_OPEN = 12
+_MAX_OPEN = 12
 """Cells beyond which their table is folded."""
-_MOST_QUOTED = 3
+_MAX_QUOTED = 3
 """Responses with figures in a short form, where no claim names any."""
 
 
@@ -26,7 +26,7 @@ def markdown_of(document: Document, figures_at: str) -> tuple[str, dict[str, str
     Of the responses it shows those that claims name, or the first. `figures_at` is where the Markdown finds them.
     """
     named = {name for claim in document["claims"] for test in claim["tests"] for name in (test["response"],)}
-    shown = [each for each in document["responses"] if each["name"] in named] or document["responses"][:_MOST_QUOTED]
+    shown = [each for each in document["responses"] if each["name"] in named] or document["responses"][:_MAX_QUOTED]
     return markdown(document["study"], _lead(document), _chapters(document, shown), figures_at)
 
 
@@ -80,7 +80,7 @@ def _how(document: Document) -> Iterator[Part]:
         for cell in document["cells"]
     ]
     cells = Sheet("Cells", ("Cell", "Levels", "Settings", "Sessions", "Gave up"), rows, frozenset({0, 1, 2}))
-    yield Folded(f"The {len(rows)} cells", [cells]) if len(rows) > _MOST_OPEN else cells
+    yield Folded(f"The {len(rows)} cells", [cells]) if len(rows) > _MAX_OPEN else cells
 
 
 def _settings(settings: Document) -> str:

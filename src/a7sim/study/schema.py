@@ -6,11 +6,11 @@ from msgspec import Meta, Struct
 
 from a7sim.scenario.schema import Name, Text
 
-MOST_REPLICATES = 1_000_000
-MOST_CELLS = 2_000
+MAX_REPLICATES = 1_000_000
+MAX_CELLS = 2_000
 
 Design = Literal["full", "one-at-a-time", "latin-hypercube"]
-Count = Annotated[int, Meta(ge=1, le=MOST_REPLICATES, description="a whole number from 1 to 1000000")]
+Count = Annotated[int, Meta(ge=1, le=MAX_REPLICATES, description="a whole number from 1 to 1000000")]
 Settings = dict[str, Any]
 """Values of a scenario by their path, as `--set` names them."""
 
@@ -75,7 +75,7 @@ class Study(_Data, frozen=True, kw_only=True):
     strips: Literal["all"] | None = None
     """All: every replicate is worked once in every case, and its cells are the strips of all their combinations."""
     design: Design = "full"
-    samples: Annotated[int, Meta(ge=2, le=MOST_CELLS, description="2 to 2000 cells")] | None = None
+    samples: Annotated[int, Meta(ge=2, le=MAX_CELLS, description="2 to 2000 cells")] | None = None
     """Cells of a Latin hypercube."""
     responses: Annotated[list[str], Meta(min_length=1, max_length=100, description="1 to 100 responses")]
     """Names that `study.responses` lists, or paths in a document of results such as models.0.truth.centres.left.Z0."""

@@ -20,7 +20,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 RESAMPLES = 999
 _DRAWN_AT_ONCE = 1_000_000
 _NOTHING = 1e-24
-_PLACES, _MOST_IN_A_DENSITY = 121, 20_000
+_PLACES, _MAX_IN_A_DENSITY = 121, 20_000
 _STREAM = 10
 """Spawns the resamples of the bootstrap."""
 
@@ -96,9 +96,7 @@ def densities(values: Mapping[str, Array]) -> dict[str, Any]:
         places = np.linspace(max(0.0, low - margin), high + margin, _PLACES)
     return {
         "places": _rounded(places),
-        "densities": {
-            name: _rounded(gaussian_kde(each[:_MOST_IN_A_DENSITY])(places)) for name, each in varying.items()
-        },
+        "densities": {name: _rounded(gaussian_kde(each[:_MAX_IN_A_DENSITY])(places)) for name, each in varying.items()},
     }
 
 

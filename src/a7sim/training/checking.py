@@ -19,7 +19,7 @@ from a7sim.training.rehearsing import Rehearsals
 from a7sim.training.variation import scenario_for
 from a7sim.wording import counted
 
-LEAST_HINTS, LEAST_FAULTY = 2, 2
+MIN_HINTS, MIN_FAULTY = 2, 2
 
 NEVER = 1e12
 """A limit that everything, or nothing, reaches."""
@@ -72,10 +72,10 @@ def _of_form(shelved: Shelved) -> Iterator[str]:
     exercise = shelved.exercise
     if not shelved.text.strip():
         yield "text.md: expected the exercise in plain words, found none"
-    if len(exercise.hints) < LEAST_HINTS:
-        yield f"hint: expected {LEAST_HINTS} hints or more, got {len(exercise.hints)}"
-    if len(exercise.faulty) < LEAST_FAULTY:
-        yield f"faulty: expected {LEAST_FAULTY} faulty ones or more, got {len(exercise.faulty)}"
+    if len(exercise.hints) < MIN_HINTS:
+        yield f"hint: expected {MIN_HINTS} hints or more, got {len(exercise.hints)}"
+    if len(exercise.faulty) < MIN_FAULTY:
+        yield f"faulty: expected {MIN_FAULTY} faulty ones or more, got {len(exercise.faulty)}"
     if not exercise.steps:
         yield "step: expected a checklist, got no step"
     total = sum(each.weight for each in exercise.criteria)

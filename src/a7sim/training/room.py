@@ -23,7 +23,7 @@ from a7sim.training.witness import Witness, WitnessedAutograph
 
 _CHECKSUM = re.compile(r"(?<=bytes, )crc32 [0-9a-f]{8}")
 
-TRAIN = "train"
+JOURNAL_COMMAND = "train"
 """The command in the header of an attempt's journal."""
 
 
@@ -67,7 +67,7 @@ class Room:
 
 def header_for(shelved: Shelved, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
     """Return what the journal of an attempt says first. It names the scenario by its hash alone: it holds the truth."""
-    first = header_of_unknown(TRAIN, exercise=shelved.name, student=student, mode=mode).line
+    first = header_of_unknown(JOURNAL_COMMAND, exercise=shelved.name, student=student, mode=mode).line
     return Header(first | {"title": shelved.exercise.title, "scenario_hash": hash_of(scenario), "seed": seed})
 
 

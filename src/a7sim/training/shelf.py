@@ -15,7 +15,7 @@ from a7sim.training.handouts import HANDOUTS
 from a7sim.training.measures import MEASURES, measure_of
 from a7sim.training.procedures import PROCEDURES
 
-SHELVES = shelves_of("exercises")
+SEARCH_PATH = shelves_of("exercises")
 """Where the exercises are that come with a7sim."""
 
 FILE = "exercise.toml"
@@ -47,7 +47,7 @@ def find_exercise(name: str) -> Shelved:
 
 def _folders() -> list[Path]:
     """Return the folders of the exercises that come with a7sim: number, hyphen, name, in their order."""
-    shelf = next((each for each in SHELVES if each.is_dir()), None)
+    shelf = next((each for each in SEARCH_PATH if each.is_dir()), None)
     return sorted(path.parent for path in shelf.glob(f"[0-9][0-9]-*/{FILE}")) if shelf else []
 
 

@@ -17,7 +17,7 @@ from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.reduction.strips import JoinMethod
 
-NARROWEST = 80
+MIN_WIDTH = 80
 """Columns that every table fits."""
 
 
@@ -282,6 +282,6 @@ def _deliver(outcome: Outcome, as_document: bool, out: Path | None, shown: Calla
         click.echo(as_json(document), nl=False)
         return
     console = Console(markup=False, highlight=False, emoji=False)
-    console.width = max(console.width, NARROWEST)
+    console.width = max(console.width, MIN_WIDTH)
     for each in [*shown(document), *tables.of_warnings(document)]:
         console.print(each)

@@ -14,7 +14,7 @@ from a7sim.training.shelf import find_exercise
 
 HOME_VARIABLE, STUDENT_VARIABLE = "A7SIM_HOME", "A7SIM_STUDENT"
 
-LONGEST_NAME = 100
+MAX_NAME_LENGTH = 100
 
 _HOME = click.option(
     "--home",
@@ -47,8 +47,8 @@ def named(student: str | None) -> str:
         except (KeyError, OSError):
             student = os.environ.get("USERNAME", "student")
     name = " ".join(student.split())
-    if not 1 <= len(name) <= LONGEST_NAME or not name.isprintable():
-        raise Mistake(f"--student: expected a name of 1 to {LONGEST_NAME} characters, got {student!r}")
+    if not 1 <= len(name) <= MAX_NAME_LENGTH or not name.isprintable():
+        raise Mistake(f"--student: expected a name of 1 to {MAX_NAME_LENGTH} characters, got {student!r}")
     return name
 
 

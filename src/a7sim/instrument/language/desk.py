@@ -25,7 +25,7 @@ class LinkEvent(Struct, frozen=True, gc=False):
     text: str
 
 
-POLL_TAKES = 0.1
+POLL_SECONDS = 0.1
 """Simulated s that pass over a look at the status while something moves, so that a client may wait by looking."""
 
 Listener = Callable[[LinkEvent], None]
@@ -43,7 +43,7 @@ class Desk:
     listener: Listener | None = None
     token: str | None = None
     """What clients must log in with, None where everybody is welcome."""
-    poll_takes: float = POLL_TAKES
+    poll_takes: float = POLL_SECONDS
     """Simulated s that a look at the status takes while something moves; 0 where the clock goes by itself."""
     version: str = a7sim.__version__
     """Of the software, as the instrument tells it."""

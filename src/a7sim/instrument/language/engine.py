@@ -16,22 +16,22 @@ from a7sim.instrument.refusals import OutOfRange, Refusal, SettingsConflict, Unk
 if TYPE_CHECKING:
     from a7sim.instrument.language.desk import Desk
 
-LONGEST_LINE = 4096
+MAX_LINE_LENGTH = 4096
 """Bytes, its end not counted."""
 
-LARGEST_REPLY = 4 * 1024 * 1024
+MAX_REPLY = 4 * 1024 * 1024
 """Bytes of the replies to one line."""
 
 UNITS_AT_ONCE, REPLY_AT_ONCE = 50, 64 * 1024
 """Units of a line that are obeyed, and bytes that they reply, before other clients may have their turn."""
 
-MOST_KEPT_BACK = 64 * 1024
+MAX_BUFFERED_BYTES = 64 * 1024
 """Bytes of input that wait behind a unit that waits for movement."""
 
-_LONGEST_PENDING = LONGEST_LINE + 2
+_MAX_PENDING_LENGTH = MAX_LINE_LENGTH + 2
 """A line, the CR of its end, and one byte that shows a line to be too long."""
 
-_TOO_MUCH = f"expected replies of at most {LARGEST_REPLY} bytes a line"
+_TOO_MUCH = f"expected replies of at most {MAX_REPLY} bytes a line"
 
 _NUMBER_OF = {
     OutOfRange: ErrorNumber.DATA_OUT_OF_RANGE,
@@ -119,7 +119,9 @@ class Engine:
     def _one_line(self, received: bytes) -> bool:
         """Whether there is one whole line, as there mostly is."""
         length = len(received)
-        return received.find(b"\n") == length - 1 <= LONGEST_LINE and (not self._cr_ends_line or b"\r" not in received)
+        return received.find(b"\n") == length - 1 <= MAX_LINE_LENGTH and (
+            not self._cr_ends_line or b"\r" not in received
+        )
 
     def _resume(self, replies: list[bytes]) -> bytes:
         """Obey the rest of the line that waited; return the input that waited behind it."""
@@ -132,21 +134,21 @@ class Engine:
         self._kept_back.clear()
         if self._overrun:
             self._overrun = False
-            kept += b"\0" * _LONGEST_PENDING
+            kept += b"\0" * _MAX_PENDING_LENGTH
         return kept
 
     def _keep_back(self, received: bytes) -> None:
-        room = MOST_KEPT_BACK - len(self._kept_back)
+        room = MAX_BUFFERED_BYTES - len(self._kept_back)
         self._kept_back += received[:room]
         self._overrun |= len(received) > room
 
     def _keep(self, part: bytes) -> None:
-        self._pending += part[: _LONGEST_PENDING - len(self._pending)]
+        self._pending += part[: _MAX_PENDING_LENGTH - len(self._pending)]
 
     def _obey_line(self, line: bytes, replies: list[bytes]) -> None:
-        if len(line) > LONGEST_LINE and len(text_of(line)) > LONGEST_LINE:
-            self._heard("!", f"(a line of more than {LONGEST_LINE} bytes, dropped)")
-            self._status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {LONGEST_LINE} bytes a line")
+        if len(line) > MAX_LINE_LENGTH and len(text_of(line)) > MAX_LINE_LENGTH:
+            self._heard("!", f"(a line of more than {MAX_LINE_LENGTH} bytes, dropped)")
+            self._status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {MAX_LINE_LENGTH} bytes a line")
             return
         if self.desk.listener is not None:
             self._tell(text_of(line))
@@ -221,7 +223,7 @@ class Engine:
         return self._waited
 
     def _answered(self, reply: str | bytes) -> None:
-        self._overflowed = self._reply_size + len(reply) > LARGEST_REPLY
+        self._overflowed = self._reply_size + len(reply) > MAX_REPLY
         if self._overflowed:
             raise LanguageError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
         self._reply_size += len(reply)

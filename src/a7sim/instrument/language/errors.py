@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 
-LONGEST_DETAIL = 180
+MAX_DETAIL_LENGTH = 180
 
 
 class ErrorNumber(IntEnum):
@@ -50,5 +50,5 @@ class LanguageError(Exception):
 def entry(number: ErrorNumber, detail: str = "") -> str:
     """Return an error as `SYSTem:ERRor?` answers it: number, then message and detail in quotes."""
     printable = "".join(c if " " <= c <= "~" else "?" for c in detail).replace('"', "'")
-    text = f"{number.message};{printable[:LONGEST_DETAIL]}" if printable else number.message
+    text = f"{number.message};{printable[:MAX_DETAIL_LENGTH]}" if printable else number.message
     return f'{int(number)},"{text}"'

@@ -5,7 +5,7 @@ import re
 
 from a7sim.instrument.language.syntax import units_of
 
-THE_TOKEN = "(the token)"
+TOKEN_PLACEHOLDER = "(the token)"
 """Stands for the token, so that a line can be said again to an instrument whose token is this."""
 
 _ANOTHER, _SECRET = "(not the token)", "(kept secret)"
@@ -29,4 +29,4 @@ def _told(unit: str, token: str | None) -> str:
         return f"{header[0]}{_SECRET}"
     given = quoted[1].replace('""', '"') if quoted[1] is not None else quoted[2].replace("''", "'")
     right = token is None or hmac.compare_digest(given.encode(), token.encode())
-    return f'{header[0]}"{THE_TOKEN if right else _ANOTHER}"'
+    return f'{header[0]}"{TOKEN_PLACEHOLDER if right else _ANOTHER}"'

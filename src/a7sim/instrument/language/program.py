@@ -9,7 +9,7 @@ from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 from a7sim.instrument.language.syntax import Mnemonic, Parameter, Unit, mnemonics_of, unit_of, units_of
 from a7sim.instrument.language.table import Call, Command, Handler
 
-LONGEST_KEPT_LINE = 100
+MAX_CACHED_LINE = 100
 """Bytes of a line that is kept taken apart; longer ones seldom come twice."""
 
 LINES_KEPT, HEADERS_KEPT = 256, 512
@@ -48,7 +48,7 @@ Path = tuple[Mnemonic, ...]
 
 def program_of(line: bytes) -> Program:
     """Return the units of a line in order, with or without its line end. Every line begins at the root."""
-    return _kept(line) if len(line) <= LONGEST_KEPT_LINE else _taken_apart(line)
+    return _kept(line) if len(line) <= MAX_CACHED_LINE else _taken_apart(line)
 
 
 class Question(Struct, frozen=True):
@@ -61,7 +61,7 @@ class Question(Struct, frozen=True):
 
 def question_of(received: bytes, cr_ends_line: bool) -> Question | None:
     """Return the question that what was received is, None where it is anything else."""
-    return _kept_question(received, cr_ends_line) if len(received) <= LONGEST_KEPT_LINE else None
+    return _kept_question(received, cr_ends_line) if len(received) <= MAX_CACHED_LINE else None
 
 
 @lru_cache(maxsize=LINES_KEPT)

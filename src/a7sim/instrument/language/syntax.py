@@ -7,7 +7,7 @@ from msgspec import Struct
 
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 
-LONGEST_NUMBER = 255
+MAX_NUMBER_LENGTH = 255
 """Digits and signs of a number (IEEE 488.2 7.7.2.4.1)."""
 
 _HEADER = re.compile(r"(\*[A-Za-z]+|:?[A-Za-z][A-Za-z0-9_]*(?::[A-Za-z][A-Za-z0-9_]*)*)(\?)?")
@@ -117,8 +117,8 @@ def _parameter(text: str) -> Parameter:
         return _text(text)
     number = _NUMBER.fullmatch(text)
     if number is not None:
-        if len(number[1]) > LONGEST_NUMBER:
-            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected at most {LONGEST_NUMBER} digits")
+        if len(number[1]) > MAX_NUMBER_LENGTH:
+            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected at most {MAX_NUMBER_LENGTH} digits")
         return Number(float(number[1]), number[2].upper())
     if _WORD.fullmatch(text):
         return Word(text.upper())

@@ -23,7 +23,7 @@ BEST_HEIGHT_UM = 2.0
 BEST_FIDUCIAL_UM = 7.0
 """Of a fiducial against its collimating mark (decision 8)."""
 
-LARGEST_OF_SOME = 2.5
+MAX_OF_SEVERAL = 2.5
 """The largest of some tens of settings, in standard deviations."""
 
 HALF_A_COUNT = 0.005

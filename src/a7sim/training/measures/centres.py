@@ -16,7 +16,7 @@ from a7sim.training.measures.base import BEST_POINTING_UM, HALF_A_COUNT, Found, 
 from a7sim.training.witness import Reading
 from a7sim.wording import counted
 
-FEWEST_POINTS = 3
+MIN_POINTS = 3
 
 AT_LEVEL = 0.1
 """Units of the Z counter within which a registration belongs to a level."""
@@ -45,7 +45,7 @@ class _Centres(Measure, frozen=True, kw_only=True):
         found = self._pointings(account, element)
         names = [account.name_of(point) for point in self.points]
         whole = [name for name in names if all((name, level) in found for level in self.levels)]
-        if len(whole) < FEWEST_POINTS:
+        if len(whole) < MIN_POINTS:
             return None
         low, high = (
             np.array([[fmean(each.shown[axis] for each in found[name, level]) for name in whole] for axis in "XY"])

@@ -3,7 +3,7 @@
 import msgspec
 from msgspec import field
 
-from a7sim.manual import RIGHT_FITTINGS
+from a7sim.manual import REQUIRED_FITTINGS
 from a7sim.operator import ModelJob
 from a7sim.scenario import Scenario
 from a7sim.training.account import Account
@@ -189,7 +189,7 @@ class WrongFittings(Measure, frozen=True, kw_only=True):
                 return Found(None, f"nothing was registered as {self.point}")
             fittings, base, lying = dict(readings[-1].fittings), readings[-1].base, readings[-1].pictures
         polarity = self.polarity or account.model.polarity
-        right = RIGHT_FITTINGS[polarity, self.base or base].as_words()
+        right = REQUIRED_FITTINGS[polarity, self.base or base].as_words()
         wrong = [f"{name} stands {at} and belongs {right[name]}" for name, at in fittings.items() if at != right[name]]
         if self.base and base != self.base:
             wrong.append(f"the base is {base} and belongs {self.base}")

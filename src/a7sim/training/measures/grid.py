@@ -10,7 +10,7 @@ from a7sim.training.account import Account
 from a7sim.training.measures.base import (
     BEST_POINTING_UM,
     HALF_A_COUNT,
-    LARGEST_OF_SOME,
+    MAX_OF_SEVERAL,
     Found,
     Measure,
     listed,
@@ -34,7 +34,7 @@ class CrossMissed(AtReadings, frozen=True, kw_only=True):
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye leaves, and half a count of both wheels at the highest level."""
         count = 1e3 * HALF_A_COUNT * math.sqrt(2.0) * scenario.camera.c / scenario.plan.projection_height
-        return math.hypot(LARGEST_OF_SOME * BEST_POINTING_UM, count)
+        return math.hypot(MAX_OF_SEVERAL * BEST_POINTING_UM, count)
 
 
 @measure("levels-near")

@@ -15,7 +15,7 @@ from a7sim.training.measures.base import (
     BEST_PARALLAX_UM,
     BEST_POINTING_UM,
     HALF_A_COUNT,
-    LARGEST_OF_SOME,
+    MAX_OF_SEVERAL,
     Found,
     Measure,
     listed,
@@ -25,7 +25,7 @@ from a7sim.training.measures.base import (
 )
 from a7sim.training.witness import Reading, WitnessedAutograph
 
-MOST_STEPS = 20
+MAX_STEPS = 20
 
 
 def half_a_count_um(scenario: Scenario) -> float:
@@ -80,7 +80,7 @@ class ParallaxLeft(AtReadings, frozen=True, kw_only=True):
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye leaves, and half a count."""
-        return math.hypot(LARGEST_OF_SOME * BEST_PARALLAX_UM, half_a_count_um(scenario))
+        return math.hypot(MAX_OF_SEVERAL * BEST_PARALLAX_UM, half_a_count_um(scenario))
 
 
 @measure("off-the-ground")
@@ -95,7 +95,7 @@ class OffTheGround(AtReadings, frozen=True, kw_only=True):
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye leaves."""
-        return LARGEST_OF_SOME * BEST_HEIGHT_UM
+        return MAX_OF_SEVERAL * BEST_HEIGHT_UM
 
 
 @measure("beside-the-point")
@@ -117,7 +117,7 @@ class BesideThePoint(AtReadings, frozen=True, kw_only=True):
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye leaves, and the least count of both wheels."""
-        return LARGEST_OF_SOME * BEST_POINTING_UM
+        return MAX_OF_SEVERAL * BEST_POINTING_UM
 
 
 def parallax_of(account: Account, point: str) -> float | None:
@@ -135,7 +135,7 @@ def parallax_of(account: Account, point: str) -> float | None:
             return None
         images.append((projector, place))
     mark = np.array([account.scenario.plan.bx / 2.0, 0.0, -account.scenario.plan.projection_height])
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         off = _misses(autograph, images, mark)
         slopes = np.array([_misses(autograph, images, mark + step) - off for step in np.eye(3)]).T
         change = np.linalg.solve(slopes[:3], -off[:3])
@@ -180,7 +180,7 @@ class ResidualParallax(Measure, frozen=True, kw_only=True):
         """Return what the best eye leaves, the film's irregular deformation, and half a count."""
         film = math.sqrt(2.0) * math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
         rms = math.hypot(BEST_PARALLAX_UM, half_a_count_um(scenario), film)
-        return LARGEST_OF_SOME * rms if self.largest else rms
+        return MAX_OF_SEVERAL * rms if self.largest else rms
 
 
 @measure("picture-off-centre")
@@ -206,7 +206,7 @@ class PictureOffCentre(Measure, frozen=True, kw_only=True):
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the mean of four fiducials allows."""
-        return 1e-3 * LARGEST_OF_SOME * BEST_FIDUCIAL_UM / 2.0
+        return 1e-3 * MAX_OF_SEVERAL * BEST_FIDUCIAL_UM / 2.0
 
 
 def _lie(account: Account, projector: int) -> tuple[float, float, float]:

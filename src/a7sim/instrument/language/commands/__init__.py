@@ -1,10 +1,10 @@
 """Every command of the language: protocol.md as frozen data, each with the few lines that carry it out."""
 
 from a7sim.instrument.language.commands.carriages import CARRIAGES
-from a7sim.instrument.language.commands.handles import HANDLES
+from a7sim.instrument.language.commands.handles import ELEMENT_COMMANDS
 from a7sim.instrument.language.commands.pictures import PICTURES
 from a7sim.instrument.language.commands.recording import RECORDING
 from a7sim.instrument.language.commands.system import SYSTEM
 from a7sim.instrument.language.table import CommandTable
 
-COMMANDS = CommandTable([*SYSTEM, *HANDLES, *CARRIAGES, *PICTURES, *RECORDING])
+COMMANDS = CommandTable([*SYSTEM, *ELEMENT_COMMANDS, *CARRIAGES, *PICTURES, *RECORDING])

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from a7sim.instrument.language.engine import Engine
 
 
-LARGEST_READING = 999999.99
+MAX_READING = 999999.99
 """Of a counter's drums."""
 
 
@@ -41,12 +41,12 @@ def _axis(axis: str) -> list[Command]:
         return low - here, high - here, 0.0
 
     def preset_limits(engine: "Engine", suffix: int) -> Limits:
-        return -LARGEST_READING, LARGEST_READING, 0.0
+        return -MAX_READING, MAX_READING, 0.0
 
     def preset(engine: "Engine", call: Call) -> None:
-        if abs(call.arguments[0]) > LARGEST_READING:
+        if abs(call.arguments[0]) > MAX_READING:
             raise LanguageError(
-                ErrorNumber.DATA_OUT_OF_RANGE, f"expected at most {LARGEST_READING}, got {call.arguments[0]:.10g}"
+                ErrorNumber.DATA_OUT_OF_RANGE, f"expected at most {MAX_READING}, got {call.arguments[0]:.10g}"
             )
         autograph_of(engine).preset(axis, call.arguments[0])
 

@@ -104,7 +104,7 @@ def _gear_text(gear: str) -> str:
     return gear if re.fullmatch(r"\d+(\.\d+)?(e[+-]?\d+)?", gear) else quoted(gear)
 
 
-HANDLES = [
+ELEMENT_COMMANDS = [
     *(
         command
         for node, name, unit, about in ELEMENT_NODES

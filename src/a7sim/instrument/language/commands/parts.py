@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from a7sim.instrument.language.engine import Engine
 
 
-LONGEST_TEXT = 1000
+MAX_TEXT_LENGTH = 1000
 """Characters of a remark or of a point's name."""
 
 ELEMENT_NODES = (
@@ -37,6 +37,8 @@ def fixed(value: float, decimals: int = 2) -> str:
 
 def text_within(text: str) -> str:
     """Return a text. Raises LanguageError for an empty one and for one that is too long."""
-    if not 1 <= len(text) <= LONGEST_TEXT:
-        raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {LONGEST_TEXT} characters, got {len(text)}")
+    if not 1 <= len(text) <= MAX_TEXT_LENGTH:
+        raise LanguageError(
+            ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {MAX_TEXT_LENGTH} characters, got {len(text)}"
+        )
     return text

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from a7sim.instrument.language.engine import Engine
 
 
-LARGEST_PICTURE = 1024
+MAX_PICTURE = 1024
 """Columns or rows of an eyepiece picture."""
 
 
@@ -78,7 +78,7 @@ def _stereo(engine: "Engine", call: Call) -> str:
 
 def _picture(engine: "Engine", call: Call) -> bytes:
     columns, rows, magnification = call.arguments
-    for name, value, largest in (("columns", columns, LARGEST_PICTURE), ("rows", rows, LARGEST_PICTURE)):
+    for name, value, largest in (("columns", columns, MAX_PICTURE), ("rows", rows, MAX_PICTURE)):
         if not 1 <= value <= largest:
             raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {largest} {name}, got {value:g}")
     if not 0.1 <= magnification <= 100.0:
