@@ -12,7 +12,7 @@ import numpy as np
 from figures import Figure, Target, tell
 
 from a7sim.scenario import load_scenario
-from a7sim.session.two_ways import a8_and_comparator
+from a7sim.session.two_ways import compare_a8_to_comparator
 
 P_TABLE = {"comparator": ((7, 11, 15), (15, 28, 31)), "a8": ((15, 19, 22), (33, 43, 44))}
 """cm: mean square and largest residuals in x, y, z at 36 checks."""
@@ -82,7 +82,7 @@ def whole_table(comparison):
 def single_errors(seeds):
     print(f"\nrms, cm, medians over {len(seeds)} seeds      comparator x, y, z         A8 x, y, z")
     for name, overrides in CHANGES.items():
-        comparison = a8_and_comparator(load_scenario("a8-strip", overrides), seeds)
+        comparison = compare_a8_to_comparator(load_scenario("a8-strip", overrides), seeds)
         both = np.concatenate([median_cm(comparison.comparator.rms), median_cm(comparison.a8.rms)])
         print(row(name, both, 6), flush=True)
 
@@ -91,7 +91,7 @@ def main():
     asked = [int(each) for each in sys.argv[1:]]
     seeds, fewer = (*asked, *(200, 100)[len(asked) :])
     began = time.perf_counter()
-    figures = whole_table(a8_and_comparator(load_scenario("a8-strip"), range(1, seeds + 1)))
+    figures = whole_table(compare_a8_to_comparator(load_scenario("a8-strip"), range(1, seeds + 1)))
     print(f"{time.perf_counter() - began:.1f} s")
     if fewer:
         single_errors(range(1, fewer + 1))

@@ -39,7 +39,7 @@ def timed(work: Callable[[], object], times: int = 40) -> float:
 
 def frame_times(columns: int, rows: int) -> tuple[float, float]:
     """Return ms to render both eyes' pictures over the language, and to draw them in half-blocks."""
-    from a7sim.console.eyepiece import half_blocks, vignetted, with_mark
+    from a7sim.console.eyepiece import apply_vignette, half_blocks, overlay_mark
     from a7sim.link.client import Client
 
     with Client.open("a7sim://akwanga?seed=7") as client:
@@ -47,7 +47,7 @@ def frame_times(columns: int, rows: int) -> tuple[float, float]:
         ask = f"PICT? {columns},{rows},8"
         rendered = timed(lambda: [client.block(f"EYEP{eye}:{ask}") for eye in (1, 2)])
         block = np.frombuffer(client.block(f"EYEP1:{ask}"), dtype=np.uint8).reshape(rows, columns)
-    drawn = timed(lambda: [with_mark(half_blocks(vignetted(block)), "o") for _ in (1, 2)])
+    drawn = timed(lambda: [overlay_mark(half_blocks(apply_vignette(block)), "o") for _ in (1, 2)])
     return rendered, drawn
 
 

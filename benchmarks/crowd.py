@@ -10,10 +10,10 @@ import time
 from drawing import cpu_seconds_to_draw, recording
 from figures import Figure, Target, tell
 
-from a7sim.operator import work
+from a7sim.operator import measure_models
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session
-from a7sim.session.crowd import open_crowd
+from a7sim.session.crowd import open_batch
 
 SESSIONS = (1, 50, 200, 800)
 RECORDED = 20
@@ -24,16 +24,16 @@ def main():
     scenario = load_scenario("akwanga")
     session = open_session(scenario, 0)
     began = time.process_time()
-    alone = list(work(session.person, session.job))
+    alone = list(measure_models(session.person, session.job))
     over_the_line = time.process_time() - began
     print(f"one session over the line: {over_the_line:.2f} s CPU")
     with recording() as calls:
-        list(open_crowd(scenario, range(RECORDED)).worked())
+        list(open_batch(scenario, range(RECORDED)).worked())
     print("sessions  open s  work s  ms a session  drawing s  ratio  same readings")
     figures = []
     for sessions in counts:
         began = time.process_time()
-        crowd = open_crowd(scenario, range(sessions))
+        crowd = open_batch(scenario, range(sessions))
         opened = time.process_time()
         records = list(crowd.worked())
         worked = time.process_time()

@@ -16,7 +16,7 @@ import msgspec
 from rich.console import Console
 from rich.text import Text
 
-from a7sim.sheets import sheet
+from a7sim.sheets import text_table
 
 COLUMNS = ("measured", "value", "against", "ratio", "target", "")
 NUMBERS = (1, 3)
@@ -115,7 +115,7 @@ def tell(measured: Callable[[], Iterable[Figure]]) -> None:
 
 def show(figures: Iterable[Figure]) -> None:
     """Print figures as a table."""
-    table = sheet(*COLUMNS, left=[i for i in range(len(COLUMNS)) if i not in NUMBERS])
+    table = text_table(*COLUMNS, left=[i for i in range(len(COLUMNS)) if i not in NUMBERS])
     for each in figures:
         table.add_row(*map(Text, each.cells()))
     whole = Console(width=1000).measure(table).maximum

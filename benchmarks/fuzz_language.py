@@ -24,8 +24,8 @@ from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.status import QUEUE_LENGTH, Status
 from a7sim.instrument.language.table import Choice, Quantity, short_form
 from a7sim.link.clock import Clock
-from a7sim.link.replies import whole_reply
-from a7sim.link.waiting import obeyed
+from a7sim.link.replies import parse_reply
+from a7sim.link.waiting import feed_until_idle
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 
@@ -89,7 +89,7 @@ class Fuzzed:
     def hears(self, line):
         """Feed a line without its end. Raises Broken."""
         self._numbers.clear()
-        reply = obeyed(self.engine, line + b"\n", self._clock)
+        reply = feed_until_idle(self.engine, line + b"\n", self._clock)
         try:
             self._check(line, reply)
         except AssertionError as broken:
@@ -145,7 +145,7 @@ def count_of(reply):
     """Return how many queries a reply answers."""
     if not reply:
         return 0
-    taken = whole_reply(reply)
+    taken = parse_reply(reply)
     assert taken is not None, "expected a whole reply"
     assert taken.length == len(reply), "expected one reply"
     for part in taken.parts:

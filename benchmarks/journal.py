@@ -20,9 +20,9 @@ from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import run
 from a7sim.session.durable import DURABILITIES
-from a7sim.session.journal import Journal, Keeping, header_of
+from a7sim.session.journal import Journal, Keeping, make_header
 from a7sim.session.lines import read_journal
-from a7sim.session.replaying import Replay, replayed
+from a7sim.session.replaying import Replay, replay_lines
 
 ASKED_OF = 100_000
 """Events of the session that is to be sought in within a second."""
@@ -66,7 +66,7 @@ def long_session(folder, events):
     desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, SEED).drawer, SEED))
     folder.mkdir()
     dice = random.Random(SEED)
-    with Journal(Keeping("none")).opened(folder, header_of("serve", scenario, SEED), desk) as journal:
+    with Journal(Keeping("none")).opened(folder, make_header("serve", scenario, SEED), desk) as journal:
         desk.listener = journal.heard
         engine = desk.open()
         engine.feed(b'PHOT1:LOAD "101";:PHOT2:LOAD "102";:BASE:BX 194.99\n', 0.0)
@@ -88,7 +88,7 @@ def seeking(home, events):
         journalled = read_journal(path)
         line = dice.randrange(3, len(journalled))
         replay = Replay(journalled)
-        for number, _, difference in replayed(replay, replay.seek(line)):
+        for number, _, difference in replay_lines(replay, replay.seek(line)):
             assert difference is None
             if number == line:
                 break

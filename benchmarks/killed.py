@@ -23,7 +23,7 @@ from figures import Figure, Target, tell
 from a7sim.cli.run import command as run
 from a7sim.cli.serve import command as serve
 from a7sim.session.lines import read_journal
-from a7sim.session.replaying import Replay, replayed
+from a7sim.session.replaying import Replay, replay_lines
 
 RUN = ("dewitt-pair", "--seed", "7", "--set", "plan.parallax_readings=1", "--quiet")
 STEPS = 150
@@ -102,7 +102,7 @@ class Clerk:
 def registered(folder):
     """Return, by client, the points and readings that a journal makes a fresh instrument register."""
     replay = Replay(read_journal(folder / "session.jsonl"))
-    assert all(difference is None for _, _, difference in replayed(replay))
+    assert all(difference is None for _, _, difference in replay_lines(replay))
     found = {1: [], 2: []}
     for each in replay.desk.autograph.recorder.registrations:
         found[int(each.point[0])].append((each.point, each.readings))

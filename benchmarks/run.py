@@ -9,7 +9,7 @@ import time
 from figures import Figure, Target, tell
 
 from a7sim.link.client import Client
-from a7sim.operator import work
+from a7sim.operator import measure_models
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session, run
 
@@ -33,7 +33,7 @@ def floor_of(scenario, seed):
     """Seconds that the session's conversation takes with nothing behind it."""
     said = []
     session = open_session(scenario, seed, lambda event: said.append((event.direction, event.text)))
-    list(work(session.person, session.job))
+    list(measure_models(session.person, session.job))
     answers = [text.encode() + b"\n" for direction, text in said if direction == "<"]
     client = Client(Parrot(answers))
     began = time.perf_counter()

@@ -19,9 +19,9 @@ from figures import Figure, Target, tell
 from msgspec.structs import replace
 
 from a7sim.mistakes import Mistake
-from a7sim.training.attempts import attempted
+from a7sim.training.attempts import run_attempt
 from a7sim.training.exercise import Played
-from a7sim.training.grading import graded
+from a7sim.training.grading import grade_folder
 from a7sim.training.shelf import all_exercises, find_exercise
 
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
@@ -85,8 +85,8 @@ def attempt(name, profile, seed):
     played = replace(procedure_of(shelved), observer={"skill": profile})
     with tempfile.TemporaryDirectory() as place:
         try:
-            attempted(shelved, played, Path(place), seed)
-            grade = graded(shelved, seed, Path(place))
+            run_attempt(shelved, played, Path(place), seed)
+            grade = grade_folder(shelved, seed, Path(place))
         except Mistake as mistake:
             raise SystemExit(f"{name}, {profile}, seed {seed}: {mistake}") from mistake
     return grade.passed, grade.points, grade.minutes, [each.id for each in grade.failed]

@@ -21,12 +21,12 @@ from figures import Figure, Target, tell
 from a7sim.reduction import Model, absolute_orientation, formed_strip
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from a7sim.session.crowd import open_crowd
-from a7sim.session.strips import ground_of, models_of
+from a7sim.session.crowd import open_batch
+from a7sim.session.strips import ground_control, models_from_documents
 from a7sim.standard_points import CASES
 from a7sim.study.loading import StudyError, load_study
 from a7sim.study.running import Pace
-from a7sim.study.simulating import seed_of
+from a7sim.study.simulating import replicate_seed
 
 TARGET = Target("at most", 5, "ratio")
 ASKED_OF = 10_000
@@ -47,7 +47,7 @@ def cpu_seconds(work):
 
 def sessions(scenario, seeds):
     """Documents of sessions without their own strips."""
-    return open_crowd(scenario, seeds).documents(strips=False)
+    return open_batch(scenario, seeds).documents(strips=False)
 
 
 class Thesis:
@@ -60,9 +60,9 @@ class Thesis:
         """Rms at checks ``(strips, 3, sessions that came to their end)``."""
         by_case = {case: sessions(scenario, seeds) for case, scenario in self.scenarios.items()}
         complete = [i for i in range(len(seeds)) if all(each[i]["status"] == "complete" for each in by_case.values())]
-        models = {case: [models_of(each[i]["models"]) for i in complete] for case, each in by_case.items()}
+        models = {case: [models_from_documents(each[i]["models"]) for i in complete] for case, each in by_case.items()}
         scenario = self.scenarios["A"]
-        ground = ground_of(scenario, build_scene(scenario, seeds[0]))
+        ground = ground_control(scenario, build_scene(scenario, seeds[0]))
         return np.array([self._strips(models, cases, ground) for cases in product(CASES, repeat=2)])
 
     def _strips(self, models, cases, ground):
@@ -96,7 +96,7 @@ def the_whole(replicates, chunk):
     Half is drawn before each chunk and half after it, so that a change of the machine's speed hits both.
     """
     work, what = study_work()
-    seeds = [seed_of(1985, replicate) for replicate in range(replicates)]
+    seeds = [replicate_seed(1985, replicate) for replicate in range(replicates)]
     work(seeds[:2])
     with recording() as calls:
         work(seeds[:RECORDED])

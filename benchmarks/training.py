@@ -10,13 +10,13 @@ from pathlib import Path
 from figures import Figure, Target, tell
 
 from a7sim.session.lines import read_journal
-from a7sim.training.attempts import attempted
+from a7sim.training.attempts import run_attempt
 from a7sim.training.exercise import Played
-from a7sim.training.grading import graded
-from a7sim.training.handed_in import graded_folders
-from a7sim.training.room import seen_again
+from a7sim.training.grading import grade_folder
+from a7sim.training.handed_in import grade_submissions
+from a7sim.training.room import replay_environment
 from a7sim.training.shelf import find_exercise
-from a7sim.training.variation import seed_of
+from a7sim.training.variation import attempt_seed
 
 STUDENTS, CORES = 200, 2
 
@@ -37,14 +37,16 @@ def main():
             name, played = DONE[i % len(DONE)]
             shelved, student = find_exercise(name), f"student {i}"
             folder = Path(place) / str(i)
-            attempted(shelved, played or shelved.exercise.reference, folder, seed_of(student, shelved.name), student)
+            run_attempt(
+                shelved, played or shelved.exercise.reference, folder, attempt_seed(student, shelved.name), student
+            )
             folders.append(folder)
             lines += len(read_journal(folder / "session.jsonl"))
-        seconds = timed(lambda: graded_folders(folders, workers=CORES))
-        shelved, seed, folder = find_exercise("4"), seed_of("student 0", "04-parallax"), folders[0]
+        seconds = timed(lambda: grade_submissions(folders, workers=CORES))
+        shelved, seed, folder = find_exercise("4"), attempt_seed("student 0", "04-parallax"), folders[0]
         journal = folder / "session.jsonl"
-        replaying = min(timed(lambda: seen_again(shelved, seed, read_journal(journal))) for _ in range(3))
-        grading = min(timed(lambda: graded(shelved, seed, folder)) for _ in range(3))
+        replaying = min(timed(lambda: replay_environment(shelved, seed, read_journal(journal))) for _ in range(3))
+        grading = min(timed(lambda: grade_folder(shelved, seed, folder)) for _ in range(3))
     print(f"{STUDENTS} journals, {lines} lines, {CORES} processes: {seconds:.1f} s")
     print(f"grading takes {grading / replaying:.2f} times as long as replaying")
     return [

@@ -11,12 +11,12 @@ import numpy as np
 
 from a7sim.geometry import GON
 from a7sim.link.client import Client
-from a7sim.link.headers import header, recorded_as, short
+from a7sim.link.headers import header, registration_word, short_form
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.manual import REQUIRED_FITTINGS
-from a7sim.training.attempts import open_
-from a7sim.training.handouts import handed_out
-from a7sim.training.room import entered
+from a7sim.training.attempts import run_opening
+from a7sim.training.handouts import make_handout
+from a7sim.training.room import open_environment
 from a7sim.training.shelf import find_exercise
 
 LOOKS = 8
@@ -132,7 +132,7 @@ class Driver:
         return {fields[i]: (float(fields[i + 1]), float(fields[i + 2])) for i in range(0, len(fields), 3)}
 
     def record(self, point, element=""):
-        self.say(f'REC "{point}"' + (f",{recorded_as(element)}" if element else ""))
+        self.say(f'REC "{point}"' + (f",{registration_word(element)}" if element else ""))
         self.readings += 1
 
     def finish(self, path):
@@ -151,9 +151,9 @@ def scripts_of(name, seed, play, variants):
     for file, otherwise, intro in variants:
         with (
             tempfile.TemporaryDirectory() as folder,
-            entered(shelved, seed, Path(folder), "author", "practice") as room,
+            open_environment(shelved, seed, Path(folder), "author", "practice") as room,
         ):
-            open_(room)
+            run_opening(room)
             driver = Driver(room, seed, intro)
             play(driver, otherwise)
             driver.finish(shelved.folder / file)
@@ -253,10 +253,10 @@ def fittings(driver, otherwise):
                 driver.say(f'PHOT{projector}:LOAD "{name}"')
                 lying[projector - 1] = name
         driver.wait(200, "to lay pictures takes its time")
-        driver.say(f"BASE:MODE {short(base)}")
+        driver.say(f"BASE:MODE {short_form(base)}")
         for fitting, position in REQUIRED_FITTINGS[polarity, base].as_words().items():
             if (letter, fitting) != forgotten.get(otherwise):
-                driver.say(f"FITT:{nodes[fitting]} {short(position)}")
+                driver.say(f"FITT:{nodes[fitting]} {short_form(position)}")
         if otherwise != "blind" or letter == "A":
             driver.lines += ["# Look, turn a handwheel, and look again.", "expect EYEP1:PICT? 1,1,8 = *"]
             driver.client.block("EYEP1:PICT? 1,1,8")
@@ -325,7 +325,7 @@ def one_projector(driver, otherwise):
 
 
 def slip(driver, otherwise):
-    made = handed_out("book with a slip", driver.room.scenario, driver.room.seed, {})
+    made = make_handout("book with a slip", driver.room.scenario, driver.room.seed, {})
     kind, entry, right = made.hidden["kind"], made.hidden["entry"], made.hidden["right"][0]
     wrong = made.papers["book.csv"].splitlines()[entry].split(",")
     driver.lines += ["# What follows from the copy that the seed above makes.", ""]

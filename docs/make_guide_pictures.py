@@ -16,7 +16,7 @@ from a7sim.console.seat import Seat
 from a7sim.console.sheet import JobSheet
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.training.attempts import begun
+from a7sim.training.attempts import start_attempt
 from a7sim.training.checklist import Checklist
 from a7sim.training.progress import Progress
 from a7sim.training.shelf import find_exercise
@@ -133,7 +133,7 @@ def main():
     with tempfile.TemporaryDirectory() as place, Progress(Path(place)) as progress:
         shelved = find_exercise("4")
         attempt = progress.begin("ada", shelved)
-        with begun(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
+        with start_attempt(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
             port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
             seat = Seat(
                 lambda: Client(port),

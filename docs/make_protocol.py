@@ -19,8 +19,8 @@ from a7sim.instrument.language.commands.pictures import MAX_PICTURE
 from a7sim.instrument.language.table import Choice, Command, Quantity, QuotedOrNumber, short_form
 from a7sim.instrument.refusals import Refusal
 from a7sim.link.clock import Clock
-from a7sim.link.replies import as_text, whole_reply
-from a7sim.link.waiting import obeyed
+from a7sim.link.replies import parse_reply, part_as_text
+from a7sim.link.waiting import feed_until_idle
 from a7sim.manual import VARIANTS
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
@@ -196,9 +196,9 @@ class Instrument:
         self.say(MOUNTED[variant])
 
     def say(self, line):
-        reply = obeyed(self.engine, line.encode() + b"\n", self._clock)
-        taken = whole_reply(reply)
-        return ";".join(map(as_text, taken.parts)) if taken else ""
+        reply = feed_until_idle(self.engine, line.encode() + b"\n", self._clock)
+        taken = parse_reply(reply)
+        return ";".join(map(part_as_text, taken.parts)) if taken else ""
 
     def errors(self):
         count = int(self.say("SYST:ERR:COUN?"))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from a7sim.study.page import markdown_of
+from a7sim.study.page import study_markdown
 
 DOCS = Path(__file__).parent
 FIGURES = DOCS / "figures" / "studies"
@@ -17,7 +17,7 @@ FIGURES = DOCS / "figures" / "studies"
 def make(folder: Path) -> None:
     document = known(msgspec.json.decode((folder / "results.json").read_bytes()))
     name = folder.resolve().name
-    text, figures = markdown_of(document, f"../figures/studies/{name}-")
+    text, figures = study_markdown(document, f"../figures/studies/{name}-")
     for old in FIGURES.glob(f"{name}-*.svg"):
         old.unlink()
     FIGURES.mkdir(parents=True, exist_ok=True)

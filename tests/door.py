@@ -5,7 +5,7 @@ from functools import cache
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Desk, Listener
 from a7sim.link.clock import Clock
-from a7sim.link.waiting import obeyed
+from a7sim.link.waiting import feed_until_idle
 from a7sim.manual import VARIANTS
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
@@ -29,7 +29,7 @@ class Door:
         self.clock = Clock()
 
     def feed(self, received: bytes) -> bytes:
-        return obeyed(self.engine, received, self.clock)
+        return feed_until_idle(self.engine, received, self.clock)
 
     def say(self, line: str) -> str:
         """Return the reply to a line without its LF, '' where there is none."""

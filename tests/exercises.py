@@ -1,6 +1,6 @@
 """All exercises, for the two test files that share `a7sim train check` between them."""
 
-from a7sim.training.checking import checked
+from a7sim.training.checking import check_exercise
 from a7sim.training.shelf import all_exercises
 
 ALL = all_exercises()
@@ -10,6 +10,6 @@ HALF = 11
 
 def see_that_it_holds_what_check_asks(shelved):
     """The reference passes, every faulty one fails for its reason, nothing is dead or below the floor."""
-    found = checked(shelved)
+    found = check_exercise(shelved)
     assert found.faults == ()
     assert found.reference_points is not None and found.reference_points >= shelved.exercise.pass_points

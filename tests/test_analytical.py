@@ -17,7 +17,7 @@ from a7sim.scene import build_scene
 from a7sim.session import a8_strip
 from a7sim.session.a8_strip import strip_on_a8
 from a7sim.session.analytical import strip_by_comparator
-from a7sim.session.two_ways import a8_and_comparator
+from a7sim.session.two_ways import compare_a8_to_comparator
 
 MILLIMETRE = 0.001
 
@@ -163,7 +163,7 @@ def test_nobody_works_a_plotter_without_a_plan():
 
 @pytest.mark.slow
 def test_the_a8_strip_stays_where_the_documentation_says():
-    comparison = a8_and_comparator(load_scenario("a8-strip"), range(1, 61))
+    comparison = compare_a8_to_comparator(load_scenario("a8-strip"), range(1, 61))
     comparator, a8 = (np.median(100.0 * each.rms, axis=1) for each in (comparison.comparator, comparison.a8))
     assert comparator == pytest.approx(DOCUMENTED_COMPARATOR, rel=0.12)
     assert a8 == pytest.approx(DOCUMENTED_A8, rel=0.12)

@@ -10,14 +10,14 @@ import pytest
 from a7sim.mistakes import Mistake
 from a7sim.operator import bridging
 from a7sim.operator.bench import Bench, Parallaxes
-from a7sim.operator.bridging import bridged
+from a7sim.operator.bridging import bridge_strip_batch
 from a7sim.operator.crew import NobodyGoesOn
 from a7sim.reduction import similarity_by_quaternion
 from a7sim.scenario import ScenarioError, load_scenario
 from a7sim.scenario.schema import GroundPoint
-from a7sim.session.bridge import bridged_strip, run_bridge
-from a7sim.session.crowd import open_crowd
-from a7sim.session.ways import documents_of_all_ways, run_all_ways
+from a7sim.session.bridge import run_bridge, strip_points
+from a7sim.session.crowd import open_batch
+from a7sim.session.ways import run_all_methods, run_all_methods_batch
 from a7sim.study.loading import load_study
 from tests.processes import a7sim_here
 from tests.sessions import without_errors
@@ -33,13 +33,13 @@ def scenario_of(models, **overrides):
 
 
 def worked(scenario, seeds=(1,)):
-    crowd = open_crowd(scenario, seeds)
-    return crowd, list(bridged(crowd.bench))
+    crowd = open_batch(scenario, seeds)
+    return crowd, list(bridge_strip_batch(crowd.bench))
 
 
 def misclosures(crowd, models, session=0):
     """How far a strip ``(3, n)`` in mm lies from the true ground, carried onto it by a similarity."""
-    strip = bridged_strip([model.places_of(session) for model in models])
+    strip = strip_points([model.places_of(session) for model in models])
     ground = np.array([crowd.scenes[session].ground_points[name] for name in strip.points]).T
     return similarity_by_quaternion(ground, strip.coordinates).residuals
 
@@ -116,8 +116,8 @@ def test_a_scenario_that_asks_for_a_bridge_gets_it_over_the_link_and_in_a_crowd(
     settings = load_study("bridging").cells[5].settings
     scenario = without_errors(load_scenario("bridge", settings=settings))
     assert scenario.work == ["bridge"]
-    alone = run_all_ways(scenario, 1)
-    (together,) = documents_of_all_ways(scenario, [1])
+    alone = run_all_methods(scenario, 1)
+    (together,) = run_all_methods_batch(scenario, [1])
     assert alone["status"] == together["status"] == "complete"
     assert alone["operator"] == together["operator"]
     assert alone["ways"] == together["ways"]
@@ -130,7 +130,7 @@ def test_a_bridge_that_does_not_close_says_why_in_both(monkeypatch):
     """Whoever gives up has no strip, and the document says so."""
     monkeypatch.setattr(bridging, "carry_scale_on", _gives_up)
     scenario = msgspec.structs.replace(scenario_of(2), work=["bridge"])
-    for document in (run_all_ways(scenario, 1), *documents_of_all_ways(scenario, [1])):
+    for document in (run_all_methods(scenario, 1), *run_all_methods_batch(scenario, [1])):
         assert (document["status"], document["message"]) == ("does not fit", "no scale")
         assert "ways" not in document
 
@@ -185,7 +185,7 @@ def test_of_two_readings_that_contradict_each_other_either_may_be_the_wrong_one(
     """One reading of by' and one of by": a slip in by" is made again too, and nobody gives up for it."""
     settings = {"plan.parallax_readings": 1, "plan.centre_method": "scales", "observer.blunder_rate": 0.02}
     scenario = load_scenario("akwanga", settings=settings)
-    crowd = open_crowd(msgspec.structs.replace(scenario, models=scenario.models[:1]), range(12))
+    crowd = open_batch(msgspec.structs.replace(scenario, models=scenario.models[:1]), range(12))
     assert len(list(crowd.worked())) == 1
     assert not any("do not agree" in why for why in crowd.bench.crew.reasons.values()), crowd.bench.crew.reasons
 
@@ -214,7 +214,7 @@ def test_who_gives_up_a_bridge_says_why_and_leaves_the_models_that_stand(tmp_pat
 def with_control():
     """Two models whose standard points are control, and the degree of a strip's polynomials."""
     scenario = scenario_of(2, **{"strip.polynomial": "2"})
-    (scene,) = open_crowd(scenario, (1,)).scenes
+    (scene,) = open_batch(scenario, (1,)).scenes
     places = {name: at for name, at in scene.ground_points.items() if name in {f"{i}" for i in range(2000, 2100)}}
     ground = [
         GroundPoint(point=name, X=round(float(x), 3), Y=round(float(y), 3), Z=round(float(z), 3), role="control")

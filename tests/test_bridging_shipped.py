@@ -5,12 +5,12 @@ from itertools import islice
 
 import pytest
 
-from a7sim.operator.bridging import bridged
+from a7sim.operator.bridging import bridge_strip_batch
 from a7sim.report.kept import read_session
-from a7sim.report.writing import report_of
+from a7sim.report.writing import render_report
 from a7sim.scenario import load_scenario
-from a7sim.session.bridge import run_bridge, tables_of
-from a7sim.session.crowd import open_crowd
+from a7sim.session.bridge import bridge_tables, run_bridge
+from a7sim.session.crowd import open_batch
 from tests.pages import Page
 
 
@@ -31,7 +31,7 @@ def test_the_shipped_strip_is_bridged_and_worked_as_independent_models_to_its_en
         assert document[way]["strip"]["accuracy_m"]["checks"]["plan"] < 1.5
     assert len(document["bridged"]["models"]) == 10
     assert document["bridged"]["strip"].keys() == document["independent"]["strip"].keys() - {"joins"}
-    tables_of(document)
+    bridge_tables(document)
 
 
 @pytest.mark.slow
@@ -47,7 +47,7 @@ def test_a_bridge_leaves_its_files(shipped):
 def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(shipped):
     """One procedure, two benches: with errors too, every reading of a session is the same."""
     scenario, document, out = shipped
-    models = list(islice(bridged(open_crowd(scenario, (2,)).bench), 2))
+    models = list(islice(bridge_strip_batch(open_batch(scenario, (2,)).bench), 2))
     rows = [row.split(",")[:2] for row in (out / "models.csv").read_text().splitlines()[2:]]
     points = [[model.model.name, point] for model in models for point in model.places_of(0)]
     assert rows[: len(points)] == points
@@ -59,7 +59,7 @@ def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(shipped):
 @pytest.mark.slow
 def test_the_report_of_a_bridge_has_both_strips(shipped):
     _, document, out = shipped
-    page = Page(report_of(read_session(out)))
+    page = Page(render_report(read_session(out)))
     table = page.table("Bridged models: scale carried by bx, rms of differences at common points")
     assert [row[3] for row in table.rows] == [f"{model['scale']:.5f}" for model in document["bridged"]["models"]]
     text = "".join(page.text)

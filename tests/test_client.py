@@ -10,9 +10,9 @@ import a7sim
 from a7sim.instrument.language import Desk
 from a7sim.link.client import Client, Identity, InstrumentRefused
 from a7sim.link.completion import completions
-from a7sim.link.exchange import say
-from a7sim.link.opening import open_port, told
-from a7sim.link.replies import NotAReply, whole_reply
+from a7sim.link.exchange import send_line
+from a7sim.link.opening import open_port, port_errors
+from a7sim.link.replies import NotAReply, parse_reply
 from a7sim.mistakes import Mistake
 from tests.door import MODEL_1
 from tests.test_language import EXAMPLES
@@ -87,7 +87,7 @@ def test_where_nobody_listens_it_is_said(scheme):
 def test_a_line_that_breaks_is_one_clear_sentence():
     with socket.create_server(("127.0.0.1", 0)) as server:
         url = f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        with pytest.raises(Mistake, match=f"{url}: the line broke: the other end hung up"), told(url):
+        with pytest.raises(Mistake, match=f"{url}: the line broke: the other end hung up"), port_errors(url):
             port = open_port(url)
             server.accept()[0].close()
             port.readline()
@@ -210,17 +210,17 @@ def test_a_token_is_shown_first_and_its_quotes_are_doubled():
     ],
 )
 def test_a_reply_is_taken_apart_when_it_is_whole_and_not_before(received, parts, rest):
-    taken = whole_reply(received)
+    taken = parse_reply(received)
     assert taken.parts == parts
     assert received[taken.length :] == rest
     for length in range(taken.length):
-        assert whole_reply(received[:length]) is None
+        assert parse_reply(received[:length]) is None
 
 
 @pytest.mark.parametrize("received", [b"#0abc\n", b"#x\n", b"#2ab1\n", b"#11ab\n"])
 def test_bytes_that_are_no_reply_are_not_taken_for_one(received):
     with pytest.raises(NotAReply):
-        whole_reply(received)
+        parse_reply(received)
 
 
 def test_a_client_reads_a_picture_behind_other_answers(client):
@@ -257,7 +257,7 @@ def test_a_client_reads_a_picture_behind_other_answers(client):
     ],
 )
 def test_an_exchange_is_the_reply_to_a_line_and_the_errors_of_it(client, line, shown, numbers):
-    exchange = say(client, line)
+    exchange = send_line(client, line)
     assert exchange.shown == shown
     assert [int(error.split(",")[0]) for error in exchange.errors] == numbers
     assert client.ask("*OPC?") == "1"
@@ -266,7 +266,7 @@ def test_an_exchange_is_the_reply_to_a_line_and_the_errors_of_it(client, line, s
 def test_a_line_that_nobody_answers_is_one_clear_sentence(pair):
     port, _ = pair
     with pytest.raises(Mistake, match=r"\*OPC\?: expected an answer in time, got none"):
-        say(Client(port), "*OPC?")
+        send_line(Client(port), "*OPC?")
 
 
 # --- completion ----------------------------------------------------------------------------------------
@@ -318,6 +318,6 @@ def test_who_has_not_logged_in_is_told_of_the_token(desk):
     guarded.token = "secret"
     with served("tcp", guarded) as url:
         with Client.open(url, timeout=SHORT) as stranger, pytest.raises(Mistake, match="asks for a token"):
-            say(stranger, "BASE:BX?")
+            send_line(stranger, "BASE:BX?")
         with Client.open(url, timeout=SHORT, token="secret") as friend:
-            assert say(friend, "BASE:BX?").shown == "0.00"
+            assert send_line(friend, "BASE:BX?").shown == "0.00"

@@ -18,7 +18,7 @@ from a7sim.cli.options import PLOTTERS
 from a7sim.cli.prompt import data_folder
 from a7sim.cli.verbs import Verbs
 from a7sim.manual import VARIANTS
-from a7sim.shelves import names_of
+from a7sim.shelves import bundled_names
 from tests.processes import a7sim_here
 
 ROOT = Path(__file__).parents[1]
@@ -386,7 +386,7 @@ def test_doctor_tells_what_is_here(typed):
     installed = {each["name"]: each["installed"] for each in found["libraries"]}
     assert installed["click"] == metadata.version("click")
     assert {"console", "browser", "report"} <= set(found["extras"])
-    assert found["comes_with"] == {kind: names_of(kind) for kind in ("scenarios", "exercises", "studies")}
+    assert found["comes_with"] == {kind: bundled_names(kind) for kind in ("scenarios", "exercises", "studies")}
     assert all(found["comes_with"].values())
     assert "Extra console: ready" in typed("doctor")[1]
 

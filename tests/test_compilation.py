@@ -11,18 +11,18 @@ from a7sim.mistakes import Mistake
 from a7sim.operator.bench import Bench
 from a7sim.operator.compilation import Compilation
 from a7sim.operator.crew import Crew
-from a7sim.operator.level_model import levelled
+from a7sim.operator.level_model import level_model
 from a7sim.operator.line_hands import LineHands
-from a7sim.operator.map_lines import Area, Errand, Spots, Tracing, chained
+from a7sim.operator.map_lines import Area, Errand, Spots, Tracing, as_polyline
 from a7sim.operator.plotting import Order, Sheet, _heights
 from a7sim.operator.stereo_view import FINE_MM, StereoView
-from a7sim.operator.work import worked
+from a7sim.operator.work import measure_models_batch
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import open_session
 from a7sim.session.compiling import Wanted, compile_model
-from a7sim.session.map_sheet import as_geojson, as_svg, index_heights
-from a7sim.session.strips import given_control, ground_of
+from a7sim.session.map_sheet import index_contours, to_geojson, to_svg
+from a7sim.session.strips import given_control, ground_control
 from tests.sessions import without_errors
 from tests.test_cli import a7sim
 
@@ -42,10 +42,10 @@ class Worker:
         person = self.session.person
         person.book.head("", "preparation")
         self.bench = Bench(Crew.of_one(person), LineHands(person), job)
-        self.record = next(worked(self.bench)).of(0)
+        self.record = next(measure_models_batch(self.bench)).of(0)
         self.view = StereoView(self.bench, person)
-        control = ground_of(scenario, self.session.scene)
-        self.model = levelled(self.bench, self.view, self.record.points, control, SCALE)
+        control = ground_control(scenario, self.session.scene)
+        self.model = level_model(self.bench, self.view, self.record.points, control, SCALE)
         self.area = Area(np.array([5030.0, 4990.0]), np.array([5110.0, 5070.0]))
         self.spots = self.at_work(0.0).spot_heights(20.0)
 
@@ -175,7 +175,7 @@ def test_vertices_are_registered_and_the_truth_does_not_cross_the_line(worker, c
 def test_geojson_and_svg_can_be_read_and_close(worker, contour):
     height, lines = contour
     sheet = worker.sheet(lines, (height,))
-    found = json.loads(as_geojson(sheet))
+    found = json.loads(to_geojson(sheet))
     drawn = [each for each in found["features"] if each["properties"]["kind"] == "contour"]
     assert len(drawn) == len(lines)
     for each in drawn:
@@ -183,7 +183,7 @@ def test_geojson_and_svg_can_be_read_and_close(worker, contour):
         assert {"sigma", "closed"} <= set(each["properties"])
         if each["properties"]["closed"]:
             assert each["geometry"]["coordinates"][0] == each["geometry"]["coordinates"][-1]
-    root = ET.fromstring(as_svg(sheet, 'A & "B" <C>'))
+    root = ET.fromstring(to_svg(sheet, 'A & "B" <C>'))
     names = [each.tag.split("}")[1] for each in root]
     assert root.get("role") == "img"
     assert {"title", "desc"} <= set(names)
@@ -199,8 +199,8 @@ def test_the_table_draws_at_map_scale(worker):
 
 
 def test_index_contours_are_every_fifth_of_their_interval():
-    assert index_heights((440.0, 450.0, 460.0, 470.0, 500.0)) == {450.0, 500.0}
-    assert index_heights((446.0, 460.0, 463.0)) == {446.0, 460.0, 463.0}
+    assert index_contours((440.0, 450.0, 460.0, 470.0, 500.0)) == {450.0, 500.0}
+    assert index_contours((446.0, 460.0, 463.0)) == {446.0, 460.0, 463.0}
 
 
 def test_a_height_outside_the_model_is_a_mistake(worker):
@@ -241,8 +241,8 @@ def test_an_operator_is_given_no_coordinate_that_a_points_role_leaves_out():
 
 
 def test_a_contour_that_ends_where_it_begins_is_an_emptychained():
-    assert chained([]).shape == (3, 0)
-    assert chained([np.array([1.0, 2.0, 3.0])]).shape == (3, 1)
+    assert as_polyline([]).shape == (3, 0)
+    assert as_polyline([np.array([1.0, 2.0, 3.0])]).shape == (3, 1)
 
 
 @pytest.mark.parametrize(

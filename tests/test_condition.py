@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from a7sim.geometry import GON, length_of, rotation
 from a7sim.instrument import Autograph, build_autograph
-from a7sim.instrument.condition import FAULT_SIGMAS, condition_of, local_coefficients
+from a7sim.instrument.condition import FAULT_SIGMAS, draw_condition, local_coefficients
 from a7sim.instrument.language import Desk
 from a7sim.instrument.local_errors import smooth_local_errors
-from a7sim.instrument.projection import beside_the_centre, place_on_carrier, pose, turned_by
+from a7sim.instrument.projection import attitude_from_angles, eccentric_offset, place_on_carrier, pose
 from a7sim.instrument.spindles import Counter, Runout, Spindle
 from a7sim.manual import A7, VARIANTS
 from a7sim.scenario import (
@@ -22,9 +22,9 @@ from a7sim.scenario import (
     Instrument,
     ProjectorCondition,
     ScenarioError,
+    build_scenario,
     find_scenario,
     load_scenario,
-    scenario_of,
 )
 from tests.door import Door
 from tests.test_instrument import photograph
@@ -108,7 +108,7 @@ def test_local_errors_alone_come_out_of_a_grid_test_as_they_were_put_in():
 
 @pytest.mark.parametrize("stated", [*CLASSES, *(Condition(upkeep=each) for each in CLASSES)])
 def test_every_instrument_of_a_class_is_another_and_the_same_seed_gives_the_same(stated):
-    first, again, other = (condition_of(instrument(stated), seed) for seed in (1, 1, 2))
+    first, again, other = (draw_condition(instrument(stated), seed) for seed in (1, 1, 2))
     assert first == again
     for name in ("left", "right", "carriage_scale_ppm", "carriage_periodic_phase_gon", "bx_zero_mm"):
         assert getattr(first, name) != getattr(other, name)
@@ -116,8 +116,8 @@ def test_every_instrument_of_a_class_is_another_and_the_same_seed_gives_the_same
 
 
 def test_a_name_is_its_table():
-    assert msgspec.structs.replace(condition_of(instrument("worn"), 3), upkeep=None) == msgspec.structs.replace(
-        condition_of(instrument(Condition(upkeep="worn")), 3), upkeep=None
+    assert msgspec.structs.replace(draw_condition(instrument("worn"), 3), upkeep=None) == msgspec.structs.replace(
+        draw_condition(instrument(Condition(upkeep="worn")), 3), upkeep=None
     )
 
 
@@ -129,7 +129,7 @@ def test_classes_grow_worse_in_every_fault():
 
 
 def test_faults_are_drawn_with_the_size_of_their_class():
-    drawn = [condition_of(instrument("worn"), seed) for seed in range(400)]
+    drawn = [draw_condition(instrument("worn"), seed) for seed in range(400)]
     tilts = np.array([each.left.omega_zero_gon for each in drawn])
     assert tilts.std() == pytest.approx(FAULT_SIGMAS["worn"].tilt_zero_gon, rel=0.12)
     assert abs(tilts.mean()) < 3.0 * tilts.std() / 20.0
@@ -139,9 +139,9 @@ def test_faults_are_drawn_with_the_size_of_their_class():
 
 
 def test_listed_faults_come_on_top_of_those_of_the_class():
-    alone = condition_of(instrument("serviced"), 4)
+    alone = draw_condition(instrument("serviced"), 4)
     listed = Condition(upkeep="serviced", left=ProjectorCondition(phi_zero_gon=0.5), carriage_backlash_mm=0.1)
-    both = condition_of(instrument(listed), 4)
+    both = draw_condition(instrument(listed), 4)
     assert both.left.phi_zero_gon == pytest.approx(alone.left.phi_zero_gon + 0.5)
     assert both.carriage_backlash_mm == pytest.approx(alone.carriage_backlash_mm + 0.1)
     assert both.left.axes_um == alone.left.axes_um
@@ -152,13 +152,13 @@ def test_what_is_only_listed_is_all_there_is():
     listed = Condition(
         left=ProjectorCondition(phi_zero_gon=0.5, local_pattern=3), right=ProjectorCondition(local_pattern=4)
     )
-    assert condition_of(instrument(listed), 4) == listed
+    assert draw_condition(instrument(listed), 4) == listed
 
 
 def test_a_pattern_of_local_errors_can_be_named():
     named = ProjectorCondition(local_um=2.0, local_pattern=11)
     np.testing.assert_allclose(local_coefficients(named), 2e-3 * smooth_local_errors(np.random.default_rng(11)))
-    assert condition_of(instrument(Condition(left=named)), 9).left == named
+    assert draw_condition(instrument(Condition(left=named)), 9).left == named
 
 
 def test_a_worn_instrument_has_its_pictures_laid_as_a_faultless_one():
@@ -199,7 +199,7 @@ def test_mistakes_in_a_condition_are_named(condition, mistake):
     raw = tomllib.loads(path.read_text("utf-8"))
     raw["instrument"] = {"condition": condition}
     with pytest.raises(ScenarioError) as refused:
-        scenario_of(raw, path.parent)
+        build_scenario(raw, path.parent)
     assert refused.value.mistakes == [mistake]
 
 
@@ -306,7 +306,7 @@ def test_driven_to_a_reading_a_slipping_counter_shows_it_and_the_mark_is_somewhe
 def test_an_eccentric_rod_passes_its_cardan_at_its_eccentricity(x, y, across, along, kappa):
     """The straight line from the mark to where the rod holds the carrier misses the centre by just so much."""
     mark, c, eccentricity = np.array([x, y, -300.0]), 150.0, np.array([along, across])
-    centre, turned = pose(turned_by(0.05, -0.03, kappa, np.zeros(3)), np.array([3.0, -2.0, 1.0]))
+    centre, turned = pose(attitude_from_angles(0.05, -0.03, kappa, np.zeros(3)), np.array([3.0, -2.0, 1.0]))
     image = place_on_carrier(mark, centre, turned, c, np.zeros(2), rod=eccentricity)
     held = centre + turned @ np.array([*image, -c])
     direction = (mark - held) / length_of(mark - held)
@@ -316,7 +316,7 @@ def test_an_eccentric_rod_passes_its_cardan_at_its_eccentricity(x, y, across, al
 
 def test_a_plumb_rod_is_beside_its_centre_along_the_axes_of_the_frame():
     np.testing.assert_allclose(
-        beside_the_centre(np.array([0.0, 0.0, -300.0]), np.array([0.01, 0.02])), [0.01, 0.02, 0.0]
+        eccentric_offset(np.array([0.0, 0.0, -300.0]), np.array([0.01, 0.02])), [0.01, 0.02, 0.0]
     )
 
 
@@ -326,10 +326,10 @@ def test_one_mark_and_many_are_brought_to_the_same_places():
     angles, phi, rods = rng.uniform(-0.1, 0.1, (3, 7)), rng.uniform(-0.1, 0.1, 7), rng.uniform(-0.1, 0.1, (2, 7))
     missed, c, point = 0.01 * places, rng.uniform(148.0, 152.0, 7), 0.02 * places[:2]
     local = np.stack([smooth_local_errors(np.random.default_rng(i)) for i in range(7)], axis=-1)
-    centres, turned = pose(turned_by(*angles, missed), places, phi)
+    centres, turned = pose(attitude_from_angles(*angles, missed), places, phi)
     found = place_on_carrier(marks, centres, turned, c, point, local, rods)
     for i in range(7):
-        centre, camera = pose(turned_by(*angles[:, i], missed[:, i]), places[:, i], phi[i])
+        centre, camera = pose(attitude_from_angles(*angles[:, i], missed[:, i]), places[:, i], phi[i])
         alone = place_on_carrier(marks[:, i], centre, camera, c[i], point[:, i], local[:, :, i], rods[:, i])
         np.testing.assert_allclose(alone, found[:, i], rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(centre, centres[:, i], atol=1e-12)

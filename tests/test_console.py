@@ -10,7 +10,7 @@ import pytest
 from a7sim.console.app import Console
 from a7sim.console.drum_panels import Elements, Wheeled
 from a7sim.console.eyepiece import Drawing
-from a7sim.console.keymap import deeds_of
+from a7sim.console.keymap import actions_for
 from a7sim.console.looking import MAGNIFICATIONS
 from a7sim.console.panels import Book
 from a7sim.console.prints import Pointed
@@ -483,7 +483,7 @@ def test_every_deed_is_in_the_palette_under_its_group_and_keys() -> None:
             person = Person(pilot)
             await person.settle()
             listed = {each.title: each for each in console.get_system_commands(console.screen)}
-            for deed in deeds_of(watching=False):
+            for deed in actions_for(watching=False):
                 assert listed[deed.about].help.startswith(f"{deed.group}, ")
             listed["a smaller step"].callback()
             finer = console.hands.step

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from a7sim.cli import main
 from a7sim.console import eyepiece
-from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
+from a7sim.console.drums import ROLLING_FRAMES, bar, rolling_frame
 from a7sim.console.eyepiece import Drawing, Run
 from a7sim.console.hands import STEP_SIZES, Hands
-from a7sim.console.keymap import deeds_of, default_keymap, load_keymap, pressed, sample
+from a7sim.console.keymap import actions_for, default_keymap, key_name, load_keymap, sample
 from a7sim.console.seat import best_drawing, speaks_utf8
-from a7sim.console.sketches import marked, pricked
-from a7sim.console.words import image_in_words, parallax_in_words
+from a7sim.console.sketches import draw_points, overlay_mark
+from a7sim.console.words import describe_image, describe_parallax
 from a7sim.manual import VARIANTS
 from a7sim.mistakes import Mistake
 
@@ -56,7 +56,7 @@ def test_the_mark_has_the_middle_cell(width: int, height: int) -> None:
     columns, rows = eyepiece.window(width, height)
     assert columns % 2 and rows % 2 and width - columns <= 1 and height - rows <= 1
     across, down = eyepiece.picture_size(Drawing.HALVES, columns, rows)
-    shown = eyepiece.with_mark(eyepiece.half_blocks(np.zeros((down, across), dtype=np.uint8)), "o")
+    shown = eyepiece.overlay_mark(eyepiece.half_blocks(np.zeros((down, across), dtype=np.uint8)), "o")
     assert text(shown)[rows // 2] == " " * (columns // 2) + "o" + " " * (columns // 2)
     assert sum(run.ink == eyepiece.MARK for row in shown for run in row) == 1
 
@@ -68,16 +68,16 @@ def test_an_anaglyph_holds_both_eyes() -> None:
 
 
 def test_the_optics_darken_the_corners_alone() -> None:
-    seen = eyepiece.vignetted(np.full((31, 31), 200, dtype=np.uint8))
+    seen = eyepiece.apply_vignette(np.full((31, 31), 200, dtype=np.uint8))
     assert seen[15, 15] == 200 and seen[0, 0] < 120 and seen[0, 0] == seen[30, 30]
 
 
 @given(st.integers(0, 99999), st.integers(0, 99999))
 def test_a_drum_passes_its_neighbours_and_then_stands(before: int, after: int) -> None:
     old, new = f"{before:08.2f}", f"{after:08.2f}"
-    assert rolled(old, new, 0) == old
-    assert rolled(old, new, ROLLING_FRAMES) == new
-    for a, b, between in zip(old, new, rolled(old, new, 1), strict=True):
+    assert rolling_frame(old, new, 0) == old
+    assert rolling_frame(old, new, ROLLING_FRAMES) == new
+    for a, b, between in zip(old, new, rolling_frame(old, new, 1), strict=True):
         if a.isdigit():
             ways = {(int(between) - int(a)) % 10, (int(a) - int(between)) % 10}
             assert min(ways) <= 2, f"{a} to {b} by {between}"
@@ -90,7 +90,7 @@ def test_a_bar_shows_where_an_element_stands() -> None:
 
 
 def test_a_sketch_shows_points_names_and_the_mark() -> None:
-    drawn = marked(pricked({"1011": (-80.0, 0.0), "C1": (80.0, 80.0)}, 25, 7), (0.0, -80.0), 25, 7)
+    drawn = overlay_mark(draw_points({"1011": (-80.0, 0.0), "C1": (80.0, 80.0)}, 25, 7), (0.0, -80.0), 25, 7)
     assert drawn.rows == [
         "                         ",
         "                    ·C1  ",
@@ -101,7 +101,7 @@ def test_a_sketch_shows_points_names_and_the_mark() -> None:
         "                         ",
     ]
     assert drawn.nearest(5, 4) == "1011" and drawn.mark == (12, 5)
-    assert marked(pricked({}, 9, 3), (500.0, 0.0), 9, 3).mark is None
+    assert overlay_mark(draw_points({}, 9, 3), (500.0, 0.0), 9, 3).mark is None
 
 
 @pytest.mark.parametrize(
@@ -114,12 +114,12 @@ def test_a_sketch_shows_points_names_and_the_mark() -> None:
     ],
 )
 def test_an_eye_says_no_more_than_it_can_tell(seen: tuple[float, float] | None, words: str) -> None:
-    assert image_in_words(seen, acuity=10.0) == words
+    assert describe_image(seen, acuity=10.0) == words
 
 
 def test_two_eyes_say_which_image_is_higher() -> None:
-    assert parallax_in_words((0.0, 512.0)) == "left image is about 510 um higher, no x-parallax"
-    assert parallax_in_words((95.0, -61.0)) == "left image is about 60 um lower, x-parallax about 100 um"
+    assert describe_parallax((0.0, 512.0)) == "left image is about 510 um higher, no x-parallax"
+    assert describe_parallax((95.0, -61.0)) == "left image is about 60 um lower, x-parallax about 100 um"
 
 
 def test_the_ladder_has_ends() -> None:
@@ -158,7 +158,7 @@ def test_the_sample_keymap_is_the_default_one(tmp_path: Path) -> None:
     file.write_text(sample(), encoding="utf-8")
     assert load_keymap(file) == default_keymap()
     for watching in (False, True):
-        keys = [key for deed in deeds_of(watching) for key in deed.keys]
+        keys = [key for deed in actions_for(watching) for key in deed.keys]
         assert len(keys) == len(set(keys))
 
 
@@ -166,7 +166,7 @@ def test_a_deed_that_a_keymap_leaves_out_keeps_its_keys(tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.write_text('[keys]\nrecord = ["space", "f5"]\n', encoding="utf-8")
     assert load_keymap(file) == {**default_keymap(), "record": ("space", "f5")}
-    assert pressed("space", " ") == "space" and pressed("plus", "+") == "+"
+    assert key_name("space", " ") == "space" and key_name("plus", "+") == "+"
 
 
 @pytest.mark.parametrize(
@@ -241,12 +241,12 @@ SLOPE = (np.add.outer(np.arange(8), np.arange(8)) * 18).astype(np.uint8)
     ],
 )
 def test_a_slope_in_every_drawing_without_colours(drawing: Drawing, golden: list[str]) -> None:
-    assert text(eyepiece.drawn(drawing, SLOPE)) == golden
+    assert text(eyepiece.render(drawing, SLOPE)) == golden
 
 
 def test_a_slope_in_an_eyepiece_at_32_greys() -> None:
     """Levels of ink and paper by cell; the corners are darkened."""
-    shown = eyepiece.half_blocks(eyepiece.vignetted(SLOPE))
+    shown = eyepiece.half_blocks(eyepiece.apply_vignette(SLOPE))
     cells = [[(run.ink, run.paper) for run in row for _ in run.text] for row in shown]
     assert cells == [
         [(0, 1), (1, 3), (3, 6), (5, 8), (7, 10), (9, 12), (10, 13), (8, 13)],

@@ -27,7 +27,7 @@ from a7sim.mistakes import Mistake
 from a7sim.scenario import load_scenario
 from a7sim.session.folder import JOURNAL
 from a7sim.session.lines import read_journal
-from a7sim.session.replaying import Replay, replayed
+from a7sim.session.replaying import Replay, replay_lines
 from tests.sitting_down import PATIENCE_S, Person
 
 SEED = 7
@@ -84,7 +84,7 @@ def standing(console: Console) -> tuple[Any, ...]:
 
 def events_differ(folder: Path) -> list[object]:
     replay = Replay(read_journal(folder / JOURNAL))
-    return [difference for _, _, difference in replayed(replay) if difference is not None]
+    return [difference for _, _, difference in replay_lines(replay) if difference is not None]
 
 
 def test_who_left_is_asked_and_goes_on_where_it_stood(data: Path) -> None:

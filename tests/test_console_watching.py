@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from textual.widgets import Static
 
-from a7sim.cli.seats import at_a_line, before_a_film, is_url
+from a7sim.cli.seats import is_url, playback_console, remote_console
 from a7sim.console.app import Console
-from a7sim.console.dials import question, read_dials
+from a7sim.console.dials import parse_readouts, readouts_query
 from a7sim.console.drum_panels import Wheeled
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.sheet import JobSheet
@@ -26,8 +26,8 @@ from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import film as film_module
 from a7sim.session import journal as journal_module
-from a7sim.session.film import Film, film_of
-from a7sim.session.journal import Journal, header_of
+from a7sim.session.film import Film, open_recording
+from a7sim.session.journal import Journal, make_header
 from a7sim.session.lines import read_journal
 from tests.door import with_model
 from tests.served import Served
@@ -53,7 +53,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
         monkeypatch.setattr(journal_module, "EVERY", 10)
         journal = Journal()
         desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, 7).drawer, 7), journal.heard)
-        with journal.opened(folder, header_of("serve", scenario, 7), desk):
+        with journal.opened(folder, make_header("serve", scenario, 7), desk):
             port = InProcessSerial(desk=desk, timeout=1.0)
             for line in WORK:
                 port.clock.spend(10.0)
@@ -63,17 +63,17 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def film(session: Path) -> Film:
-    return film_of(str(session))
+    return open_recording(str(session))
 
 
 def dials_of(a_film: Film) -> Any:
     with a_film.opened() as client:
-        client.send(question(VARIANTS["A7"]))
-        return read_dials(VARIANTS["A7"], client.reply())
+        client.send(readouts_query(VARIANTS["A7"]))
+        return parse_readouts(VARIANTS["A7"], client.reply())
 
 
 def watched(session: str, sitting: Any, size: tuple[int, int] = (100, 30), **others: Any) -> None:
-    console = Console(replace(before_a_film(session), **{"drawing": Drawing.HALVES, **others}))
+    console = Console(replace(playback_console(session), **{"drawing": Drawing.HALVES, **others}))
 
     async def sit_down() -> None:
         async with console.run_test(size=size) as pilot:
@@ -157,10 +157,10 @@ def test_an_address_is_known_from_a_session(watched: str, so: bool) -> None:
 
 def test_a_session_in_which_nothing_was_said_is_one_sentence(tmp_path: Path) -> None:
     scenario = load_scenario("akwanga")
-    with Journal().opened(tmp_path, header_of("serve", scenario, 7), None):
+    with Journal().opened(tmp_path, make_header("serve", scenario, 7), None):
         pass
     with pytest.raises(Mistake, match="expected a session in which something was said, got none"):
-        film_of(str(tmp_path))
+        open_recording(str(tmp_path))
 
 
 # --- at the console -----------------------------------------------------------------------------------
@@ -256,7 +256,9 @@ def test_a_script_is_watched_too_and_in_words(session: Path) -> None:
 def test_who_watches_a_served_instrument_sees_what_another_does_and_turns_nothing() -> None:
     with Served(with_model().desk) as served:
         url = f"tcp://127.0.0.1:{served.port}"
-        console = Console(replace(at_a_line(url, JobSheet("Akwanga"), None, watching=True), drawing=Drawing.HALVES))
+        console = Console(
+            replace(remote_console(url, JobSheet("Akwanga"), None, watching=True), drawing=Drawing.HALVES)
+        )
 
         async def sit_down() -> None:
             async with console.run_test(size=(100, 30)) as pilot:

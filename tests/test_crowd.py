@@ -3,11 +3,11 @@
 import msgspec
 import pytest
 
-from a7sim.operator import DoesNotFit, work
+from a7sim.operator import DoesNotFit, measure_models
 from a7sim.scenario import load_scenario
 from a7sim.scenario.schema import Condition, ProjectorCondition
 from a7sim.session import open_session, run
-from a7sim.session.crowd import FleetHands, open_crowd
+from a7sim.session.crowd import FleetHands, open_batch
 from tests.sessions import read_once, tilted_flight, without_errors
 
 SEEDS = (1985, 7)
@@ -33,7 +33,7 @@ def same_to_the_digit(scenario, seeds=SEEDS, all_finish=False, looked_at=None):
 
 def same_as_alone(scenario, seeds, looked_at):
     """A crowd that has worked, and whether those of it that are looked at read and set what each does alone."""
-    crowd = open_crowd(scenario, seeds)
+    crowd = open_batch(scenario, seeds)
     records = list(crowd.worked())
     if not crowd.bench.crew.reasons:
         assert [each.model.name for each in records] == [each.name for each in scenario.models]
@@ -44,7 +44,7 @@ def _same(crowd, records, session, seed):
     alone = open_session(crowd.scenario, seed)
     done, why = [], None
     try:
-        for record in work(alone.person, alone.job):
+        for record in measure_models(alone.person, alone.job):
             done.append(record)
     except DoesNotFit as trouble:
         why = str(trouble)
@@ -145,7 +145,7 @@ def test_a_bench_that_is_off_by_a_count_is_found_out(monkeypatch):
 @pytest.fixture(scope="module")
 def by_itself():
     """The document of a crowd of one, with seed 3."""
-    (document,) = open_crowd(read_once(SCENARIOS["as it stands"]), [3]).documents()
+    (document,) = open_batch(read_once(SCENARIOS["as it stands"]), [3]).documents()
     return document
 
 
@@ -174,6 +174,6 @@ def test_sessions_do_not_disturb_each_other(by_itself):
     strict = msgspec.structs.replace(
         scenario, plotting=msgspec.structs.replace(scenario.plan, tolerated_centre_rms=0.19)
     )
-    given_up, among_others, *_ = open_crowd(strict, [14, 3, 11]).documents()
+    given_up, among_others, *_ = open_batch(strict, [14, 3, 11]).documents()
     assert given_up["status"] == "does not fit"
     assert by_itself == among_others

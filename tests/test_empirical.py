@@ -26,15 +26,15 @@ from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit, empirical
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Crew
-from a7sim.operator.empirical import over_correction, over_correction_by_coefficients, set_off, steps_of
+from a7sim.operator.empirical import clearing_steps, over_correction, over_correction_by_coefficients, perturb_elements
 from a7sim.operator.line_hands import LineHands
-from a7sim.operator.work import oriented, worked
+from a7sim.operator.work import measure_models_batch, orient_model
 from a7sim.reduction import Stand, element_corrections, orientation_by_schut, relative_orientation
 from a7sim.reduction.hallert import REGULAR_POINTS, nine_point_corrections, regular_corrections
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session, run
-from a7sim.session.crowd import open_crowd
-from a7sim.session.tables import of_session
+from a7sim.session.crowd import open_batch
+from a7sim.session.tables import session_tables
 from a7sim.standard_points import CASES, PLACES
 from tests.sessions import tilted_flight, without_errors
 
@@ -65,7 +65,7 @@ def ready(scenario, seed, model=0, change=lambda job: job):
 def made_ready(crew, hands, job):
     bench = Bench(crew, hands, job)
     with suppress(_IsReady):
-        next(worked(bench, _stop_at_relative_orientation))
+        next(measure_models_batch(bench, _stop_at_relative_orientation))
     crew.begin(crew.everybody, job.models[0].name, "relative orientation")
     return bench
 
@@ -73,7 +73,7 @@ def made_ready(crew, hands, job):
 def orient(scenario, seed, model=0, change=lambda job: job):
     """The relative orientation of one model of a scenario, and the book."""
     session, bench = ready(scenario, seed, model, change)
-    return oriented(bench, bench.job.models[0]).of(0), session.person.book
+    return orient_model(bench, bench.job.models[0]).of(0), session.person.book
 
 
 def akwanga(method="independent", **overrides):
@@ -143,9 +143,9 @@ def _cleared(seeds, method, **overrides):
     scenario = load_scenario("akwanga", TWO_GON_OFF | {"plan.method": f'"{method}"'} | overrides)
     found = {}
     for model in (0, 1):
-        crowd = open_crowd(scenario, [seed for seed in seeds if seed % 2 == model])
+        crowd = open_batch(scenario, [seed for seed in seeds if seed % 2 == model])
         job = dataclasses.replace(crowd.job, models=(crowd.job.models[model],))
-        orientations = oriented(made_ready(crowd.bench.crew, crowd.bench.hands, job), job.models[0])
+        orientations = orient_model(made_ready(crowd.bench.crew, crowd.bench.hands, job), job.models[0])
         assert crowd.bench.crew.reasons == {}
         found |= {seed: orientations.of(session) for session, seed in enumerate(crowd.seeds)}
     in_order = [found[seed] for seed in seeds]
@@ -215,7 +215,7 @@ def test_the_book_shows_what_was_cleared_where_in_the_order_of_the_text_books(me
     """Model 2 has the base out: the right-hand photograph, the new one, lies in projector 1."""
     session, bench = ready(akwanga(method, **READ_ONCE), 3, model)
     job = bench.job.models[0]
-    oriented(bench, job)
+    orient_model(bench, job)
     first_round = [e for e in session.person.book.entries if e.form == "relative orientation" and e.round == 1]
     turned = [(e.point, e.item) for e in first_round if e.item[:-1] in ("by", "bz", "kappa", "phi", "omega")]
     expected = [(job.standard_points[label], element) for label, element in ORDERS[method, model]]
@@ -246,7 +246,7 @@ def test_the_book_and_the_rounds_show_the_parallaxes_narrowing_down():
 
 def test_setting_off_reaches_two_gon_on_both_sides_and_never_beyond(monkeypatch):
     def only_set_off(*given):
-        set_off(*given)
+        perturb_elements(*given)
         raise _IsReady
 
     monkeypatch.setattr(import_module("a7sim.operator.work"), "set_off", only_set_off)
@@ -254,7 +254,7 @@ def test_setting_off_reaches_two_gon_on_both_sides_and_never_beyond(monkeypatch)
     for seed in range(6):
         session, bench = ready(without_errors(load_scenario("akwanga", TWO_GON_OFF)), seed)
         with pytest.raises(_IsReady):
-            oriented(bench, bench.job.models[0])
+            orient_model(bench, bench.job.models[0])
         entries = session.person.book.entries
         at = next(i for i, entry in enumerate(entries) if "set off" in entry.remark)
         off += [(float(e.reading) % 100.0 + 50.0) % 100.0 - 50.0 for e in entries[at + 1 : at + 6]]
@@ -304,11 +304,11 @@ def test_with_a_corner_under_water_the_others_are_used(method, missing):
 
 def test_the_points_in_between_serve_where_the_case_has_them():
     (job,) = open_session(akwanga(), 1).job.models[:1]
-    steps = steps_of("dependent", job, without("6", "i")(job).points_of_case("E"))
+    steps = clearing_steps("dependent", job, without("6", "i")(job).points_of_case("E"))
     assert [step.position for step in steps] == ["2", "1", "4", "3", "f"]
-    assert [step.position for step in steps_of("dependent", job, "12d456")] == ["2", "1", "4", "d", "6"]
-    assert [step.position for step in steps_of("dependent", job, "12g456")] == ["2", "1", "6", "5", "4"]
-    assert steps_of("dependent", job, CASES["A"].replace("1", "h")) is None
+    assert [step.position for step in clearing_steps("dependent", job, "12d456")] == ["2", "1", "4", "d", "6"]
+    assert [step.position for step in clearing_steps("dependent", job, "12g456")] == ["2", "1", "6", "5", "4"]
+    assert clearing_steps("dependent", job, CASES["A"].replace("1", "h")) is None
 
 
 @pytest.mark.parametrize("missing", ["56", "36"])
@@ -335,7 +335,7 @@ def test_a_point_whose_images_do_not_come_together_is_done_without(monkeypatch):
     monkeypatch.setattr(
         bench.mark, "fuse", lambda who, point, judged: who[:0] if point == "1025" else fuse(who, point, judged)
     )
-    found = oriented(bench, bench.job.models[0]).of(0)
+    found = orient_model(bench, bench.job.models[0]).of(0)
     assert set(found.rounds[-1].parallaxes) == set("12345")
     assert "6" not in found.residuals
     assert any("images of 1025 cannot be fused: done without" in remark for remark in session.person.book.remarks)
@@ -484,7 +484,7 @@ def test_results_and_tables_tell_how_a_model_was_cleared(capsys):
     assert orientation["procedure"] == "empirical"
     assert orientation["rounds"][0]["over_correction"] == pytest.approx(2.15, abs=0.1)
     assert orientation["rounds"][-1]["over_correction"] == 0.0
-    Console(width=110).print(of_session(document))
+    Console(width=110).print(session_tables(document))
     printed = capsys.readouterr().out
     assert "Empirical relative orientation, swing-swing" in printed
     assert f"{orientation['rounds'][0]['parallax_mm']['6']:+.3f}" in printed

@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from a7sim.report.forms import forms_of
+from a7sim.report.forms import make_forms
 from a7sim.report.kept import read_session
 
 
@@ -93,7 +93,7 @@ def test_forms_have_the_titles_of_the_thesis_and_a_page_each(akwanga_folder, typ
     code, printed, _ = typed("export", akwanga_folder, "--to", "forms")
     assert code == 0
     pages = printed.split("\f")
-    assert len(pages) == len(list(forms_of(read_session(akwanga_folder))))
+    assert len(pages) == len(list(make_forms(read_session(akwanga_folder))))
     for title, number in (
         ("FORM FOR NUMERICAL RELATIVE ORIENTATION", 4),
         ("FORM FOR RECORDING MODEL COORDINATES", 2),
@@ -104,7 +104,7 @@ def test_forms_have_the_titles_of_the_thesis_and_a_page_each(akwanga_folder, typ
 
 
 def test_every_reading_stands_on_the_forms_once(akwanga_folder, book):
-    forms = list(forms_of(read_session(akwanga_folder)))
+    forms = list(make_forms(read_session(akwanga_folder)))
     on_forms = sorted(
         cell for form in forms for column in form.columns[1:] if column.which not in ("mean",) and column.item != "p"
         for cell in column.cells if cell
@@ -116,7 +116,7 @@ def test_every_reading_stands_on_the_forms_once(akwanga_folder, book):
 
 def test_parallaxes_on_the_forms_are_those_of_the_results(akwanga_folder, results):
     """The thesis takes half of by' less by" at each point; the form and the results agree on it."""
-    form = next(form for form in forms_of(read_session(akwanga_folder)) if "relative" in form.caption)
+    form = next(form for form in make_forms(read_session(akwanga_folder)) if "relative" in form.caption)
     points, p = form.columns[0].cells, form.columns[-1].cells
     by1, by2 = ([float(cell) for cell in column.cells] for column in form.columns if column.which == "mean")
     model = results["models"][0]
@@ -128,7 +128,7 @@ def test_parallaxes_on_the_forms_are_those_of_the_results(akwanga_folder, result
 
 
 def test_centres_stand_under_their_forms(akwanga_folder, results):
-    forms = [form for form in forms_of(read_session(akwanga_folder)) if "left perspective centre" in form.caption]
+    forms = [form for form in make_forms(read_session(akwanga_folder)) if "left perspective centre" in form.caption]
     for form, model in zip(forms, results["models"], strict=True):
         centre = model["perspective_centres"]["left"]
         assert f"Z0 = {centre['Z0']:.3f} ± {centre['sigma_Z0']:.3f}" in form.foot

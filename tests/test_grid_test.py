@@ -15,15 +15,15 @@ from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk
 from a7sim.manual import VARIANTS
 from a7sim.mistakes import Mistake
-from a7sim.operator import work
+from a7sim.operator import measure_models
 from a7sim.operator.bench import Bench
-from a7sim.operator.grid_test import GridTestOrder, calibrate, calibrated, level_heights
-from a7sim.reduction import Elements, Undetermined, grid_test, perspective_centre_of_levels, plate_lie
+from a7sim.operator.grid_test import GridTestOrder, level_heights, measure_grid, measure_grid_batch
+from a7sim.reduction import Elements, Undetermined, grid_test, perspective_centre_of_levels, plate_placement
 from a7sim.reduction.grid_test import HELD_AT_ONE_LEVEL, UNKNOWNS
 from a7sim.scenario import GridPlate, ScenarioError, load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import open_session, run
-from a7sim.session.crowd import open_crowd
+from a7sim.session.crowd import open_batch
 from a7sim.session.grid_test import run_grid_test
 from tests.door import Door
 from tests.examples import examples
@@ -91,8 +91,8 @@ def sheets_of(scenario, seed=1, **order):
 def sheets_of_crowd(scenario, seeds, **order):
     """The left and the right projector, each of many sessions, which test as each would at its line (see below)."""
     order = GridTestOrder(scenario.camera, scenario.grid_plate, **order)
-    bench = open_crowd(scenario, seeds).bench
-    sheets = list(calibrated(Bench(bench.crew, bench.hands, order.job), order))
+    bench = open_batch(scenario, seeds).bench
+    sheets = list(measure_grid_batch(Bench(bench.crew, bench.hands, order.job), order))
     assert all(len(sheet.who) == len(seeds) for sheet in sheets)
     return sheets
 
@@ -171,8 +171,8 @@ def test_the_plates_lie_is_taken_off_and_its_uncertainty_put_on():
     marks = np.array([[-106.0, 106.0, -106.0, 106.0], [-106.0, 106.0, 106.0, -106.0]])
     turn, shift = 3e-4, np.array([0.012, -0.007])
     lain = shift[:, None] + turn * np.array([-marks[1], marks[0]])
-    lie = plate_lie(lain + 0.01 * np.random.default_rng(3).standard_normal(lain.shape), marks)
-    exact = plate_lie(lain, marks)
+    lie = plate_placement(lain + 0.01 * np.random.default_rng(3).standard_normal(lain.shape), marks)
+    exact = plate_placement(lain, marks)
     assert (exact.dx, exact.dy, exact.turn) == pytest.approx((*shift, turn))
     assert 0.001 < lie.sigma_shift < 0.015
     without, with_it = (
@@ -308,7 +308,7 @@ def test_a_serviced_instrument_gives_four_to_seven_um():
 def test_slips_are_struck_out_and_do_not_spoil_the_test():
     scenario = with_faults(**{"observer.blunder_rate": "0.04"})
     session = open_session(scenario, 2)
-    sheets = list(calibrate(session.person, GridTestOrder(scenario.camera, scenario.grid_plate)))
+    sheets = list(measure_grid(session.person, GridTestOrder(scenario.camera, scenario.grid_plate)))
     assert sum(bool(entry.struck) for entry in session.person.book.entries) >= 8
     for sheet, faults in zip(sheets, FAULTS.values(), strict=True):
         assert float(sheet.test.s0[0]) < 0.004
@@ -319,11 +319,11 @@ def test_slips_are_struck_out_and_do_not_spoil_the_test():
 def test_a_crowd_tests_its_instruments_as_each_would_at_its_line():
     scenario = with_faults()
     order = GridTestOrder(scenario.camera, scenario.grid_plate)
-    crowd = open_crowd(scenario, [1, 2])
-    sheets = list(calibrated(Bench(crowd.bench.crew, crowd.bench.hands, order.job), order))
+    crowd = open_batch(scenario, [1, 2])
+    sheets = list(measure_grid_batch(Bench(crowd.bench.crew, crowd.bench.hands, order.job), order))
     for i, seed in enumerate((1, 2)):
         session = open_session(scenario, seed)
-        for sheet, alone in zip(sheets, calibrate(session.person, order), strict=True):
+        for sheet, alone in zip(sheets, measure_grid(session.person, order), strict=True):
             assert {name: each[i] for name, each in sheet.test.errors.items()} == pytest.approx(
                 {name: each[0] for name, each in alone.test.errors.items()}, abs=1e-9
             )
@@ -376,7 +376,7 @@ def centres_by(method, seed):
 @cache
 def sessions_by(method):
     plan = {"plan.centre_method": f'"{method}"', "plan.parallax_readings": "2"}
-    crowd = open_crowd(load_scenario("akwanga", plan | METHODS[method]), SEEDS)
+    crowd = open_batch(load_scenario("akwanga", plan | METHODS[method]), SEEDS)
     documents = crowd.documents()
     assert crowd.bench.crew.reasons == {}
     return documents, crowd.bench.crew.seconds / 3600.0
@@ -446,7 +446,7 @@ def test_more_levels_make_the_centre_more_exact_as_theory_says(levels):
 
 def test_the_picture_is_put_back_and_centred_again():
     session = open_session(read_once(load_scenario("akwanga", {"plan.centre_method": '"grid plate"'})), 1)
-    record = next(iter(work(session.person, session.job)))
+    record = next(iter(measure_models(session.person, session.job)))
     elements = {name: session.autograph.element(name) for name in record.orientation.elements}
     assert elements == dict(record.orientation.elements)
     assert (session.autograph.loaded(1), session.autograph.loaded(2)) == ("101", "102")

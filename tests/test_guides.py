@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from a7sim.training.attempts import attempted, seed_played
+from a7sim.training.attempts import run_attempt, seed_for
 from a7sim.training.shelf import all_exercises, find_exercise
 from tests.guides import ROOT, blocks, commands, not_shown, page, steps, type_in
 
@@ -25,7 +25,7 @@ def room(typed, tmp_path, monkeypatch):
     four = find_exercise("4")
     Path("mine.a7s").write_text((four.folder / "faulty-half.a7s").read_text())
     played = four.exercise.faulty[0]
-    attempted(four, played, Path("handed-in/bob"), seed_played(four, played), "bob")
+    run_attempt(four, played, Path("handed-in/bob"), seed_for(four, played), "bob")
     return typed
 
 

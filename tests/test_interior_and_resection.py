@@ -18,7 +18,7 @@ from a7sim.reduction.corrections import (
     without_refraction,
 )
 from a7sim.reduction.interior import MIN_FIDUCIALS, UNKNOWNS, plane_fit, principal_distance_for_film
-from a7sim.reduction.least_squares import adjusted
+from a7sim.reduction.least_squares import solve_least_squares
 from a7sim.reduction.resection import MAX_CONDITION, _coefficients, resection
 from a7sim.scenario.schema import Camera, Fiducial
 from a7sim.scene.camera import distorted, lowered_by_curvature, refracted
@@ -283,7 +283,7 @@ def condition_at(ground, centre, turn):
     unit = np.sqrt(((ground - mean[:, None]) ** 2).sum(axis=0).mean())
     away = (ground - centre[:, None]) / unit
     computed = image_of(away, np.zeros((3, 1)), turn[:, :, None], 1.0)
-    return float(adjusted(_coefficients(away, computed, turn), np.zeros(2 * ground.shape[1])).condition)
+    return float(solve_least_squares(_coefficients(away, computed, turn), np.zeros(2 * ground.shape[1])).condition)
 
 
 @given(SEEDS, st.integers(4, 12), st.floats(0.0, 0.8))

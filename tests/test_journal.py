@@ -19,15 +19,15 @@ from a7sim.cli.replay import Pace
 from a7sim.instrument.language import LinkEvent
 from a7sim.link.clock import Clock
 from a7sim.mistakes import Mistake
-from a7sim.scenario import carried, find_scenario, hash_of, load_scenario, scenario_from
+from a7sim.scenario import find_scenario, from_data, hash_scenario, load_scenario, to_data
 from a7sim.scene import PICTURES
 from a7sim.session import combinations, durable, run
 from a7sim.session.checkpoints import read_checkpoints
 from a7sim.session.durable import DurableFile, JournalStopped
-from a7sim.session.journal import Header, Journal, Keeping, header_of, header_of_unknown
+from a7sim.session.journal import Header, Journal, Keeping, make_header, make_header_without_scenario
 from a7sim.session.lines import Chain, read_journal
-from a7sim.session.replaying import Replay, replayed
-from a7sim.session.resuming import begun_in
+from a7sim.session.replaying import Replay, replay_lines
+from a7sim.session.resuming import find_resumable
 from a7sim.session.running import Watcher
 from a7sim.session.scripts import find_script, read_script
 from tests.processes import ANYWHERE, COMMAND, Running, a7sim, said_here
@@ -57,7 +57,7 @@ def copied(whole, tmp_path):
 
 
 def resumed(folder):
-    begun = begun_in(folder, "run")
+    begun = find_resumable(folder, "run")
     return run(begun.scenario, begun.seed, folder, keeping=Keeping(resumes=True))
 
 
@@ -80,7 +80,7 @@ def test_the_header_says_what_a_session_follows_from_and_names_the_scenario_by_i
     header = read_journal(whole / "session.jsonl").header
     assert header["software"] == f"a7sim {__version__}"
     assert (header["command"], header["seed"], header["variant"], header["pictures"]) == ("run", 7, "A7", PICTURES)
-    assert header["scenario_hash"] == hash_of(load_scenario("dewitt-pair", LIGHT))
+    assert header["scenario_hash"] == hash_scenario(load_scenario("dewitt-pair", LIGHT))
     assert "scenario" not in header
     scenario = (whole / "session.scenario.json").read_text()
     assert json.loads(scenario)["photos"][0]["measured"]["file"] == "dewitt-pair.csv"
@@ -89,8 +89,8 @@ def test_the_header_says_what_a_session_follows_from_and_names_the_scenario_by_i
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "scenarios").glob("*.toml")))
 def test_every_scenario_can_be_carried(name):
-    carried_about = json.loads(json.dumps(carried(load_scenario(name))))
-    assert json.loads(json.dumps(carried(scenario_from(carried_about)))) == carried_about
+    carried_about = json.loads(json.dumps(to_data(load_scenario(name))))
+    assert json.loads(json.dumps(to_data(from_data(carried_about)))) == carried_about
     assert find_scenario(name).is_file()
 
 
@@ -216,7 +216,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_bytes(whole, tmp_path, capsys)
 
 def test_a_journal_of_another_seed_is_refused_at_its_line(copied):
     journalled = read_journal(copied / "session.jsonl")
-    header = header_of("run", load_scenario("dewitt-pair", LIGHT), 8).line
+    header = make_header("run", load_scenario("dewitt-pair", LIGHT), 8).line
     (copied / "session.jsonl").write_bytes(forged(journalled, header))
     first = next(n for n in range(2, len(journalled)) if "FID?" in journalled.event(n).text) + 1
     with pytest.raises(Mistake, match=rf"session\.jsonl, line {first}: expected what this session does again"):
@@ -304,7 +304,7 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
     with pytest.raises(KeyboardInterrupt):
         combinations.run_combinations(light, 1985, cut, Watcher(begins=interrupt))
     assert not (cut / "results.json").exists()
-    session = begun_in(cut, "run")
+    session = find_resumable(cut, "run")
     assert session.setting("strips") == "all"
     combinations.run_combinations(session.scenario, session.seed, cut, keeping=Keeping(resumes=True))
     assert {name: files_of(cut / name) for name in ("case-A", "case-B")} == {
@@ -507,7 +507,7 @@ def test_a_replay_from_a_checkpoint_ends_where_one_from_the_beginning_ends(whole
     for line in (2, len(journalled) - 20):
         replay = Replay(journalled)
         first = replay.seek(line)
-        assert all(difference is None for _, _, difference in replayed(replay, first))
+        assert all(difference is None for _, _, difference in replay_lines(replay, first))
         assert replay.ended() is None
         states.append(replay.desk.state())
         assert (first > len(journalled) // 2) == (line > 2)
@@ -684,7 +684,7 @@ def test_what_a_client_and_an_instrument_say_is_recorded_and_replays(tmp_path, c
 
 
 def test_a_record_of_an_unknown_instrument_is_told_and_not_verified(tmp_path, capsys):
-    with Journal().opened(tmp_path, header_of_unknown("record", instrument="a7"), None) as journal:
+    with Journal().opened(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
         journal.heard(LinkEvent(1.0, "client1", ">", "*IDN?"))
     done = said_here(capsys, "replay", tmp_path)
     assert done.stdout.splitlines()[0] == "      1.00 client1   > *IDN?"
@@ -695,7 +695,7 @@ def test_a_record_of_an_unknown_instrument_is_told_and_not_verified(tmp_path, ca
 
 def test_a_client_that_goes_needs_no_journal_that_can_be_written_and_any_other_word_does(tmp_path, monkeypatch):
     """Who goes is not held up by a full disk; nothing else is acknowledged that is not written."""
-    with Journal().opened(tmp_path, header_of_unknown("record", instrument="a7"), None) as journal:
+    with Journal().opened(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
 
         def full(*_, **__):
             raise JournalStopped("the disk is full")
@@ -707,7 +707,7 @@ def test_a_client_that_goes_needs_no_journal_that_can_be_written_and_any_other_w
 
 
 def test_what_a_replay_only_tells_is_not_told_where_it_is_to_be_quiet(tmp_path, capsys):
-    with Journal().opened(tmp_path, header_of_unknown("record", instrument="a7"), None) as journal:
+    with Journal().opened(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
         journal.heard(LinkEvent(1.0, "client1", ">", "*IDN?"))
     told = said_here(capsys, "replay", tmp_path, "--quiet")
     assert (told.returncode, told.stdout) == (0, "")

@@ -7,10 +7,10 @@ import pytest
 from a7sim.geometry import GON, rotation
 from a7sim.manual import A7, A8
 from a7sim.operator.job import ModelJob
-from a7sim.operator.levelling import MAX_ROUNDS, turned_by_common_phi, turned_together
+from a7sim.operator.levelling import MAX_ROUNDS, levelled_by_all_elements, levelled_by_common_phi
 from a7sim.scenario import load_scenario
-from a7sim.session.crowd import open_crowd
-from a7sim.session.tables import of_session
+from a7sim.session.crowd import open_batch
+from a7sim.session.tables import session_tables
 from a7sim.session.truth import Relative
 from tests.sessions import without_errors
 
@@ -28,7 +28,7 @@ def scenario_of(**overrides):
 
 
 def levelled(scenario, seed=1):
-    crowd = open_crowd(scenario, [seed])
+    crowd = open_batch(scenario, [seed])
     (record,) = crowd.worked()
     return crowd, record.of(0)
 
@@ -88,12 +88,12 @@ def test_afterwards_everything_stands_as_it_did(without_any_error):
 
 
 def test_a_person_with_errors_comes_within_what_is_tolerated_too():
-    (document,) = open_crowd(scenario_of(), [7]).documents()
+    (document,) = open_batch(scenario_of(), [7]).documents()
     found = document["models"][0]["absolute_orientation"]
     assert found["agrees"]
     assert 2 <= len(found["rounds"]) <= MAX_ROUNDS + 1
     assert found["rounds"][0]["height_rms_m"] > 10.0 * found["rounds"][-1]["height_rms_m"]
-    of_session(document)
+    session_tables(document)
 
 
 def test_an_a8_is_levelled_by_what_it_has():
@@ -129,7 +129,9 @@ def test_both_projectors_and_the_base_turn_together(base, lean):
     """Rotations stay to the last digits, the base within the hundredths that bz' and bz" share; up is up to a count."""
     model = ModelJob("1", "a", "b", base, "positive", {})
     up = np.array([*lean, np.sqrt(1.0 - lean[0] ** 2 - lean[1] ** 2)])[:, None]
-    turned = turned_together({name: np.array([v]) for name, v in SETTINGS.items()}, model, A7, up, np.array([1.01]))
+    turned = levelled_by_all_elements(
+        {name: np.array([v]) for name, v in SETTINGS.items()}, model, A7, up, np.array([1.01])
+    )
     after = SETTINGS | {name: float(each[0]) for name, each in turned.items()}
     rotations, bases = Relative.of_counters(SETTINGS, model, A7).differences_gon(Relative.of_counters(after, model, A7))
     assert rotations < 1e-9
@@ -150,7 +152,7 @@ def test_a_common_phi_and_equal_omegas_do_the_same(common):
     settings = {"common_phi": common, "omega1": 100.3, "omega2": 99.6, "bx": 190.0}
     model = ModelJob("1", "a", "b", "inside", "positive", {})
     up = np.array([0.02, -0.03, np.sqrt(1.0 - 0.0013)])[:, None]
-    turned = turned_by_common_phi(
+    turned = levelled_by_common_phi(
         {name: np.array([v]) for name, v in settings.items()}, model, A8, up, np.array([1.01])
     )
     assert set(turned) <= set(A8.elements)

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from a7sim.geometry import GON
-from a7sim.operator import DoesNotFit, work
-from a7sim.operator.seat import wrapped
+from a7sim.operator import DoesNotFit, measure_models
+from a7sim.operator.seat import wrap_gon
 from a7sim.scenario import Observer, load_scenario
 from a7sim.session import open_session, run
-from a7sim.session.crowd import open_crowd
+from a7sim.session.crowd import open_batch
 from tests.sessions import element_errors, read_once, tampered_session, tilted_flight, without_errors
 
 CASES = "ABCDE"
@@ -25,7 +25,7 @@ SEEDS = range(10)
 
 
 def _run_case(case):
-    return open_crowd(load_scenario("akwanga", {"plan.case": f'"{case}"'}), SEEDS).documents()
+    return open_batch(load_scenario("akwanga", {"plan.case": f'"{case}"'}), SEEDS).documents()
 
 
 @cache
@@ -129,7 +129,7 @@ def test_the_second_model_is_as_good_as_the_first():
     """Base out, photograph 102 stays where it is, 103 goes into the other projector."""
     session = open_session(without_errors(load_scenario("akwanga")), 2)
     loaded = []
-    for record in work(session.person, session.job):
+    for record in measure_models(session.person, session.job):
         loaded.append((session.autograph.loaded(1), session.autograph.loaded(2)))
         assert record.orientation.rms < 0.02
     assert loaded == [("101", "102"), ("103", "102")]
@@ -140,7 +140,7 @@ def test_the_second_model_is_as_good_as_the_first():
 def test_model_coordinates_are_the_ground_at_model_scale():
     """Similarity of the measured model to the true ground: what remains is counter reading and residual parallax."""
     session = open_session(without_errors(load_scenario("akwanga", {"camera.principal_point": "[0.0, 0.0]"})), 3)
-    for record in work(session.person, session.job):
+    for record in measure_models(session.person, session.job):
         names = list(record.points)
         model = np.array([record.points[name] for name in names]).T / np.array([[1.0], [1.0], [record.z_units_per_mm]])
         ground = np.array([session.scene.ground_points[name] for name in names]).T
@@ -179,7 +179,7 @@ def test_with_noise_the_real_pair_lies_within_the_published_sigmas_and_the_opera
 def test_a_blunder_is_caught_by_comparing_by_and_by_and_struck_out():
     """T 3.4.2: both by' and by" are read at every point to guard against blunders."""
     session = open_session(load_scenario("akwanga", {"observer.blunder_rate": "0.06"}), 5)
-    record = next(iter(work(session.person, session.job)))
+    record = next(iter(measure_models(session.person, session.job)))
     struck = [e for e in session.person.book.entries if e.struck and e.item in ("by1", "by2")]
     assert len(struck) >= 5
     for entry in struck:
@@ -198,13 +198,13 @@ def test_a_blunder_is_caught_by_comparing_by_and_by_and_struck_out():
 
 def test_without_slips_nothing_of_by_is_struck_out():
     session = open_session(load_scenario("akwanga", {"observer.blunder_rate": "0", "observer.last_digit_slip": "0"}), 5)
-    next(iter(work(session.person, session.job)))
+    next(iter(measure_models(session.person, session.job)))
     assert [e for e in session.person.book.entries if e.struck and e.item in ("by1", "by2")] == []
 
 
 def test_two_pointings_of_every_model_point_agree_within_a_hundredth():
     session = open_session(read_once(load_scenario("akwanga")), 6)
-    next(iter(work(session.person, session.job)))
+    next(iter(measure_models(session.person, session.job)))
     kept = [
         e for e in session.person.book.entries if e.form == "model coordinates" and e.item in "XYZ" and not e.struck
     ]
@@ -216,7 +216,7 @@ def test_two_pointings_of_every_model_point_agree_within_a_hundredth():
 
 def test_three_readings_of_by_and_three_of_by_are_taken_at_every_point():
     session = open_session(msgspec.structs.replace(load_scenario("akwanga"), observer=Observer.faultless()), 1)
-    record = next(iter(work(session.person, session.job)))
+    record = next(iter(measure_models(session.person, session.job)))
     readings = [e for e in session.person.book.entries if e.item in ("by1", "by2")]
     rounds = len(record.orientation.rounds)
     assert len([e for e in readings if e.point == "1011"]) == 6 * (rounds + 1)
@@ -237,7 +237,7 @@ def test_dependent_orientation_leaves_the_photograph_that_is_oriented_already():
     assert [first[name] for name in ("kappa1", "phi1", "omega1", "by1", "bz1")] == [0.0, 100.0, 100.0, 0.0, 0.0]
     stays = ("kappa2", "phi2", "omega2", "by2", "bz2")
     assert [first[name] for name in stays] == [second[name] for name in stays]
-    assert abs(wrapped(second["kappa1"])) > 0.5
+    assert abs(wrap_gon(second["kappa1"])) > 0.5
 
 
 def test_a_worn_instrument_disturbs_the_result():
@@ -276,7 +276,7 @@ def test_wrong_handling_fails_as_a_person_would_with_a_remark_that_says_what(wha
     exchanges, word = WRONG[what]
     session = tampered_session(read_once(load_scenario("akwanga")), exchanges)
     with pytest.raises(DoesNotFit) as trouble:
-        list(work(session.person, session.job))
+        list(measure_models(session.person, session.job))
     assert word in str(trouble.value)
     assert session.person.book.remarks[-1] == f"does not fit: {trouble.value}"
 
@@ -297,7 +297,7 @@ def test_prints_that_do_not_overlap_towards_each_other_are_noticed():
         dataclasses.replace(drawer["101"], name="102"),
     )
     with pytest.raises(DoesNotFit, match="do not overlap towards each other"):
-        list(work(session.person, session.job))
+        list(measure_models(session.person, session.job))
 
 
 def test_a_wrong_picture_under_the_right_name_and_print_is_noticed():
@@ -306,7 +306,7 @@ def test_a_wrong_picture_under_the_right_name_and_print_is_noticed():
     drawer = session.autograph._photographs
     drawer["101"] = dataclasses.replace(drawer["101"], points=drawer["103"].points)
     with pytest.raises(DoesNotFit, match="nowhere near where the print shows it"):
-        list(work(session.person, session.job))
+        list(measure_models(session.person, session.job))
 
 
 def test_a_misidentified_point_does_not_pass_for_a_model(tmp_path):
@@ -338,7 +338,7 @@ def test_nothing_that_crosses_the_link_depends_on_the_stations_or_the_ground():
             scene.stations[name] = dataclasses.replace(station, centre=station.centre + shift)
         for name in scene.ground_points:
             scene.ground_points[name] = scene.ground_points[name] + 2.0 * shift
-        next(iter(work(session.person, session.job)))
+        next(iter(measure_models(session.person, session.job)))
         said.append([each for each in lines if each[0] in "<>"])
     assert said[0] == said[1]
 

@@ -18,7 +18,7 @@ import pytest
 
 import a7sim
 from a7sim.cli.doctor import NOT_FOR_USERS
-from a7sim.shelves import names_of
+from a7sim.shelves import bundled_names
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -120,10 +120,10 @@ def test_it_works_away_from_the_checkout(away):
     assert run.returncode == 0, run.stderr
     assert json.loads(run.stdout)["status"] == "complete"
     listed = json.loads(away("train", "list", "--json").stdout)
-    assert len(listed["exercises"]) == len(names_of("exercises")) > 0
+    assert len(listed["exercises"]) == len(bundled_names("exercises")) > 0
     unknown = away("study", "nothing")
     assert unknown.returncode == 2
-    assert all(name in unknown.stderr for name in names_of("studies"))
+    assert all(name in unknown.stderr for name in bundled_names("studies"))
     unknown = away("replay", "nothing")
     assert "clearing" in unknown.stderr
 

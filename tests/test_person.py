@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from a7sim.operator import DoesNotFit, work
+from a7sim.operator import DoesNotFit, measure_models
 from a7sim.operator.skill import HOUR, acuity_factor, slip_factor
 from a7sim.operator.slips import neighbours, transpositions
 from a7sim.scenario import PROFILES, Observer, ScenarioError, load_scenario, observer_of_skill, scenario_schema
 from a7sim.scenario.schema import CertainSlip, Film
 from a7sim.session import open_session, run
-from a7sim.session.crowd import open_crowd
+from a7sim.session.crowd import open_batch
 from tests.processes import a7sim_here
 from tests.sessions import read_once
 
@@ -100,7 +100,7 @@ def test_the_command_line_knows_the_skills():
 def crowd_of(skill):
     """Twelve persons of a skill on film without errors, none of whom slips."""
     scenario = read_once(one_model(observer_of_skill(skill, **WITHOUT_SLIPS), film=Film()))
-    crowd = open_crowd(scenario, range(12))
+    crowd = open_batch(scenario, range(12))
     (records,) = crowd.worked()
     return crowd, records
 
@@ -121,12 +121,12 @@ def test_the_profiles_differ_in_residuals_in_centres_and_in_time():
 @pytest.mark.slow
 def test_a_novice_in_a_crowd_is_the_novice_at_the_line():
     scenario, seeds = one_model(observer_of_skill("novice")), (4, 5)
-    crowd = open_crowd(scenario, seeds)
+    crowd = open_batch(scenario, seeds)
     (records,) = crowd.worked()
     assert all(crowd.bench.crew.slip_log[i] for i in range(len(seeds)))
     for i, seed in enumerate(seeds):
         session = open_session(scenario, seed)
-        record = next(iter(work(session.person, session.job)))
+        record = next(iter(measure_models(session.person, session.job)))
         assert record.orientation.elements == records.of(i).orientation.elements
         assert [_told(slip) for slip in session.person.slips] == [_told(slip) for slip in crowd.bench.crew.slip_log[i]]
         assert session.person.timesheet.acts_of(0) == crowd.bench.crew.timesheet.acts_of(i)
@@ -148,8 +148,8 @@ def test_warm_up_falls_evenly_to_nothing_and_fatigue_grows_once_no_longer_fresh(
 
 def test_a_tired_persons_settings_scatter_more_and_a_break_restores_them():
     """The same draws, larger by the factor of the hour; after a break as at the start."""
-    tired = open_crowd(one_model(Observer(fresh_hours=0.0, fatigue_per_hour=1.0, takes_breaks=True)), (1,)).bench.crew
-    fresh = open_crowd(one_model(Observer()), (1,)).bench.crew
+    tired = open_batch(one_model(Observer(fresh_hours=0.0, fatigue_per_hour=1.0, takes_breaks=True)), (1,)).bench.crew
+    fresh = open_batch(one_model(Observer()), (1,)).bench.crew
     who = tired.everybody
     for crew in (tired, fresh):
         crew.spend(who, 3.0 * HOUR)
@@ -160,7 +160,7 @@ def test_a_tired_persons_settings_scatter_more_and_a_break_restores_them():
 
 
 def test_breaks_are_taken_by_those_who_are_due_only():
-    crew = open_crowd(one_model(Observer(takes_breaks=True)), (1, 2)).bench.crew
+    crew = open_batch(one_model(Observer(takes_breaks=True)), (1, 2)).bench.crew
     crew.spend(crew.everybody[:1], 2.5 * HOUR)
     crew.begin(crew.everybody, "1", "relative orientation")
     assert crew.seconds.tolist() == [2.75 * HOUR, 0.0]
@@ -172,7 +172,7 @@ def test_breaks_are_taken_by_those_who_are_due_only():
 @pytest.mark.parametrize("skill", ["trained", "novice"])
 def test_the_time_adds_up(skill):
     session = open_session(read_once(one_model(observer_of_skill(skill, **WITHOUT_SLIPS))), 2)
-    next(iter(work(session.person, session.job)))
+    next(iter(measure_models(session.person, session.job)))
     person = session.person
     for column in (person.timesheet.activities_of(0), person.timesheet.acts_of(0)):
         assert sum(column.values()) == pytest.approx(person.clock.now, rel=1e-12)
@@ -182,7 +182,7 @@ def test_the_time_adds_up(skill):
 
 
 def test_pace_makes_everything_slower_but_breaks():
-    slow, usual = (open_crowd(one_model(Observer(pace=pace)), (1,)).bench.crew for pace in (1.5, 1.0))
+    slow, usual = (open_batch(one_model(Observer(pace=pace)), (1,)).bench.crew for pace in (1.5, 1.0))
     for crew in (slow, usual):
         crew.spend(crew.everybody, 10.0, "looking")
     assert (slow.seconds[0], usual.seconds[0]) == (15.0, 10.0)
@@ -202,7 +202,7 @@ def planted(kind, **place):
     scenario = one_model(observer)
     session = open_session(scenario if kind == "forgotten lever" else read_once(scenario), 1)
     try:
-        record = next(iter(work(session.person, session.job)))
+        record = next(iter(measure_models(session.person, session.job)))
     except DoesNotFit as trouble:
         return session.person, None, str(trouble)
     return session.person, record, ""
@@ -300,7 +300,7 @@ def test_levers_whose_wrongs_make_a_right_are_all_found_in_the_end(levers, proce
     scenario = one_model(observer)
     plan = msgspec.structs.replace(scenario.plan, procedure=procedure)
     session = open_session(read_once(msgspec.structs.replace(scenario, plotting=plan)), 1)
-    record = next(iter(work(session.person, session.job)))
+    record = next(iter(measure_models(session.person, session.job)))
     found = [remark for remark in session.person.book.remarks if "forgotten" in remark]
     assert sorted(found) == sorted(f"1: the {LEVERS[lever]}" for lever in levers)
     assert record.orientation.rms < 0.03
@@ -342,7 +342,7 @@ def test_slips_are_told_in_the_results_and_in_no_entry_of_book_or_journal(tmp_pa
 def test_drawn_slips_come_as_often_as_their_rates_say():
     """Of four persons who write a thousand readings of by each, with a rate of 5 % of either kind."""
     slipping = Observer(**WITHOUT_SLIPS | {"wrong_sign_rate": 0.05, "transposed_rate": 0.05})
-    crew = open_crowd(one_model(slipping), range(4)).bench.crew
+    crew = open_batch(one_model(slipping), range(4)).bench.crew
     who, nothing = crew.everybody, np.zeros(4)
     for _ in range(1000):
         crew.write(who, "1", "by1", np.full(4, 3.12), nothing)
@@ -355,7 +355,7 @@ def test_drawn_slips_come_as_often_as_their_rates_say():
 def test_what_chance_misreads_is_told_too():
     session = open_session(one_model(Observer(blunder_rate=0.05)), 1)
     person = session.person
-    next(iter(work(person, session.job)))
+    next(iter(measure_models(person, session.job)))
     assert {slip.kind for slip in person.slips} == {"gross", "last digit"}
     for slip in person.slips:
         if slip.entry:

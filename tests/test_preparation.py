@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from a7sim.cli import cli
 from a7sim.manual import A7, A8
 from a7sim.mistakes import Mistake
-from a7sim.operator.preparation import Flight, preparation
+from a7sim.operator.preparation import Flight, choose_settings
 
 AKWANGA = Flight.of_heights(152.676, 91.0, (430.24, 487.92), photo_scale=8000.0)
 
@@ -24,7 +24,7 @@ def test_the_theses_flight_is_that_of_section_3_2_3():
 
 def test_the_theses_settings_come_out():
     """T: 1:3750, Cd, 1-2-1, 325.709 mm; its optimum is 490 / 152.676 / 8000, printed 1/2496.669 for 1/2492.669."""
-    found = preparation(AKWANGA, A7, map_scale=2500.0)
+    found = choose_settings(AKWANGA, A7, map_scale=2500.0)
     assert found.optimum == pytest.approx(2492.669, abs=5e-4)
     assert found.chosen.number == 3750.0
     assert (found.chosen.height_gear, found.chosen.plan_gear) == ("Cd", "1-2-1")
@@ -34,23 +34,23 @@ def test_the_theses_settings_come_out():
 
 def test_the_base_is_what_the_photo_base_promises_at_the_scale():
     """The photo base of 91 mm promises 0.9 mm less than T cleared at points 1 and 2."""
-    assert preparation(AKWANGA, A7, 2500.0).chosen.bx == pytest.approx(91.0 * 8000.0 / 3750.0)
+    assert choose_settings(AKWANGA, A7, 2500.0).chosen.bx == pytest.approx(91.0 * 8000.0 / 3750.0)
 
 
 def test_the_optimum_asks_for_a_base_beyond_the_range():
     """Why a smaller model is taken at all: bx ends at 280 mm."""
-    assert preparation(AKWANGA, A7).optimum_bx > A7.elements["bx"].high
+    assert choose_settings(AKWANGA, A7).optimum_bx > A7.elements["bx"].high
 
 
 def test_without_a_map_the_largest_model_with_fine_heights_is_taken():
-    assert preparation(AKWANGA, A7).chosen.height_gear == "Bd"
+    assert choose_settings(AKWANGA, A7).chosen.height_gear == "Bd"
 
 
 def test_every_scale_that_is_left_keeps_all_ranges():
     for height in range(400, 2000, 50):
         flight = Flight.of_heights(152.676, 91.0, (100.0, 150.0), flying_height=float(height))
         try:
-            chosen = preparation(flight, A7).chosen
+            chosen = choose_settings(flight, A7).chosen
         except Mistake as none:
             assert "range" in str(none)
             continue
@@ -64,7 +64,7 @@ def test_every_scale_that_is_left_keeps_all_ranges():
 def test_a_flight_too_low_or_too_high_is_refused(flying_height):
     flight = Flight.of_heights(152.676, 91.0, (100.0, 110.0), flying_height=flying_height)
     with pytest.raises(Mistake, match="needs Z"):
-        preparation(flight, A7)
+        choose_settings(flight, A7)
 
 
 @pytest.mark.parametrize(
@@ -73,17 +73,17 @@ def test_a_flight_too_low_or_too_high_is_refused(flying_height):
 def test_what_excludes_the_largest_model_is_named(flying_height, photo_base, said):
     """At 1:3000 and 470 mm: a base of 91 mm becomes 280.1 mm, the corners of the picture lie 354 mm off the base."""
     flight = Flight.of_heights(152.676, photo_base, (100.0, 110.0), flying_height=flying_height)
-    largest = preparation(flight, A7).scales[0]
+    largest = choose_settings(flight, A7).scales[0]
     assert any(each.startswith(said) for each in largest.against)
 
 
 def test_a_map_without_a_horizontal_gear_is_refused():
     with pytest.raises(Mistake, match="no horizontal gear to 1:4000"):
-        preparation(AKWANGA, A7, map_scale=4000.0)
+        choose_settings(AKWANGA, A7, map_scale=4000.0)
 
 
 def test_another_plotter_has_other_ranges_and_gears():
-    chosen = preparation(AKWANGA, A8).chosen
+    chosen = choose_settings(AKWANGA, A8).chosen
     assert chosen.height_gear in A8.height_gears
     assert 175.0 <= chosen.lowest < chosen.highest <= 350.0
 

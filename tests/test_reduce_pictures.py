@@ -83,7 +83,7 @@ def test_lens_and_refraction_are_taken_off_and_pairs_are_written(tmp_path):
     path = counts_file(tmp_path / "counts.csv", rows)
     outcome = computing.interior(path, camera, corrections=("lens", "refraction"), flight=Flight(3000.0, 500.0))
     assert outcome.document["about"] == "principal point"
-    computing.written(outcome, tmp_path / "o")
+    computing.write_result(outcome, tmp_path / "o")
     with (tmp_path / "o" / "pairs.csv").open(encoding="utf-8") as file:
         found = list(csv.DictReader(file))
     assert [row["model"] for row in found] == ["27-28"] * 2
@@ -142,7 +142,7 @@ def test_the_robust_method_names_the_point_with_the_blunder(tmp_path):
     done = reduce("relative", path, "--c", 152, "--method", "robust")
     assert "blunder at point 7:" in done.stdout
     assert "taken out" in done.stdout
-    document = computing.written(
+    document = computing.write_result(
         computing.relative(path, 152.0, (0.0, 0.0), "dependent", 92.0, "robust"), tmp_path / "o"
     )
     model = (tmp_path / "o" / "models.csv").read_text(encoding="utf-8")

@@ -213,7 +213,7 @@ def test_out_holds_the_printed_document_the_tables_and_the_cards(tmp_path):
 def test_output_cards_are_a_deck_again(tmp_path):
     models, ground = flat_strip(np.random.default_rng(3), 4, noise=0.02)
     path, known = models_file(tmp_path / "m.csv", models), ground_file(tmp_path / "g.csv", ground)
-    first = computing.written(computing.strip(path, known), tmp_path / "o")
+    first = computing.write_result(computing.strip(path, known), tmp_path / "o")
     again = computing.strip(tmp_path / "o" / "strip.crd").document
     assert again["absolute"]["scale"] == pytest.approx(1.0, abs=1e-5)
     for point, residual in again["residuals_m"].items():
@@ -273,7 +273,7 @@ def test_differences_to_given_coordinates_are_tabled(tmp_path):
     moved = Ground(ground.points, ground.coordinates + np.array([[0.3], [0.0], [-0.4]]), ground.roles)
     other = ground_file(tmp_path / "other.csv", moved)
     out = tmp_path / "o"
-    document = computing.written(computing.strip(path, known, against=other), out)
+    document = computing.write_result(computing.strip(path, known, against=other), out)
     assert document["compare"]["rms"] == pytest.approx({"X": 0.3, "Y": 0.0, "Z": 0.4}, abs=1e-6)
     assert document["compare"]["largest"]["Z"] == pytest.approx(0.4, abs=1e-6)
     header, *rows = (out / "compare.csv").read_text(encoding="utf-8").splitlines()
@@ -322,7 +322,7 @@ def test_a_block_of_two_strips_comes_back_exactly(tmp_path):
     paths = [models_file(tmp_path / "1.csv", first), models_file(tmp_path / "2.csv", renamed)]
     known = ground_file(tmp_path / "g.csv", ground)
     outcome = computing.block(paths, known)
-    document = computing.written(outcome, tmp_path / "o")
+    document = computing.write_result(outcome, tmp_path / "o")
     assert document["s0_m"] < 1e-6
     assert document["accuracy_m"]["checks"]["height"] < 1e-6
     assert len(document["models"]) == 6

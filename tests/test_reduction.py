@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from a7sim.reduction import (
     Stand,
     Undetermined,
-    adjusted,
     element_corrections,
     perspective_centre,
-    picture_lie,
+    picture_placement,
+    solve_least_squares,
 )
 
 LEVELS = (4900.0, 5100.0)
@@ -162,12 +162,12 @@ def test_four_points_do_not_orient():
 def test_least_squares_is_numpys_and_a_batch_is_its_members(seed):
     rng = np.random.default_rng(seed)
     design, observed = rng.standard_normal((9, 4, 3)), rng.standard_normal((9, 3))
-    together = adjusted(design, observed)
+    together = solve_least_squares(design, observed)
     for i in range(3):
         expected, squares, *_ = np.linalg.lstsq(design[:, :, i], observed[:, i], rcond=None)
         np.testing.assert_allclose(together.unknowns[:, i], expected, rtol=1e-7, atol=1e-9)
         assert together.s0[i] == pytest.approx(np.sqrt(squares[0] / 5.0), rel=1e-7)
-        one = adjusted(design[:, :, i], observed[:, i])
+        one = solve_least_squares(design[:, :, i], observed[:, i])
         np.testing.assert_allclose(together.sigmas[:, i], one.sigmas, rtol=1e-9)
         np.testing.assert_allclose(together.condition[i], one.condition, rtol=1e-6)
     np.testing.assert_allclose(together.redundancy_numbers.sum(axis=0), 5.0)
@@ -177,9 +177,9 @@ def test_least_squares_is_numpys_and_a_batch_is_its_members(seed):
 def test_weights_count_as_repeated_observations():
     rng = np.random.default_rng(2)
     design, observed = rng.standard_normal((7, 3)), rng.standard_normal(7)
-    weighted = adjusted(design, observed, weights=np.array([1.0, 2.0, 1.0, 3.0, 1.0, 1.0, 1.0]))
+    weighted = solve_least_squares(design, observed, weights=np.array([1.0, 2.0, 1.0, 3.0, 1.0, 1.0, 1.0]))
     rows = [0, 1, 1, 2, 3, 3, 3, 4, 5, 6]
-    repeated = adjusted(design[rows], observed[rows], redundancy=4)
+    repeated = solve_least_squares(design[rows], observed[rows], redundancy=4)
     np.testing.assert_allclose(weighted.unknowns, repeated.unknowns)
     np.testing.assert_allclose(weighted.sigmas, repeated.sigmas)
     assert weighted.redundancy_numbers.sum() == pytest.approx(4.0)
@@ -190,5 +190,5 @@ def test_a_pictures_lie_comes_back_from_its_fiducials(dx, dy, turn, scale):
     marks = np.array([(-106.0, -106.0), (106.0, 106.0), (-106.0, 106.0), (106.0, -106.0)]).T
     x, y = marks
     displaced = np.array([dx - turn * y + scale * x, dy + turn * x + scale * y])
-    lie = picture_lie(displaced, marks)
+    lie = picture_placement(displaced, marks)
     np.testing.assert_allclose((lie.dx, lie.dy, lie.turn, lie.scale), (dx, dy, turn, scale), atol=1e-12)

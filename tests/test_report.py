@@ -10,8 +10,8 @@ import sys
 import pytest
 
 from a7sim.report.kept import read_session
-from a7sim.report.rays import rays_of
-from a7sim.report.writing import report_of
+from a7sim.report.rays import pointing_rays
+from a7sim.report.writing import render_report
 from tests.pages import Page
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -24,7 +24,7 @@ def results(akwanga_folder):
 
 @pytest.fixture(scope="module")
 def text(akwanga_folder):
-    return report_of(read_session(akwanga_folder))
+    return render_report(read_session(akwanga_folder))
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_a_report_goes_with_the_session_that_is_written_over(short_folder, tmp_p
 
 
 def test_a_report_of_the_same_session_is_the_same_to_the_byte(akwanga_folder, text):
-    assert report_of(read_session(akwanga_folder)) == text
+    assert render_report(read_session(akwanga_folder)) == text
 
 
 def test_a_report_can_be_shown_in_the_browser(short_folder, tmp_path, typed, monkeypatch):
@@ -160,7 +160,7 @@ def test_the_page_says_what_gives_the_session_again(page, results):
 
 
 def test_a_request_is_told_with_what_it_changed(short_folder):
-    page = Page(report_of(read_session(short_folder)))
+    page = Page(render_report(read_session(short_folder)))
     line = page.table("What gives this session again").row("command line")[1]
     assert line == "a7sim run akwanga --seed 1985 --set 'photos.1.laid=upside down' --skill novice"
     changed = {row[0]: row[1] for row in page.table("Changed in the scenario's file").rows}
@@ -168,7 +168,7 @@ def test_a_request_is_told_with_what_it_changed(short_folder):
 
 
 def test_a_session_that_does_not_fit_says_so_and_shows_what_there_is(short_folder):
-    page = Page(report_of(read_session(short_folder)))
+    page = Page(render_report(read_session(short_folder)))
     assert "does not fit: picture 102 lies upside down" in "".join(page.text)
     assert "Hours by activity" in [table.caption for table in page.tables]
     assert not [table for table in page.tables if "centres" in table.caption]
@@ -177,7 +177,7 @@ def test_a_session_that_does_not_fit_says_so_and_shows_what_there_is(short_folde
 def test_an_interrupted_session_shows_what_there_is(akwanga_folder, results, tmp_path):
     half = {key: value for key, value in results.items() if key != "strip"}
     half |= {"status": "interrupted", "message": "the session was interrupted", "models": results["models"][:1]}
-    page = Page(report_of(read_session(changed(akwanga_folder, half, tmp_path))))
+    page = Page(render_report(read_session(changed(akwanga_folder, half, tmp_path))))
     assert "The session was interrupted" in "".join(page.text)
     assert sum(table.caption == "Elements as set" for table in page.tables) == 1
 
@@ -187,7 +187,7 @@ def test_rays_of_the_points_give_the_rms_of_the_centre(akwanga_folder, results):
     kept = read_session(akwanga_folder)
     for model in results["models"]:
         for side, found in model["perspective_centres"].items():
-            rays = rays_of(kept, model, side).values()
+            rays = pointing_rays(kept, model, side).values()
             assert len(rays) == 6
             squares = sum((x - found["X0"]) ** 2 + (y - found["Y0"]) ** 2 for x, y in rays)
             assert (squares / 9) ** 0.5 == pytest.approx(found["rms"], abs=1e-3)
@@ -197,13 +197,13 @@ def test_rays_that_do_not_give_the_rms_of_the_results_are_not_drawn(akwanga_fold
     model = results["models"][0]
     found = model["perspective_centres"]["left"]
     other = model | {"perspective_centres": {"left": found | {"rms": found["rms"] + 0.01}}}
-    assert rays_of(read_session(akwanga_folder), other, "left") == {}
+    assert pointing_rays(read_session(akwanga_folder), other, "left") == {}
 
 
 def test_a_strip_by_comparator_and_readings_has_a_chapter_for_each_way(tmp_path, typed):
     out = tmp_path / "ways"
     assert typed("run", "a8-strip", "--quiet", "--out", out)[0] == 0
-    page = Page(report_of(read_session(out)))
+    page = Page(render_report(read_session(out)))
     text = "".join(page.text)
     for words in ("Strip, comparator", "Strip, A8", "A8 minus comparator"):
         assert words in text
@@ -214,7 +214,7 @@ def test_a_strip_by_comparator_and_readings_has_a_chapter_for_each_way(tmp_path,
 def test_a_grid_test_has_its_residuals_at_the_crosses(tmp_path, typed):
     out = tmp_path / "grid"
     assert typed("calibrate", "grid-test", "--points", 9, "--levels", 1, "--quiet", "--out", out)[0] == 0
-    page = Page(report_of(read_session(out)))
+    page = Page(render_report(read_session(out)))
     titles = [table.caption for table in page.tables]
     assert "left projector" in titles and "right projector" in titles
     assert "Right projector: residuals at the crosses" in "".join(page.text)
@@ -237,7 +237,7 @@ def test_a_map_stands_on_the_page_as_a_picture_of_its_own(tmp_path, results):
     (tmp_path / "results.json").write_text(json.dumps(document), encoding="utf-8")
     drawn = '<svg xmlns="http://www.w3.org/2000/svg"><style>text { fill: red; }</style></svg>'
     (tmp_path / "map.svg").write_text(drawn, encoding="utf-8")
-    text = report_of(read_session(tmp_path))
+    text = render_report(read_session(tmp_path))
     page = Page(text)
     image = next(attributes for tag, attributes in page.elements if tag == "img")
     assert image["alt"] == "Map of model 1"

@@ -9,7 +9,7 @@ import pytest
 from a7sim.scenario import load_scenario
 from a7sim.session.bridge import INDEPENDENT, run_bridge
 from a7sim.session.journal import Keeping
-from a7sim.session.resuming import begun_in
+from a7sim.session.resuming import find_resumable
 from tests.processes import said_here
 
 JOURNAL = "session.jsonl"
@@ -85,7 +85,7 @@ def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridg
     (cut / "results.json").unlink()
     shutil.rmtree(cut / INDEPENDENT)
     cut_off(bridged / INDEPENDENT, cut / INDEPENDENT, 0.3)
-    begun = begun_in(cut, "bridge")
+    begun = find_resumable(cut, "bridge")
     run_bridge(begun.scenario, begun.seed, cut, keeping=Keeping(resumes=True))
     assert without_what_was_torn(files_of(cut)) == files_of(bridged)
 
@@ -98,7 +98,7 @@ def test_results_of_a_bridge_say_so_where_it_was_interrupted_among_the_independe
         raise KeyboardInterrupt
 
     cut = Path(shutil.copytree(bridged, tmp_path / "cut"))
-    begun = begun_in(cut, "bridge")
+    begun = find_resumable(cut, "bridge")
     monkeypatch.setattr("a7sim.session.bridge.run", interrupted)
     with pytest.raises(KeyboardInterrupt):
         run_bridge(begun.scenario, begun.seed, cut, keeping=Keeping(resumes=True))

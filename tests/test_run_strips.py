@@ -10,12 +10,18 @@ import pytest
 from a7sim.mistakes import Mistake
 from a7sim.reduction import Ground, absolute_orientation, formed_strip, read_cards
 from a7sim.report.kept import read_session
-from a7sim.report.writing import report_of
+from a7sim.report.writing import render_report
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import run
 from a7sim.session.combinations import run_combinations
-from a7sim.session.strips import card_numbers, ground_of, grounded, models_of, of_grounded
+from a7sim.session.strips import (
+    card_numbers,
+    ground_control,
+    models_from_documents,
+    orient_strip,
+    oriented_strip_document,
+)
 from tests.pages import Page
 from tests.sessions import tilted_flight
 from tests.test_cli import a7sim
@@ -60,15 +66,15 @@ def test_control_and_checks_are_accounted_for_apart(all_strips):
 def test_checks_take_no_part_in_the_strip():
     """A check moved by ten metres moves its own residual and nothing else; a control point moves the strip."""
     scenario = load_scenario("akwanga", {"plan.parallax_readings": "1"})
-    models = models_of(run(scenario, 3)["models"])
-    ground = ground_of(scenario, build_scene(scenario, 3))
+    models = models_from_documents(run(scenario, 3)["models"])
+    ground = ground_control(scenario, build_scene(scenario, 3))
 
     def strip_with(name):
         moved = ground.coordinates.copy()
         moved[:, ground.points.index(name)] += 10.0
-        return of_grounded(grounded(models, Ground(ground.points, moved, ground.roles)))
+        return oriented_strip_document(orient_strip(models, Ground(ground.points, moved, ground.roles)))
 
-    strip = of_grounded(grounded(models, ground))
+    strip = oriented_strip_document(orient_strip(models, ground))
     with_check = strip_with("K2")
     assert with_check["absolute"] == strip["absolute"]
     changed = [name for name, each in strip["residuals_m"].items() if each != with_check["residuals_m"][name]]
@@ -186,7 +192,7 @@ def test_the_strip_of_paper_p_is_measured_in_two_ways_side_by_side(tmp_path):
 def test_the_report_of_all_strips_has_a_row_and_a_mark_for_each(all_strips):
     """The numbers are those of the results; each case's folder has a report of its own, with its own command."""
     document, out, _ = all_strips
-    page = Page(report_of(read_session(out)))
+    page = Page(render_report(read_session(out)))
     table = page.table("Strips of all cases, rms residuals in m")
     assert [row[0] for row in table.rows] == [str(strip["number"]) for strip in document["strips"]]
     assert [row[5] for row in table.rows] == [f"{s['accuracy_m']['checks']['plan']:.3f}" for s in document["strips"]]

@@ -8,8 +8,8 @@ import pytest
 
 from a7sim.files import read_rows
 from a7sim.mistakes import Mistake
-from a7sim.scenario import ScenarioError, load_scenario, scenario_of, scenario_schema
-from a7sim.session.ways import run_all_ways
+from a7sim.scenario import ScenarioError, build_scenario, load_scenario, scenario_schema
+from a7sim.session.ways import run_all_methods
 
 SCENARIOS = sorted((Path(__file__).parents[1] / "scenarios").glob("*.toml"))
 
@@ -24,7 +24,7 @@ def a8_strip():
 
 def mistakes_of(raw):
     with pytest.raises(ScenarioError) as caught:
-        scenario_of(raw, SCENARIOS[0].parent, "test")
+        build_scenario(raw, SCENARIOS[0].parent, "test")
     return caught.value.mistakes
 
 
@@ -35,7 +35,7 @@ WORKED_ELSEWHERE = {"bridge"}
 @pytest.mark.parametrize("path", [p for p in SCENARIOS if p.stem not in WORKED_ELSEWHERE], ids=lambda path: path.stem)
 def test_every_scenario_is_worked_to_its_end(path):
     scenario = load_scenario(path)
-    document = run_all_ways(scenario, 1)
+    document = run_all_methods(scenario, 1)
     assert document["status"] == "complete", document["message"]
     assert len(document.get("models", scenario.models)) == len(scenario.models)
     for strip in document.get("ways", {}).values():

@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from a7sim.documents import as_json
-from a7sim.link.twin import BesideTwin, served_at
+from a7sim.link.twin import BesideTwin, open_checked_port
 from a7sim.mistakes import Mistake
 from a7sim.scenario import load_scenario
 from a7sim.session import run
@@ -171,7 +171,7 @@ def one_model():
 @pytest.mark.parametrize("kind", ["tcp", "pty", "rfc2217"])
 def test_an_operator_at_a_served_instrument_leaves_the_same_results(one_model, kind, tmp_path):
     scenario, results = one_model
-    with served(kind, new_desk(scenario)) as url, served_at(url, timeout=5.0) as port:
+    with served(kind, new_desk(scenario)) as url, open_checked_port(url, timeout=5.0) as port:
         run(scenario, 7, tmp_path / "out", cable=lambda twin: BesideTwin(port, twin, url))
     assert (tmp_path / "out" / "results.json").read_text(encoding="utf-8") == results
 
@@ -228,7 +228,7 @@ def test_an_instrument_of_another_scenario_or_seed_is_refused_in_one_sentence(on
     with (
         served("tcp", new_desk(scenario, seed)) as url,
         pytest.raises(Mistake, match=f"{url}: the instrument served {sentence}"),
-        served_at(url, timeout=1.0) as port,
+        open_checked_port(url, timeout=1.0) as port,
     ):
         run(one_model[0], 7, cable=lambda twin: BesideTwin(port, twin, url))
 
@@ -248,9 +248,9 @@ def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
 def test_operate_holds_the_lock_and_gives_it_back():
     desk = new_desk()
     with served("tcp", desk) as url:
-        with served_at(url, timeout=1.0):
+        with open_checked_port(url, timeout=1.0):
             assert desk.lock_holder is not None
-            with pytest.raises(Mistake, match="another client holds its lock"), served_at(url, timeout=1.0):
+            with pytest.raises(Mistake, match="another client holds its lock"), open_checked_port(url, timeout=1.0):
                 pytest.fail("two operators in one chair")
         assert desk.lock_holder is None
 

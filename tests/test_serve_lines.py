@@ -15,7 +15,7 @@ from a7sim.instrument import Autograph
 from a7sim.instrument.language import Desk
 from a7sim.link.client import Client
 from a7sim.link.conversation import Terms
-from a7sim.link.faults import Cut, Faults, Noise, faults_of
+from a7sim.link.faults import Cut, Faults, Noise, parse_faults
 from a7sim.link.serving import Doors
 from a7sim.link.wires import MAX_UNREAD
 from a7sim.manual import VARIANTS
@@ -203,7 +203,7 @@ def test_a_paced_client_that_hangs_up_its_half_is_answered_to_the_end():
 
 def faulty(spec, seed=1, baud=None):
     return Served(
-        Desk(Autograph(VARIANTS["A7"])), Terms(faults=faults_of(spec), fault_seed=seed, baud=baud, most_clients=200)
+        Desk(Autograph(VARIANTS["A7"])), Terms(faults=parse_faults(spec), fault_seed=seed, baud=baud, most_clients=200)
     )
 
 
@@ -261,8 +261,10 @@ def test_a_cut_is_an_end_not_a_reply():
 
 
 def test_faults_read_as_they_are_written():
-    assert faults_of("drop-reply:0.01,delay:50ms,garble:0.001,disconnect:0.0005") == Faults(0.01, 0.001, 0.0005, 0.05)
-    assert faults_of("delay:1.5s") == Faults(delay=1.5)
+    assert parse_faults("drop-reply:0.01,delay:50ms,garble:0.001,disconnect:0.0005") == Faults(
+        0.01, 0.001, 0.0005, 0.05
+    )
+    assert parse_faults("delay:1.5s") == Faults(delay=1.5)
 
 
 @pytest.mark.parametrize(
@@ -280,4 +282,4 @@ def test_faults_read_as_they_are_written():
 )
 def test_faults_that_cannot_be_read_are_said(spec, sentence):
     with pytest.raises(Mistake, match=sentence.replace("(", r"\(")):
-        faults_of(spec)
+        parse_faults(spec)

@@ -8,10 +8,10 @@ import pytest
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk
 from a7sim.link.clock import Clock
-from a7sim.link.waiting import obeyed
+from a7sim.link.waiting import feed_until_idle
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from a7sim.session.checkpoints import Checkpoint, as_lines, differences, hash_of_state, read_checkpoints
+from a7sim.session.checkpoints import Checkpoint, differences, read_checkpoints, state_hash, to_lines
 
 LINES = {
     "akwanga": [
@@ -58,7 +58,7 @@ def test_an_instrument_restored_goes_on_as_the_one_its_state_was_taken_from(name
     engines[0].feed(b'SYST:LOG "sesame";:REC "P0"\n', 0.0)
     engines[1].feed(b'SYST:LOG "sesame"\n' if seed % 2 else b"COUN?\n", 0.0)
     for _ in range(60):
-        obeyed(dice.choice(engines), line(dice, name), clock)
+        feed_until_idle(dice.choice(engines), line(dice, name), clock)
     changes = len(desk.autograph.recorder.changes)
     state = json.loads(json.dumps(desk.state()))
     again = worn(name, "sesame")
@@ -67,8 +67,8 @@ def test_an_instrument_restored_goes_on_as_the_one_its_state_was_taken_from(name
     later = Clock(clock.now)
     for _ in range(60):
         client, said = dice.choice(engines).client, line(dice, name)
-        expected = obeyed(desk.clients[client], said, clock)
-        assert obeyed(again.clients[client], said, later) == expected
+        expected = feed_until_idle(desk.clients[client], said, clock)
+        assert feed_until_idle(again.clients[client], said, later) == expected
     assert clock.now == later.now
     assert desk.state(changes) == again.state(changes)
     assert len(desk.state(changes)["autograph"]["registered"]) < len(desk.autograph.recorder.changes)
@@ -77,12 +77,12 @@ def test_an_instrument_restored_goes_on_as_the_one_its_state_was_taken_from(name
 
 def test_states_that_are_not_what_their_hash_says_are_not_believed(tmp_path):
     states = [{"a": 1, "b": [1.5]}, {"a": 2, "b": [1.5]}]
-    kept = [Checkpoint(n, 1.0, hash_of_state(state), state) for n, state in enumerate(states)]
-    (tmp_path / "states").write_bytes(as_lines(kept))
+    kept = [Checkpoint(n, 1.0, state_hash(state), state) for n, state in enumerate(states)]
+    (tmp_path / "states").write_bytes(to_lines(kept))
     assert list(read_checkpoints(tmp_path / "states")) == kept
-    (tmp_path / "states").write_bytes(as_lines(kept).replace(b'"a":2', b'"a":3'))
+    (tmp_path / "states").write_bytes(to_lines(kept).replace(b'"a":2', b'"a":3'))
     assert list(read_checkpoints(tmp_path / "states")) == kept[:1]
-    for damaged in (as_lines(kept)[:-9], as_lines(kept).replace(b'"b"', b'"\xff"')):
+    for damaged in (to_lines(kept)[:-9], to_lines(kept).replace(b'"b"', b'"\xff"')):
         (tmp_path / "states").write_bytes(damaged)
         assert list(read_checkpoints(tmp_path / "states")) in (kept[:1], [])
     assert list(read_checkpoints(tmp_path / "nowhere")) == []

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from a7sim.geometry import image_of, ray_of, rotation, stereoscopic_intersection
 from a7sim.mistakes import Mistake
-from a7sim.reduction.absolute import Ground, absolute_orientation, largest, root_mean_square
+from a7sim.reduction.absolute import Ground, absolute_orientation, max_abs_residual, root_mean_square
 from a7sim.reduction.block import block_adjustment
 from a7sim.reduction.coplanarity import relative_orientation
 from a7sim.reduction.least_squares import Undetermined
@@ -243,7 +243,7 @@ def test_two_real_strips_come_to_the_ground_with_the_residuals_listed(reference,
         scale = float(found.similarity.scale)
         assert scale == pytest.approx(expected[f"strip{number}_absolute_scale"], rel=digits)
         listed = np.array(expected[f"strip{number}_control_max_residual_m"])
-        assert (largest(found.fit.at_control) < listed + 5.1e-4).all()
+        assert (max_abs_residual(found.fit.at_control) < listed + 5.1e-4).all()
         assert all(text.startswith("ground points that the model has not") for text in found.warnings)
 
 
@@ -542,7 +542,7 @@ def test_one_model_of_a_batch_is_warned_of_as_if_it_were_alone():
 
 def test_the_largest_residual_is_of_those_there_are():
     residuals = np.array([[1.0, np.nan, -3.0], [np.nan, np.nan, np.nan], [0.5, 0.25, 0.0]])
-    np.testing.assert_array_equal(largest(residuals), [3.0, np.nan, 0.5])
+    np.testing.assert_array_equal(max_abs_residual(residuals), [3.0, np.nan, 0.5])
 
 
 def test_ground_points_the_model_has_not_are_named_and_wrong_roles_refused():

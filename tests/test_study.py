@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from a7sim.mistakes import Mistake
-from a7sim.study.cells import cells_of
+from a7sim.study.cells import make_cells
 from a7sim.study.checkpoint import save
-from a7sim.study.executors import opened
-from a7sim.study.loading import SEARCH_PATH, load_study, study_of
-from a7sim.study.running import Pace, _Size, work
+from a7sim.study.executors import open_executor
+from a7sim.study.loading import SEARCH_PATH, build_study, load_study
+from a7sim.study.running import Pace, _Size, run_study
 from a7sim.study.schema import Factor, Study
 from a7sim.study.tally import Tally
 
@@ -26,7 +26,7 @@ BY_COMPARATOR = {
 
 
 def laid(tmp_path, raw=BY_COMPARATOR, **changes):
-    return study_of(raw | changes, tmp_path)
+    return build_study(raw | changes, tmp_path)
 
 
 def a_design(design, *factors, **others):
@@ -39,17 +39,17 @@ READINGS = Factor(name="readings", path="plan.parallax_readings", levels=[1, 3])
 
 
 def test_a_full_design_has_every_combination_and_one_at_a_time_every_level_once():
-    full = [cell.levels for cell in cells_of(a_design("full", CASE, READINGS))]
+    full = [cell.levels for cell in make_cells(a_design("full", CASE, READINGS))]
     assert len(full) == 6
     assert full[1] == {"case": "A", "readings": "3"}
-    single = [tuple(cell.levels.values()) for cell in cells_of(a_design("one-at-a-time", CASE, READINGS))]
+    single = [tuple(cell.levels.values()) for cell in make_cells(a_design("one-at-a-time", CASE, READINGS))]
     assert single == [("A", "1"), ("B", "1"), ("C", "1"), ("A", "3")]
 
 
 def test_a_latin_hypercube_has_one_cell_in_every_tenth_of_every_range():
     bx = Factor(name="bx", path="plan.bx", range=(180.0, 200.0))
     height = Factor(name="height", path="plan.projection_height", range=(300.0, 340.0))
-    cells = cells_of(a_design("latin-hypercube", bx, height, samples=10))
+    cells = make_cells(a_design("latin-hypercube", bx, height, samples=10))
     for path, low, high in (("plan.bx", 180.0, 200.0), ("plan.projection_height", 300.0, 340.0)):
         tenths = sorted(int(10 * (cell.settings[path] - low) / (high - low)) for cell in cells)
         assert tenths == list(range(10))
@@ -68,8 +68,8 @@ def test_every_study_that_comes_with_a7sim_can_be_laid_out(name):
 
 def numbers_of(laid_study, kind="process", largest_chunk=2000, tally=None):
     tally = tally or Tally.empty(len(laid_study.cells), len(laid_study.responses))
-    with opened(kind, 2 if kind == "pool" else None) as (executor, at_once):
-        work(laid_study, tally, executor, at_once, pace=Pace(largest_chunk=largest_chunk))
+    with open_executor(kind, 2 if kind == "pool" else None) as (executor, at_once):
+        run_study(laid_study, tally, executor, at_once, pace=Pace(largest_chunk=largest_chunk))
     return tally
 
 
@@ -197,7 +197,7 @@ def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
     changes, words = MISTAKES[name]
     (tmp_path / "study.toml").write_text('responses = ["hours"]')
     with pytest.raises(Mistake) as told:
-        laid(tmp_path, **changes) if "photos" not in changes else study_of(changes, tmp_path)
+        laid(tmp_path, **changes) if "photos" not in changes else build_study(changes, tmp_path)
     assert words in str(told.value)
     assert str(told.value).startswith("study: ")
     assert len(str(told.value).splitlines()) == 1

@@ -5,11 +5,11 @@ import pytest
 
 from a7sim.session import crowd
 from a7sim.session.fleet_hands import FleetHands
-from a7sim.study.auditing import audited
+from a7sim.study.auditing import audit_study
 from a7sim.study.executors import InProcess
-from a7sim.study.loading import study_of
-from a7sim.study.running import work
-from a7sim.study.simulating import Task, seed_of
+from a7sim.study.loading import build_study
+from a7sim.study.running import run_study
+from a7sim.study.simulating import Task, replicate_seed
 from a7sim.study.tally import Tally
 
 AT_THE_PLOTTER = {
@@ -26,17 +26,17 @@ AT_THE_PLOTTER = {
 @pytest.fixture(scope="module")
 def worked(tmp_path_factory):
     """A study of one session, and its tally by the true batch bench; the link's results are worked once."""
-    laid = study_of(AT_THE_PLOTTER, tmp_path_factory.mktemp("study"))
+    laid = build_study(AT_THE_PLOTTER, tmp_path_factory.mktemp("study"))
     tally = Tally.empty(1, 1)
-    work(laid, tally, InProcess())
-    linked = laid.tasks[0].linked(0, seed_of(laid.study.seed, 0))
+    run_study(laid, tally, InProcess())
+    linked = laid.tasks[0].linked(0, replicate_seed(laid.study.seed, 0))
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(Task, "linked", lambda task, cell, seed: linked)
         yield laid, tally
 
 
 def test_the_true_batch_bench_passes(worked):
-    assert audited(*worked, 1) == []
+    assert audit_study(*worked, 1) == []
 
 
 def _reads(name, off):
@@ -83,12 +83,12 @@ PERTURBED = {
 def test_a_least_count_too_much_anywhere_on_the_bench_is_found_out(worked, monkeypatch, name):
     method, perturbed = PERTURBED[name]
     monkeypatch.setattr(FleetHands, method, perturbed(getattr(FleetHands, method)))
-    (found,) = audited(*worked, 1)
+    (found,) = audit_study(*worked, 1)
     assert (found.cell, found.replicate) == (1, 1)
 
 
 def test_a_strip_that_is_off_by_a_millimetre_on_the_bench_is_found_out(worked, monkeypatch):
-    truly = crowd.strip_of
+    truly = crowd.strip_document
 
     def a_millimetre_off(scenario, ground, models):
         document, strip = truly(scenario, ground, models)
@@ -97,7 +97,7 @@ def test_a_strip_that_is_off_by_a_millimetre_on_the_bench_is_found_out(worked, m
         return document | {"residuals_m": residuals}, strip
 
     monkeypatch.setattr(crowd, "strip_of", a_millimetre_off)
-    (found,) = audited(*worked, 1)
+    (found,) = audit_study(*worked, 1)
     assert (found.place, found.others) == ("strip.residuals_m.C1.X", 0)
 
 
@@ -105,5 +105,5 @@ def test_a_response_that_the_study_did_not_keep_as_it_was_is_found_out(worked):
     laid, _ = worked
     other = Tally.empty(1, 1)
     other.add(0, np.array([[1.0]]))
-    (found,) = audited(laid, other, 1)
+    (found,) = audit_study(laid, other, 1)
     assert (found.place, found.on_the_bench, found.others) == ("hours", 1.0, 0)

@@ -10,7 +10,7 @@ import time
 import pytest
 
 from a7sim.study.auditing import Difference
-from a7sim.study.checkpoint import KINDS, checkpoint_in, load
+from a7sim.study.checkpoint import KINDS, checkpoint_path, load
 from a7sim.study.folder import FILES, PAGE
 from a7sim.study.loading import load_study
 from tests.processes import COMMAND, a7sim, said_here
@@ -65,12 +65,12 @@ def test_a_study_that_was_killed_goes_on_to_the_same_bytes_and_leaves_no_worker_
     out = tmp_path / "out"
     command = [*COMMAND, "study", str(path), "--workers", "1", "--out", str(out)]
     killed = subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _wait_until(checkpoint_in(out).exists)
+    _wait_until(checkpoint_path(out).exists)
     os.kill(killed.pid, signal.SIGKILL)
     killed.wait()
     _wait_until(lambda: _gone(killed.pid))
     laid = load_study(path)
-    assert 0 < load(checkpoint_in(out), laid.identity).done.sum() < 24
+    assert 0 < load(checkpoint_path(out), laid.identity).done.sum() < 24
     assert said_here(capsys, "study", path, "--executor", "process", "--out", out, "--quiet").returncode == 0
     assert _files_in(out) == _files_in(whole)
 
@@ -105,7 +105,7 @@ def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, c
     told = said_here(capsys, "study", study[0], "--replicates", 2, "--executor", "process", "--out", tmp_path / "out")
     assert told.returncode == 0
     assert "matplotlib" in told.stderr
-    expected = {*FILES, checkpoint_in(tmp_path).name} - {PAGE} - ({*KINDS} - {checkpoint_in(tmp_path).name})
+    expected = {*FILES, checkpoint_path(tmp_path).name} - {PAGE} - ({*KINDS} - {checkpoint_path(tmp_path).name})
     assert set(_files_in(tmp_path / "out")) == expected
 
 

@@ -16,12 +16,12 @@ import pytest
 from a7sim.documents import as_json
 from a7sim.mistakes import Mistake
 from a7sim.study import by_mpi
-from a7sim.study.checkpoint import checkpoint_in, save
-from a7sim.study.executors import opened
-from a7sim.study.findings import document_of
-from a7sim.study.folder import leave
-from a7sim.study.loading import study_of
-from a7sim.study.running import Pace, work
+from a7sim.study.checkpoint import checkpoint_path, save
+from a7sim.study.executors import open_executor
+from a7sim.study.findings import findings_document
+from a7sim.study.folder import write_results
+from a7sim.study.loading import build_study
+from a7sim.study.running import Pace, run_study
 from a7sim.study.tally import Tally
 from tests.processes import said_here
 from tests.served import PATIENCE
@@ -32,20 +32,20 @@ NEEDS_MPI = pytest.mark.skipif(RUN_BY_MPI is None, reason="there is no mpiexec: 
 
 
 def laid(tmp_path):
-    return study_of(BY_COMPARATOR, tmp_path)
+    return build_study(BY_COMPARATOR, tmp_path)
 
 
 def worked(study, tally, kind, workers, tick=lambda _: None):
-    with opened(kind, workers) as (executor, at_once):
-        work(study, tally, executor, at_once, None, tick, Pace(largest_chunk=1))
+    with open_executor(kind, workers) as (executor, at_once):
+        run_study(study, tally, executor, at_once, None, tick, Pace(largest_chunk=1))
 
 
 def left(study, tally, folder):
     """Return all that a study says and leaves."""
     folder.mkdir()
-    document = document_of(study, tally)
-    leave(folder, study, tally, document)
-    save(tally, checkpoint_in(folder), study.identity)
+    document = findings_document(study, tally)
+    write_results(folder, study, tally, document)
+    save(tally, checkpoint_path(folder), study.identity)
     return {path.name: path.read_bytes() for path in folder.iterdir()} | {"--json": as_json(document)}
 
 
@@ -90,7 +90,7 @@ def test_a_pool_that_lost_a_worker_says_so_and_the_study_goes_on_to_the_same_byt
 
 
 def test_an_interrupted_pool_does_not_wait_for_what_its_workers_do():
-    with pytest.raises(KeyboardInterrupt), opened("pool", 1) as (executor, _):
+    with pytest.raises(KeyboardInterrupt), open_executor("pool", 1) as (executor, _):
         worker = executor.submit(os.getpid).result()
         executor.submit(time.sleep, 10 * PATIENCE)
         began = time.monotonic()
@@ -198,7 +198,7 @@ def the_world_of(monkeypatch, processes, executor):
 def test_over_mpi_the_first_process_asks_all_the_others(monkeypatch):
     executor = object()
     the_world_of(monkeypatch, 5, executor)
-    with by_mpi.on_mpi({"THREADS": "1"}) as asked:
+    with by_mpi.open_mpi_executor({"THREADS": "1"}) as asked:
         assert asked == (executor, 4)
 
 
@@ -206,7 +206,7 @@ def test_over_mpi_another_process_works_and_ends_without_a_word(monkeypatch):
     """It must not go on: the first one alone says what comes of the study."""
     the_world_of(monkeypatch, 5, None)
     with pytest.raises(SystemExit) as ended, ExitStack() as stack:
-        stack.enter_context(by_mpi.on_mpi({"THREADS": "1"}))
+        stack.enter_context(by_mpi.open_mpi_executor({"THREADS": "1"}))
     assert ended.value.code == 0
 
 
@@ -216,4 +216,4 @@ def test_a_process_that_was_started_alone_is_told_how_to_start_more(monkeypatch)
         pytest.raises(Mistake, match=r"two processes or more \(mpiexec -n 5 .*\), got this one alone"),
         ExitStack() as stack,
     ):
-        stack.enter_context(by_mpi.on_mpi({"THREADS": "1"}))
+        stack.enter_context(by_mpi.open_mpi_executor({"THREADS": "1"}))

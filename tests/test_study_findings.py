@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from a7sim.study.figures import of_response
-from a7sim.study.findings import MAX_DENSITIES, document_of
-from a7sim.study.loading import study_of
-from a7sim.study.page import markdown_of
-from a7sim.study.tables import of_study
+from a7sim.study.figures import response_figures
+from a7sim.study.findings import MAX_DENSITIES, findings_document
+from a7sim.study.loading import build_study
+from a7sim.study.page import study_markdown
+from a7sim.study.tables import study_tables
 from a7sim.study.tally import Tally
 from tests.test_study import BY_COMPARATOR
 
@@ -20,16 +20,16 @@ NOISE = 0.01 * np.random.default_rng(1).standard_normal((40, 8))
 
 def found(folder, values, **changes):
     """The document of a study whose responses all have replicates ``(cells, n)``, and its tables as text."""
-    laid = study_of(BY_COMPARATOR | {"responses": [RESPONSE]} | changes, folder)
+    laid = build_study(BY_COMPARATOR | {"responses": [RESPONSE]} | changes, folder)
     values = np.asarray(values, dtype=float)
     responses = len(laid.responses)
     tally = Tally.empty(len(laid.cells), responses)
     for i, each in enumerate(values):
         tally.add(i, np.tile(each, (responses, 1)))
-    document = document_of(laid, tally)
+    document = findings_document(laid, tally)
     console = Console(width=200)
     with console.capture() as printed:
-        console.print(of_study(document))
+        console.print(study_tables(document))
     return document, printed.get()
 
 
@@ -95,7 +95,7 @@ def test_a_hypercube_says_which_way_a_factor_works_or_that_none_does(tmp_path, s
         "samples": 40,
         "factor": [{"name": "film", "path": "film.irregular_um", "range": [0.0, 5.0]}],
     }
-    laid = study_of(BY_COMPARATOR | {"responses": [RESPONSE]} | hypercube, tmp_path)
+    laid = build_study(BY_COMPARATOR | {"responses": [RESPONSE]} | hypercube, tmp_path)
     films = np.array([[cell.settings["film.irregular_um"]] for cell in laid.cells])
     document, printed = found(tmp_path, 9.0 + slope * films + NOISE, **hypercube)
     assert words in document["answer"][0]
@@ -155,13 +155,13 @@ def test_each_response_of_a_hypercube_has_its_own_effects_everywhere(tmp_path):
     document, printed = found(tmp_path, 2.0 + NOISE[:12], **hypercube)
     assert [each["response"] for each in document["main_effects"]] == hypercube["responses"]
     assert printed.count("of that, chance") == 2
-    page, _ = markdown_of(document, "figures")
+    page, _ = study_markdown(document, "figures")
     assert page.count("What each factor weighs alone") == 2
 
 
 def test_a_page_says_loudly_that_all_gave_up_and_that_a_precision_is_not_reached(tmp_path):
     precision = {"response": RESPONSE, "half_width": 1e-6}
-    page, figures = markdown_of(found(tmp_path, np.full((2, 8), np.nan), precision=precision)[0], "figures")
+    page, figures = study_markdown(found(tmp_path, np.full((2, 8), np.nan), precision=precision)[0], "figures")
     assert "**Every session gave up.**" in page
     assert "**The precision asked for is not reached.**" in page
     assert figures == {}
@@ -197,7 +197,7 @@ def test_levels_far_apart_are_drawn_on_a_logarithmic_axis_and_too_many_cells_not
     drawn = {}
     for most in (2, 1):
         monkeypatch.setattr("a7sim.study.figures.MOST_CELLS_DRAWN", most)
-        drawn[most] = [each.caption for each in of_response(document, document["responses"][0])]
+        drawn[most] = [each.caption for each in response_figures(document, document["responses"][0])]
     assert len(drawn[2]) == 2
     assert drawn[1] == drawn[2][:1]
     assert "against film" in drawn[1][0]

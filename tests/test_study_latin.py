@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from a7sim.study.cells import cells_of
-from a7sim.study.findings import document_of
-from a7sim.study.latin import MIN_CELLS, main_effects, share_of_chance
-from a7sim.study.loading import study_of
-from a7sim.study.page import page_of
-from a7sim.study.tables import of_study
+from a7sim.study.cells import make_cells
+from a7sim.study.findings import findings_document
+from a7sim.study.latin import MIN_CELLS, main_effects, noise_share
+from a7sim.study.loading import build_study
+from a7sim.study.page import study_page
+from a7sim.study.tables import study_tables
 from a7sim.study.tally import Tally
 from tests.pages import Page
 
@@ -78,8 +78,8 @@ def test_chance_is_what_means_of_few_replicates_leave_and_common_numbers_are_non
     cells, common = np.linspace(0.0, 1.0, 400)[:, None], 50.0 * rng.standard_normal(10)
     values = cells + common + 0.5 * rng.standard_normal((400, 10))
     expected = 0.025 / (np.var(cells, ddof=1) + 0.025)
-    assert share_of_chance(values) == pytest.approx(expected, rel=0.1)
-    assert np.isnan(share_of_chance(values[:, :1]))
+    assert noise_share(values) == pytest.approx(expected, rel=0.1)
+    assert np.isnan(noise_share(values[:, :1]))
 
 
 def test_a_hypercube_is_told_in_words_tables_and_a_page(tmp_path):
@@ -98,17 +98,17 @@ def test_a_hypercube_is_told_in_words_tables_and_a_page(tmp_path):
         "responses": ["strip_plan_at_checks_m"],
         "replicates": 5,
     }
-    laid = study_of(raw, tmp_path)
+    laid = build_study(raw, tmp_path)
     tally = Tally.empty(40, 1)
     rng = np.random.default_rng(1)
-    for i, cell in enumerate(cells_of(laid.study)):
+    for i, cell in enumerate(make_cells(laid.study)):
         tally.add(i, cell.settings["film.irregular_um"] + 0.1 * rng.standard_normal((1, 5)))
-    document = document_of(laid, tally)
+    document = findings_document(laid, tally)
     (hypercube,) = document["main_effects"]
     assert [each["factor"] for each in hypercube["factors"]] == ["film", "kind"]
     assert "alone it follows film (100 % of the variance between cells" in document["answer"][0]
     assert ", growing with it)" in document["answer"][0]
     assert "kind" not in document["answer"][0].split("alone")[1]
-    rows = Page(page_of(document)).table("What each factor weighs alone").rows
+    rows = Page(study_page(document)).table("What each factor weighs alone").rows
     assert [row[0] for row in rows] == ["film", "kind"]
-    of_study(document)
+    study_tables(document)

@@ -5,12 +5,12 @@ import pytest
 from scipy import stats
 
 from a7sim.study.statistics import (
-    compared,
+    compare_cells,
     densities,
-    dependence,
     holm,
     mean_interval,
     quantile_with_interval,
+    regress_on,
     sd_interval,
     variance_by_factor,
 )
@@ -21,13 +21,13 @@ RNG = np.random.default_rng(12)
 def test_a_comparison_is_the_paired_t_test_of_scipy():
     one, other = RNG.normal(1.0, 1.0, 40), RNG.normal(0.8, 1.0, 40)
     expected = stats.ttest_rel(one, other)
-    found = compared(one, other)
+    found = compare_cells(one, other)
     assert found.p == pytest.approx(expected.pvalue)
     assert found.interval == pytest.approx(tuple(expected.confidence_interval()))
 
 
 def test_a_comparison_leaves_out_pairs_of_which_one_gave_up():
-    found = compared(np.array([1.0, np.nan, 3.0, 5.0]), np.array([0.0, 1.0, np.nan, 2.0]))
+    found = compare_cells(np.array([1.0, np.nan, 3.0, 5.0]), np.array([0.0, 1.0, np.nan, 2.0]))
     assert (found.pairs, found.difference) == (2, 2.0)
 
 
@@ -128,7 +128,7 @@ def test_the_interval_of_an_effect_holds_the_truth_as_often_as_it_says(shift):
     held = 0
     for _ in range(300):
         common = rng.normal(0.0, 0.8, 60)
-        found = compared(common + rng.normal(shift, 0.6, 60), common + rng.normal(0.0, 0.6, 60))
+        found = compare_cells(common + rng.normal(shift, 0.6, 60), common + rng.normal(0.0, 0.6, 60))
         low, high = found.effect_interval
         held += low <= shift <= high
     assert 270 <= held <= 297
@@ -136,7 +136,7 @@ def test_the_interval_of_an_effect_holds_the_truth_as_often_as_it_says(shift):
 
 def test_a_contrast_of_cells_is_that_of_their_means_in_deviations_of_one_replicate():
     values, against = RNG.normal(1.0, 1.0, (3, 2000)), RNG.normal(0.0, 1.0, (2, 2000))
-    found = compared(values, against)
+    found = compare_cells(values, against)
     assert found.difference == pytest.approx(values.mean() - against.mean())
     assert found.effect == pytest.approx(1.0, abs=0.1)
 
@@ -144,7 +144,7 @@ def test_a_contrast_of_cells_is_that_of_their_means_in_deviations_of_one_replica
 def test_dependence_in_one_cell_is_the_regression_of_scipy():
     x = RNG.normal(size=400)
     y = 0.5 * x + RNG.normal(size=400)
-    found, expected = dependence(y[None], x[None]), stats.linregress(x, y)
+    found, expected = regress_on(y[None], x[None]), stats.linregress(x, y)
     assert (found.slope, found.correlation) == pytest.approx((expected.slope, expected.rvalue))
     interval = stats.pearsonr(x, y).confidence_interval()
     assert found.correlation_interval == pytest.approx(tuple(interval), abs=0.03)
@@ -153,7 +153,7 @@ def test_dependence_in_one_cell_is_the_regression_of_scipy():
 def test_dependence_takes_off_what_differs_between_cells_and_counts_replicates_once():
     x = RNG.normal(size=(1, 300))
     y = 0.2 * x + RNG.normal(size=(1, 300))
-    one, same_twice = dependence(y, x), dependence(np.vstack([y, y + 7.0]), np.vstack([x, x - 5.0]))
+    one, same_twice = regress_on(y, x), regress_on(np.vstack([y, y + 7.0]), np.vstack([x, x - 5.0]))
     assert same_twice.slope == pytest.approx(one.slope)
     assert same_twice.interval == pytest.approx(one.interval)
     assert same_twice.correlation_interval == pytest.approx(one.correlation_interval)
@@ -173,12 +173,12 @@ def test_too_few_values_say_nothing_instead_of_something():
     assert np.isnan(sd_interval(one, 1, (0,))).all()
     value, interval = quantile_with_interval(np.array([]), 0.5)
     assert np.isnan([value, *interval]).all()
-    alone = compared(one, np.array([1.0]))
+    alone = compare_cells(one, np.array([1.0]))
     assert alone.pairs == 1
     assert np.isnan([alone.difference, *alone.interval, alone.p]).all()
     same, rising = np.ones((1, 5)), np.arange(5.0)[None]
     for values, on, count in ((two, two, 2), (same, rising, 5), (rising, same, 5)):
-        found = dependence(values, on)
+        found = regress_on(values, on)
         assert found.replicates == count
         assert np.isnan([found.slope, *found.interval, found.correlation, *found.correlation_interval, found.p]).all()
     assert variance_by_factor(np.array([[1.0, np.nan], [2.0, 3.0]]), ["f"]) == []

@@ -8,21 +8,21 @@ from a7sim.report.drawing import standalone
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session.combinations import combinations
-from a7sim.session.crossing import crossed
-from a7sim.session.strips import ground_of, grounded, models_of, of_grounded
-from a7sim.session.ways import documents_of_all_ways
+from a7sim.session.crossing import combine_strips
+from a7sim.session.strips import ground_control, models_from_documents, orient_strip, oriented_strip_document
+from a7sim.session.ways import run_all_methods_batch
 from a7sim.standard_points import CASES
 from a7sim.study import claims
 from a7sim.study import figures as figures_of_study
 from a7sim.study.cells import Cell
 from a7sim.study.checkpoint import save
-from a7sim.study.executors import opened
-from a7sim.study.findings import document_of
-from a7sim.study.loading import load_study, study_of
-from a7sim.study.page import markdown_of, page_of
-from a7sim.study.running import Pace, work
+from a7sim.study.executors import open_executor
+from a7sim.study.findings import findings_document
+from a7sim.study.loading import build_study, load_study
+from a7sim.study.page import study_markdown, study_page
+from a7sim.study.running import Pace, run_study
 from a7sim.study.schema import Claim
-from a7sim.study.simulating import Task, seed_of
+from a7sim.study.simulating import Task, replicate_seed
 from a7sim.study.tally import Tally
 
 STUDY = {
@@ -54,7 +54,7 @@ STUDY = {
 
 
 def laid(tmp_path, **changes):
-    return study_of(STUDY | changes, tmp_path)
+    return build_study(STUDY | changes, tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def scenario():
     return load_scenario("akwanga", settings=STUDY["settings"])
 
 
-SEEDS = [seed_of(STUDY["seed"], each) for each in range(3)]
+SEEDS = [replicate_seed(STUDY["seed"], each) for each in range(3)]
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def asked(tmp_path_factory):
     by_case = {}
 
     def kept(scenario, *arguments, **options):
-        by_case[scenario.plan.case] = documents_of_all_ways(scenario, *arguments, **options)
+        by_case[scenario.plan.case] = run_all_methods_batch(scenario, *arguments, **options)
         return by_case[scenario.plan.case]
 
     with pytest.MonkeyPatch.context() as patched:
@@ -92,16 +92,16 @@ def replicates(asked):
 
 @pytest.fixture(scope="module")
 def ground(scenario):
-    return ground_of(scenario, build_scene(scenario, 1))
+    return ground_control(scenario, build_scene(scenario, 1))
 
 
 def test_strips_on_arrays_are_those_of_the_computing_room(scenario, replicates, ground):
     """Every one of the twenty-five is `grounded` to a hundredth of a micron, far below the 0.1 mm that are printed."""
-    by_case = {case: models_of(each["models"]) for case, each in replicates[0].items()}
-    (documents,) = crossed(replicates[:1], 2, ground, scenario.strip)
+    by_case = {case: models_from_documents(each["models"]) for case, each in replicates[0].items()}
+    (documents,) = combine_strips(replicates[:1], 2, ground, scenario.strip)
     assert len(documents) == 25
     for combination, document in zip(combinations(by_case), documents, strict=True):
-        expected = of_grounded(grounded(combination.models, ground))
+        expected = oriented_strip_document(orient_strip(combination.models, ground))
         strip = document["strip"]
         assert strip["joins"][0]["max_residual_mm"] == pytest.approx(expected["joins"][0]["max_residual_mm"], abs=1e-8)
         for on in ("control", "checks"):
@@ -111,12 +111,12 @@ def test_strips_on_arrays_are_those_of_the_computing_room(scenario, replicates, 
 
 
 def test_no_bit_of_a_strip_depends_on_the_replicates_beside_it(scenario, replicates, ground):
-    together = list(crossed(replicates, 2, ground, scenario.strip))
-    assert together == [strips for each in replicates for strips in crossed([each], 2, ground, scenario.strip)]
+    together = list(combine_strips(replicates, 2, ground, scenario.strip))
+    assert together == [strips for each in replicates for strips in combine_strips([each], 2, ground, scenario.strip)]
 
 
 def test_a_session_that_gave_up_takes_only_its_own_strips_along(scenario, replicates, ground):
-    _, of_second, *_ = crossed(replicates, 2, ground, scenario.strip)
+    _, of_second, *_ = combine_strips(replicates, 2, ground, scenario.strip)
     statuses = [document["status"] for document in of_second]
     assert statuses.count("does not fit") == 9
     assert statuses[0] == statuses[-1] == "complete"
@@ -125,7 +125,7 @@ def test_a_session_that_gave_up_takes_only_its_own_strips_along(scenario, replic
 
 def test_hours_of_a_strip_of_one_case_are_those_of_its_session(scenario, replicates, ground):
     for number, case in ((0, "A"), (12, "C"), (24, "E")):
-        hours = next(crossed(replicates[:1], 2, ground, scenario.strip))[number]["operator"]["hours"]
+        hours = next(combine_strips(replicates[:1], 2, ground, scenario.strip))[number]["operator"]["hours"]
         assert hours == pytest.approx(replicates[0][case]["operator"]["hours"], abs=1e-3)
 
 
@@ -171,7 +171,7 @@ def test_one_cell_needs_no_session_but_those_of_its_own_cases(tmp_path, monkeypa
         return [replicates[0][scenario.plan.case], replicates[2][scenario.plan.case]]
 
     monkeypatch.setattr("a7sim.study.simulating.documents_of_all_ways", worked_already)
-    whole = list(crossed([replicates[0], replicates[2]], 2, ground, scenario.strip))
+    whole = list(combine_strips([replicates[0], replicates[2]], 2, ground, scenario.strip))
     for cell, cases in ((8, ["B", "D"]), (15, ["D", "A"]), (12, ["C"])):
         assert task.crowded(cell, SEEDS[::2]) == [each[cell] for each in whole]
         assert worked_cases == cases
@@ -198,8 +198,8 @@ def test_a_task_cut_off_between_its_cells_goes_on_to_the_same_numbers(tmp_path, 
 
 def _numbers(study, largest_chunk, tally=None):
     tally = tally or Tally.empty(len(study.cells), len(study.responses))
-    with opened("process") as (executor, at_once):
-        work(study, tally, executor, at_once, pace=Pace(largest_chunk=largest_chunk))
+    with open_executor("process") as (executor, at_once):
+        run_study(study, tally, executor, at_once, pace=Pace(largest_chunk=largest_chunk))
     return tally
 
 
@@ -213,7 +213,7 @@ def test_a_strip_over_the_link_gives_the_same_digits(tmp_path, asked):
 
 @pytest.fixture(scope="module")
 def document(worked):
-    return document_of(*worked)
+    return findings_document(*worked)
 
 
 def test_claims_are_answered_in_words_and_in_one_sentence(document):
@@ -229,14 +229,14 @@ def test_a_factor_that_a_response_cannot_know_has_no_variance(document):
 
 
 def test_the_page_has_the_map_of_the_combinations_and_asks_nothing_of_the_network(document):
-    page = page_of(document)
+    page = study_page(document)
     for words in ("Claim: Density matters.", "Strip plan at checks (m) by model 1 and model 2", "densities by model 1"):
         assert words in page
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
 def test_the_markdown_names_every_figure_that_comes_with_it_and_figures_stand_alone(document):
-    text, figures = markdown_of(document, "../figures/the-")
+    text, figures = study_markdown(document, "../figures/the-")
     assert {"map-strip-plan-at-checks-m.svg", "claims-effect.svg", "claims-correlation.svg"} <= set(figures)
     for name, svg in figures.items():
         assert f"](../figures/the-{name})" in text
@@ -257,7 +257,7 @@ def test_the_verdict_of_a_claim_follows_from_effect_and_interval(shift, replicat
     cells = [Cell(number, {"f": level}, {}) for number, level in enumerate("ABC", start=1)]
     claim = Claim(says="s", about="it", factor="f", alike=["A", "B", "C"], responses=["hours"])
     responses = {"hours": {"name": "hours", "unit": "h", "meaning": "hours"}}
-    (found,) = claims.tested([claim], cells, responses, lambda _: values)
+    (found,) = claims.test_claims([claim], cells, responses, lambda _: values)
     assert found["verdict"] == verdict
     assert len(found["tests"]) == 3
 

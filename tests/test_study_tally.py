@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from a7sim.mistakes import Mistake
 from a7sim.study import checkpoint
-from a7sim.study.checkpoint import KINDS, checkpoint_in, load, newest_in, save
+from a7sim.study.checkpoint import KINDS, checkpoint_path, load, newest_checkpoint, save
 from a7sim.study.sketch import CAPACITY, Sketch
 from a7sim.study.statistics import quantile_with_interval
 from a7sim.study.tally import Tally
@@ -110,7 +110,7 @@ def test_a_checkpoint_of_either_kind_holds_all_and_can_go_on_as_the_other(tmp_pa
     save(tally, tmp_path / name, "study")
     again = load(tmp_path / name, "study")
     save(again, tmp_path / other, "study")
-    assert newest_in(tmp_path) == tmp_path / other
+    assert newest_checkpoint(tmp_path) == tmp_path / other
     assert [path.name for path in tmp_path.iterdir()] == [other]
     more = RNG.normal(size=(2, CAPACITY))
     written = []
@@ -149,10 +149,10 @@ def test_a_checkpoint_of_something_else_is_refused_in_one_sentence(tmp_path, tal
 
 
 def test_without_pyarrow_checkpoints_are_npz_and_parquet_is_one_sentence(tmp_path, tally, monkeypatch):
-    assert checkpoint_in(tmp_path).name == "checkpoint.parquet"
+    assert checkpoint_path(tmp_path).name == "checkpoint.parquet"
     save(tally, tmp_path / "checkpoint.parquet", "study")
     monkeypatch.setattr(checkpoint, "find_spec", lambda name: None)
-    assert checkpoint_in(tmp_path).name == "checkpoint.npz"
+    assert checkpoint_path(tmp_path).name == "checkpoint.npz"
     with pytest.raises(Mistake, match=r"pip install 'a7sim\[parquet\]'"):
         load(tmp_path / "checkpoint.parquet", "study")
 

@@ -10,22 +10,22 @@ from a7sim.geometry import GON
 from a7sim.manual import LEAST_COUNT
 from a7sim.reduction import perspective_centre
 from a7sim.scenario import load_scenario
-from a7sim.session.crowd import open_crowd
+from a7sim.session.crowd import open_batch
 from a7sim.study import theory
-from a7sim.study.findings import document_of
-from a7sim.study.loading import study_of
-from a7sim.study.page import page_of
-from a7sim.study.tables import of_study
+from a7sim.study.findings import findings_document
+from a7sim.study.loading import build_study
+from a7sim.study.page import study_page
+from a7sim.study.tables import study_tables
 from a7sim.study.tally import Tally
 from a7sim.study.theory import (
     ROUNDING,
-    beside_theory,
     centre_sds,
     element_errors,
-    limits_of,
     predicted_sd,
+    quantised_error,
     reading_sd,
-    settled,
+    theory_comparison,
+    theory_limits,
 )
 from tests.pages import Page
 
@@ -70,13 +70,13 @@ def test_without_counters_theory_is_hallerts(monkeypatch):
 def test_a_count_takes_an_error_as_often_as_drawn_errors_say(fraction, sd):
     errors = sd * np.random.default_rng(7).standard_normal(400_000)
     shown = LEAST_COUNT * np.round((LEAST_COUNT * fraction + errors) / LEAST_COUNT)
-    gain, added = settled(fraction, sd)
+    gain, added = quantised_error(fraction, sd)
     assert gain * sd**2 == pytest.approx(np.cov(shown, errors)[0, 1], abs=0.01 * LEAST_COUNT * sd)
     assert (gain * sd) ** 2 + added == pytest.approx(shown.var(), abs=0.01 * LEAST_COUNT**2)
 
 
 def test_far_beyond_a_count_its_fraction_does_not_matter():
-    assert settled(0.3, 3.0 * LEAST_COUNT) == pytest.approx((1.0, ROUNDING**2), rel=1e-3)
+    assert quantised_error(0.3, 3.0 * LEAST_COUNT) == pytest.approx((1.0, ROUNDING**2), rel=1e-3)
 
 
 def test_centres_from_two_levels_spread_as_drawn_pointings_do():
@@ -102,7 +102,7 @@ def test_centres_from_two_levels_spread_as_drawn_pointings_do():
 def test_sessions_spread_as_theory_says_and_not_as_least_squares_alone(method):
     """Within what 150 sessions can tell (a quarter); least squares of free parallaxes falls short by more."""
     scenario = quiet(plan__method=method, plan__centre_method="scales")
-    documents = open_crowd(scenario, range(150)).documents()
+    documents = open_batch(scenario, range(150)).documents()
     predicted = element_errors(scenario, 0)
     ratios = {}
     for name in predicted.names:
@@ -120,20 +120,20 @@ def test_theory_is_silent_where_it_has_nothing_to_say():
     assert predicted_sd(quiet(plan__procedure="empirical"), element) is None
     assert predicted_sd(quiet(plan__centre_method="scales"), "centre_X_error") is None
     assert predicted_sd(load_scenario("a8-strip"), "centre_X_error") is None
-    assert beside_theory(quiet(), "hours", 1.0, 1.0) == {}
+    assert theory_comparison(quiet(), "hours", 1.0, 1.0) == {}
 
 
 def test_an_rms_is_compared_by_its_quadratic_mean_and_a_difference_by_its_spread():
     X, _, _ = centre_sds(quiet())
-    assert beside_theory(quiet(), "centre_X_error", 0.6 * X, 0.8 * X)["ratio"] == pytest.approx(1.0)
+    assert theory_comparison(quiet(), "centre_X_error", 0.6 * X, 0.8 * X)["ratio"] == pytest.approx(1.0)
     name = "models.0.truth.centre_differences.left.X0"
-    assert beside_theory(quiet(), name, 0.6 * X, 0.8 * X)["ratio"] == pytest.approx(0.8)
+    assert theory_comparison(quiet(), name, 0.6 * X, 0.8 * X)["ratio"] == pytest.approx(0.8)
 
 
 def test_what_theory_leaves_out_is_said():
-    assert limits_of(quiet()) == []
+    assert theory_limits(quiet()) == []
     worn = quiet(instrument__condition="worn", film__shear_sigma_ppm=10.0, observer__blunder_rate=0.01)
-    assert [each.split()[0] for each in limits_of(worn)] == ["film", "faults", "slips,"]
+    assert [each.split()[0] for each in theory_limits(worn)] == ["film", "faults", "slips,"]
 
 
 def studied(folder):
@@ -147,11 +147,11 @@ def studied(folder):
         "responses": ["centre_Z_error", "hours"],
         "replicates": 3,
     }
-    laid = study_of(raw, folder)
+    laid = build_study(raw, folder)
     tally = Tally.empty(2, 2)
     for cell in range(2):
         tally.add(cell, np.array([[0.9, 1.0, 1.1], [9.0, 8.0, 7.0]]))
-    return document_of(laid, tally)
+    return findings_document(laid, tally)
 
 
 def test_a_study_has_theory_in_its_document_and_on_its_page(tmp_path):
@@ -160,7 +160,7 @@ def test_a_study_has_theory_in_its_document_and_on_its_page(tmp_path):
     assert spread["ratio"] == pytest.approx(math.hypot(1.0, 0.1) / spread["theory"])
     assert "theory" not in document["cells"][0]["responses"]["hours"]
     assert "It leaves out film that shrinks unevenly" in document["theory"]
-    page = Page(page_of(document))
+    page = Page(study_page(document))
     assert page.table("Means, standard deviations and quantiles").rows[0][-1] == f"{spread['ratio']:.4g}"
 
 
@@ -168,7 +168,7 @@ def test_a_study_prints_what_theory_says_and_how_far_it_is_from_that(tmp_path):
     document = studied(tmp_path)
     console = Console(width=250)
     with console.capture() as printed:
-        console.print(of_study(document))
+        console.print(study_tables(document))
     text = " ".join(printed.get().split())
     assert " ".join(document["theory"].split()) in text
     spread = document["cells"][0]["responses"]["centre_Z_error"]

@@ -6,14 +6,14 @@ import pytest
 from msgspec.structs import replace as changed
 
 from a7sim.session.lines import Chain, read_journal
-from a7sim.training.attempts import attempted, begun, gone_on, write_answers
-from a7sim.training.checking import checked
+from a7sim.training.attempts import resume_attempt, run_attempt, start_attempt, write_answers
+from a7sim.training.checking import check_exercise
 from a7sim.training.exercise import Measured, Played
-from a7sim.training.grading import graded
-from a7sim.training.measures import Found, measure_of
+from a7sim.training.grading import grade_folder
+from a7sim.training.measures import Found, make_metric
 from a7sim.training.room import Unreliable
 from a7sim.training.shelf import ExerciseError, all_exercises, find_exercise, read_exercise
-from a7sim.training.variation import scenario_for, seed_of
+from a7sim.training.variation import attempt_seed, scenario_for
 
 EXERCISES = all_exercises()
 
@@ -29,7 +29,7 @@ def test_a_criterion_that_decides_nothing_is_found_out(parallax, limits, mutatio
     """The time of exercise 4 with a limit that everybody reaches, or nobody."""
     time = parallax.exercise.criteria[-1]
     criteria = [*parallax.exercise.criteria[:-1], changed(time, **limits)]
-    found = checked(changed(parallax, exercise=changed(parallax.exercise, criteria=criteria)))
+    found = check_exercise(changed(parallax, exercise=changed(parallax.exercise, criteria=criteria)))
     dead = [each for each in found.faults if "expected it to decide something" in each]
     assert f"time: expected it to decide something, but nothing changes where {mutation}" in dead
     assert {each.split(":")[0] for each in dead} == {"time"}
@@ -50,12 +50,12 @@ def parallax():
 @pytest.fixture(scope="module")
 def left_standing(parallax, tmp_path_factory):
     folder = tmp_path_factory.mktemp("attempt")
-    assert attempted(parallax, Played(script="faulty-by2-left.a7s"), folder, 4) == ""
+    assert run_attempt(parallax, Played(script="faulty-by2-left.a7s"), folder, 4) == ""
     return folder
 
 
 def test_the_sheet_names_the_mistake_with_its_points(parallax, left_standing):
-    grade = graded(parallax, 4, left_standing)
+    grade = grade_folder(parallax, 4, left_standing)
     mark = next(each for each in grade.failed if each.id == "at-rest")
     assert not grade.passed
     assert mark.sentence.startswith("by\" was never returned to 0 before reading by' at points 1, 5, 6, 2 and 4: -25.")
@@ -73,12 +73,12 @@ def test_an_edited_reply_is_found_by_working_the_journal_again(parallax, left_st
     chain = Chain()
     (tmp_path / "session.jsonl").write_bytes(b"".join(chain.line(each) + b"\n" for each in events))
     with pytest.raises(Unreliable, match=f"line {number}: expected what the instrument does again"):
-        graded(parallax, 4, tmp_path)
+        grade_folder(parallax, 4, tmp_path)
 
 
 def test_a_journal_of_another_seed_is_another_students(parallax, left_standing):
     with pytest.raises(Unreliable, match="expected an attempt with"):
-        graded(parallax, 5, left_standing)
+        grade_folder(parallax, 5, left_standing)
 
 
 def _fields(event):
@@ -92,7 +92,7 @@ def test_the_journal_of_an_attempt_holds_no_truth(left_standing):
 
 
 def test_an_attempt_that_was_cut_off_goes_on_where_it_was(parallax, tmp_path):
-    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
         engine = room.desk.open("client2", time=1.0)
         engine.feed(b'PROJ1:BY 0.30\nREC "1011",BY1\n', 2.0)
         engine.feed(b"REC:COUN?\n", 3.0)
@@ -100,37 +100,37 @@ def test_an_attempt_that_was_cut_off_goes_on_where_it_was(parallax, tmp_path):
     lines = journal.read_bytes().splitlines(keepends=True)
     cut = next(n for n, line in enumerate(lines) if b"REC:COUN?" in line) + 1
     journal.write_bytes(b"".join(lines[:cut]) + b'{"t":3.0,"cl')
-    with gone_on(parallax, 4, tmp_path) as room:
+    with resume_attempt(parallax, 4, tmp_path) as room:
         assert room.autograph.element("by1") == 0.3
         assert [each.point for each in room.account().readings] == ["1011"]
         room.desk.open(time=room.clock.now).feed(b'REC "1012",BY1\n', 9.0)
-    assert graded(parallax, 4, tmp_path).minutes == pytest.approx((9.0 - room.witness.began) / 60.0, abs=0.1)
+    assert grade_folder(parallax, 4, tmp_path).minutes == pytest.approx((9.0 - room.witness.began) / 60.0, abs=0.1)
 
 
 def test_neighbours_have_different_photographs_and_the_same_student_the_same(parallax):
-    ada, bob = (seed_of(name, parallax.name) for name in ("ada", "bob"))
-    assert ada != bob and ada == seed_of("ada", parallax.name)
-    assert ada != seed_of("ada", parallax.name, "exam")
+    ada, bob = (attempt_seed(name, parallax.name) for name in ("ada", "bob"))
+    assert ada != bob and ada == attempt_seed("ada", parallax.name)
+    assert ada != attempt_seed("ada", parallax.name, "exam")
     first, again, other = (scenario_for(parallax, seed) for seed in (ada, ada, bob))
     assert first == again and first.photos != other.photos
 
 
 def test_answers_written_down_count_before_those_noted(tmp_path):
     counters = find_exercise("1")
-    assert attempted(counters, counters.exercise.reference, tmp_path, 1) == ""
-    assert graded(counters, 1, tmp_path).passed
+    assert run_attempt(counters, counters.exercise.reference, tmp_path, 1) == ""
+    assert grade_folder(counters, 1, tmp_path).passed
     write_answers(tmp_path, {"play": "0.5"})
-    assert [each.id for each in graded(counters, 1, tmp_path).failed] == ["play"]
+    assert [each.id for each in grade_folder(counters, 1, tmp_path).failed] == ["play"]
 
 
 def test_pictures_are_not_drawn_again_for_a_grade_and_all_else_is_compared(parallax, tmp_path):
-    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
         engine = room.desk.open("client2")
         first = engine.feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 1.0)
         engine.feed(b'REC "1011",BY1\n', 2.0)
     assert len(set(first)) > 20, "expected a picture that is not black"
-    assert graded(parallax, 4, tmp_path).marks
-    with gone_on(parallax, 4, tmp_path) as room:
+    assert grade_folder(parallax, 4, tmp_path).marks
+    with resume_attempt(parallax, 4, tmp_path) as room:
         assert room.desk.open(time=3.0).feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 3.0) == first
 
 
@@ -165,7 +165,7 @@ def test_a_mistake_in_an_exercise_is_named_with_its_place(parallax, tmp_path, wa
 
 def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
     """By lines that a person might say; what the instrument refuses and what is struck out did not happen."""
-    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
         engine = room.desk.open("client2", time=5.0)
         lines = (
             b'PROJ1:BY 0.30;:REC "1011",BY1\n',
@@ -178,7 +178,7 @@ def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
         account = room.account({"play": "0.08"})
 
         def found(name, **options):
-            return measure_of(Measured(measure=name, options=options)).of(account)
+            return make_metric(Measured(measure=name, options=options)).of(account)
 
         assert found("spread", handles=["by1"]) == Found(0.04, "by' at point 1 read from 0.26 to 0.30")
         assert found("missing-readings", points=["2"]) == Found(1.0, "1 of 1 registration missing: 2")
@@ -191,14 +191,14 @@ def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
 
 def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parallax, tmp_path):
     """At the console whatever is in hand is registered, so that an element is named says nothing."""
-    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
         engine = room.desk.open("client2", time=5.0)
 
         def missing_after(*lines):
             for line in lines:
                 engine.feed(line + b"\n", 6.0)
             options = {"points": ["1"], "each": 4}
-            return measure_of(Measured(measure="missing-pointings", options=options)).of(room.account()).value
+            return make_metric(Measured(measure="missing-pointings", options=options)).of(room.account()).value
 
         assert missing_after(b"DRIV:X 50", b"PROJ1:BY 0.3", b"DRIV:X 1", b'REC "1011",BY1') == 3.0
         assert missing_after(b"PROJ1:BY 0.4;:WHE:Y 0.4", b'REC "1011",BY1') == 3.0
@@ -208,14 +208,14 @@ def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parall
 
 def test_an_answer_that_is_missing_or_no_number_is_told_and_measures_nothing(parallax, tmp_path):
     """What is answered is measured against what was kept back; blanks and capitals of words do not matter."""
-    with begun(parallax, 4, tmp_path, "ada", "practice") as room:
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
         room.desk.open("client2", time=5.0).feed(b'DRIV:X 20;:REC "1011"\n', 6.0)
         blank = room.account({})
         hidden = {"base": 92.5, "height": 300.0, "sign": ["minus", "-"]}
 
     def found(name, answers, **options):
         account = replace(blank, written=answers, hidden=hidden)
-        return measure_of(Measured(measure=name, options=options)).of(account)
+        return make_metric(Measured(measure=name, options=options)).of(account)
 
     both = {"keys": ["base", "height"]}
     assert found("answers-off", {"base": "92", "height": "301"}, **both) == Found(

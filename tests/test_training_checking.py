@@ -5,7 +5,7 @@ import shutil
 import pytest
 from msgspec.structs import replace as changed
 
-from a7sim.training.checking import checked
+from a7sim.training.checking import check_exercise
 from a7sim.training.exercise import Faulty, Played, Shelved, Step
 from a7sim.training.shelf import find_exercise
 
@@ -20,7 +20,7 @@ def wrong(shelved, **changes):
 
 
 def faults_of(shelved):
-    found = checked(shelved)
+    found = check_exercise(shelved)
     assert all("\n" not in fault and "expected " in fault for fault in found.faults)
     return found.faults
 
@@ -35,7 +35,7 @@ def test_all_that_is_missing_of_the_form_is_said_at_once_and_nothing_is_played(p
         criteria=[changed(first, weight=first.weight + 5.0), *others],
         opening=None,
     )
-    found = checked(bare)
+    found = check_exercise(bare)
     assert found.reference_points is None
     assert found.faults == (
         "text.md: expected the exercise in plain words, found none",

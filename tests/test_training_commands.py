@@ -16,12 +16,12 @@ import pytest
 
 from a7sim.link.client import Client
 from a7sim.mistakes import Mistake
-from a7sim.training.attempts import attempted
+from a7sim.training.attempts import run_attempt
 from a7sim.training.exercise import Played
-from a7sim.training.handed_in import graded_folder, graded_folders
+from a7sim.training.handed_in import grade_submission, grade_submissions
 from a7sim.training.progress import FILE, MIGRATIONS, Progress
 from a7sim.training.shelf import find_exercise
-from a7sim.training.variation import seed_of
+from a7sim.training.variation import attempt_seed
 
 EXERCISES = Path(__file__).parents[1] / "exercises"
 REFERENCE = EXERCISES / "04-parallax" / "reference.a7s"
@@ -87,7 +87,9 @@ def test_an_exam_gives_no_hints_ticks_nothing_and_is_over_with_its_grade(train, 
     assert train("verify")[0] == 1
     with Progress(tmp_path / "home") as progress:
         last = progress.last("ada")
-        assert last.closed and last.seed == seed_of("ada", "04-parallax", "exam") != seed_of("ada", "04-parallax")
+        assert last.closed and last.seed == attempt_seed("ada", "04-parallax", "exam") != attempt_seed(
+            "ada", "04-parallax"
+        )
 
 
 def test_reset_keeps_the_old_attempt_and_begins_anew(train, tmp_path):
@@ -163,11 +165,11 @@ def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path, monkeypatch)
     shelved = find_exercise("14")
     folders = []
     for i in range(4):
-        seed = seed_of(f"student {i}", shelved.name)
+        seed = attempt_seed(f"student {i}", shelved.name)
         folders.append(tmp_path / str(i))
-        assert attempted(shelved, Played(script="faulty-kind.a7s"), folders[-1], seed, f"student {i}") == ""
-    together = graded_folders(folders, workers=2)
-    assert together == [graded_folder(folder) for folder in folders]
+        assert run_attempt(shelved, Played(script="faulty-kind.a7s"), folders[-1], seed, f"student {i}") == ""
+    together = grade_submissions(folders, workers=2)
+    assert together == [grade_submission(folder) for folder in folders]
     assert [each.student for each in together] == [f"student {i}" for i in range(4)]
     assert not any(each.grade.passed for each in together)
 

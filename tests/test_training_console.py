@@ -8,7 +8,7 @@ from a7sim.console.eyepiece import Drawing
 from a7sim.console.seat import Seat
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.training.attempts import begun
+from a7sim.training.attempts import start_attempt
 from a7sim.training.checklist import Checklist
 from a7sim.training.progress import Progress
 from a7sim.training.shelf import find_exercise
@@ -34,7 +34,7 @@ def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: 
             await person.type_in("A")
             assert person.message() == "recorded 3: A"
 
-    with begun(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
+    with start_attempt(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
         port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
         tasks = Checklist(room, attempt).lines
         asyncio.run(sit_down(Console(Seat(lambda: Client(port), lambda: 0.0, drawing=Drawing.HALVES, tasks=tasks))))
@@ -63,7 +63,7 @@ def test_points_are_driven_to_with_a_gear_engaged_before_and_counters_preset_by_
                     await person.press(":")
                     await person.type_in(line)
 
-    with begun(shelved, 9, tmp_path, "ada", "practice") as room:
+    with start_attempt(shelved, 9, tmp_path, "ada", "practice") as room:
         port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
         asyncio.run(sit_down(Console(Seat(lambda: Client(port), lambda: 0.0, drawing=Drawing.HALVES))))
         assert abs(room.autograph.counter("X") - 5000.0 - 194.99) < 15.0

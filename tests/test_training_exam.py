@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from a7sim.training.exercise import Measured
-from a7sim.training.measures import measure_of
+from a7sim.training.measures import make_metric
 from a7sim.training.progress import Progress
-from a7sim.training.room import entered
+from a7sim.training.room import open_environment
 from a7sim.training.shelf import ExerciseError, find_exercise, read_exercise
 from a7sim.training.variation import scenario_for
 
@@ -93,9 +93,9 @@ def test_fittings_are_judged_by_the_job_sheet(exam, tmp_path):
     """Right levers do not help where base or pictures are not those that were ordered."""
     ordered = scenario_for(exam, 16).models[0]
     assert ordered.base == "outside"
-    with entered(exam, 16, tmp_path, "ada", "exam") as room:
+    with open_environment(exam, 16, tmp_path, "ada", "exam") as room:
         engine = room.desk.open("client2")
-        found = measure_of(Measured(measure="wrong-fittings", options={"by_job": True})).of
+        found = make_metric(Measured(measure="wrong-fittings", options={"by_job": True})).of
         engine.feed(f'PHOT1:LOAD "{ordered.left}";:PHOT2:LOAD "{ordered.right}"\n'.encode(), 1.0)
         assert "the base is inside and belongs outside" in found(room.account()).reason
         assert f"{ordered.left} lies in projector 1 and {ordered.right} belongs there" in found(room.account()).reason

@@ -7,10 +7,10 @@ import pytest
 
 from a7sim.geometry import GON
 from a7sim.session.grid_test import true_errors
-from a7sim.training.attempts import attempted
+from a7sim.training.attempts import run_attempt
 from a7sim.training.exercise import Played
-from a7sim.training.grading import account_in, grade_of
-from a7sim.training.handouts import handed_out
+from a7sim.training.grading import grade_record, load_record
+from a7sim.training.handouts import make_handout
 from a7sim.training.measures.ground import element_at, last_readings
 from a7sim.training.shelf import find_exercise
 from a7sim.training.variation import scenario_for
@@ -29,8 +29,8 @@ PERFECT = {
 @pytest.fixture(scope="module")
 def grid_tested(tmp_path_factory):
     shelved, folder = find_exercise("13"), tmp_path_factory.mktemp("grid")
-    assert attempted(shelved, shelved.exercise.reference, folder, 3) == ""
-    return account_in(shelved, 3, folder)
+    assert run_attempt(shelved, shelved.exercise.reference, folder, 3) == ""
+    return load_record(shelved, 3, folder)
 
 
 @pytest.mark.parametrize("projector", [1, 2])
@@ -62,9 +62,9 @@ def test_the_grid_test_by_hand_finds_what_stands_in_a_worn_projector(grid_tested
 def test_the_misread_point_can_be_found_and_the_strip_comes_to_the_true_ground(seed, tmp_path):
     shelved = find_exercise("12")
     scenario = scenario_for(shelved, seed)
-    made = handed_out("model sheets", scenario, seed, shelved.exercise.handout_options)
-    assert attempted(shelved, shelved.exercise.reference, tmp_path, seed) == ""
-    account = account_in(shelved, seed, tmp_path)
+    made = make_handout("model sheets", scenario, seed, shelved.exercise.handout_options)
+    assert run_attempt(shelved, shelved.exercise.reference, tmp_path, seed) == ""
+    account = load_record(shelved, seed, tmp_path)
     assert account.answers["bad"] == made.hidden["bad"]
     for name in ("8003", "8005"):
         found = [float(account.answers[f"{axis}{name}"]) for axis in "xyz"]
@@ -74,8 +74,8 @@ def test_the_misread_point_can_be_found_and_the_strip_comes_to_the_true_ground(s
 def test_who_leaves_the_misread_point_in_is_told_where_it_shows(tmp_path):
     shelved = find_exercise("12")
     played = Played(procedure="strip by cards", options={"wanted": ["8003", "8005"], "leave_out": False})
-    assert attempted(shelved, played, tmp_path, 12) == ""
-    failed = {each.id: each for each in grade_of(account_in(shelved, 12, tmp_path)).failed}
+    assert run_attempt(shelved, played, tmp_path, 12) == ""
+    failed = {each.id: each for each in grade_record(load_record(shelved, 12, tmp_path)).failed}
     assert set(failed) == {"plan"}
     assert "y8003 was answered" in failed["plan"].sentence
 
@@ -83,8 +83,8 @@ def test_who_leaves_the_misread_point_in_is_told_where_it_shows(tmp_path):
 @pytest.fixture(scope="module")
 def levelled(tmp_path_factory):
     shelved, folder = find_exercise("10"), tmp_path_factory.mktemp("levelled")
-    assert attempted(shelved, Played(procedure="absolute orientation", observer=PERFECT), folder, 8) == ""
-    return account_in(shelved, 8, folder)
+    assert run_attempt(shelved, Played(procedure="absolute orientation", observer=PERFECT), folder, 8) == ""
+    return load_record(shelved, 8, folder)
 
 
 def test_levelling_turns_both_projectors_as_the_text_says(levelled):
@@ -103,5 +103,5 @@ def test_levelling_turns_both_projectors_as_the_text_says(levelled):
 
 
 def test_a_perfect_eye_is_left_with_what_film_and_counts_allow(levelled):
-    marks = {each.id: each for each in grade_of(levelled).marks}
+    marks = {each.id: each for each in grade_record(levelled).marks}
     assert marks["heights"].value < 0.15 and marks["on-the-ground"].value < 4.0

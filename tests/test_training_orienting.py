@@ -11,10 +11,10 @@ from a7sim.reduction import Stand, perspective_centre
 from a7sim.reduction.hallert import regular_corrections
 from a7sim.scenario import load_scenario
 from a7sim.standard_points import CASES
-from a7sim.training.attempts import attempted
+from a7sim.training.attempts import run_attempt
 from a7sim.training.exercise import Played
-from a7sim.training.forms import FIVE, form_of, multipliers
-from a7sim.training.grading import graded
+from a7sim.training.forms import FIVE, computation_form, multipliers
+from a7sim.training.grading import grade_folder
 from a7sim.training.measures.centres import sigmas_of_centre
 from a7sim.training.measures.clearing import Turn
 from a7sim.training.shelf import find_exercise
@@ -39,7 +39,7 @@ def test_form_a_is_hallerts_six_point_form(akwanga):
 
 @pytest.mark.parametrize("case", "AE")
 def test_a_form_has_a_line_for_every_point_and_leaves_the_sums_to_the_student(akwanga, case):
-    lines = form_of(akwanga, case).splitlines()
+    lines = computation_form(akwanga, case).splitlines()
     rows = [line.split() for line in lines if line[:1] in CASES[case] and "........" in line]
     assert [row[0] for row in rows] == list(CASES[case])
     assert all(row[1:5] == ["........"] * 4 for row in rows)
@@ -96,8 +96,8 @@ def test_tolerances_of_centres_rest_on_what_pointings_scatter_by(akwanga):
 
 def sheet_of(name, folder, seed, **played):
     shelved = find_exercise(name)
-    attempted(shelved, Played(**played), folder, seed)
-    return {each.id: each for each in graded(shelved, seed, folder).marks}
+    run_attempt(shelved, Played(**played), folder, seed)
+    return {each.id: each for each in grade_folder(shelved, seed, folder).marks}
 
 
 def test_the_sheet_says_how_far_omega_should_have_gone(tmp_path):

@@ -2,8 +2,8 @@
 
 import pytest
 
-from a7sim.training.attempts import attempted, seed_played
-from a7sim.training.grading import account_in, found_in
+from a7sim.training.attempts import run_attempt, seed_for
+from a7sim.training.grading import evaluate_metrics, load_record
 from a7sim.training.rehearsing import Rehearsals
 from a7sim.training.shelf import find_exercise
 
@@ -24,17 +24,17 @@ def test_a_rehearsal_comes_to_what_the_journal_of_the_same_attempt_gives(number,
     rehearsals = Rehearsals(shelved)
     rehearsals.attempted(shelved.exercise.reference)
     rehearsed, trouble = rehearsals.attempted(played)
-    seed = seed_played(shelved, played)
-    assert attempted(shelved, played, tmp_path, seed) == trouble
-    journalled = account_in(shelved, seed, tmp_path)
+    seed = seed_for(shelved, played)
+    assert run_attempt(shelved, played, tmp_path, seed) == trouble
+    journalled = load_record(shelved, seed, tmp_path)
     assert len(journalled.deeds) > 0
     assert seen(rehearsed) == seen(journalled)
-    assert found_in(rehearsed) == found_in(journalled)
+    assert evaluate_metrics(rehearsed) == evaluate_metrics(journalled)
 
 
 def test_what_is_rehearsed_leaves_the_opening_as_it_was():
     rehearsals = Rehearsals(find_exercise("9"))
-    seed = seed_played(rehearsals.shelved, rehearsals.shelved.exercise.reference)
+    seed = seed_for(rehearsals.shelved, rehearsals.shelved.exercise.reference)
     before = rehearsals.left(seed, None)
     rehearsals.attempted(rehearsals.shelved.exercise.reference)
     assert seen(rehearsals.left(seed, None)) == seen(before)

@@ -8,7 +8,7 @@ from typing import get_args
 import pytest
 
 from a7sim.scenario.schema import SlipKind
-from a7sim.training.handouts import handed_out
+from a7sim.training.handouts import make_handout
 from a7sim.training.shelf import find_exercise
 from a7sim.training.variation import scenario_for
 
@@ -46,7 +46,7 @@ def contradictions(rows):
 def test_every_kind_of_slip_leaves_a_contradiction_that_its_mending_removes(kind):
     exercise = find_exercise("14")
     for seed in (1, 2, 3):
-        made = handed_out("book with a slip", scenario_for(exercise, seed), seed, {"kind": kind})
+        made = make_handout("book with a slip", scenario_for(exercise, seed), seed, {"kind": kind})
         rows = list(csv.DictReader(io.StringIO(made.papers["book.csv"])))
         assert made.hidden["kind"] == kind
         assert contradictions(rows)
@@ -57,6 +57,6 @@ def test_every_kind_of_slip_leaves_a_contradiction_that_its_mending_removes(kind
 
 def test_seeds_draw_different_slips_and_the_same_seed_the_same_book():
     exercise = find_exercise("14")
-    made = [handed_out("book with a slip", scenario_for(exercise, seed), seed, {}) for seed in (*range(12), 0)]
+    made = [make_handout("book with a slip", scenario_for(exercise, seed), seed, {}) for seed in (*range(12), 0)]
     assert len({each.hidden["kind"] for each in made}) >= 5
     assert made[0] == made[-1]

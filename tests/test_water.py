@@ -9,22 +9,22 @@ import pytest
 from click.testing import CliRunner
 
 from a7sim.cli import cli
-from a7sim.operator import DoesNotFit, work
+from a7sim.operator import DoesNotFit, measure_models
 from a7sim.operator.bench import Bench
 from a7sim.operator.compilation import Compilation
 from a7sim.operator.crew import Crew
-from a7sim.operator.level_model import levelled
+from a7sim.operator.level_model import level_model
 from a7sim.operator.line_hands import LineHands
 from a7sim.operator.map_lines import Area, Tracing
 from a7sim.operator.stereo_view import StereoView
-from a7sim.operator.work import worked
+from a7sim.operator.work import measure_models_batch
 from a7sim.scenario import load_scenario
 from a7sim.scenario.schema import Water
 from a7sim.scene import build_scene
 from a7sim.scene.content import WATER_TONE
 from a7sim.session import open_session
-from a7sim.session.crowd import open_crowd
-from a7sim.session.strips import ground_of
+from a7sim.session.crowd import open_batch
+from a7sim.session.strips import ground_control
 from a7sim.standard_points import CASES, determine_orientation
 from tests.sessions import read_once, without_errors
 from tests.test_crowd import same_to_the_digit
@@ -48,7 +48,7 @@ def flooded(name, **overrides):
 
 def worked_alone(scenario, seed=1):
     session = open_session(scenario, seed)
-    return next(iter(work(session.person, session.job))), session.person
+    return next(iter(measure_models(session.person, session.job))), session.person
 
 
 # --- the scene ------------------------------------------------------------------------------------------
@@ -168,7 +168,7 @@ def test_a_point_that_only_some_of_a_crowd_find_on_their_prints_is_used_by_these
     scenario = msgspec.structs.replace(scenario, models=scenario.models[:1])
     shown = [
         all(scene.photographs[name].points.get("1015") is not None for name in ("101", "102"))
-        for scene in open_crowd(scenario, (2, 3)).scenes
+        for scene in open_batch(scenario, (2, 3)).scenes
     ]
     assert shown == [False, True]
     assert same_to_the_digit(scenario, (2, 3), all_finish=True)
@@ -252,9 +252,9 @@ def test_on_water_no_spot_is_set_and_no_contour_followed():
     person = session.person
     person.book.head("", "preparation")
     bench = Bench(Crew.of_one(person), LineHands(person), replace(session.job, models=session.job.models[:1]))
-    record = next(worked(bench)).of(0)
+    record = next(measure_models_batch(bench)).of(0)
     view = StereoView(bench, person)
-    model = levelled(bench, view, record.points, ground_of(scenario, session.scene), 3750.0)
+    model = level_model(bench, view, record.points, ground_control(scenario, session.scene), 3750.0)
     ground = session.scene.ground
     shore = np.array([*ground.shores[0][:, 2], 460.0])
     x, y, _ = model.readings_of(shore)

@@ -14,7 +14,7 @@ from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Crew
 from a7sim.operator.empirical import over_correction
 from a7sim.operator.line_hands import LineHands
-from a7sim.operator.work import oriented, worked
+from a7sim.operator.work import measure_models_batch, orient_model
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session
 
@@ -42,8 +42,8 @@ def seen_at_six(n_and_seed):
     session = open_session(load_scenario("akwanga", plan | {"plan.tolerated_parallax_um": "1000"}), seed)
     bench = Bench(Crew.of_one(session.person), LineHands(session.person), session.job)
     with suppress(_IsReady):
-        next(worked(bench, _stop))
-    found = oriented(bench, session.job.models[0]).of(0)
+        next(measure_models_batch(bench, _stop))
+    found = orient_model(bench, session.job.models[0]).of(0)
     _, y, z = found.places["6"]
     return [abs(each.parallaxes["6"]) for each in found.rounds], float(over_correction(z, abs(y)))
 

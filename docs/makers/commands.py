@@ -6,7 +6,7 @@ from inspect import cleandoc
 import click
 
 from a7sim.cli import cli
-from a7sim.cli.complaints import in_words
+from a7sim.cli.complaints import describe_range
 
 OPENING = """# Commands
 
@@ -63,7 +63,9 @@ def _row(option, context):
     extra = option.get_help_extra(context)
     bracketed = re.compile(r"\s*\[(?:[^\[\]]|\[[^\]]*\])*\]$")
     told = bracketed.sub("", about) if any(extra.values()) else about
-    limits = ", ".join(filter(None, (in_words(option.type) if "range" in extra else "", extra.get("required", ""))))
+    limits = ", ".join(
+        filter(None, (describe_range(option.type) if "range" in extra else "", extra.get("required", "")))
+    )
     told, spoken, said = told.partition("  [default: ")
     told += "." if spoken else ""
     default = str(extra.get("default", said.removesuffix("]")))

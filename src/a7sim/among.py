@@ -12,7 +12,7 @@ Who = npt.NDArray[np.intp]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
-def without(who: Who, others: Who) -> Who:
+def exclude(who: Who, others: Who) -> Who:
     """Return those of some that are not among others, in their order."""
     if not who.size or not others.size:
         return who
@@ -21,7 +21,7 @@ def without(who: Who, others: Who) -> Who:
     return np.asarray(who[stays[who]])
 
 
-def among(values: npt.NDArray[Scalar], who: Who) -> npt.NDArray[Scalar]:
+def take(values: npt.NDArray[Scalar], who: Who) -> npt.NDArray[Scalar]:
     """Return the values ``(..., m)`` of some among those ``(..., all)``, to be read at once and not written to.
 
     They are laid out as these, where indexing transposes; everybody's are not copied.
@@ -40,7 +40,7 @@ def put(values: npt.NDArray[np.float64], who: Who, into: npt.NDArray[np.float64]
             row[who] = new
 
 
-def add(amount: float, who: Who, to: npt.NDArray[np.float64]) -> None:
+def add_at(amount: float, who: Who, to: npt.NDArray[np.float64]) -> None:
     """Add an amount to the values of some among those ``(all,)`` of all."""
     if who.size == to.size:
         to += amount

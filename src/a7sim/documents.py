@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from a7sim.geometry import GON, Array
-from a7sim.reduction.absolute import AbsoluteOrientation, GroundFit, largest, root_mean_square
+from a7sim.reduction.absolute import AbsoluteOrientation, GroundFit, max_abs_residual, root_mean_square
 from a7sim.reduction.least_squares import Adjustment
 from a7sim.reduction.polynomials import StripAdjustment
 from a7sim.reduction.similarity import Similarity
@@ -18,7 +18,7 @@ SCHEMA_VERSION = 1
 Document = dict[str, Any]
 
 
-def head(command: str) -> Document:
+def document_header(command: str) -> Document:
     """Return what every document says first."""
     return {"schema_version": SCHEMA_VERSION, "command": command}
 
@@ -28,12 +28,12 @@ def as_json(document: Document) -> str:
     return msgspec.json.format(msgspec.json.encode(document), indent=2).decode() + "\n"
 
 
-def by_point(points: Sequence[str], values: Array) -> dict[str, list[float]]:
+def points_as_rows(points: Sequence[str], values: Array) -> dict[str, list[float]]:
     """Return values ``(k, n)`` as a list of k for each of n points."""
     return dict(zip(points, values.T.tolist(), strict=True))
 
 
-def of_elements(values: Mapping[str, Array], sigmas: Mapping[str, Array]) -> Document:
+def elements_document(values: Mapping[str, Array], sigmas: Mapping[str, Array]) -> Document:
     """Return elements with their standard deviations, angles in gon."""
     units = {name: 1.0 if name.startswith("b") else GON for name in values}
     return {
@@ -42,7 +42,7 @@ def of_elements(values: Mapping[str, Array], sigmas: Mapping[str, Array]) -> Doc
     }
 
 
-def of_statistics(adjustment: Adjustment, names: Sequence[str], observations: Sequence[str]) -> Document:
+def statistics_document(adjustment: Adjustment, names: Sequence[str], observations: Sequence[str]) -> Document:
     """Return the statistics of an adjustment whose unknowns and observations are named; correlations row by row."""
     return {
         "unknowns": list(names),
@@ -53,7 +53,7 @@ def of_statistics(adjustment: Adjustment, names: Sequence[str], observations: Se
     }
 
 
-def of_similarity(found: Similarity) -> Document:
+def similarity_document(found: Similarity) -> Document:
     """Return scale, rotation and translation."""
     return {
         "scale": float(found.scale),
@@ -62,7 +62,7 @@ def of_similarity(found: Similarity) -> Document:
     }
 
 
-def of_joins(strip: Strip) -> list[Document]:
+def joins_document(strip: Strip) -> list[Document]:
     """Return the connections of a strip's models."""
     return [
         {
@@ -75,17 +75,17 @@ def of_joins(strip: Strip) -> list[Document]:
     ]
 
 
-def of_absolute(oriented: AbsoluteOrientation) -> Document:
+def absolute_document(oriented: AbsoluteOrientation) -> Document:
     """Return an absolute orientation with its residuals, how accurate it is, and its warnings."""
     return {
-        "absolute": of_similarity(oriented.similarity),
-        "residuals_m": of_residuals(oriented.fit),
-        "accuracy_m": of_accuracy(oriented.fit),
+        "absolute": similarity_document(oriented.similarity),
+        "residuals_m": residuals_document(oriented.fit),
+        "accuracy_m": accuracy_document(oriented.fit),
         "warnings": list(oriented.warnings),
     }
 
 
-def of_adjustment(adjusted: StripAdjustment) -> Document:
+def adjustment_document(adjusted: StripAdjustment) -> Document:
     """Return a polynomial adjustment: its residuals and what it found the strip to be."""
     found = adjusted.deformation
     return {
@@ -98,12 +98,12 @@ def of_adjustment(adjusted: StripAdjustment) -> Document:
             "vertical_sag_m": float(found.vertical_sag),
             "twist_gon_per_km": 1e3 * float(found.twist) / GON,
         },
-        "residuals_m": of_residuals(adjusted.fit),
-        "accuracy_m": of_accuracy(adjusted.fit),
+        "residuals_m": residuals_document(adjusted.fit),
+        "accuracy_m": accuracy_document(adjusted.fit),
     }
 
 
-def of_residuals(fit: GroundFit) -> Document:
+def residuals_document(fit: GroundFit) -> Document:
     """Return computed minus given at every ground point, with its role; null where nothing is given."""
     return {
         point: {"role": role} | {axis: _known(value) for axis, value in zip("XYZ", residual, strict=True)}
@@ -111,18 +111,18 @@ def of_residuals(fit: GroundFit) -> Document:
     }
 
 
-def of_accuracy(fit: GroundFit) -> Document:
+def accuracy_document(fit: GroundFit) -> Document:
     """Return rms and largest residuals at control and at checks; `plan` is the rms distance in plan."""
     return {
-        which: of_differences(residuals)
+        which: differences_document(residuals)
         for which, residuals in (("control", fit.at_control), ("checks", fit.at_checks))
         if np.isfinite(residuals).any()
     }
 
 
-def of_differences(residuals: Array) -> Document:
+def differences_document(residuals: Array) -> Document:
     """Return rms and largest of differences ``(3, n)`` in X, Y and Z, nan left out."""
-    rms, most = root_mean_square(residuals), largest(residuals)
+    rms, most = root_mean_square(residuals), max_abs_residual(residuals)
     return {
         "points": int(np.isfinite(residuals).any(axis=0).sum()),
         "rms": {axis: _known(float(value)) for axis, value in zip("XYZ", rms, strict=True)},

@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from a7sim.mistakes import Mistake
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 MAX_FILE_BYTES = 20_000_000
 """Bytes; a longer file is refused before it is read."""
@@ -107,7 +107,7 @@ class Table:
         return value
 
 
-def what_is_at(path: Path) -> str:
+def describe_missing_file(path: Path) -> str:
     """Return what is found where a file is looked for and there is none."""
     return "a folder" if path.is_dir() else "no such file"
 
@@ -183,7 +183,7 @@ def _csv_table(path: Path, text: str) -> Table:
         raise Mistake(f"{path}, line {header_line}, column {_shown(twice)}: expected every column once, got it twice")
     for line, cells in lines[1:]:
         if len(cells) != len(columns):
-            raise Mistake(f"{path}, line {line}: expected {counted(len(columns), 'column')}, got {len(cells)}")
+            raise Mistake(f"{path}, line {line}: expected {pluralize(len(columns), 'column')}, got {len(cells)}")
     cells_of = tuple((line, dict(zip(columns, cells, strict=True))) for line, cells in lines[1:])
     return Table(path, tuple(columns), cells_of, f", line {header_line}", "line")
 
@@ -231,7 +231,7 @@ def _toml_cell(path: Path, row: int, column: str, value: Any) -> str:
     return value.strip() if isinstance(value, str) else repr(value)
 
 
-def unique(path: str | Path, rows: Sequence[Row], *columns: str) -> dict[tuple[str, ...], Row]:
+def rows_by_key(path: str | Path, rows: Sequence[Row], *columns: str) -> dict[tuple[str, ...], Row]:
     """Return the rows by the texts of the named columns. Raises Mistake when two rows have the same."""
     found: dict[tuple[str, ...], Row] = {}
     for row in rows:
@@ -246,14 +246,14 @@ def unique(path: str | Path, rows: Sequence[Row], *columns: str) -> dict[tuple[s
     return found
 
 
-def numbered_order(name: str) -> tuple[tuple[str | tuple[int, str], ...], str]:
+def natural_sort_key(name: str) -> tuple[tuple[str | tuple[int, str], ...], str]:
     """Return a key that sorts names as people number them: 2 before 10, `7a` before `7b`."""
     parts = re.split(r"([0-9]+)", name)
     shown = [part.lstrip("0") if i % 2 else part for i, part in enumerate(parts)]
     return tuple((len(part), part) if i % 2 else part for i, part in enumerate(shown)), name
 
 
-def csv_text(columns: Sequence[str], rows: Iterable[Sequence[str | float | None]]) -> str:
+def to_csv(columns: Sequence[str], rows: Iterable[Sequence[str | float | None]]) -> str:
     """Return a table as CSV, numbers with six decimals, an empty cell for None and nan."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

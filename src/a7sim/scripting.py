@@ -11,17 +11,17 @@ from a7sim.instrument.language import Desk
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import TIMEOUT_S
-from a7sim.link.twin import BesideTwin, served_at
+from a7sim.link.twin import BesideTwin, open_checked_port
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
 from a7sim.session import Watcher
-from a7sim.session.ways import run_all_ways
-from a7sim.study.checkpoint import checkpoint_in
-from a7sim.study.executors import opened
-from a7sim.study.findings import document_of
-from a7sim.study.folder import begun, leave
+from a7sim.session.ways import run_all_methods
+from a7sim.study.checkpoint import checkpoint_path
+from a7sim.study.executors import open_executor
+from a7sim.study.findings import findings_document
+from a7sim.study.folder import open_tally, write_results
 from a7sim.study.loading import Laid, load_study
-from a7sim.study.running import work
+from a7sim.study.running import run_study
 
 Name = str | PathLike[str]
 """A file, or the name of what comes with a7sim."""
@@ -84,12 +84,12 @@ class Operator:
         """
         folder = None if out is None else Path(out)
         if link is None:
-            return run_all_ways(self.scenario, self.seed, folder, watcher, force)
+            return run_all_methods(self.scenario, self.seed, folder, watcher, force)
         if "plotter" not in self.scenario.work:
             ways = ", ".join(self.scenario.work)
             raise Mistake(f"{self.scenario.title}: expected work at the plotter for the operator, got {ways}")
-        with served_at(link, timeout, token) as served:
-            return run_all_ways(
+        with open_checked_port(link, timeout, token) as served:
+            return run_all_methods(
                 self.scenario, self.seed, folder, watcher, force, lambda twin: BesideTwin(served, twin, link)
             )
 
@@ -118,12 +118,12 @@ class Study:
         `out` the tables are left there, and a study that was cut off there goes on. Raises Mistake.
         """
         folder = None if out is None else Path(out)
-        tally = begun(self.laid, folder, force)
-        with opened("process") if workers == 1 else opened("pool", workers) as (executor, at_once):
-            work(self.laid, tally, executor, at_once, checkpoint_in(folder) if folder is not None else None)
-        document = document_of(self.laid, tally)
+        tally = open_tally(self.laid, folder, force)
+        with open_executor("process") if workers == 1 else open_executor("pool", workers) as (executor, at_once):
+            run_study(self.laid, tally, executor, at_once, checkpoint_path(folder) if folder is not None else None)
+        document = findings_document(self.laid, tally)
         if folder is not None:
-            leave(folder, self.laid, tally, document)
+            write_results(folder, self.laid, tally, document)
         return document
 
 

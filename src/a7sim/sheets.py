@@ -5,7 +5,7 @@ from collections.abc import Collection
 from rich.table import Table
 
 
-def sheet(*columns: str, left: Collection[int] = (0,), fold: Collection[int] = ()) -> Table:
+def text_table(*columns: str, left: Collection[int] = (0,), fold: Collection[int] = ()) -> Table:
     """Return an empty table of these columns; names to the `left`; none breaks its lines unless in `fold`."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
     for i, column in enumerate(columns):

@@ -8,13 +8,13 @@ Kind = Literal["scenarios", "exercises", "studies"]
 _PACKAGE = Path(__file__).parent
 
 
-def shelves_of(kind: Kind) -> tuple[Path, Path]:
+def bundled_dirs(kind: Kind) -> tuple[Path, Path]:
     """Return the folders in which those of a kind may stand."""
     return _PACKAGE / kind, _PACKAGE.parents[1] / kind
 
 
-def names_of(kind: Kind) -> list[str]:
+def bundled_names(kind: Kind) -> list[str]:
     """Return the names of all of a kind that come with a7sim, in alphabetical order."""
     files = "*/exercise.toml" if kind == "exercises" else "*.toml"
-    found = {file for shelf in shelves_of(kind) for file in shelf.glob(files)}
+    found = {file for shelf in bundled_dirs(kind) for file in shelf.glob(files)}
     return sorted({file.parent.name if kind == "exercises" else file.stem for file in found})

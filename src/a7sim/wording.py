@@ -1,7 +1,7 @@
 """How a count is said: 1 reading, 2 readings."""
 
 
-def counted(number: float, one: str, many: str | None = None) -> str:
+def pluralize(number: float, one: str, many: str | None = None) -> str:
     """Return a number with what is counted; `many` where it is not `one` with an s.
 
     >>> counted(1, "reading"), counted(0, "reading"), counted(2, "cross", "crosses")

@@ -7,7 +7,7 @@ import click
 from click.exceptions import NoArgsIsHelpError
 
 import a7sim
-from a7sim.cli.complaints import in_one_sentence
+from a7sim.cli.complaints import format_usage_error
 from a7sim.cli.verbs import Verb, Verbs
 from a7sim.mistakes import Mistake
 
@@ -62,7 +62,7 @@ def main() -> None:
     except click.ClickException as error:
         if debug:
             raise
-        click.echo(f"a7sim: {in_one_sentence(error)}", err=True)
+        click.echo(f"a7sim: {format_usage_error(error)}", err=True)
         code = EXIT_MISTAKE
     except (click.Abort, KeyboardInterrupt):
         if debug:

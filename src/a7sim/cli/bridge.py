@@ -2,26 +2,36 @@
 
 import click
 
-from a7sim.cli.names import a_scenario
-from a7sim.cli.operators import Asked, Kept, Told, ended, kept_in_a_folder, of_a_scenario, of_results, ordered, watched
+from a7sim.cli.names import scenario_argument
+from a7sim.cli.operators import (
+    Asked,
+    Kept,
+    Told,
+    display_options,
+    output_options,
+    progress_bar,
+    resolve_request,
+    scenario_options,
+    show_results,
+)
 
 _POINTS_A_MODEL = 260
 """About how many points an operator works on in a model in both ways."""
 
 
 @click.command("bridge")
-@click.argument("scenario", required=False, shell_complete=a_scenario)
-@of_a_scenario
-@kept_in_a_folder()
-@of_results
+@click.argument("scenario", required=False, shell_complete=scenario_argument)
+@scenario_options
+@output_options()
+@display_options
 def command(scenario: str | None, asked: Asked, kept: Kept, told: Told) -> None:
     """Bridge the strip of SCENARIO with base in and out in turn, and work it as independent models for comparison.
 
     Example: a7sim bridge bridge --seed 7 --out runs/bridge
     """
-    from a7sim.session.bridge import run_bridge, tables_of
+    from a7sim.session.bridge import bridge_tables, run_bridge
 
-    order = ordered(scenario, asked, kept)
-    with watched(_POINTS_A_MODEL * len(order.scenario.models), told) as watcher:
+    order = resolve_request(scenario, asked, kept)
+    with progress_bar(_POINTS_A_MODEL * len(order.scenario.models), told) as watcher:
         document = run_bridge(order.scenario, order.seed, kept.folder, watcher, kept.force, kept.keeping)
-    ended(document, told, tables_of)
+    show_results(document, told, bridge_tables)

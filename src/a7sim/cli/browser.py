@@ -35,19 +35,19 @@ _OPTIONS = (
 _OWN = ("browser", "port", "idle_exit")
 
 
-def in_a_browser(command: Callable[..., None]) -> Callable[..., None]:
+def browser_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of a console that is served to browsers."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
 
 
-def drawn_by_a_browser() -> bool:
+def is_browser_child() -> bool:
     """Whether this process draws what a browser shows, as its server says."""
     return "TEXTUAL_DRIVER" in os.environ
 
 
-def served_instead(context: click.Context) -> bool:
+def serve_in_browser(context: click.Context) -> bool:
     """Serve the command of a context without its browser, until it is ended or left alone, if that was asked for."""
     if not context.params["browser"]:
         _refuse_without_browser(context)

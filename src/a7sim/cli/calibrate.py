@@ -2,15 +2,25 @@
 
 import click
 
-from a7sim.cli.names import a_scenario
-from a7sim.cli.operators import Asked, Kept, Told, ended, kept_in_a_folder, of_a_scenario, of_results, ordered, watched
+from a7sim.cli.names import scenario_argument
+from a7sim.cli.operators import (
+    Asked,
+    Kept,
+    Told,
+    display_options,
+    output_options,
+    progress_bar,
+    resolve_request,
+    scenario_options,
+    show_results,
+)
 from a7sim.mistakes import Mistake
 
 PROJECTORS = 2
 
 
 @click.command("calibrate")
-@click.argument("scenario", required=False, shell_complete=a_scenario)
+@click.argument("scenario", required=False, shell_complete=scenario_argument)
 @click.option(
     "--points", type=int, metavar="N", default=25, show_default=True, help="Crosses of the plate, evenly spaced."
 )
@@ -23,9 +33,9 @@ PROJECTORS = 2
     show_default=True,
     help="At each cross and level.",
 )
-@of_a_scenario
-@kept_in_a_folder()
-@of_results
+@scenario_options
+@output_options()
+@display_options
 def command(
     scenario: str | None,
     points: int,
@@ -40,9 +50,9 @@ def command(
     Example: a7sim calibrate grid-test --points 25 --out runs/grid-test
     """
     from a7sim.operator.grid_test import GridTestOrder
-    from a7sim.session.grid_test import run_grid_test, sheet_of
+    from a7sim.session.grid_test import report_tables, run_grid_test
 
-    order = ordered(scenario, asked, kept)
+    order = resolve_request(scenario, asked, kept)
     points, levels, pointings = (
         order.setting(name, given) for name, given in (("points", points), ("levels", levels), ("pointings", pointings))
     )
@@ -51,6 +61,6 @@ def command(
         known = ", ".join(map(str, plate.even_counts))
         raise Mistake(f"--points: expected as many crosses as lie evenly on the plate ({known}), got {points}")
     test = GridTestOrder(camera, plate, points, levels, pointings, polarity)
-    with watched(PROJECTORS * points * levels * pointings, told) as watcher:
+    with progress_bar(PROJECTORS * points * levels * pointings, told) as watcher:
         document = run_grid_test(order.scenario, order.seed, test, kept.folder, watcher, kept.force, kept.keeping)
-    ended(document, told, sheet_of)
+    show_results(document, told, report_tables)

@@ -20,15 +20,15 @@ def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> N
     from rich.console import Console
 
     from a7sim.documents import as_json
-    from a7sim.report.comparison import compared, of_comparison, table_of
+    from a7sim.report.comparison import compare_sessions, comparison_document, comparison_table
     from a7sim.report.kept import read_session
 
     if len(folders) < 2:
         raise Mistake(f"compare: expected two folders of sessions or more, got one: {folders[0]}")
     sessions = [read_session(folder) for folder in folders]
-    rows = compared(sessions, everything)
+    rows = compare_sessions(sessions, everything)
     if as_document:
-        click.echo(as_json(of_comparison(sessions, rows)), nl=False)
+        click.echo(as_json(comparison_document(sessions, rows)), nl=False)
     else:
         console = Console()
-        console.print(table_of(sessions, rows, console.width))
+        console.print(comparison_table(sessions, rows, console.width))

@@ -21,7 +21,7 @@ _WORDS = (
 )
 
 
-def in_one_sentence(error: click.ClickException) -> str:
+def format_usage_error(error: click.ClickException) -> str:
     """Return the sentence for whoever typed a command, without a line end."""
     context = error.ctx if isinstance(error, click.UsageError) else None
     more = f" ({context.command_path} --help says more)" if context else ""
@@ -38,9 +38,9 @@ def _said(error: click.ClickException, context: click.Context | None) -> str:
         meant = f"; did you mean {', '.join(sorted(error.possibilities))}?" if error.possibilities else ""
         return f"{told}expected an option of this command, got {error.option_name}{meant}"
     if isinstance(error, click.MissingParameter) and error.param is not None:
-        return f"{told}expected {name_of(error.param)}, got none"
+        return f"{told}expected {parameter_label(error.param)}, got none"
     if isinstance(error, click.BadParameter) and error.param is not None:
-        return f"{name_of(error.param)}: {_of_bounds(error) or _reworded(error.message)}"
+        return f"{parameter_label(error.param)}: {_of_bounds(error) or _reworded(error.message)}"
     return f"{told}{_reworded(error.format_message())}"
 
 
@@ -53,11 +53,11 @@ def _of_bounds(error: click.BadParameter) -> str | None:
     if isinstance(kind, click.Choice):
         return f"expected one of {', '.join(map(str, kind.choices))}, got {got}"
     if isinstance(kind, click.IntRange | click.FloatRange):
-        return f"expected {in_words(kind)}, got {got}"
+        return f"expected {describe_range(kind)}, got {got}"
     return None
 
 
-def in_words(bounds: click.IntRange | click.FloatRange) -> str:
+def describe_range(bounds: click.IntRange | click.FloatRange) -> str:
     """Return what a range holds: 1 to 5, or 0 or more."""
     low, high = bounds.min, bounds.max
     if low is not None and high is not None and not bounds.min_open:
@@ -73,7 +73,7 @@ def _or_like(word: str, context: click.Context) -> str:
     return f"; did you mean {like[0]}?" if like else ""
 
 
-def name_of(parameter: click.Parameter) -> str:
+def parameter_label(parameter: click.Parameter) -> str:
     """Return what people call an option or an argument: --seed, SCENARIO."""
     if isinstance(parameter, click.Option):
         return max(parameter.opts, key=len)

@@ -9,8 +9,8 @@ from typing import Any
 import click
 
 from a7sim.cli import options
-from a7sim.cli.browser import drawn_by_a_browser, in_a_browser, served_instead
-from a7sim.cli.names import a_scenario
+from a7sim.cli.browser import browser_options, is_browser_child, serve_in_browser
+from a7sim.cli.names import scenario_argument
 from a7sim.cli.prompt import data_folder
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.words import ACUITY_UM
@@ -25,7 +25,7 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 
 
 @click.command("console")
-@click.argument("scenario", required=False, shell_complete=a_scenario)
+@click.argument("scenario", required=False, shell_complete=scenario_argument)
 @click.option("--connect", metavar="URL", help="Sit down at a served instrument; SCENARIO is then the job sheet.")
 @options.seed()
 @options.variant()
@@ -59,7 +59,7 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
     help="Watch a session (folder, .jsonl, .a7s), or a served instrument that somebody works.",
 )
 @options.token_file
-@in_a_browser
+@browser_options
 @click.pass_context
 def command(
     context: click.Context,
@@ -87,7 +87,7 @@ def command(
     Example: a7sim console akwanga
     """
     _see_that_textual_is_there()
-    from a7sim.cli.seats import InProcess, at_a_line, before_a_film, is_url  # only who sits down
+    from a7sim.cli.seats import InProcess, is_url, playback_console, remote_console  # only who sits down
     from a7sim.console.app import Console
     from a7sim.console.keymap import default_keymap, load_keymap, sample
     from a7sim.console.sheet import JobSheet
@@ -102,19 +102,19 @@ def command(
     here: InProcess | None = None
     if watch is not None and not is_url(watch):
         _refuse_beside("--watch", watch, scenario=scenario)
-        seat = before_a_film(watch)
+        seat = playback_console(watch)
     elif url := watch or connect:
         loaded = load_scenario(scenario) if scenario else None
         sheet = JobSheet(loaded.title, loaded.camera) if loaded else JobSheet()
-        seat = at_a_line(url, sheet, token_file, watching=watch is not None)
+        seat = remote_console(url, sheet, token_file, watching=watch is not None)
     else:
         name = scenario or USUAL
         overrides = {"instrument.variant": f'"{variant.upper()}"'} if variant else {}
         here = InProcess(name, load_scenario(name, overrides), seed, out, go_on)
         seat = here.seat
-    if served_instead(context):
+    if serve_in_browser(context):
         return
-    if not (drawn_by_a_browser() or (sys.stdin.isatty() and sys.stderr.isatty())):
+    if not (is_browser_child() or (sys.stdin.isatty() and sys.stderr.isatty())):
         raise Mistake("console: expected a terminal to sit at, got a file or a pipe (a7sim send takes lines from one)")
     Console(
         replace(

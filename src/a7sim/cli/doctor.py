@@ -16,7 +16,7 @@ import click
 import a7sim
 from a7sim.cli import options
 from a7sim.mistakes import Mistake
-from a7sim.shelves import Kind, names_of
+from a7sim.shelves import Kind, bundled_names
 
 EXIT_MISSING = 1
 
@@ -55,7 +55,7 @@ def command(as_document: bool) -> None:
 
     Example: a7sim doctor
     """
-    found = examined()
+    found = examine()
     if as_document:
         click.echo(json.dumps(found, indent=2, ensure_ascii=False))
     else:
@@ -64,7 +64,7 @@ def command(as_document: bool) -> None:
         raise click.exceptions.Exit(EXIT_MISSING)
 
 
-def examined() -> dict[str, Any]:
+def examine() -> dict[str, Any]:
     """Return what is found, as the document of `--json`. Raises Mistake where a7sim is not installed."""
     asked = libraries()
     extras = {name: _of_extra(name, parts) for name, parts in asked.items() if name not in ("", *NOT_FOR_USERS)}
@@ -78,7 +78,7 @@ def examined() -> dict[str, Any]:
         "platform": f"{platform.system()} {platform.machine()}",
         "libraries": [_of_library(each) for each in asked[""]],
         "extras": extras,
-        "comes_with": {kind: names_of(kind) for kind in _KINDS},
+        "comes_with": {kind: bundled_names(kind) for kind in _KINDS},
         "terminal": _of_terminal(),
     }
 

@@ -7,11 +7,11 @@ import click
 
 from a7sim.cli import options
 from a7sim.mistakes import Mistake
-from a7sim.report.cast import cast_of
-from a7sim.report.decks import deck_of
+from a7sim.report.cast import make_cast
+from a7sim.report.decks import strip_deck
 from a7sim.report.forms import forms_text
 from a7sim.report.kept import Kept, read_session
-from a7sim.session.folder import BOOK, write_whole
+from a7sim.session.folder import BOOK, write_atomic
 
 _OPTION_OF = {"speed": "asciicast", "way": "cards"}
 
@@ -27,7 +27,9 @@ _OPTION_OF = {"speed": "asciicast", "way": "cards"}
 )
 @options.out_file("what is made", "standard output")
 @click.option(
-    "--speed", type=options.above(0.0), help="How many times as fast as it happened, of an asciicast  [default: 120]"
+    "--speed",
+    type=options.greater_than(0.0),
+    help="How many times as fast as it happened, of an asciicast  [default: 120]",
 )
 @click.option("--way", metavar="WAY", help="cards: comparator or A8, where the strip was measured so.")
 def command(folder: Path, kind: str, out: Path | None, speed: float | None, way: str | None) -> None:
@@ -40,16 +42,16 @@ def command(folder: Path, kind: str, out: Path | None, speed: float | None, way:
             raise Mistake(f"--{name}: expected only with --to {_OPTION_OF[name]}, got it with --to {kind}")
     kept = read_session(folder)
     makers: dict[str, Callable[[], str]] = {
-        "asciicast": lambda: cast_of(kept, speed or 120.0),
+        "asciicast": lambda: make_cast(kept, speed or 120.0),
         "book": lambda: _book(kept),
         "forms": lambda: forms_text(kept),
-        "cards": lambda: deck_of(kept, way),
+        "cards": lambda: strip_deck(kept, way),
     }
     text = makers[kind]()
     if out is None:
         click.echo(text, nl=False)
     else:
-        write_whole(out, text)
+        write_atomic(out, text)
         click.echo(str(out))
 
 

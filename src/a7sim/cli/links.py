@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli.options import TOKEN_VARIABLE, Number, together, token_file
+from a7sim.cli.options import TOKEN_VARIABLE, Number, combine_options, token_file
 from a7sim.link.opening import TIMEOUT_S
 from a7sim.mistakes import Mistake
 
@@ -24,7 +24,7 @@ _TIMEOUT = click.option(
     help="How long a reply is waited for.",
 )
 
-of_a_link = together(_TIMEOUT, token_file)
+link_options = combine_options(_TIMEOUT, token_file)
 """--timeout, --token-file: how to talk to a served instrument."""
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import click
 from click.shell_completion import CompletionItem
 
-from a7sim.shelves import names_of, shelves_of
+from a7sim.shelves import bundled_dirs, bundled_names
 
 Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
@@ -21,7 +21,7 @@ def _or_files(names: Callable[[], Iterable[str]]) -> Completer:
 
 
 def _scripts() -> list[str]:
-    return sorted({file.stem for shelf in shelves_of("scenarios") for file in shelf.glob("scripts/*.a7s")})
+    return sorted({file.stem for shelf in bundled_dirs("scenarios") for file in shelf.glob("scripts/*.a7s")})
 
 
 class OneOf(click.Choice[str]):
@@ -39,8 +39,8 @@ class OneOf(click.Choice[str]):
         return [CompletionItem(each) for each in self.choices if each.lower().startswith(incomplete.lower())]
 
 
-a_scenario = _or_files(lambda: names_of("scenarios"))
-an_exercise = _or_files(lambda: names_of("exercises"))
-a_study = _or_files(lambda: names_of("studies"))
-a_session = _or_files(_scripts)
+scenario_argument = _or_files(lambda: bundled_names("scenarios"))
+exercise_argument = _or_files(lambda: bundled_names("exercises"))
+study_argument = _or_files(lambda: bundled_names("studies"))
+session_argument = _or_files(_scripts)
 """Sessions are folders; scripts have names."""

@@ -5,30 +5,30 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
-from a7sim.cli.links import of_a_link, token_from
-from a7sim.cli.names import a_scenario
+from a7sim.cli.links import link_options, token_from
+from a7sim.cli.names import scenario_argument
 from a7sim.cli.operators import (
     POINTS_A_MODEL,
     SESSION,
     Asked,
     Told,
-    chosen,
-    ended,
-    of_a_scenario,
-    of_an_orientation,
-    of_results,
-    watched,
+    display_options,
+    orientation_options,
+    progress_bar,
+    resolve_scenario,
+    scenario_options,
+    show_results,
 )
 
 
 @click.command("operate")
-@click.argument("scenario", shell_complete=a_scenario)
+@click.argument("scenario", shell_complete=scenario_argument)
 @click.option("--link", "url", required=True, metavar="URL", help="Where the instrument is served.")
-@of_a_link
-@of_an_orientation
-@of_a_scenario
+@link_options
+@orientation_options
+@scenario_options
 @options.new_folder(SESSION)
-@of_results
+@display_options
 def command(
     scenario: str,
     url: str,
@@ -49,11 +49,11 @@ def command(
     Example: a7sim operate akwanga --link tcp://127.0.0.1:5025
     """
     from a7sim.scripting import Operator
-    from a7sim.session.tables import of_session
+    from a7sim.session.tables import session_tables
 
-    loaded, seed = chosen(scenario, asked, {"plan.case": case, "plan.method": method})
+    loaded, seed = resolve_scenario(scenario, asked, {"plan.case": case, "plan.method": method})
     token = token_from(token_file)
-    with watched(POINTS_A_MODEL * len(loaded.models), told) as watcher:
+    with progress_bar(POINTS_A_MODEL * len(loaded.models), told) as watcher:
         operator = Operator(loaded, seed)
         document = operator.work(url, out, force=force, timeout=timeout, token=token, watcher=watcher)
-    ended(document, told, of_session)
+    show_results(document, told, session_tables)

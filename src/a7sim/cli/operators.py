@@ -13,10 +13,10 @@ import msgspec
 from click.core import ParameterSource
 
 from a7sim.cli import EXIT_DOES_NOT_FIT, options
-from a7sim.cli.complaints import name_of
+from a7sim.cli.complaints import parameter_label
 from a7sim.cli.names import OneOf
 from a7sim.mistakes import Mistake
-from a7sim.scenario import PROFILES, Observer, Request, Scenario, bare_name, load_scenario, requested
+from a7sim.scenario import PROFILES, Observer, Request, Scenario, load_scenario, scenario_name, with_provenance
 from a7sim.session.durable import DURABILITIES, Durability
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class Told:
     quiet: bool
 
 
-of_a_scenario = options.gathered(
+scenario_options = options.group_options(
     "asked",
     Asked,
     options.seed(),
@@ -92,7 +92,7 @@ of_a_scenario = options.gathered(
 )
 """--seed, --set, --skill, --perfect-observer, as `asked`."""
 
-of_an_orientation = options.together(
+orientation_options = options.combine_options(
     click.option("--case", type=OneOf("ABCDE"), help="Standard points used (thesis)."),
     click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one."),
 )
@@ -101,12 +101,12 @@ of_an_orientation = options.together(
 SESSION = "journal, book, tables and results"
 
 
-def kept_in_a_folder(of: str = SESSION) -> options.Option[Any]:
+def output_options(of: str = SESSION) -> options.Option[Any]:
     """Return --out, --force, --resume, --durability, as `kept`, for a folder of what `of` says."""
-    return options.gathered("kept", Kept, options.new_folder(of), _RESUME, DURABILITY)
+    return options.group_options("kept", Kept, options.new_folder(of), _RESUME, DURABILITY)
 
 
-of_results = options.gathered("told", Told, options.as_document, options.quiet())
+display_options = options.group_options("told", Told, options.as_document, options.quiet())
 """--json, --quiet, as `told`."""
 
 _NOT_OF_THE_RESULTS = {
@@ -129,18 +129,22 @@ class Order:
         return asked if self.begun_with is None else self.begun_with.get(name)
 
 
-def ordered(scenario: str | None, asked: Asked, kept: Kept, others: Mapping[str, str | None] | None = None) -> Order:
+def resolve_request(
+    scenario: str | None, asked: Asked, kept: Kept, others: Mapping[str, str | None] | None = None
+) -> Order:
     """Return what the options order: a new session, or with --resume the one in its folder. Raises Mistake.
 
     `others` are overrides of the scenario as texts by path.
     """
     if kept.resume is None:
-        return Order(*chosen(scenario, asked, others))
-    session = resumed(kept.resume)
+        return Order(*resolve_scenario(scenario, asked, others))
+    session = resolve_resume(kept.resume)
     return Order(session.scenario, session.seed, session.settings)
 
 
-def chosen(scenario: str | None, asked: Asked, others: Mapping[str, str | None] | None = None) -> tuple[Scenario, int]:
+def resolve_scenario(
+    scenario: str | None, asked: Asked, others: Mapping[str, str | None] | None = None
+) -> tuple[Scenario, int]:
     """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
     if scenario is None:
         raise Mistake(f"{click.get_current_context().info_name}: expected SCENARIO or --resume DIR, got none")
@@ -150,7 +154,9 @@ def chosen(scenario: str | None, asked: Asked, others: Mapping[str, str | None] 
         loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
         overrides["observer"] = "perfect"
     seed = loaded.seed if asked.seed is None else asked.seed
-    return requested(loaded, Request(command_line=_command_line(bare_name(scenario), seed), settings=overrides)), seed
+    return with_provenance(
+        loaded, Request(command_line=_command_line(scenario_name(scenario), seed), settings=overrides)
+    ), seed
 
 
 def _command_line(scenario: str, seed: int) -> str:
@@ -179,15 +185,15 @@ def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> di
     return overrides | {key: f'"{value}"' for key, value in texts.items() if value is not None}
 
 
-def resumed(folder: Path, *beside: str) -> "Begun":
+def resolve_resume(folder: Path, *beside: str) -> "Begun":
     """Return the session of the command under way that --resume goes on with.
 
     Raises Mistake where anything but what is named stands `beside` it, since the journal says what was asked for.
     """
-    from a7sim.session.resuming import begun_in
+    from a7sim.session.resuming import find_resumable
 
     _see_that_resume_stands_alone(beside)
-    return begun_in(folder, click.get_current_context().info_name or "")
+    return find_resumable(folder, click.get_current_context().info_name or "")
 
 
 def _see_that_resume_stands_alone(beside: tuple[str, ...]) -> None:
@@ -196,7 +202,9 @@ def _see_that_resume_stands_alone(beside: tuple[str, ...]) -> None:
     for name in ctx.params:
         if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             said = next(each for each in ctx.command.params if each.name == name)
-            raise Mistake(f"--resume: expected no {name_of(said)} beside it, since the journal says what was asked for")
+            raise Mistake(
+                f"--resume: expected no {parameter_label(said)} beside it, since the journal says what was asked for"
+            )
 
 
 POINTS_A_MODEL = 130
@@ -204,7 +212,7 @@ POINTS_A_MODEL = 130
 
 
 @contextmanager
-def watched(points: int, told: Told) -> "Iterator[Watcher]":
+def progress_bar(points: int, told: Told) -> "Iterator[Watcher]":
     """Show on a terminal how the operator gets on with about so many points."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -221,7 +229,7 @@ def watched(points: int, told: Told) -> "Iterator[Watcher]":
         )
 
 
-def ended(document: "Document", told: Told, tables: "Callable[[Document], RenderableType]") -> None:
+def show_results(document: "Document", told: Told, tables: "Callable[[Document], RenderableType]") -> None:
     """Show the results, and end with exit code 1 where the operator gave up."""
     from rich.console import Console
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-from a7sim.cli.names import OneOf, a_scenario
+from a7sim.cli.names import OneOf, scenario_argument
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Option = Callable[[Command], Command]
@@ -38,7 +38,7 @@ class Number(click.FloatRange):
         return number
 
 
-def above(bound: float) -> Number:
+def greater_than(bound: float) -> Number:
     """Return the kind of the numbers above a bound."""
     return Number(min=bound, min_open=True)
 
@@ -49,7 +49,7 @@ HEIGHT = Number(-1e6, 1e6)
 COUNT = click.IntRange(min=1)
 
 
-def together(*options: Option[Any]) -> Option[Any]:
+def combine_options(*options: Option[Any]) -> Option[Any]:
     """Return several options as one, in their order."""
 
     def decorated(command: Command) -> Command:
@@ -60,7 +60,7 @@ def together(*options: Option[Any]) -> Option[Any]:
     return decorated
 
 
-def gathered(name: str, into: type[Any], *options: Option[Any]) -> Option[Any]:
+def group_options(name: str, into: type[Any], *options: Option[Any]) -> Option[Any]:
     """Return options whose values a command is given as one: a dataclass with a field for each, under a name."""
 
     def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -69,13 +69,13 @@ def gathered(name: str, into: type[Any], *options: Option[Any]) -> Option[Any]:
             given = {field.name: values.pop(field.name) for field in fields(into)}
             return command(*arguments, **values, **{name: into(**given)})
 
-        with_options: Callable[..., Any] = together(*options)(called)
+        with_options: Callable[..., Any] = combine_options(*options)(called)
         return with_options
 
     return decorated
 
 
-def about(option: str, default: str | None = None) -> str:
+def option_help(option: str, default: str | None = None) -> str:
     """Return what help says about an option, and about what it is where it is left out."""
     return f"{option}." if default is None else f"{option}  [default: {default}]"
 
@@ -83,18 +83,23 @@ def about(option: str, default: str | None = None) -> str:
 def seed(default: str = "the scenario's") -> Option[Any]:
     """Return --seed, which is `default` where it is left out."""
     return click.option(
-        "--seed", type=click.IntRange(min=0), metavar="N", help=about("Seed of all that is drawn by chance", default)
+        "--seed",
+        type=click.IntRange(min=0),
+        metavar="N",
+        help=option_help("Seed of all that is drawn by chance", default),
     )
 
 
 def out_folder(of: str, default: str | None = None, required: bool = False) -> Option[Any]:
     """Return --out DIR, a folder of what `of` says."""
-    return click.option("--out", type=PLACE, metavar="DIR", required=required, help=about(f"Folder for {of}", default))
+    return click.option(
+        "--out", type=PLACE, metavar="DIR", required=required, help=option_help(f"Folder for {of}", default)
+    )
 
 
 def out_file(of: str, default: str | None = None) -> Option[Any]:
     """Return --out FILE, a file of what `of` says."""
-    return click.option("--out", type=FILE, metavar="FILE", help=about(f"File for {of}", default))
+    return click.option("--out", type=FILE, metavar="FILE", help=option_help(f"File for {of}", default))
 
 
 force = click.option("--force", is_flag=True, help="Write into a folder that exists.")
@@ -102,7 +107,7 @@ force = click.option("--force", is_flag=True, help="Write into a folder that exi
 
 def new_folder(of: str, required: bool = False) -> Option[Any]:
     """Return --out DIR and --force, for a folder that is not there yet."""
-    return together(out_folder(of, required=required), force)
+    return combine_options(out_folder(of, required=required), force)
 
 
 as_document = click.option(
@@ -117,18 +122,18 @@ def quiet(but: str = "") -> Option[Any]:
 
 def variant(default: str | None = None) -> Option[Any]:
     """Return --variant, which is that of the scenario where there is no default."""
-    told = about("Which plotter", None if default else "the scenario's")
+    told = option_help("Which plotter", None if default else "the scenario's")
     return click.option("--variant", type=OneOf(PLOTTERS), default=default, show_default=default is not None, help=told)
 
 
 instrument_of = click.option(
     "--scenario",
     metavar="SCENARIO",
-    shell_complete=a_scenario,
+    shell_complete=scenario_argument,
     help="What the instrument is of; only a journal whose scenario is known can be replayed.",
 )
 
-map_scale = click.option("--map-scale", type=above(99.0), metavar="N", help="Scale number of the map.")
+map_scale = click.option("--map-scale", type=greater_than(99.0), metavar="N", help="Scale number of the map.")
 
 plain = click.option("--plain", is_flag=True, help="Say in words what the eyes see; nothing rolls. For screen readers.")
 
@@ -140,7 +145,7 @@ def principal_distance(required: bool) -> Option[Any]:
 
 def tcp(default: str, multiple: bool = False) -> Option[Any]:
     """Return --tcp, where clients find a bare socket: `default` where it is left out."""
-    told = about("Listen on a bare socket", default)
+    told = option_help("Listen on a bare socket", default)
     return click.option(
         "--tcp", default=None if multiple else default, multiple=multiple, metavar="HOST:PORT", help=told
     )

@@ -8,17 +8,21 @@ from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from a7sim.cli import options
-from a7sim.documents import as_json, head
+from a7sim.documents import as_json, document_header
 from a7sim.manual import VARIANTS
-from a7sim.operator.preparation import Flight, ModelScale, Preparation, preparation
-from a7sim.sheets import sheet
+from a7sim.operator.preparation import Flight, ModelScale, Preparation, choose_settings
+from a7sim.sheets import text_table
 
 
 @click.command("prepare")
 @options.principal_distance(required=True)
-@click.option("--photo-scale", type=options.above(0.0), help="Scale number of the photographs at the mean ground.")
-@click.option("--flying-height", type=options.above(0.0), help="Above the mean ground, m, in place of the photo scale.")
-@click.option("--photo-base", type=options.above(0.0), required=True, help="Base in the photograph, mm.")
+@click.option(
+    "--photo-scale", type=options.greater_than(0.0), help="Scale number of the photographs at the mean ground."
+)
+@click.option(
+    "--flying-height", type=options.greater_than(0.0), help="Above the mean ground, m, in place of the photo scale."
+)
+@click.option("--photo-base", type=options.greater_than(0.0), required=True, help="Base in the photograph, mm.")
 @click.option("--heights", type=options.HEIGHT, nargs=2, required=True, help="Lowest and highest ground, m.")
 @options.map_scale
 @options.variant("A7")
@@ -38,7 +42,7 @@ def command(
     Example: a7sim prepare --c 152.676 --photo-scale 8000 --photo-base 91 --heights 430.24 487.92 --map-scale 2500
     """
     flight = Flight.of_heights(c, photo_base, heights, photo_scale, flying_height)
-    found = preparation(flight, VARIANTS[variant], map_scale)
+    found = choose_settings(flight, VARIANTS[variant], map_scale)
     if as_document:
         click.echo(as_json(_document(found, variant)), nl=False)
     else:
@@ -48,7 +52,7 @@ def command(
 def _document(found: Preparation, variant: str) -> dict[str, Any]:
     flight = found.flight
     return (
-        head("prepare")
+        document_header("prepare")
         | {"variant": variant}
         | {
             "flight": msgspec.to_builtins(flight)
@@ -72,7 +76,7 @@ def _of_scale(scale: ModelScale) -> dict[str, Any]:
 
 def _sheet(found: Preparation, variant: str, map_scale: float | None) -> RenderableType:
     flight, chosen = found.flight, found.chosen
-    table = sheet("model scale", "gear", "last digit, m", "plan", "Z, mm", "bx, mm", "", left=(0, 6), fold=(6,))
+    table = text_table("model scale", "gear", "last digit, m", "plan", "Z, mm", "bx, mm", "", left=(0, 6), fold=(6,))
     for scale in found.scales:
         table.add_row(
             f"1:{scale.number:.0f}",

@@ -11,7 +11,7 @@ import click
 
 from a7sim.link.client import Client
 from a7sim.link.completion import completions
-from a7sim.link.exchange import say
+from a7sim.link.exchange import send_line
 
 HISTORY = "send-history"
 
@@ -21,9 +21,9 @@ MAX_HISTORY = 1000
 _LEAVING = ("exit", "quit", "bye")
 
 
-def prompted(url: str, client: Client) -> None:
+def run_prompt(url: str, client: Client) -> None:
     """Ask for lines and show what comes of each, until the end of input or `exit`."""
-    identity = say(client, "*IDN?").shown or "an instrument that does not say what it is"
+    identity = send_line(client, "*IDN?").shown or "an instrument that does not say what it is"
     headers = _headers(client)
     click.echo(f"{url}: {identity}. Tab completes, help lists the headers, exit leaves.")
     with _editing(headers):
@@ -45,7 +45,7 @@ def prompted(url: str, client: Client) -> None:
 
 
 def _shown(client: Client, line: str) -> None:
-    exchange = say(client, line)
+    exchange = send_line(client, line)
     if exchange.shown is not None:
         click.echo(exchange.shown)
     for error in exchange.errors:
@@ -54,7 +54,7 @@ def _shown(client: Client, line: str) -> None:
 
 
 def _headers(client: Client) -> list[str]:
-    listed = say(client, "SYST:HELP:HEAD?").shown
+    listed = send_line(client, "SYST:HELP:HEAD?").shown
     return next(csv.reader([listed])) if listed else []
 
 

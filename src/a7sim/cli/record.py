@@ -9,8 +9,8 @@ import click
 
 from a7sim.cli import options
 from a7sim.cli.operators import DURABILITY
-from a7sim.documents import as_json, head
-from a7sim.link.addresses import Address, address_of
+from a7sim.documents import as_json, document_header
+from a7sim.link.addresses import Address, parse_address
 from a7sim.link.between import Between
 from a7sim.link.clock import WallClock
 from a7sim.link.opening import open_port
@@ -18,7 +18,7 @@ from a7sim.mistakes import Mistake
 from a7sim.scenario import load_scenario
 from a7sim.session.durable import Durability
 from a7sim.session.folder import prepare_folder
-from a7sim.session.journal import Header, Journal, Keeping, header_of, header_of_unknown
+from a7sim.session.journal import Header, Journal, Keeping, make_header, make_header_without_scenario
 
 _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
@@ -49,7 +49,7 @@ def command(
     """
     header = _header(url, scenario, seed)
     open_port(url).close()
-    address = address_of(tcp, "--tcp")
+    address = parse_address(tcp, "--tcp")
     if not address.loopback:
         raise Mistake(f"--tcp {address}: expected an address of this machine alone")
     stop = threading.Event()
@@ -60,7 +60,10 @@ def command(
         with Journal(Keeping(durability)).opened(out, header, None) as journal:
             host, port = door.getsockname()[:2]
             where = f"tcp://{Address(host, port)}"
-            click.echo(as_json(head("record") | {"url": where, "instrument": url}) if as_document else where, nl=False)
+            click.echo(
+                as_json(document_header("record") | {"url": where, "instrument": url}) if as_document else where,
+                nl=False,
+            )
             click.echo("" if as_document else "\nready")
             Between(url, journal.heard, WallClock(), stop).serve(door)
 
@@ -69,9 +72,9 @@ def _header(url: str, scenario: str | None, seed: int | None) -> Header:
     if scenario is None:
         if seed is not None:
             raise Mistake("--seed: expected a --scenario beside it, got none")
-        return header_of_unknown("record", instrument=url)
+        return make_header_without_scenario("record", instrument=url)
     loaded = load_scenario(scenario)
-    return header_of("record", loaded, loaded.seed if seed is None else seed, instrument=url)
+    return make_header("record", loaded, loaded.seed if seed is None else seed, instrument=url)
 
 
 def _door(address: Address) -> socket.socket:

@@ -7,26 +7,26 @@ from pathlib import Path
 import click
 
 from a7sim.cli import EXIT_DIFFERS, options
-from a7sim.cli.names import a_session
-from a7sim.documents import as_json, head
+from a7sim.cli.names import session_argument
+from a7sim.documents import as_json, document_header
 from a7sim.mistakes import Mistake
 from a7sim.scenario import load_scenario
 from a7sim.session.checkpoints import Differing
-from a7sim.session.conversation import Told, line_of_event
+from a7sim.session.conversation import Told, format_event
 from a7sim.session.folder import JOURNAL, prepare_folder
-from a7sim.session.journal import Journal, header_of
+from a7sim.session.journal import Journal, make_header
 from a7sim.session.lines import Journalled, read_journal
 from a7sim.session.playing import Player
-from a7sim.session.replaying import Difference, Replay, names_scenario, replayed
+from a7sim.session.replaying import Difference, Replay, knows_scenario, replay_lines
 from a7sim.session.scripts import SUFFIX, find_script, read_script
-from a7sim.session.seeking import line_sought
-from a7sim.wording import counted
+from a7sim.session.seeking import find_line
+from a7sim.wording import pluralize
 
 _MAX_PARTS = 20
 
 
 @click.command("replay")
-@click.argument("session", shell_complete=a_session)
+@click.argument("session", shell_complete=session_argument)
 @click.option("--verify", is_flag=True, help="Stop at the first difference, with exit code 3.")
 @click.option(
     "--speed",
@@ -67,14 +67,14 @@ def command(
             raise Mistake("--from: expected a journal to seek in, got a script")
         if scenario is not None:
             raise Mistake("--scenario: expected a journal, got a script, which says its own")
-        played(session, pace, out, force, silent, as_document)
+        play_script(session, pace, out, force, silent, as_document)
         return
     if out is not None:
         raise Mistake("--out: expected a script, whose journal it keeps; a journal there is already")
     path = Path(session)
     journalled = read_journal(path / JOURNAL if path.is_dir() else path)
     first = 2 if begin is None else _line(journalled, begin)
-    if not (names_scenario(journalled) or verify):
+    if not (knows_scenario(journalled) or verify):
         _told(journalled, first, pace, silent, as_document)
     else:
         replay = Replay(journalled, load_scenario(scenario) if scenario is not None else None)
@@ -103,7 +103,7 @@ def _is_script(session: str) -> bool:
 
 def _line(journalled: Journalled, begin: str) -> int:
     """Return the first line that is to be told. Raises Mistake where there is none."""
-    found = line_sought(journalled, begin)
+    found = find_line(journalled, begin)
     if found is None:
         raise Mistake(f"--from {begin}: expected a time, @LINE or the text of a note within {journalled.path}")
     return found
@@ -115,7 +115,7 @@ def _told(journalled: Journalled, first: int, pace: Pace, silent: bool, as_docum
         event = journalled.event(number)
         pace.until(event.t)
         if not silent:
-            click.echo(line_of_event(event))
+            click.echo(format_event(event))
     _ended(journalled, 0, None, 0, as_document, silent)
 
 
@@ -125,11 +125,11 @@ def _replayed(replay: Replay, first: int, verify: bool, pace: Pace, silent: bool
     known = len(replay.checkpoints)
     differing = 0
     difference: Difference | None = None
-    for number, event, differs in replayed(replay, begins):
+    for number, event, differs in replay_lines(replay, begins):
         if number >= first:
             pace.until(event.t)
             if not silent:
-                click.echo(line_of_event(event))
+                click.echo(format_event(event))
         if differs is not None:
             differing += 1
             difference = difference or differs
@@ -170,7 +170,7 @@ def _ended(
         found = None
         if difference is not None:
             found = {"line": difference.line, "journal": difference.journalled, "instrument": difference.replayed}
-        document = head("replay") | {
+        document = document_header("replay") | {
             "session": str(journalled.path),
             "status": "differs" if differing else "same",
             "lines": lines,
@@ -181,11 +181,11 @@ def _ended(
         click.echo(as_json(document), nl=False)
     elif not silent:
         came = f"{differing} different" if differing else "no difference"
-        rest = f"; a torn last line of {counted(torn, 'byte')} is left out" if torn else ""
-        click.echo(f"{counted(lines, 'line')}, {counted(checkpoints, 'checkpoint')}: {came}{rest}")
+        rest = f"; a torn last line of {pluralize(torn, 'byte')} is left out" if torn else ""
+        click.echo(f"{pluralize(lines, 'line')}, {pluralize(checkpoints, 'checkpoint')}: {came}{rest}")
 
 
-def played(session: str, pace: Pace, out: Path | None, force: bool, silent: bool, as_document: bool) -> None:
+def play_script(session: str, pace: Pace, out: Path | None, force: bool, silent: bool, as_document: bool) -> None:
     """Play a script, and end with exit code 3 where it and the instrument part."""
     script = read_script(find_script(session))
     journal = Journal()
@@ -193,11 +193,11 @@ def played(session: str, pace: Pace, out: Path | None, force: bool, silent: bool
     player = Player(script, told.heard)
     if out is not None:
         prepare_folder(out, force)
-    header = header_of("replay", script.scenario, script.seed, script=script.file.name)
+    header = make_header("replay", script.scenario, script.seed, script=script.file.name)
     with journal.opened(out, header, player.desk) if out else nullcontext():
         failed = player.play()
     if as_document:
-        document = head("replay") | {
+        document = document_header("replay") | {
             "session": str(script.file),
             "status": "differs" if failed else "same",
             "lines": len(script.statements),
@@ -215,4 +215,4 @@ def played(session: str, pace: Pace, out: Path | None, force: bool, silent: bool
         click.echo(f"a7sim: {failed}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
     if not silent:
-        click.echo(f"{counted(len(script.statements), 'statement')}: all as expected")
+        click.echo(f"{pluralize(len(script.statements), 'statement')}: all as expected")

@@ -18,11 +18,11 @@ def command(folder: Path, out: Path | None, shown: bool) -> None:
     Example: a7sim report runs/akwanga --open
     """
     from a7sim.report.kept import read_session
-    from a7sim.report.writing import report_of
-    from a7sim.session.folder import REPORT, write_whole
+    from a7sim.report.writing import render_report
+    from a7sim.session.folder import REPORT, write_atomic
 
     out = out or folder / REPORT
-    write_whole(out, report_of(read_session(folder)))
+    write_atomic(out, render_report(read_session(folder)))
     click.echo(str(out))
     if shown:
         webbrowser.open(out.resolve().as_uri())

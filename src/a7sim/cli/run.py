@@ -2,27 +2,27 @@
 
 import click
 
-from a7sim.cli.names import a_scenario
+from a7sim.cli.names import scenario_argument
 from a7sim.cli.operators import (
     POINTS_A_MODEL,
     Asked,
     Kept,
     Told,
-    ended,
-    kept_in_a_folder,
-    of_a_scenario,
-    of_an_orientation,
-    of_results,
-    ordered,
-    watched,
+    display_options,
+    orientation_options,
+    output_options,
+    progress_bar,
+    resolve_request,
+    scenario_options,
+    show_results,
 )
 from a7sim.mistakes import Mistake
 from a7sim.standard_points import CASES
 
 
 @click.command("run")
-@click.argument("scenario", required=False, shell_complete=a_scenario)
-@of_an_orientation
+@click.argument("scenario", required=False, shell_complete=scenario_argument)
+@orientation_options
 @click.option(
     "--strips",
     type=click.Choice(["one", "all"]),
@@ -30,9 +30,9 @@ from a7sim.standard_points import CASES
     show_default=True,
     help="all: every case of one model with every case of the next, 25 strips of two models.",
 )
-@of_a_scenario
-@kept_in_a_folder()
-@of_results
+@scenario_options
+@output_options()
+@display_options
 def command(
     scenario: str | None,
     case: str | None,
@@ -47,15 +47,15 @@ def command(
     Example: a7sim run akwanga --case E --seed 7 --out runs/akwanga-e
     """
     from a7sim.session.combinations import run_combinations
-    from a7sim.session.tables import of_session, of_strips
-    from a7sim.session.ways import run_all_ways
+    from a7sim.session.tables import session_tables, strips_table
+    from a7sim.session.ways import run_all_methods
 
-    order = ordered(scenario, asked, kept, {"plan.case": case, "plan.method": method})
+    order = resolve_request(scenario, asked, kept, {"plan.case": case, "plan.method": method})
     every_case = order.setting("strips", strips) == "all"
     if every_case and case is not None:
         raise Mistake("--strips all: expected no --case beside it, since every case is worked")
-    work = run_combinations if every_case else run_all_ways
+    work = run_combinations if every_case else run_all_methods
     sessions = len(CASES) if every_case else 1
-    with watched(POINTS_A_MODEL * sessions * len(order.scenario.models), told) as watcher:
+    with progress_bar(POINTS_A_MODEL * sessions * len(order.scenario.models), told) as watcher:
         document = work(order.scenario, order.seed, kept.folder, watcher, kept.force, keeping=kept.keeping)
-    ended(document, told, of_strips if every_case else of_session)
+    show_results(document, told, strips_table if every_case else session_tables)

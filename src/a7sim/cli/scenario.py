@@ -3,12 +3,12 @@
 import click
 
 from a7sim.cli import EXIT_MISTAKE, options
-from a7sim.cli.names import a_scenario
-from a7sim.documents import as_json, head
+from a7sim.cli.names import scenario_argument
+from a7sim.documents import as_json, document_header
 from a7sim.mistakes import Mistake
 from a7sim.scenario import ScenarioError, load_scenario, scenario_schema
 from a7sim.scene import build_scene
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 
 @click.group("scenario")
@@ -20,7 +20,7 @@ def command() -> None:
 
 
 @command.command("validate")
-@click.argument("file", metavar="SCENARIO", shell_complete=a_scenario)
+@click.argument("file", metavar="SCENARIO", shell_complete=scenario_argument)
 @options.as_document
 def validate(file: str, as_document: bool) -> None:
     """Name every mistake of a SCENARIO and of the files it names; exit code 2 if there is any.
@@ -36,12 +36,12 @@ def validate(file: str, as_document: bool) -> None:
     except Mistake as mistake:
         mistakes = str(mistake).splitlines()
     if as_document:
-        click.echo(as_json(head("scenario validate") | {"file": file, "mistakes": mistakes}), nl=False)
+        click.echo(as_json(document_header("scenario validate") | {"file": file, "mistakes": mistakes}), nl=False)
     elif mistakes:
         for mistake_text in mistakes:
             click.echo(f"a7sim: {file}: {mistake_text}", err=True)
     else:
-        photographs, models = counted(len(scenario.photos), "photograph"), counted(len(scenario.models), "model")
+        photographs, models = pluralize(len(scenario.photos), "photograph"), pluralize(len(scenario.models), "model")
         click.echo(f"{file}: {scenario.title}, {photographs}, {models}")
     if mistakes:
         raise click.exceptions.Exit(EXIT_MISTAKE)
@@ -55,4 +55,6 @@ def schema(as_document: bool) -> None:
     Example: a7sim scenario schema > scenario.schema.json
     """
     described = scenario_schema()
-    click.echo(as_json(head("scenario schema") | {"schema": described} if as_document else described), nl=False)
+    click.echo(
+        as_json(document_header("scenario schema") | {"schema": described} if as_document else described), nl=False
+    )

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 from a7sim.cli.links import token_from
 from a7sim.cli.prompt import data_folder
-from a7sim.console.margins import elapsed
+from a7sim.console.margins import format_elapsed
 from a7sim.console.recalling import Said
 from a7sim.console.seat import Resumable, Seat
 from a7sim.console.sheet import JobSheet
 from a7sim.link.client import Client
 from a7sim.link.clock import Clock, WallClock
 from a7sim.mistakes import Mistake
-from a7sim.scenario import Scenario, bare_name
+from a7sim.scenario import Scenario, scenario_name
 
 if TYPE_CHECKING:
     from a7sim.session.chair import Chair
@@ -29,7 +29,7 @@ class InProcess:
     def __init__(self, name: str, scenario: Scenario, seed: int | None, out: Path | None, go_on: bool | None) -> None:
         self._name, self._scenario = name, scenario
         self._seed = scenario.seed if seed is None else seed
-        self._folder = out or data_folder() / SESSIONS_FOLDER / bare_name(name)
+        self._folder = out or data_folder() / SESSIONS_FOLDER / scenario_name(name)
         self._go_on = go_on
         self._clock, self._wall = Clock(), WallClock()
         self._left: Left | None = None
@@ -87,14 +87,14 @@ class InProcess:
             self._greeting = ""
             return None
         when = datetime.fromtimestamp(last.when).strftime("%Y-%m-%d %H:%M")  # as the person's clock shows it
-        about = f"{elapsed(last.lasted)} at the instrument, left {when}, kept in {last.folder}"
+        about = f"{format_elapsed(last.lasted)} at the instrument, left {when}, kept in {last.folder}"
         return Resumable(about, lambda goes_on: self._decide(last, goes_on))
 
     def _decide(self, last: "Left", goes_on: bool) -> None:
         if goes_on:
             self._left = last
             self._wall = WallClock(now=last.lasted)
-            self._greeting = f"where it stood, {elapsed(last.lasted)} at the instrument; ? is help"
+            self._greeting = f"where it stood, {format_elapsed(last.lasted)} at the instrument; ? is help"
 
     def _opened(self) -> Client:
         """Sit down in the chair, which is built when the instrument is first spoken to."""
@@ -120,7 +120,7 @@ class InProcess:
         return self._chair.folder
 
 
-def at_a_line(url: str, sheet: JobSheet, token_file: Path | None, watching: bool = False) -> Seat:
+def remote_console(url: str, sheet: JobSheet, token_file: Path | None, watching: bool = False) -> Seat:
     """Return a seat at a served instrument. Raises Mistake where nobody answers there."""
     token = token_from(token_file)
     Client.open(url, token=token).close()
@@ -140,11 +140,11 @@ def _watching_now(url: str) -> Callable[[], str]:
     return lambda: f"watching {url}; ? is help"
 
 
-def before_a_film(session: str) -> Seat:
+def playback_console(session: str) -> Seat:
     """Return a seat from which a session that is over is watched. Raises Mistake where there is none."""
-    from a7sim.session.film import film_of  # only for who watches one
+    from a7sim.session.film import open_recording  # only for who watches one
 
-    film = film_of(session)
+    film = open_recording(session)
     title = str(film.journalled.header.get("title", ""))
     return Seat(
         film.opened,

@@ -9,10 +9,10 @@ import click
 import msgspec
 
 from a7sim.cli import options
-from a7sim.cli.links import of_a_link, token_from
+from a7sim.cli.links import link_options, token_from
 from a7sim.link.client import Client
-from a7sim.link.exchange import Exchange, say
-from a7sim.link.opening import told
+from a7sim.link.exchange import Exchange, send_line
+from a7sim.link.opening import port_errors
 
 EXIT_REFUSED = 1
 
@@ -20,7 +20,7 @@ EXIT_REFUSED = 1
 @click.command("send")
 @click.argument("url")
 @click.argument("lines", metavar="[LINE]...", nargs=-1)
-@of_a_link
+@link_options
 @options.out_file("the bytes of blocks")
 @options.as_document
 def command(
@@ -33,15 +33,15 @@ def command(
 
     Example: a7sim send a7sim://akwanga '*IDN?' 'BASE:BX 194.99;BX?'
     """
-    with told(url), Client.open(url, timeout, token_from(token_file)) as client:
+    with port_errors(url), Client.open(url, timeout, token_from(token_file)) as client:
         if not lines and not as_document and sys.stdin.isatty():
-            from a7sim.cli.prompt import prompted  # readline takes hold of the terminal
+            from a7sim.cli.prompt import run_prompt  # readline takes hold of the terminal
 
-            prompted(url, client)
+            run_prompt(url, client)
             return
         exchanges = []
         for line in _given(lines):
-            exchange = say(client, line)
+            exchange = send_line(client, line)
             exchanges.append(exchange)
             if not as_document and exchange.shown is not None:
                 click.echo(exchange.shown)

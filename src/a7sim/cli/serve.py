@@ -11,24 +11,24 @@ import click
 
 from a7sim.cli import options
 from a7sim.cli.links import token_from
-from a7sim.cli.names import a_scenario
-from a7sim.cli.operators import Asked, Kept, chosen, kept_in_a_folder, of_a_scenario, resumed
+from a7sim.cli.names import scenario_argument
+from a7sim.cli.operators import Asked, Kept, output_options, resolve_resume, resolve_scenario, scenario_options
 from a7sim.cli.options import TOKEN_VARIABLE
-from a7sim.documents import Document, as_json, head
+from a7sim.documents import Document, as_json, document_header
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import Desk
 from a7sim.instrument.language.desk import POLL_SECONDS
-from a7sim.link.addresses import Address, address_of
+from a7sim.link.addresses import Address, parse_address
 from a7sim.link.clock import Clock, WallClock
 from a7sim.link.conversation import Terms
-from a7sim.link.faults import EXAMPLE, faults_of
+from a7sim.link.faults import EXAMPLE, parse_faults
 from a7sim.link.loops import run
 from a7sim.link.serving import Doors, Server
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
 from a7sim.session.durable import JournalStopped
-from a7sim.session.journal import Journal, Keeping, header_of
-from a7sim.session.resuming import Begun, served_again
+from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.resuming import Begun, restore_instrument
 
 USUAL = Address("127.0.0.1", 5025)
 
@@ -39,7 +39,7 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
 
 @click.command("serve")
-@click.argument("scenario", required=False, shell_complete=a_scenario)
+@click.argument("scenario", required=False, shell_complete=scenario_argument)
 @options.tcp(str(USUAL), multiple=True)
 @click.option("--rfc2217", multiple=True, metavar="HOST:PORT", help="Listen as a serial port over telnet.")
 @click.option("--pty", multiple=True, type=options.PLACE, metavar="PATH", help="Make a link to a pseudo-terminal.")
@@ -52,7 +52,7 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 @click.option("--clients", type=options.COUNT, metavar="N", default=64, show_default=True, help="Most at a time.")
 @click.option(
     "--idle",
-    type=options.above(0.0),
+    type=options.greater_than(0.0),
     default=3600.0,
     show_default=True,
     metavar="SECONDS",
@@ -62,8 +62,8 @@ _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 @click.option(
     "--fault-seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Draws the faults."
 )
-@of_a_scenario
-@kept_in_a_folder("the journal")
+@scenario_options
+@output_options("the journal")
 @options.as_document
 @options.quiet()
 def command(
@@ -93,11 +93,11 @@ def command(
     doors = _doors(tcp, rfc2217, pty)
     token = token_from(token_file)
     _refuse_open_doors(doors, listen_anyway, token)
-    terms = Terms(baud, faults_of(fault) if fault is not None else None, fault_seed, idle, most_clients=clients)
+    terms = Terms(baud, parse_faults(fault) if fault is not None else None, fault_seed, idle, most_clients=clients)
     if kept.resume is not None:
-        served = _served_again(resumed(kept.resume, *_OF_THE_DOOR), token, kept.keeping)
+        served = _served_again(resolve_resume(kept.resume, *_OF_THE_DOOR), token, kept.keeping)
     else:
-        loaded, seed = chosen(scenario, asked)
+        loaded, seed = resolve_scenario(scenario, asked)
         kept.keeping.prepare(kept.out, kept.force)
         served = _served_anew(loaded, seed, token, realtime, kept)
     with served.journal:
@@ -118,7 +118,7 @@ def _served_anew(scenario: Scenario, seed: int, token: str | None, realtime: boo
     autograph = Autograph.of_scenario(scenario, seed)
     journal = Journal(kept.keeping)
     desk = Desk(autograph, journal.heard if kept.out else None, token, 0.0 if realtime else POLL_SECONDS)
-    header = header_of("serve", scenario, seed, realtime=realtime, login=token is not None)
+    header = make_header("serve", scenario, seed, realtime=realtime, login=token is not None)
     return Served(_head(scenario, seed), desk, _clock(realtime), journal.opened(kept.out, header, desk))
 
 
@@ -129,7 +129,7 @@ def _served_again(begun: Begun, token: str | None, keeping: Keeping) -> Served:
             f"{begun.journalled.where(1)}: expected {asked} token, as the session was begun with, got {given}"
         )
     journal = Journal(keeping)
-    desk, now, _ = served_again(begun, journal)
+    desk, now, _ = restore_instrument(begun, journal)
     desk.token = token
     return Served(_head(begun.scenario, begun.seed), desk, _clock(begun.setting("realtime"), now), journal)
 
@@ -186,16 +186,16 @@ class Announcements:
 
 
 def _head(scenario: Scenario, seed: int) -> Document:
-    return head("serve") | {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
+    return document_header("serve") | {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
 
 
 def _doors(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]) -> Doors:
-    sockets = [address_of(text, "--tcp") for text in tcp]
+    sockets = [parse_address(text, "--tcp") for text in tcp]
     if not (tcp or rfc2217 or pty):
         sockets = [USUAL]
     if len({path.absolute() for path in pty}) < len(pty):
         raise Mistake(f"--pty: expected a path of its own for each, got {', '.join(map(str, pty))}")
-    return Doors(sockets, [address_of(text, "--rfc2217") for text in rfc2217], pty)
+    return Doors(sockets, [parse_address(text, "--rfc2217") for text in rfc2217], pty)
 
 
 def _refuse_open_doors(doors: Doors, listen_anyway: bool, token: str | None) -> None:

@@ -20,23 +20,23 @@ from rich.progress import (
 from rich.text import Text
 
 from a7sim.cli import EXIT_DIFFERS, options
-from a7sim.cli.names import a_study
+from a7sim.cli.names import study_argument
 from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
-from a7sim.study.auditing import audited
-from a7sim.study.checkpoint import checkpoint_in
-from a7sim.study.executors import KINDS, Kind, opened
-from a7sim.study.findings import document_of
-from a7sim.study.folder import begun, leave, leave_page
+from a7sim.study.auditing import audit_study
+from a7sim.study.checkpoint import checkpoint_path
+from a7sim.study.executors import KINDS, Kind, open_executor
+from a7sim.study.findings import findings_document
+from a7sim.study.folder import open_tally, write_page, write_results
 from a7sim.study.loading import Laid, load_study
-from a7sim.study.running import work
-from a7sim.study.tables import of_study
+from a7sim.study.running import run_study
+from a7sim.study.tables import study_tables
 from a7sim.study.tally import Tally
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 
 @click.command("study")
-@click.argument("study", shell_complete=a_study)
+@click.argument("study", shell_complete=study_argument)
 @click.option("--replicates", type=int, metavar="N", help="Sessions in every cell, instead of what STUDY says.")
 @click.option(
     "--executor",
@@ -75,19 +75,19 @@ def command(
     Example: a7sim study levels --replicates 50 --out runs/levels --audit 4
     """
     laid = load_study(study, replicates)
-    with opened(executor, workers, scheduler) as (others, at_once):
-        tally = begun(laid, out, force)
+    with open_executor(executor, workers, scheduler) as (others, at_once):
+        tally = open_tally(laid, out, force)
         with _watched(laid, tally, as_document or quiet) as (progress, task):
-            checkpoint = checkpoint_in(out) if out is not None else None
-            work(laid, tally, others, at_once, checkpoint, lambda done: progress.advance(task, done))
-    document = document_of(laid, tally)
+            checkpoint = checkpoint_path(out) if out is not None else None
+            run_study(laid, tally, others, at_once, checkpoint, lambda done: progress.advance(task, done))
+    document = findings_document(laid, tally)
     if out is not None:
-        leave(out, laid, tally, document)
+        write_results(out, laid, tally, document)
         _leave_page(out, document)
     if as_document:
         click.echo(as_json(document), nl=False)
     elif not quiet:
-        Console().print(of_study(document))
+        Console().print(study_tables(document))
     if audit is not None:
         _audit(laid, tally, audit, as_document or quiet)
 
@@ -95,14 +95,14 @@ def command(
 def _leave_page(out: Path, document: Document) -> None:
     """Leave the page; without matplotlib all else is there nevertheless."""
     try:
-        leave_page(out, document)
+        write_page(out, document)
     except Mistake as missing:
         click.echo(f"a7sim: {missing}", err=True)
 
 
 def _audit(laid: Laid, tally: Tally, picks: int, silent: bool) -> None:
-    differences = audited(laid, tally, picks)
-    worked = counted(min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells)))), "session")
+    differences = audit_study(laid, tally, picks)
+    worked = pluralize(min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells)))), "session")
     if differences:
         click.echo(f"a7sim: {len(differences)} of {worked} differ over the link; {differences[0]}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)

@@ -6,12 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
-from a7sim.computing.comparing import against as compared_with
-from a7sim.computing.comparing import against_csv
-from a7sim.computing.outcome import Outcome, blamed_on, free_format, models_csv, output_cards, points_csv, residuals_csv
-from a7sim.computing.reading import along_the_strip, listed, read_ground, read_models
-from a7sim.computing.strips import numbered
-from a7sim.documents import Document, by_point, head, of_accuracy, of_residuals
+from a7sim.computing.comparing import compare_to_reference as compared_with
+from a7sim.computing.comparing import comparison_csv
+from a7sim.computing.outcome import (
+    Outcome,
+    errors_for,
+    free_format,
+    models_csv,
+    output_cards,
+    points_csv,
+    residuals_csv,
+)
+from a7sim.computing.reading import read_ground, read_models, short_list, sort_along_strip
+from a7sim.computing.strips import number_models
+from a7sim.documents import Document, accuracy_document, document_header, points_as_rows, residuals_document
 from a7sim.geometry import GON
 from a7sim.reduction.block import BlockAdjustment, block_adjustment
 from a7sim.reduction.strips import Model
@@ -24,24 +32,24 @@ def block(paths: Sequence[Path], ground_path: Path, height_weight: float = 1.0, 
     """Return the models of all files adjusted to the ground as one block. Raises Mistake."""
     models = read_models(paths)
     ground = read_ground(ground_path)
-    with blamed_on(listed(paths), f"ground {ground_path}"):
+    with errors_for(short_list(paths), f"ground {ground_path}"):
         found = block_adjustment(models, ground, height_weight)
-    document = head("reduce block") | {
+    document = document_header("reduce block") | {
         "models": _of_models(found),
         "s0_m": found.s0,
         "s0_plan_m": found.s0_plan,
         "s0_height_m": found.s0_height,
         "redundancy": found.redundancy,
         "iterations": found.iterations,
-        "residuals_m": of_residuals(found.fit),
-        "accuracy_m": of_accuracy(found.fit),
+        "residuals_m": residuals_document(found.fit),
+        "accuracy_m": accuracy_document(found.fit),
         "warnings": _missing(ground.points, found),
-        "points": by_point(found.points, found.coordinates),
+        "points": points_as_rows(found.points, found.coordinates),
     }
     files = _files(models, found)
     if against:
         document["compare"] = compared = compared_with(against, found.points, found.coordinates)
-        files["compare.csv"] = lambda: against_csv(compared)
+        files["compare.csv"] = lambda: comparison_csv(compared)
     return Outcome(document, files)
 
 
@@ -84,13 +92,13 @@ def _files(models: Sequence[Model], found: BlockAdjustment) -> dict[str, Callabl
         "models.csv": lambda: models_csv(in_ground),
         "points.csv": lambda: points_csv(found.points, found.coordinates),
         "residuals.csv": lambda: residuals_csv(found.fit),
-        "block.pat": lambda: free_format(numbered(in_ground)),
+        "block.pat": lambda: free_format(number_models(in_ground)),
         **cards,
     }
 
 
 def _cards(strip: Sequence[Model], found: BlockAdjustment) -> str:
-    return output_cards(found.fit, numbered(along_the_strip(strip)))
+    return output_cards(found.fit, number_models(sort_along_strip(strip)))
 
 
 def _strips(models: Sequence[Model]) -> list[list[Model]]:

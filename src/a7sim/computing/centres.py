@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from a7sim.computing.outcome import Outcome, blamed_on, points_csv
-from a7sim.computing.reading import columns_of, names_of, read_points
-from a7sim.documents import Document, by_point, head, of_statistics
-from a7sim.files import csv_text, numbered_order, read_table, unique
+from a7sim.computing.outcome import Outcome, errors_for, points_csv
+from a7sim.computing.reading import point_columns, point_names, read_points
+from a7sim.documents import Document, document_header, points_as_rows, statistics_document
+from a7sim.files import natural_sort_key, read_table, rows_by_key, to_csv
 from a7sim.geometry import GON, Array
 from a7sim.mistakes import Mistake
 from a7sim.reduction.centres import (
@@ -52,10 +52,10 @@ def _of_two_levels(path: Path, z1: float, z2: float) -> Outcome:
     rows = read_points(path, ("X1", "Y1", "X2", "Y2"))
     if z1 == z2:
         raise Mistake(f"--z1 and --z2: expected two different levels, got {z1:g} twice")
-    pointings = columns_of(rows, ("X1", "Y1", "X2", "Y2"))
-    with blamed_on(path):
+    pointings = point_columns(rows, ("X1", "Y1", "X2", "Y2"))
+    with errors_for(path):
         found = perspective_centre(pointings[:2], pointings[2:], z1, z2)
-    return _of_lines("two-levels", names_of(rows), found, {"levels": [z1, z2]})
+    return _of_lines("two-levels", point_names(rows), found, {"levels": [z1, z2]})
 
 
 def _of_levels(path: Path) -> Outcome:
@@ -69,14 +69,14 @@ def _of_levels(path: Path) -> Outcome:
                 f"got it twice at {key[1]:g}"
             )
         by_level[key] = np.array([row.numbers["X"], row.numbers["Y"]])
-    points = sorted({point for point, _ in by_level}, key=numbered_order)
+    points = sorted({point for point, _ in by_level}, key=natural_sort_key)
     levels = sorted({level for _, level in by_level})
     for point in points:
         for level in levels:
             if (point, level) not in by_level:
                 raise Mistake(f"{path}: expected every point at every level, got none of point {point} at {level:g}")
     pointings = np.array([[by_level[point, level] for point in points] for level in levels])
-    with blamed_on(path):
+    with errors_for(path):
         found = perspective_centre_of_levels(np.moveaxis(pointings, 2, 0), levels)
     extra: Document = {"levels": levels}
     if found.pointing_rms is not None:
@@ -85,11 +85,11 @@ def _of_levels(path: Path) -> Outcome:
 
 
 def _of_lines(method: str, points: tuple[str, ...], found: PerspectiveCentre, extra: Document) -> Outcome:
-    document = head("reduce centres") | {"method": method}
+    document = document_header("reduce centres") | {"method": method}
     document |= {name: float(getattr(found, name)) for name in UNKNOWNS}
     document |= {f"sigma_{name}": float(getattr(found, f"sigma_{name}")) for name in UNKNOWNS}
     document |= {"rms": float(found.rms), "redundancy": 2 * len(points) - 3}
-    document |= {"residuals": by_point(points, found.residuals[:2])} | extra
+    document |= {"residuals": points_as_rows(points, found.residuals[:2])} | extra
     return Outcome(document, {"residuals.csv": lambda: _residuals_csv(document["residuals"])})
 
 
@@ -97,10 +97,10 @@ def _of_grid_plate(path: Path, c: float | None) -> Outcome:
     if c is None:
         raise Mistake("--method grid: expected the projector's principal distance (--c), got none")
     rows = read_points(path, ("x", "y", "X", "Y", "Z"))
-    values, points = columns_of(rows, ("x", "y", "X", "Y", "Z")), names_of(rows)
-    with blamed_on(path):
+    values, points = point_columns(rows, ("x", "y", "X", "Y", "Z")), point_names(rows)
+    with errors_for(path):
         found = grid_plate_centre(values[:2], values[2:4], values[4], c)
-    document = head("reduce centres") | {"method": "grid", "c_mm": c}
+    document = document_header("reduce centres") | {"method": "grid", "c_mm": c}
     document |= dict(zip(("X0", "Y0", "Z0"), found.centre.tolist(), strict=True))
     document |= dict(zip(("sigma_X0", "sigma_Y0", "sigma_Z0"), found.sigma_centre.tolist(), strict=True))
     angles, sigmas = (found.angles / GON).tolist(), (found.sigma_angles / GON).tolist()
@@ -112,22 +112,22 @@ def _of_grid_plate(path: Path, c: float | None) -> Outcome:
         "rotation": found.rotation.tolist(),
         "s0_mm": float(found.s0),
         "iterations": int(found.iterations),
-        "statistics": of_statistics(found.adjustment, ELEMENTS, observations),
-        "residuals": by_point(points, found.residuals),
+        "statistics": statistics_document(found.adjustment, ELEMENTS, observations),
+        "residuals": points_as_rows(points, found.residuals),
     }
     return Outcome(document, {"residuals.csv": lambda: _residuals_csv(document["residuals"])})
 
 
 def _of_base_scale(path: Path) -> Outcome:
     table = read_table(path)
-    rows = unique(path, table.rows(["model"], ["base", "column", "height"]), "model")
-    names = sorted((name for (name,) in rows), key=numbered_order)
-    base, column, height = columns_of([rows[name,] for name in names], ("base", "column", "height"))
+    rows = rows_by_key(path, table.rows(["model"], ["base", "column", "height"]), "model")
+    names = sorted((name for (name,) in rows), key=natural_sort_key)
+    base, column, height = point_columns([rows[name,] for name in names], ("base", "column", "height"))
     if not (base > 0.0).all():
         row = next(row for row in rows.values() if not row.numbers["base"] > 0.0)
         raise Mistake(f"{path}, {row.place}, column base: expected a base above 0 mm, got {row.numbers['base']:g}")
     left, right = a8_centres(base, column, height)
-    document = head("reduce centres") | {
+    document = document_header("reduce centres") | {
         "method": "a8",
         "models": {name: {"left": left[:, i].tolist(), "right": right[:, i].tolist()} for i, name in enumerate(names)},
     }
@@ -136,4 +136,4 @@ def _of_base_scale(path: Path) -> Outcome:
 
 
 def _residuals_csv(residuals: Mapping[str, list[float]]) -> str:
-    return csv_text(("point", "x", "y"), [(point, *values) for point, values in residuals.items()])
+    return to_csv(("point", "x", "y"), [(point, *values) for point, values in residuals.items()])

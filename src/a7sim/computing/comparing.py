@@ -3,18 +3,18 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from a7sim.computing.reading import columns_of, names_of, read_points
-from a7sim.documents import Document, by_point
-from a7sim.files import csv_text
+from a7sim.computing.reading import point_columns, point_names, read_points
+from a7sim.documents import Document, points_as_rows
+from a7sim.files import to_csv
 from a7sim.geometry import Array
 from a7sim.mistakes import Mistake
-from a7sim.reduction.absolute import largest, root_mean_square
+from a7sim.reduction.absolute import max_abs_residual, root_mean_square
 
 Quantities = Mapping[tuple[str, str], Mapping[str, float]]
 """Values by method, by name and unit of what they are of."""
 
 
-def of_methods(quantities: Quantities) -> Document:
+def compare_methods(quantities: Quantities) -> Document:
     """Return the values of several methods side by side, and by unit the largest difference between any two."""
     rows: list[Document] = []
     most: dict[str, float] = {}
@@ -29,7 +29,7 @@ def methods_csv(compared: Document) -> str:
     """Return the values of several methods as CSV, to twelve digits."""
     rows = compared["rows"]
     methods = list(rows[0]["values"])
-    return csv_text(
+    return to_csv(
         ("quantity", "unit", *methods, "difference"),
         (
             (row["quantity"], row["unit"], *(f"{row['values'][m]:.12g}" for m in methods), f"{row['difference']:.3e}")
@@ -38,27 +38,27 @@ def methods_csv(compared: Document) -> str:
     )
 
 
-def against(path: Path, points: Sequence[str], coordinates: Array) -> Document:
+def compare_to_reference(path: Path, points: Sequence[str], coordinates: Array) -> Document:
     """Return how far final coordinates ``(3, n)`` lie from those of a file, computed minus given. Raises Mistake."""
     place = {name: i for i, name in enumerate(points)}
     rows = [row for row in read_points(path, "XYZ", gaps="XYZ") if row.texts["point"] in place]
     if not rows:
         raise Mistake(f"{path}, column point: expected points that were computed, got none of them")
-    names, given = names_of(rows), columns_of(rows, "XYZ")
+    names, given = point_names(rows), point_columns(rows, "XYZ")
     differences = coordinates[:, [place[name] for name in names]] - given
     return {
         "points": len(names),
         "rms": dict(zip("XYZ", root_mean_square(differences).tolist(), strict=True)),
-        "largest": dict(zip("XYZ", largest(differences).tolist(), strict=True)),
-        "given": by_point(names, given),
-        "differences": by_point(names, differences),
+        "largest": dict(zip("XYZ", max_abs_residual(differences).tolist(), strict=True)),
+        "given": points_as_rows(names, given),
+        "differences": points_as_rows(names, differences),
     }
 
 
-def against_csv(compared: Document) -> str:
+def comparison_csv(compared: Document) -> str:
     """Return given coordinates and computed minus given as CSV."""
     given = compared["given"]
-    return csv_text(
+    return to_csv(
         ("point", "X", "Y", "Z", "dX", "dY", "dZ"),
         ((name, *given[name], *difference) for name, difference in compared["differences"].items()),
     )

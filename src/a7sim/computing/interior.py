@@ -8,16 +8,16 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from a7sim.computing.outcome import Outcome, blamed_on
-from a7sim.computing.reading import by_name, columns_of, names_of
-from a7sim.documents import Document, by_point, head, of_statistics
-from a7sim.files import Row, csv_text, numbered_order, read_table, read_toml
+from a7sim.computing.outcome import Outcome, errors_for
+from a7sim.computing.reading import group_rows, point_columns, point_names
+from a7sim.documents import Document, document_header, points_as_rows, statistics_document
+from a7sim.files import Row, natural_sort_key, read_table, read_toml, to_csv
 from a7sim.geometry import GON, Array
 from a7sim.mistakes import Mistake
 from a7sim.reduction.corrections import corrected_image
 from a7sim.reduction.interior import PlaneFit, plane_fit, principal_distance_for_film
 from a7sim.scenario import Camera
-from a7sim.scenario.validation import mistakes_of_form
+from a7sim.scenario.validation import schema_errors
 
 CORRECTIONS = ("lens", "refraction", "curvature")
 """Corrections of image coordinates; any of them brings these to the principal point."""
@@ -58,12 +58,12 @@ def interior(
     `count_mm` is the size of a count, by which the change of the film's size is known. Raises Mistake.
     """
     camera = read_camera(camera_path)
-    found = by_name(read_table(path), "photo", "xy")
+    found = group_rows(read_table(path), "photo", "xy")
     pictures = [
         _picture(path, name, found[name], camera, kind, corrections, flight)
-        for name in sorted(found, key=numbered_order)
+        for name in sorted(found, key=natural_sort_key)
     ]
-    document = head("reduce interior") | {
+    document = document_header("reduce interior") | {
         "method": kind,
         "camera": {"name": camera.name, "c_mm": camera.c, "principal_point_mm": list(camera.principal_point)},
         "corrections": list(corrections),
@@ -72,11 +72,11 @@ def interior(
         "warnings": [warning for picture in pictures for warning in _warnings(picture, camera)],
     }
     files = {
-        "image.csv": lambda: csv_text(("photo", "point", "x", "y"), _image_rows(pictures)),
-        "residuals.csv": lambda: csv_text(("photo", "point", "x", "y"), _residual_rows(pictures)),
+        "image.csv": lambda: to_csv(("photo", "point", "x", "y"), _image_rows(pictures)),
+        "residuals.csv": lambda: to_csv(("photo", "point", "x", "y"), _residual_rows(pictures)),
     }
     if len(pictures) > 1:
-        files["pairs.csv"] = lambda: csv_text(("model", "point", "xl", "yl", "xr", "yr"), _pair_rows(pictures))
+        files["pairs.csv"] = lambda: to_csv(("model", "point", "xl", "yl", "xr", "yr"), _pair_rows(pictures))
     return Outcome(document, files)
 
 
@@ -84,7 +84,7 @@ def read_camera(path: Path) -> Camera:
     """Return the camera of a TOML file, as a scenario gives it: under `[camera]` or at the top. Raises Mistake."""
     raw = read_toml(path)
     raw = raw.get("camera", raw)
-    wrong = next(mistakes_of_form(raw, msgspec.inspect.type_info(Camera), "camera"), None)
+    wrong = next(schema_errors(raw, msgspec.inspect.type_info(Camera), "camera"), None)
     if wrong:
         raise Mistake(f"{path}: {wrong}")
     return msgspec.convert(raw, Camera)
@@ -102,15 +102,15 @@ def _picture(
     calibrated = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in camera.fiducials}
     fiducials = [row for row in rows if row.texts["point"] in calibrated]
     others = [row for row in rows if row.texts["point"] not in calibrated]
-    names = names_of(fiducials)
-    with blamed_on(path, f"photo {name}"):
+    names = point_names(fiducials)
+    with errors_for(path, f"photo {name}"):
         places = np.array([calibrated[each] for each in names]).reshape((-1, 2)).T
-        fit = plane_fit(columns_of(fiducials, "xy"), places, kind)
+        fit = plane_fit(point_columns(fiducials, "xy"), places, kind)
         _refuse_confused(fit, names)
-        image = fit.calibrated(columns_of(others, "xy").reshape((2, -1)))
+        image = fit.calibrated(point_columns(others, "xy").reshape((2, -1)))
         if corrections:
             image = _corrected(image, camera, corrections, flight)
-    return _Picture(name, names, fit, names_of(others), image)
+    return _Picture(name, names, fit, point_names(others), image)
 
 
 def _refuse_confused(fit: PlaneFit, names: Sequence[str]) -> None:
@@ -160,12 +160,12 @@ def _of_picture(picture: _Picture, camera: Camera, count_mm: float | None) -> Do
             name: {"value": float(value), "sigma": float(sigmas[name])} for name, value in fit.unknowns.items()
         },
         "matrix": fit.matrix.tolist(),
-        "residuals_mm": by_point(picture.fiducials, fit.residuals),
+        "residuals_mm": points_as_rows(picture.fiducials, fit.residuals),
         "s0_mm": float(fit.adjustment.s0),
         "iterations": int(fit.iterations),
-        "statistics": of_statistics(fit.adjustment, list(fit.unknowns), observations),
+        "statistics": statistics_document(fit.adjustment, list(fit.unknowns), observations),
         "film": _of_film(fit, camera.c, count_mm),
-        "points": by_point(picture.points, picture.image),
+        "points": points_as_rows(picture.points, picture.image),
     }
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from a7sim.documents import Document, as_json
-from a7sim.files import csv_text, write_files
+from a7sim.files import to_csv, write_files
 from a7sim.geometry import Array
 from a7sim.mistakes import Mistake
 from a7sim.reduction.absolute import GroundFit
@@ -30,7 +30,7 @@ class Outcome:
 
 
 @contextmanager
-def blamed_on(path: Path | str, what: str = "") -> Iterator[None]:
+def errors_for(path: Path | str, what: str = "") -> Iterator[None]:
     """Turn what the sums refuse or cannot determine into a mistake of the file; they say so themselves, not numpy."""
     try:
         with np.errstate(all="ignore"):
@@ -39,7 +39,7 @@ def blamed_on(path: Path | str, what: str = "") -> Iterator[None]:
         raise Mistake(f"{path}{f', {what}' if what else ''}: {refusal}") from refusal
 
 
-def written(outcome: Outcome, folder: Path) -> Document:
+def write_result(outcome: Outcome, folder: Path) -> Document:
     """Write `results.json` and the files of an outcome into a folder and return the document as written.
 
     What does not fit the form of a file (a name of letters on a card) keeps that file from being written, and the
@@ -58,7 +58,7 @@ def written(outcome: Outcome, folder: Path) -> Document:
 
 def models_csv(models: Sequence[Model]) -> str:
     """Return models as CSV, centres as points `<photo>:centre`."""
-    return csv_text(
+    return to_csv(
         MODEL_COLUMNS,
         ([model.name, name, *xyz] for model in models for name, xyz in _places(model.points, model.coordinates)),
     )
@@ -66,13 +66,13 @@ def models_csv(models: Sequence[Model]) -> str:
 
 def points_csv(points: Sequence[str], coordinates: Array) -> str:
     """Return points with coordinates ``(3, n)`` as CSV."""
-    return csv_text(POINT_COLUMNS, ([name, *xyz] for name, xyz in _places(points, coordinates)))
+    return to_csv(POINT_COLUMNS, ([name, *xyz] for name, xyz in _places(points, coordinates)))
 
 
 def residuals_csv(fit: GroundFit) -> str:
     """Return computed minus given at the ground points as CSV."""
     rows = zip(fit.ground.points, fit.ground.roles, fit.residuals.T.tolist(), strict=True)
-    return csv_text(RESIDUAL_COLUMNS, ([name, role, *residual] for name, role, residual in rows))
+    return to_csv(RESIDUAL_COLUMNS, ([name, role, *residual] for name, role, residual in rows))
 
 
 def free_format(models: Sequence[Model]) -> str:

@@ -6,11 +6,11 @@ from typing import Literal
 
 import numpy as np
 
-from a7sim.computing.comparing import methods_csv, of_methods
-from a7sim.computing.outcome import Outcome, blamed_on, models_csv
-from a7sim.computing.reading import Pair, pairs_of, photographs_of
-from a7sim.documents import Document, by_point, head, of_elements, of_statistics
-from a7sim.files import csv_text, read_table
+from a7sim.computing.comparing import compare_methods, methods_csv
+from a7sim.computing.outcome import Outcome, errors_for, models_csv
+from a7sim.computing.reading import Pair, model_photographs, read_pairs
+from a7sim.documents import Document, document_header, elements_document, points_as_rows, statistics_document
+from a7sim.files import read_table, to_csv
 from a7sim.geometry import Array, ray_of, stereoscopic_intersection
 from a7sim.mistakes import Mistake
 from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, relative_orientation
@@ -46,15 +46,15 @@ def relative(
     methods = [each for each in RELATIVE_METHODS if each != "all"] if method == "all" else [method]
     found: dict[str, RelativeOrientation | SnoopedOrientation] = {}
     for name in methods:
-        with blamed_on(path, f"by {name}" if method == "all" else ""):
+        with errors_for(path, f"by {name}" if method == "all" else ""):
             found[name] = _oriented(pair, c, unknowns, bx, name)
     first = found[methods[0]]
-    document = head("reduce relative") | {"method": methods[0]} | of_pair(pair, first, c, bx)
-    photos = photographs_of(pair.name) or ("left", "right")
-    model = with_centres(_without_blunders(pair, first), _orientation(first), c, bx, photos)
+    document = document_header("reduce relative") | {"method": methods[0]} | pair_document(pair, first, c, bx)
+    photos = model_photographs(pair.name) or ("left", "right")
+    model = add_centres(_without_blunders(pair, first), _orientation(first), c, bx, photos)
     files = {
         "models.csv": lambda: models_csv([model]),
-        "residuals.csv": lambda: csv_text(("point", "p"), list(document["residual_y_parallax_mm"].items())),
+        "residuals.csv": lambda: to_csv(("point", "p"), list(document["residual_y_parallax_mm"].items())),
     }
     if method == "all":
         document["compare"] = compared = _compared(pair, found, c, bx)
@@ -64,14 +64,14 @@ def relative(
 
 
 def _only_pair(path: Path, principal_point: tuple[float, float]) -> Pair:
-    pairs = pairs_of(read_table(path), principal_point, may_be_one=True)
+    pairs = read_pairs(read_table(path), principal_point, may_be_one=True)
     if len(pairs) > 1:
         shown = ", ".join(pair.name for pair in pairs)[:80]
         raise Mistake(f"{path}, column model: expected one pair, got {len(pairs)} ({shown}); `reduce strip` takes more")
     return pairs[0]
 
 
-def of_pair(pair: Pair, found: RelativeOrientation | SnoopedOrientation, c: float, bx: float) -> Document:
+def pair_document(pair: Pair, found: RelativeOrientation | SnoopedOrientation, c: float, bx: float) -> Document:
     """Return an oriented pair with its model, a base of length `bx` in the left photograph's frame."""
     orientation = _orientation(found)
     oriented_on = found.points if isinstance(found, SnoopedOrientation) else pair.points
@@ -79,19 +79,19 @@ def of_pair(pair: Pair, found: RelativeOrientation | SnoopedOrientation, c: floa
         "unknowns": list(orientation.unknowns),
         "rotation": orientation.rotation.tolist(),
         "base": orientation.base.tolist(),
-        "elements": of_elements(orientation.elements, orientation.sigmas),
+        "elements": elements_document(orientation.elements, orientation.sigmas),
         "iterations": int(orientation.iterations),
         "converged": bool(orientation.converged),
         "condition": float(orientation.condition),
         "s0_mm": float(orientation.s0),
         "residual_y_parallax_mm": dict(zip(oriented_on, orientation.picture_parallaxes.tolist(), strict=True)),
-        "statistics": of_statistics(orientation.adjustment, orientation.unknowns, oriented_on),
-        "points": by_point(pair.points, model_points(pair, orientation, c, bx)),
+        "statistics": statistics_document(orientation.adjustment, orientation.unknowns, oriented_on),
+        "points": points_as_rows(pair.points, model_points(pair, orientation, c, bx)),
     }
     return document | _of_snooping(found)
 
 
-def with_centres(pair: Pair, orientation: RelativeOrientation, c: float, bx: float, photos: tuple[str, str]) -> Model:
+def add_centres(pair: Pair, orientation: RelativeOrientation, c: float, bx: float, photos: tuple[str, str]) -> Model:
     """Return the model of a pair, its centres among the points."""
     points = model_points(pair, orientation, c, bx)
     ends = np.array([np.zeros(3), orientation.base * bx]).T
@@ -155,7 +155,7 @@ def _of_snooping(found: RelativeOrientation | SnoopedOrientation) -> Document:
 def _compared(pair: Pair, found: dict[str, RelativeOrientation | SnoopedOrientation], c: float, bx: float) -> Document:
     """Return elements, precision and model coordinates of several methods side by side."""
     orientations = {name: _orientation(each) for name, each in found.items()}
-    elements = {name: of_elements(each.elements, each.sigmas) for name, each in orientations.items()}
+    elements = {name: elements_document(each.elements, each.sigmas) for name, each in orientations.items()}
     first = next(iter(elements.values()))
     rows = {
         (element, "mm" if element.startswith("b") else "gon"): {
@@ -168,11 +168,12 @@ def _compared(pair: Pair, found: dict[str, RelativeOrientation | SnoopedOrientat
         for k, axis in enumerate("XYZ"):
             rows[f"{point} {axis}", "mm of the model"] = {name: float(model[k, i]) for name, model in models.items()}
     rows["s0", "mm of the picture"] = {name: float(each.s0) for name, each in orientations.items()}
-    return of_methods(rows)
+    return compare_methods(rows)
 
 
 def photographs_of_pairs(pairs: Sequence[Pair]) -> list[tuple[str, str]]:
     """Return the photographs of each pair: those in its name (`321-320`), else by its place in the file."""
     return [
-        photographs_of(pair.name) or (f"photo{place}", f"photo{place + 1}") for place, pair in enumerate(pairs, start=1)
+        model_photographs(pair.name) or (f"photo{place}", f"photo{place + 1}")
+        for place, pair in enumerate(pairs, start=1)
     ]

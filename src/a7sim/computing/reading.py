@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from a7sim.files import Row, Table, numbered_order, read_table, read_text, unique
+from a7sim.files import Row, Table, natural_sort_key, read_table, read_text, rows_by_key
 from a7sim.geometry import Array
 from a7sim.mistakes import Mistake
 from a7sim.reduction.absolute import ROLES, Ground
@@ -31,57 +31,58 @@ class Pair:
     right: Array
 
 
-def is_of_pairs(table: Table) -> bool:
+def is_pair_table(table: Table) -> bool:
     """Tell whether a table holds image coordinates of pairs rather than models."""
     return any(column in table.columns for column in PAIR_COLUMNS)
 
 
-def names_of(rows: Sequence[Row]) -> tuple[str, ...]:
+def point_names(rows: Sequence[Row]) -> tuple[str, ...]:
     """Return the points of rows."""
     return tuple(row.texts["point"] for row in rows)
 
 
-def columns_of(rows: Sequence[Row], names: Sequence[str]) -> Array:
+def point_columns(rows: Sequence[Row], names: Sequence[str]) -> Array:
     """Return columns ``(len(names), n)`` of rows."""
     return np.array([[row.numbers[name] for row in rows] for name in names])
 
 
 def read_points(path: Path, numbers: Sequence[str], gaps: Sequence[str] = ()) -> list[Row]:
     """Return the rows of a file of points, each there once, by their names. Raises Mistake."""
-    rows = unique(path, read_table(path).rows(["point"], numbers, gaps), "point").values()
-    return sorted(rows, key=lambda row: numbered_order(row.texts["point"]))
+    rows = rows_by_key(path, read_table(path).rows(["point"], numbers, gaps), "point").values()
+    return sorted(rows, key=lambda row: natural_sort_key(row.texts["point"]))
 
 
-def by_name(table: Table, group: str, numbers: Sequence[str], may_be_one: bool = False) -> dict[str, list[Row]]:
+def group_rows(table: Table, group: str, numbers: Sequence[str], may_be_one: bool = False) -> dict[str, list[Row]]:
     """Return the rows of a table by the text of a column, in which each point is there once. Raises Mistake.
 
     Groups come as they first stand in the file, their points by name. A table that `may_be_one` group needs no such
     column; the group is then named after the file.
     """
     if may_be_one and group not in table.columns:
-        rows = unique(table.path, table.rows(["point"], numbers), "point").values()
-        return {table.path.stem: sorted(rows, key=lambda row: numbered_order(row.texts["point"]))}
+        rows = rows_by_key(table.path, table.rows(["point"], numbers), "point").values()
+        return {table.path.stem: sorted(rows, key=lambda row: natural_sort_key(row.texts["point"]))}
     found: dict[str, list[Row]] = {}
-    for row in unique(table.path, table.rows([group, "point"], numbers), group, "point").values():
+    for row in rows_by_key(table.path, table.rows([group, "point"], numbers), group, "point").values():
         found.setdefault(row.texts[group], []).append(row)
-    return {name: sorted(rows, key=lambda row: numbered_order(row.texts["point"])) for name, rows in found.items()}
+    return {name: sorted(rows, key=lambda row: natural_sort_key(row.texts["point"])) for name, rows in found.items()}
 
 
-def pairs_of(table: Table, principal_point: tuple[float, float], may_be_one: bool = False) -> list[Pair]:
+def read_pairs(table: Table, principal_point: tuple[float, float], may_be_one: bool = False) -> list[Pair]:
     """Return the pairs of a table as they first stand in it. Raises Mistake."""
     shift = np.array(principal_point)[:, None]
     pairs = []
-    for name, rows in by_name(table, "model", PAIR_COLUMNS, may_be_one).items():
-        measured = columns_of(rows, PAIR_COLUMNS)
-        pairs.append(Pair(name, names_of(rows), measured[:2] - shift, measured[2:] - shift))
+    for name, rows in group_rows(table, "model", PAIR_COLUMNS, may_be_one).items():
+        measured = point_columns(rows, PAIR_COLUMNS)
+        pairs.append(Pair(name, point_names(rows), measured[:2] - shift, measured[2:] - shift))
     return pairs
 
 
-def models_of(table: Table, may_be_one: bool = False) -> list[Model]:
+def read_models_table(table: Table, may_be_one: bool = False) -> list[Model]:
     """Return the models of a table, by name. Raises Mistake."""
-    found = by_name(table, "model", "XYZ", may_be_one)
+    found = group_rows(table, "model", "XYZ", may_be_one)
     return [
-        Model(name, names_of(found[name]), columns_of(found[name], "XYZ")) for name in sorted(found, key=numbered_order)
+        Model(name, point_names(found[name]), point_columns(found[name], "XYZ"))
+        for name in sorted(found, key=natural_sort_key)
     ]
 
 
@@ -93,22 +94,26 @@ def read_models(paths: Sequence[Path], may_be_one: bool = False) -> list[Model]:
     found: dict[str, tuple[Path, Model]] = {}
     for path in paths:
         text = read_text(path)
-        here = read_cards(path, text).models if is_deck(path, text) else models_of(read_table(path, text), may_be_one)
+        here = (
+            read_cards(path, text).models
+            if is_deck(path, text)
+            else read_models_table(read_table(path, text), may_be_one)
+        )
         for model in here:
             if model.name in found:
                 raise Mistake(f"{path}: expected models of its own, got {model.name} as in {found[model.name][0]}")
             found[model.name] = path, model
-    return sorted((model for _, model in found.values()), key=lambda model: numbered_order(model.name))
+    return sorted((model for _, model in found.values()), key=lambda model: natural_sort_key(model.name))
 
 
-def listed(paths: Sequence[Path]) -> str:
+def short_list(paths: Sequence[Path]) -> str:
     """Return the names of files, the first three of them."""
     return ", ".join(map(str, paths[:3])) + (" ..." if len(paths) > 3 else "")
 
 
 def read_ground(path: Path) -> Ground:
     """Return the ground points of a file; cells that a role does not need may be empty. Raises Mistake."""
-    rows = unique(path, read_table(path).rows(["point", "role"], "XYZ", gaps="XYZ"), "point").values()
+    rows = rows_by_key(path, read_table(path).rows(["point", "role"], "XYZ", gaps="XYZ"), "point").values()
     for row in rows:
         role = row.texts["role"]
         if role not in ROLES:
@@ -119,29 +124,29 @@ def read_ground(path: Path) -> Ground:
         missing = [axis for axis in _NEEDED[role] if axis in empty] or (empty if len(empty) == 3 else [])
         if missing:
             raise Mistake(f"{path}, {row.place}, column {missing[0]}: expected a number at a {role} point, got nothing")
-    ordered = sorted(rows, key=lambda row: numbered_order(row.texts["point"]))
-    return Ground(names_of(ordered), columns_of(ordered, "XYZ"), tuple(row.texts["role"] for row in ordered))
+    ordered = sorted(rows, key=lambda row: natural_sort_key(row.texts["point"]))
+    return Ground(point_names(ordered), point_columns(ordered, "XYZ"), tuple(row.texts["role"] for row in ordered))
 
 
-def photographs_of(model: str) -> tuple[str, str] | None:
+def model_photographs(model: str) -> tuple[str, str] | None:
     """Return the photographs that a model is named after (`321-320`), or None."""
     left, dash, right = (part.strip() for part in model.partition("-"))
     return (left, right) if dash and left and right else None
 
 
-def along_the_strip(models: Sequence[Model]) -> tuple[Model, ...]:
+def sort_along_strip(models: Sequence[Model]) -> tuple[Model, ...]:
     """Return models as they follow each other, whatever order they were given in.
 
     A strip of models named LEFT-RIGHT begins with the one whose left-hand photograph is nobody's right-hand one,
     another with the end of the lower name; models that share no centre follow each other by name. Raises Mistake as
     `in_order` does.
     """
-    chain = in_order(sorted(models, key=lambda model: numbered_order(model.name)))
+    chain = in_order(sorted(models, key=lambda model: natural_sort_key(model.name)))
     if len(chain) < 2:
         return chain
-    photographs = photographs_of(chain[0].name), photographs_of(chain[-1].name)
+    photographs = model_photographs(chain[0].name), model_photographs(chain[-1].name)
     if photographs[0] and photographs[1]:
         backwards = f"{photographs[0][0]}{CENTRE}" in chain[1].points
     else:
-        backwards = numbered_order(chain[-1].name) < numbered_order(chain[0].name)
+        backwards = natural_sort_key(chain[-1].name) < natural_sort_key(chain[0].name)
     return chain[::-1] if backwards and set(chain[0].centres) & set(chain[1].centres) else chain

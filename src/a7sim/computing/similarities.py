@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import Literal
 
-from a7sim.computing.comparing import methods_csv, of_methods
-from a7sim.computing.outcome import Outcome, blamed_on
-from a7sim.computing.reading import columns_of, names_of, read_points
-from a7sim.documents import Document, by_point, head, of_similarity, of_statistics
-from a7sim.files import csv_text
+from a7sim.computing.comparing import compare_methods, methods_csv
+from a7sim.computing.outcome import Outcome, errors_for
+from a7sim.computing.reading import point_columns, point_names, read_points
+from a7sim.documents import Document, document_header, points_as_rows, similarity_document, statistics_document
+from a7sim.files import to_csv
 from a7sim.geometry import GON
 from a7sim.reduction.similarity import Similarity, similarity_by_iteration, similarity_by_quaternion
 
@@ -26,33 +26,33 @@ def similarity(path: Path, method: SimilarityMethod = "iteration") -> Outcome:
     Raises Mistake.
     """
     rows = read_points(path, ("x", "y", "z", "X", "Y", "Z"))
-    points, values = names_of(rows), columns_of(rows, ("x", "y", "z", "X", "Y", "Z"))
-    with blamed_on(path):
+    points, values = point_names(rows), point_columns(rows, ("x", "y", "z", "X", "Y", "Z"))
+    with errors_for(path):
         found = {name: by(values[:3], values[3:]) for name, by in _BY.items() if method in (name, "both")}
         name, first = next(iter(found.items()))
-        document = head("reduce similarity") | {"method": name} | of_common(first, points)
+        document = document_header("reduce similarity") | {"method": name} | common_points_document(first, points)
     files = {
-        "residuals.csv": lambda: csv_text(
+        "residuals.csv": lambda: to_csv(
             ("point", "X", "Y", "Z"), [(point, *v) for point, v in document["residuals"].items()]
         )
     }
     if method == "both":
-        document["compare"] = compared = of_methods(_quantities(found))
+        document["compare"] = compared = compare_methods(_quantities(found))
         files["compare.csv"] = lambda: methods_csv(compared)
     return Outcome(document, files)
 
 
-def of_common(found: Similarity, points: tuple[str, ...]) -> Document:
+def common_points_document(found: Similarity, points: tuple[str, ...]) -> Document:
     """Return a similarity on named points with its statistics, angles in gon."""
     sigmas = [found.sigma_scale, *(found.sigma_angles / GON), *found.sigma_translation]
     observations = [f"{point} {axis}" for axis in "XYZ" for point in points]
-    return of_similarity(found) | {
+    return similarity_document(found) | {
         "angles": dict(zip(ANGLES, (found.angles / GON).tolist(), strict=True)),
         "sigma": {name: float(sigma) for name, sigma in zip(("scale", *ANGLES, *SHIFTS), sigmas, strict=True)},
         "s0": float(found.s0),
         "iterations": found.iterations,
-        "residuals": by_point(points, found.residuals),
-        "statistics": of_statistics(found.adjustment, ("scale", *ANGLES, *SHIFTS), observations),
+        "residuals": points_as_rows(points, found.residuals),
+        "statistics": statistics_document(found.adjustment, ("scale", *ANGLES, *SHIFTS), observations),
     }
 
 

@@ -4,28 +4,36 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from a7sim.computing.comparing import against as compared_with
-from a7sim.computing.comparing import against_csv
+from a7sim.computing.comparing import compare_to_reference as compared_with
+from a7sim.computing.comparing import comparison_csv
 from a7sim.computing.outcome import (
     Outcome,
-    blamed_on,
+    errors_for,
     free_format,
     models_csv,
     output_cards,
     points_csv,
     residuals_csv,
 )
-from a7sim.computing.pairs import of_pair, photographs_of_pairs, with_centres
+from a7sim.computing.pairs import add_centres, pair_document, photographs_of_pairs
 from a7sim.computing.reading import (
-    along_the_strip,
-    is_of_pairs,
-    listed,
-    models_of,
-    pairs_of,
+    is_pair_table,
     read_ground,
     read_models,
+    read_models_table,
+    read_pairs,
+    short_list,
+    sort_along_strip,
 )
-from a7sim.documents import Document, by_point, head, of_absolute, of_adjustment, of_joins, of_statistics
+from a7sim.documents import (
+    Document,
+    absolute_document,
+    adjustment_document,
+    document_header,
+    joins_document,
+    points_as_rows,
+    statistics_document,
+)
 from a7sim.files import Table, read_table, read_text
 from a7sim.mistakes import Mistake
 from a7sim.reduction.absolute import AbsoluteOrientation, Ground, GroundFit, absolute_orientation
@@ -59,16 +67,16 @@ class _Input:
 def connect(paths: Sequence[Path], method: JoinMethod = "points") -> Outcome:
     """Return the models of all files joined into one, in the system of the first along the strip. Raises Mistake."""
     models = read_models(paths)
-    with blamed_on(listed(paths)):
+    with errors_for(short_list(paths)):
         if len(models) < 2:
             raise Mistake(f"expected two models or more, got {len(models)}")
-        formed = formed_strip(along_the_strip(models), method)
-    document = head("reduce connect") | {
+        formed = formed_strip(sort_along_strip(models), method)
+    document = document_header("reduce connect") | {
         "method": method,
         "system": formed.models[0].name,
         "models": [model.name for model in formed.models],
         "joins": _of_closed_joins(formed),
-        "points": by_point(formed.points, formed.coordinates),
+        "points": points_as_rows(formed.points, formed.coordinates),
     }
     return Outcome(document, _model_files(formed.models, formed.as_model))
 
@@ -79,10 +87,10 @@ def absolute(path: Path, ground_path: Path, against: Path | None = None) -> Outc
     if len(models) > 1:
         raise Mistake(f"{path}, column model: expected one model, got {len(models)}; `reduce strip` joins them")
     ground = read_ground(ground_path)
-    with blamed_on(path, f"ground {ground_path}"):
+    with errors_for(path, f"ground {ground_path}"):
         oriented = absolute_orientation(models[0], ground)
-    document = head("reduce absolute") | of_oriented(oriented)
-    document["points"] = by_point(oriented.model.points, oriented.model.coordinates)
+    document = document_header("reduce absolute") | orientation_document(oriented)
+    document["points"] = points_as_rows(oriented.model.points, oriented.model.coordinates)
     files = _model_files([oriented.model], oriented.model)
     files["residuals.csv"] = lambda: residuals_csv(oriented.fit)
     return _with_comparison(Outcome(document, files), oriented.model, against)
@@ -106,43 +114,43 @@ def strip(
     ground = own_ground or given.ground
     if ground is None:
         raise Mistake(f"{path}: expected ground points (--ground), which only cards bring with them, got none")
-    with blamed_on(path):
+    with errors_for(path):
         formed = formed_strip(given.models, method)
-    with blamed_on(path, f"ground {ground_path}" if ground_path else ""):
+    with errors_for(path, f"ground {ground_path}" if ground_path else ""):
         oriented = absolute_orientation(formed, ground)
         adjusted = strip_adjustment(oriented.model, ground, degree) if degree else None
-    document = head("reduce strip") | {
+    document = document_header("reduce strip") | {
         "input": given.kind,
         "method": method,
         "models": given.documents,
         "joins": _of_closed_joins(formed),
     }
-    document |= of_oriented(oriented)
+    document |= orientation_document(oriented)
     if adjusted:
-        document["polynomial"] = of_adjustment(adjusted) | _of_polynomials(adjusted)
+        document["polynomial"] = adjustment_document(adjusted) | _of_polynomials(adjusted)
     final = adjusted.model if adjusted else oriented.model
-    document["points"] = by_point(final.points, final.coordinates)
+    document["points"] = points_as_rows(final.points, final.coordinates)
     models = _in_ground(formed, oriented, adjusted)
     fit = adjusted.fit if adjusted else oriented.fit
     return _with_comparison(Outcome(document, _model_files(models, final) | ground_files(models, fit)), final, against)
 
 
-def of_oriented(oriented: AbsoluteOrientation) -> Document:
+def orientation_document(oriented: AbsoluteOrientation) -> Document:
     """Return an absolute orientation with the statistics of its seven unknowns where these are all determined."""
     similarity = oriented.similarity
     try:
         adjustment = similarity.adjustment
     except Undetermined:  # omega and kappa turn about one axis
-        return of_absolute(oriented)
+        return absolute_document(oriented)
     used = oriented.fit.ground.used > 0.0
     names = oriented.fit.ground.points
     observations = [
         f"{name} {axis}" for k, axis in enumerate("XYZ") for name, each in zip(names, used[k], strict=True) if each
     ]
-    return of_absolute(oriented) | {
+    return absolute_document(oriented) | {
         "iterations": similarity.iterations,
         "s0_m": float(adjustment.s0),
-        "statistics": of_statistics(adjustment, SIMILARITY_UNKNOWNS, observations),
+        "statistics": statistics_document(adjustment, SIMILARITY_UNKNOWNS, observations),
     }
 
 
@@ -150,12 +158,12 @@ def ground_files(models: Sequence[Model], fit: GroundFit) -> dict[str, Callable[
     """Return the files of a strip in the ground system: residuals, output cards and free format."""
     return {
         "residuals.csv": lambda: residuals_csv(fit),
-        "strip.crd": lambda: output_cards(fit, numbered(models)),
-        "strip.pat": lambda: free_format(numbered(models)),
+        "strip.crd": lambda: output_cards(fit, number_models(models)),
+        "strip.pat": lambda: free_format(number_models(models)),
     }
 
 
-def numbered(models: Sequence[Model]) -> list[Model]:
+def number_models(models: Sequence[Model]) -> list[Model]:
     """Return models with numbers for names, as cards want them: their own, else their place in the strip."""
     if all(model.name.isascii() and model.name.isdigit() for model in models):
         return list(models)
@@ -167,8 +175,8 @@ def _strip_input(path: Path, camera: PairCamera | None) -> _Input:
     if is_deck(path, text):
         return _of_deck(path, read_cards(path, text))
     table = read_table(path, text)
-    if not is_of_pairs(table):
-        return _of_models(path, "models", models_of(table))
+    if not is_pair_table(table):
+        return _of_models(path, "models", read_models_table(table))
     if camera is None:
         raise Mistake(f"{path}: expected the principal distance (--c) of the pairs, got none")
     return _of_pairs(path, table, camera)
@@ -180,19 +188,19 @@ def _of_deck(path: Path, deck: Deck) -> _Input:
 
 
 def _of_models(path: Path, kind: str, models: Sequence[Model]) -> _Input:
-    with blamed_on(path):
-        chain = along_the_strip(models)
-    documents = [{"model": model.name, "points": by_point(model.points, model.coordinates)} for model in chain]
+    with errors_for(path):
+        chain = sort_along_strip(models)
+    documents = [{"model": model.name, "points": points_as_rows(model.points, model.coordinates)} for model in chain]
     return _Input(kind, chain, documents)
 
 
 def _of_pairs(path: Path, table: Table, camera: PairCamera) -> _Input:
-    pairs = pairs_of(table, camera.principal_point)
+    pairs = read_pairs(table, camera.principal_point)
     models: list[Model] = []
     documents: dict[str, Document] = {}
     for pair, photos in zip(pairs, photographs_of_pairs(pairs), strict=True):
         base = float((pair.left[0] - pair.right[0]).mean()) if camera.bx is None else camera.bx
-        with blamed_on(path, f"model {pair.name}"):
+        with errors_for(path, f"model {pair.name}"):
             if not base > 0.0:
                 raise Mistake(
                     f"expected the points of the left photograph further right than in the other, "
@@ -200,10 +208,10 @@ def _of_pairs(path: Path, table: Table, camera: PairCamera) -> _Input:
                 )
             orientation = relative_orientation(pair.left, pair.right, camera.c, camera.c, "dependent", bx=base)
         length = base / abs(float(orientation.base[0]))
-        documents[pair.name] = {"model": pair.name} | of_pair(pair, orientation, camera.c, length)
-        models.append(with_centres(pair, orientation, camera.c, length, photos))
-    with blamed_on(path):
-        chain = along_the_strip(models)
+        documents[pair.name] = {"model": pair.name} | pair_document(pair, orientation, camera.c, length)
+        models.append(add_centres(pair, orientation, camera.c, length, photos))
+    with errors_for(path):
+        chain = sort_along_strip(models)
     return _Input("pairs", chain, [documents[model.name] for model in chain])
 
 
@@ -214,9 +222,9 @@ def _of_closed_joins(formed: Strip) -> list[Document]:
             "points": list(join.points),
             "translation": join.similarity.translation.tolist(),
             "rms_mm": join.rms.tolist(),
-            "differences_mm": by_point(join.points, join.differences),
+            "differences_mm": points_as_rows(join.points, join.differences),
         }
-        for document, join in zip(of_joins(formed), formed.joins, strict=True)
+        for document, join in zip(joins_document(formed), formed.joins, strict=True)
     ]
 
 
@@ -241,10 +249,10 @@ def _of_polynomials(adjusted: StripAdjustment) -> Document:
             for name, value, sigma in zip(names, part.unknowns, part.sigmas, strict=True)
         },
         "statistics": {
-            "plan": of_statistics(
+            "plan": statistics_document(
                 adjusted.plan, in_plan, [f"{name} {where}" for where in ("along", "across") for name in plan]
             ),
-            "height": of_statistics(adjusted.height, in_height, height),
+            "height": statistics_document(adjusted.height, in_height, height),
         },
     }
 
@@ -268,5 +276,5 @@ def _with_comparison(outcome: Outcome, final: Model, path: Path | None) -> Outco
         return outcome
     compared = compared_with(path, final.points, final.coordinates)
     return Outcome(
-        outcome.document | {"compare": compared}, {**outcome.files, "compare.csv": lambda: against_csv(compared)}
+        outcome.document | {"compare": compared}, {**outcome.files, "compare.csv": lambda: comparison_csv(compared)}
     )

@@ -19,12 +19,12 @@ from a7sim.console.drum_panels import Wheeled
 from a7sim.console.front import WELCOME, Front
 from a7sim.console.hands import Hands
 from a7sim.console.hearing import Hearing
-from a7sim.console.keymap import deeds_by_key, deeds_of, pressed, shown
-from a7sim.console.margins import hints, hints_to_watch, keys_shown, masthead
+from a7sim.console.keymap import actions_by_key, actions_for, key_display, key_name
+from a7sim.console.margins import header_text, hints, hints_to_watch, key_labels
 from a7sim.console.news import Met, Sight, Silent
 from a7sim.console.playback import Playback
 from a7sim.console.prints import Pointed
-from a7sim.console.reaching import Presets, on_print
+from a7sim.console.reaching import Presets, print_position
 from a7sim.console.seat import Resumable, Seat, best_drawing, speaks_utf8
 from a7sim.console.sketches import Place
 from a7sim.console.station import Station
@@ -63,7 +63,7 @@ class Console(Hearing, Deeds, App[None]):
         self.silent: Silent | None = None
         self.station = Station(seat.connect, self._tell, seat.alone)
         self.playback = Playback(seat.film, self.ask, self.show_frame) if seat.film else None
-        self._by_key = deeds_by_key(seat.keymap, seat.watching)
+        self._by_key = actions_by_key(seat.keymap, seat.watching)
         self._early: deque[events.Key] | None = deque()
         self.main = Front(self.binocular, self.key_pressed, self.utf8, seat.goal or WELCOME * seat.welcome, seat.tasks)
         for theme in THEMES:
@@ -115,7 +115,7 @@ class Console(Hearing, Deeds, App[None]):
     def _masthead(self) -> None:
         if self.met is not None and self.main.is_there:
             job = self.seat.sheet.title or self.seat.where
-            self.main.head(masthead(self.met.identity, self.dials, job, self.seat.time(), self.size.width))
+            self.main.head(header_text(self.met.identity, self.dials, job, self.seat.time(), self.size.width))
 
     def next_panel(self) -> None:
         """Show the next panel at the right of a narrow screen."""
@@ -126,7 +126,7 @@ class Console(Hearing, Deeds, App[None]):
 
     def key_pressed(self, event: events.Key) -> bool:
         """Do the deed of a key; return whether it has one."""
-        name = self._by_key.get(pressed(event.key, event.character))
+        name = self._by_key.get(key_name(event.key, event.character))
         if self._early is not None and name not in ACTIONS_WHILE_DISCONNECTED:
             self._early.append(event)
         elif name is None:
@@ -143,7 +143,7 @@ class Console(Hearing, Deeds, App[None]):
             self.set_timer(SETTLING_S, self.press_early_keys)
         else:
             event = self._early.popleft()
-            name = self._by_key.get(pressed(event.key, event.character))
+            name = self._by_key.get(key_name(event.key, event.character))
             if self.screen is not self.main:
                 self.post_message(events.Key(event.key, event.character))
                 self.set_timer(SETTLING_S, self.press_early_keys)
@@ -167,8 +167,8 @@ class Console(Hearing, Deeds, App[None]):
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
         """Return what the palette lists: every deed by its name, and the library's own."""
-        for deed in deeds_of(self.seat.watching, self.seat.film is not None):
-            keys = " ".join(shown(key, not self.utf8) for key in self.seat.keymap[deed.name])
+        for deed in actions_for(self.seat.watching, self.seat.film is not None):
+            keys = " ".join(key_display(key, not self.utf8) for key in self.seat.keymap[deed.name])
             yield SystemCommand(deed.about, f"{deed.group}, {keys}", partial(self.do, deed.name))
         yield from super().get_system_commands(screen)
 
@@ -181,11 +181,11 @@ class Console(Hearing, Deeds, App[None]):
             return
         self.main.show(met.variant, dials, None if self.seat.watching else self.hands, self.entries)
         for projector, picture in enumerate(dials.pictures, start=1):
-            mark = partial(on_print, met.variant, dials, self.presets, projector)
+            mark = partial(print_position, met.variant, dials, self.presets, projector)
             self.main.show_sketch(projector, picture, self.sketches[projector], mark, self.point)
         pricked = any(self.sketches.values())
         unstruck = any(not entry.struck for entry in self.entries)
-        keys, magnification = keys_shown(self.seat.keymap, not self.utf8), self.view.magnification
+        keys, magnification = key_labels(self.seat.keymap, not self.utf8), self.view.magnification
         if self.seat.watching:
             self.main.hint(
                 hints_to_watch(keys, magnification, None if self.playback is None else self.playback.playing)

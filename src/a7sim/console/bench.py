@@ -5,11 +5,11 @@ from functools import partial
 from typing import Any
 
 from a7sim.console.dialogs import Ask, Choose
-from a7sim.console.hands import title
+from a7sim.console.hands import element_label
 from a7sim.console.panels import FITTING_ROWS
-from a7sim.console.sheet import Centred, centre
+from a7sim.console.sheet import Centred, centre_picture
 from a7sim.console.sitting import PROJECTORS, Sitting
-from a7sim.link.headers import FITTING_NODES, quoted, short
+from a7sim.link.headers import FITTING_NODES, quote_text, short_form
 from a7sim.manual import POSITIONS_OF
 
 
@@ -36,13 +36,13 @@ class BenchDeeds(Sitting):
                 )
             if projector in console.principal_distances:
                 c = console.principal_distances[projector]
-                words = f"{title(f'c{projector}')} to {c:.2f}, by certificate and film"
+                words = f"{element_label(f'c{projector}')} to {c:.2f}, by certificate and film"
                 choices.append((words, partial(console.station.say, f"PROJ{projector}:PDIS {c:.2f}")))
         choices += [self._lever(name, at) for name, at in dials.fittings.items()]
         if len(variant.base_modes) > 1:
             other = next(mode for mode in variant.base_modes if mode != dials.base)
             choices.append(
-                (f"base {dials.base}: put it {other}", partial(console.station.say, f"BASE:MODE {short(other)}"))
+                (f"base {dials.base}: put it {other}", partial(console.station.say, f"BASE:MODE {short_form(other)}"))
             )
         choices.append((f"height gear {dials.height_gear}: another", self._height_gear))
         choices.append((f"plan gear {dials.plan_gear}: another", self._plan_gear))
@@ -69,7 +69,7 @@ class BenchDeeds(Sitting):
         def chosen(name: str | None) -> None:
             if name is not None:
                 console.principal_distances.pop(projector, None)
-                console.station.say(f"PHOT{projector}:LOAD {quoted(catalogue[int(name.removeprefix('n'))])}")
+                console.station.say(f"PHOT{projector}:LOAD {quote_text(catalogue[int(name.removeprefix('n'))])}")
 
         listed = [(f"n{number}", name) for number, name in enumerate(catalogue)]
         console.push_screen(Choose(f"lay in the {PROJECTORS[projector]} projector", listed), chosen)
@@ -82,11 +82,11 @@ class BenchDeeds(Sitting):
                 console.principal_distances[projector] = lie.principal_distance
             console.say(f"{PROJECTORS[projector]} picture: {lie.words}")
 
-        console.ask(lambda client: centre(client, projector, console.seat.sheet), centred)
+        console.ask(lambda client: centre_picture(client, projector, console.seat.sheet), centred)
 
     def _lever(self, name: str, at: str) -> tuple[str, Callable[[], Any]]:
         other = next(position for position in POSITIONS_OF[name] if position != at)
-        line = f"FITT:{FITTING_NODES[name]} {short(other)}"
+        line = f"FITT:{FITTING_NODES[name]} {short_form(other)}"
         return f"{FITTING_ROWS[name]} {at}: put it {other}", partial(self._console.station.say, line)
 
     def _height_gear(self) -> None:
@@ -108,14 +108,14 @@ class BenchDeeds(Sitting):
             )
             return
         console.presets.regeared(variant, dials, units)
-        console.station.say(f"GEAR:HEIG {quoted(gear) if known else gear}")
+        console.station.say(f"GEAR:HEIG {quote_text(gear) if known else gear}")
 
     def _plan_gear(self) -> None:
         console = self._console
 
         def chosen(gear: str | None) -> None:
             if gear is not None:
-                console.station.say(f"GEAR:PLAN {quoted(gear)}")
+                console.station.say(f"GEAR:PLAN {quote_text(gear)}")
 
         console.push_screen(Ask("plan gear", note="such as 1-2-1"), chosen)
 

@@ -7,7 +7,7 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal
 from textual.timer import Timer
 
-from a7sim.console.eyepiece import Drawing, anaglyph, drawn, is_drawn_as, picture_size, vignetted, with_mark
+from a7sim.console.eyepiece import Drawing, anaglyph, apply_vignette, is_drawn_as, overlay_mark, picture_size, render
 from a7sim.console.news import Look, Sight
 from a7sim.console.window import Eyepiece
 
@@ -84,15 +84,15 @@ class Binocular(Horizontal):
         self._sight = sight
         view = self.view
         fitting = {eye: greys for eye, greys in sight.pictures.items() if is_drawn_as(view.drawing, greys)}
-        pictures = {eye: vignetted(greys) for eye, greys in fitting.items()}
+        pictures = {eye: apply_vignette(greys) for eye, greys in fitting.items()}
         both = view.in_one and len(pictures) == 2
         if both and view.merged == "anaglyph":
-            self._eyes[1].show(with_mark(anaglyph(pictures[1], pictures[2]), self._mark), in_colours=True)
+            self._eyes[1].show(overlay_mark(anaglyph(pictures[1], pictures[2]), self._mark), in_colours=True)
             return
         if both:
             pictures = {1: pictures[self._flicker_eye]}
         for eye, greys in pictures.items():
-            self._eyes[eye].show(with_mark(drawn(view.drawing, greys), self._mark))
+            self._eyes[eye].show(overlay_mark(render(view.drawing, greys), self._mark))
 
     def say(self, words: dict[int, str]) -> None:
         """Say to each eye in words what it sees."""

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from a7sim.console.dials import values
-from a7sim.console.hands import title
+from a7sim.console.hands import element_label
 from a7sim.link.client import Client
-from a7sim.link.headers import quoted, recorded_as
-from a7sim.link.replies import as_text
+from a7sim.link.headers import quote_text, registration_word
+from a7sim.link.replies import part_as_text
 from a7sim.manual import VARIANTS
 
 ELEMENTS = tuple(dict.fromkeys(name for variant in VARIANTS.values() for name in variant.elements))
@@ -56,16 +56,16 @@ def read_book(client: Client, records: int) -> tuple[Entry, ...]:
     for first in range(1, records + 1, BATCH_SIZE):
         numbers = range(first, min(first + BATCH_SIZE, records + 1))
         client.send(";".join(f"REC? {number}" for number in numbers))
-        entries += [Entry.read(values(as_text(part))) for part in client.reply() or ()]
+        entries += [Entry.read(values(part_as_text(part))) for part in client.reply() or ()]
     return tuple(entries)
 
 
 def _title(word: str) -> str:
-    return next((title(element) for element in ELEMENTS if recorded_as(element) == word), word)
+    return next((element_label(element) for element in ELEMENTS if registration_word(element) == word), word)
 
 
 def record(client: Client, point: str, elements: Sequence[str]) -> Entry | None:
     """Register the counters and elements under a point; return the entry, None where the instrument refused."""
     words = "".join(f",{word}" for word in elements)
-    before, after = client.numbers(f"REC:COUN?;:REC {quoted(point)}{words};:REC:COUN?")
+    before, after = client.numbers(f"REC:COUN?;:REC {quote_text(point)}{words};:REC:COUN?")
     return Entry.read(client.fields("REC:LAST?")) if after > before else None

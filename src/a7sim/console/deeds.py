@@ -7,11 +7,11 @@ from a7sim.console.bench import BenchDeeds
 from a7sim.console.dialogs import Ask, Choose, HelpPage
 from a7sim.console.looking import LookingDeeds
 from a7sim.console.reaching import Reach
-from a7sim.console.recalling import follow
+from a7sim.console.recalling import update_presets
 from a7sim.console.recording import RecordingDeeds
 from a7sim.console.turning import TurningDeeds
 from a7sim.console.watching import WatchingDeeds
-from a7sim.link.exchange import say
+from a7sim.link.exchange import send_line
 
 _TURNS = {
     "x_up": ("X", 1),
@@ -87,12 +87,12 @@ class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeed
 
             def shown(exchange: Any) -> None:
                 if not exchange.errors:
-                    follow(console.presets, variant, dials, line)
+                    update_presets(console.presets, variant, dials, line)
                 console.say(
                     exchange.shown or " ".join(exchange.errors) or f"said {line}", refused=bool(exchange.errors)
                 )
 
-            console.ask(lambda client: say(client, line), shown)
+            console.ask(lambda client: send_line(client, line), shown)
 
     def do_panel(self) -> None:
         """Show the next panel at the right of a narrow screen."""

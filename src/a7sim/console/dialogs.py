@@ -11,7 +11,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from a7sim.console.keymap import Keymap, deeds_of, shown
+from a7sim.console.keymap import Keymap, actions_for, key_display
 
 _LEAVING: list[BindingType] = [("escape", "leave", "back")]
 
@@ -117,12 +117,12 @@ counters, elements and book. Your hands are off; your eyes are your own.
 def help_text(keymap: Keymap, plain: bool, watching: bool = False, film: bool = True) -> str:
     """Return the page of help."""
     lines = [_HOW_TO_WATCH if watching else _HOW_TO]
-    deeds = deeds_of(watching, film)
+    deeds = actions_for(watching, film)
     for group in dict.fromkeys(deed.group for deed in deeds):
         lines.append(group.upper())
         for deed in deeds:
             if deed.group == group:
-                keys = " ".join(shown(key, plain) for key in keymap[deed.name])
+                keys = " ".join(key_display(key, plain) for key in keymap[deed.name])
                 lines.append(f"  {keys:<10} {deed.about}")
         lines.append("")
     return "\n".join(lines)

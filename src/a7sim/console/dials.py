@@ -4,7 +4,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from a7sim.link.headers import FITTING_NODES, header, short
+from a7sim.link.headers import FITTING_NODES, header, short_form
 from a7sim.link.replies import Part
 from a7sim.manual import POSITIONS_OF, Variant
 
@@ -37,7 +37,7 @@ class Dials:
         return float(self.counters[axis])
 
 
-def question(variant: Variant) -> str:
+def readouts_query(variant: Variant) -> str:
     """Return the line that asks for all dials of a plotter."""
     return ";:".join(
         [
@@ -49,7 +49,7 @@ def question(variant: Variant) -> str:
     )
 
 
-def read_dials(variant: Variant, reply: Sequence[Part]) -> Dials:
+def parse_readouts(variant: Variant, reply: Sequence[Part]) -> Dials:
     """Return the dials that a reply to `question` shows. Raises ValueError for a reply to something else."""
     texts = [part if isinstance(part, str) else "" for part in reply]
     counters, *rest = texts
@@ -61,9 +61,9 @@ def read_dials(variant: Variant, reply: Sequence[Part]) -> Dials:
         dict(zip(variant.elements, elements, strict=True)),
         {name: _word(POSITIONS_OF[name], shown) for name, shown in zip(variant.fittings, fittings, strict=True)},
         _word(variant.base_modes, mode),
-        unquoted(height),
-        unquoted(plan),
-        (unquoted(left), unquoted(right)),
+        unquote(height),
+        unquote(plan),
+        (unquote(left), unquote(right)),
         int(records),
         int(struck),
         int(errors),
@@ -71,10 +71,10 @@ def read_dials(variant: Variant, reply: Sequence[Part]) -> Dials:
 
 
 def _word(words: Sequence[str], shown: str) -> str:
-    return next((word for word in words if short(word) == shown), shown.lower())
+    return next((word for word in words if short_form(word) == shown), shown.lower())
 
 
-def unquoted(text: str) -> str:
+def unquote(text: str) -> str:
     """Return the first text of a reply without its quotes."""
     return values(text)[0]
 

@@ -11,7 +11,7 @@ from textual.message import Message
 from textual.strip import Strip
 from textual.timer import Timer
 
-from a7sim.console.drums import ROLLING_FRAMES, bar, rolled
+from a7sim.console.drums import ROLLING_FRAMES, bar, rolling_frame
 from a7sim.console.hands import SIDELESS_ELEMENTS, Hands
 from a7sim.console.panels import Panel
 from a7sim.manual import Variant
@@ -65,7 +65,7 @@ class Counter(Panel):
 
     def render_line(self, y: int) -> Strip:
         """Return the digits in their windows."""
-        shown = rolled(self._from, self._to, self._frame)
+        shown = rolling_frame(self._from, self._to, self._frame)
         width = self.content_size.width
         apart = " " if width >= 2 * len(shown) + 1 else ""
         whole, point, decimals = shown.partition(".")

@@ -4,7 +4,7 @@ ROLLING_FRAMES = 3
 """A turned digit passes through its neighbours in so many frames, then stands still."""
 
 
-def rolled(before: str, after: str, frame: int) -> str:
+def rolling_frame(before: str, after: str, frame: int) -> str:
     """Return what a drum shows so many frames after it was turned from one reading to another.
 
     Every digit goes the short way round; signs and points change at once, and so do drums of another length.
@@ -21,7 +21,7 @@ def _passing(old: str, new: str, frame: int) -> str:
     return str((int(old) + round(way * frame / ROLLING_FRAMES)) % 10)
 
 
-def windows(reading: str, digits: int) -> str:
+def digit_windows(reading: str, digits: int) -> str:
     """Return a reading set into so many windows before its decimals, padded at the left."""
     return reading.rjust(digits)
 

@@ -71,7 +71,7 @@ def _vignette(rows: int, columns: int) -> npt.NDArray[np.float32]:
     return np.asarray(1.0 - _CORNER * ((x * x + y * y) / 2.0) ** 2, dtype=np.float32)
 
 
-def vignetted(greys: Greys) -> Greys:
+def apply_vignette(greys: Greys) -> Greys:
     """Return a picture ``(rows, columns)`` as the eyepiece shows it, darker towards the corners."""
     return (greys * _vignette(*greys.shape)).astype(np.uint8)
 
@@ -129,7 +129,7 @@ def braille(greys: Greys) -> list[list[Run]]:
     return [[Run("".join(map(chr, row)))] for row in codes.tolist()]
 
 
-def drawn(drawing: Drawing, greys: Greys) -> list[list[Run]]:
+def render(drawing: Drawing, greys: Greys) -> list[list[Run]]:
     """Return the rows of runs that show a picture of `picture_size`."""
     if drawing is Drawing.HALVES:
         return half_blocks(greys)
@@ -138,7 +138,7 @@ def drawn(drawing: Drawing, greys: Greys) -> list[list[Run]]:
     return ascii_shades(greys) if drawing is Drawing.ASCII else shades(greys)
 
 
-def with_mark(rows: list[list[Run]], mark: str) -> list[list[Run]]:
+def overlay_mark(rows: list[list[Run]], mark: str) -> list[list[Run]]:
     """Return the rows with the floating mark in the middle cell, on the paper that lies about it."""
     middle = len(rows) // 2
     row = rows[middle]

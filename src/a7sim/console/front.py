@@ -15,7 +15,7 @@ from a7sim.console.dials import Dials
 from a7sim.console.drum_panels import Counter, Elements
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.hands import Hands
-from a7sim.console.margins import Hints, line_of
+from a7sim.console.margins import Hints, hints_line
 from a7sim.console.panels import Book, Fittings
 from a7sim.console.prints import SketchPanel
 from a7sim.console.sketches import Place
@@ -137,7 +137,7 @@ class Front(Screen[None]):
         """Show which keys do something now."""
         if hints != self._hinted:
             self._hinted = hints
-            self.query_one("#hints", Static).update(line_of(hints))
+            self.query_one("#hints", Static).update(hints_line(hints))
 
     # --- panels ---------------------------------------------------------------------------------------
 

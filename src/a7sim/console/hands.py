@@ -53,7 +53,7 @@ class Hands:
         return f"WHE:{axis} {way * self.step:g}"
 
 
-def title(element: str) -> str:
+def element_label(element: str) -> str:
     """Return an element as the field writes it: by', kappa", bx, Phi."""
     if element == "common_phi":
         return "Phi"

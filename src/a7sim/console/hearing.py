@@ -7,14 +7,14 @@ from typing import Any
 from textual.message import Message
 
 from a7sim.console.book import Entry, read_book
-from a7sim.console.dials import Dials, unquoted
+from a7sim.console.dials import Dials, unquote
 from a7sim.console.news import Met, News, Refused, Sight, Silent
 from a7sim.console.playback import TICK_S
-from a7sim.console.reaching import Presets, sketch_of
-from a7sim.console.recalling import recalled
+from a7sim.console.reaching import Presets, fetch_sketch
+from a7sim.console.recalling import recover_presets
 from a7sim.console.sitting import Sitting
 from a7sim.console.sketches import Place
-from a7sim.console.words import error_in_words
+from a7sim.console.words import describe_error
 from a7sim.link.client import Client
 
 
@@ -73,7 +73,7 @@ class Hearing(Sitting):
                 console.sight = told.news
                 console.draw()
             case Refused():
-                console.say(" · ".join(error_in_words(error) for error in told.news.errors), refused=True)
+                console.say(" · ".join(describe_error(error) for error in told.news.errors), refused=True)
             case Silent():
                 self._lose(told.news)
 
@@ -98,7 +98,7 @@ class Hearing(Sitting):
         past = console.seat.past
         watching = console.seat.watching
         self.ask(
-            lambda client: recalled(met.variant, past(), "" if watching else unquoted(client.ask("GEAR:HEIG?"))),
+            lambda client: recover_presets(met.variant, past(), "" if watching else unquote(client.ask("GEAR:HEIG?"))),
             self._recall,
         )
         if console.playback is not None:
@@ -123,7 +123,7 @@ class Hearing(Sitting):
         before, console.dials = console.dials, dials
         for projector, picture in enumerate(dials.pictures, start=1):
             if before is None or before.pictures[projector - 1] != picture:
-                self.ask(partial(sketch_of, projector, picture), partial(self._sketch, projector))
+                self.ask(partial(fetch_sketch, projector, picture), partial(self._sketch, projector))
         if console.seat.watching or (before is None and console.seat.alone):
             self._keep_book(dials)
         console.refresh_panels()

@@ -82,7 +82,7 @@ ACTIONS = (
 """All that keys do. Same keys on every plotter that has the part."""
 
 
-def deeds_of(watching: bool, film: bool = True) -> tuple[Deed, ...]:
+def actions_for(watching: bool, film: bool = True) -> tuple[Deed, ...]:
     """Return what keys do at the instrument, or while one watches, be it a film or what is done now."""
     played = {PLAYBACK_ACTIONS} if film else set()
     return tuple(
@@ -141,22 +141,22 @@ def _is_key(key: str) -> bool:
 def _refuse_shared(path: Path, keymap: Keymap) -> None:
     for watching in (False, True):
         deeds: dict[str, str] = {}
-        for deed in deeds_of(watching):
+        for deed in actions_for(watching):
             for key in keymap[deed.name]:
                 other = deeds.setdefault(key, deed.name)
                 if other != deed.name:
                     raise Mistake(f"{path}: expected every key once, got {key!r} for both {other} and {deed.name}")
 
 
-def deeds_by_key(keymap: Keymap, watching: bool = False) -> dict[str, str]:
+def actions_by_key(keymap: Keymap, watching: bool = False) -> dict[str, str]:
     """Return the name of the deed that every key does; who watches has those of the hands too where they are free."""
     at_the_instrument, watched = (
-        {key: deed.name for deed in deeds_of(each) for key in keymap[deed.name]} for each in (False, True)
+        {key: deed.name for deed in actions_for(each) for key in keymap[deed.name]} for each in (False, True)
     )
     return at_the_instrument | watched if watching else at_the_instrument
 
 
-def pressed(key: str, character: str | None) -> str:
+def key_name(key: str, character: str | None) -> str:
     """Return how a keymap writes a key that the terminal reports by its name and, maybe, its character."""
     return character if character and character.isprintable() and character != " " else key
 
@@ -174,7 +174,7 @@ _SHOWN = {
 }
 
 
-def shown(key: str, plain: bool = False) -> str:
+def key_display(key: str, plain: bool = False) -> str:
     """Return a key as help writes it; plain is without any character beyond ASCII."""
     written = _SHOWN.get(key, key)
     return key.capitalize() if plain and not written.isascii() else written

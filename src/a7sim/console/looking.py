@@ -6,7 +6,7 @@ from a7sim.console.binocular import View
 from a7sim.console.eyepiece import Drawing
 from a7sim.console.news import Sight
 from a7sim.console.sitting import Sitting
-from a7sim.console.words import image_in_words, parallax_in_words
+from a7sim.console.words import describe_image, describe_parallax
 
 MAGNIFICATIONS = (1.0, 2.0, 4.0, 8.0, 12.0, 20.0, 40.0)
 EYES = ((1, 2), (1,), (2,))
@@ -47,10 +47,10 @@ class LookingDeeds(Sitting):
             return
         left, right = sight.seen.get(1), sight.seen.get(2)
         console.binocular.say(
-            {eye: f"{point}: {image_in_words(each, acuity)}" for eye, each in ((1, left), (2, right))}
+            {eye: f"{point}: {describe_image(each, acuity)}" for eye, each in ((1, left), (2, right))}
         )
         both = (left[0] - right[0], left[1] - right[1]) if left and right else None
-        console.say(f"{point}: {parallax_in_words(both, acuity)}")
+        console.say(f"{point}: {describe_parallax(both, acuity)}")
 
     def set_view(self, **changes: Any) -> None:
         """Change how the eyepieces show what they see."""

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 from rich.text import Text
 
 from a7sim.console.dials import Dials
-from a7sim.console.hands import Hands, title
-from a7sim.console.keymap import Keymap, shown
+from a7sim.console.hands import Hands, element_label
+from a7sim.console.keymap import Keymap, key_display
 from a7sim.link.client import Identity
 
 WIDE_COLUMNS = 100
@@ -16,28 +16,28 @@ Hints = tuple[tuple[str, str], ...]
 """Keys as help writes them, and what they do."""
 
 
-def masthead(identity: Identity, dials: Dials | None, job: str, seconds: float, width: int) -> str:
+def header_text(identity: Identity, dials: Dials | None, job: str, seconds: float, width: int) -> str:
     """Return the line that says which instrument this is, what lies in it, and how late it is there."""
     parts = [
         f"Wild {identity.model}  no. {identity.serial}",
         job,
         " | ".join(name or "-" for name in dials.pictures) if dials else "",
         f"base {dials.base}" if dials else "",
-        elapsed(seconds),
+        format_elapsed(seconds),
     ]
     roomy = width >= WIDE_COLUMNS
     return ("    " if roomy else "  ").join(part for part in parts if part) + (" at the instrument" if roomy else "")
 
 
-def elapsed(seconds: float) -> str:
+def format_elapsed(seconds: float) -> str:
     """Return a time as hours, minutes and seconds."""
     whole = int(seconds)
     return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
 
 
-def keys_shown(keymap: Keymap, plain: bool) -> Mapping[str, str]:
+def key_labels(keymap: Keymap, plain: bool) -> Mapping[str, str]:
     """Return the first key of every deed as help writes it."""
-    return {name: shown(keys[0], plain) for name, keys in keymap.items()}
+    return {name: key_display(keys[0], plain) for name, keys in keymap.items()}
 
 
 def hints(
@@ -50,7 +50,7 @@ def hints(
         (True, keys["bench"], "bench"),
         (True, arrows if len(arrows) == 4 else f"{keys['x_up']} {keys['y_up']} ...", "X Y"),
         (True, f"{keys['z_up']} {keys['z_down']}", "Z"),
-        (True, f"{keys['turn_up']} {keys['turn_down']}", title(hands.element)),
+        (True, f"{keys['turn_up']} {keys['turn_down']}", element_label(hands.element)),
         (True, f"{keys['finer']} {keys['coarser']}", f"step {hands.step:g}"),
         (pricked, keys["go_to"], "go to"),
         (pricked, keys["record"], f"record {point}" if point else "record"),
@@ -74,6 +74,6 @@ def hints_to_watch(keys: Mapping[str, str], magnification: float, playing: bool 
     return ((keys["help"], "help"), *(film if playing is not None else ()), *eyes)
 
 
-def line_of(offered: Iterable[tuple[str, str]]) -> Text:
+def hints_line(offered: Iterable[tuple[str, str]]) -> Text:
     """Return hints as a line."""
     return Text("  ", no_wrap=True).join(Text(key, "bold").append(f" {word}", "not bold") for key, word in offered)

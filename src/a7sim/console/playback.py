@@ -5,7 +5,7 @@ from collections.abc import Callable
 from time import monotonic
 from typing import TYPE_CHECKING, Protocol
 
-from a7sim.console.margins import elapsed
+from a7sim.console.margins import format_elapsed
 from a7sim.link.client import Client
 from a7sim.mistakes import Mistake
 
@@ -125,10 +125,10 @@ class Playback:
         frame = self.frame
         pace = "max" if math.isinf(self.speed) else f"{self.speed:g}x"
         state = f"playing {pace}" if self.playing else f"paused ({pace})"
-        return f"{state}  step {frame.step} of {self.film.steps}  {elapsed(frame.time)}  {frame.said}".rstrip()
+        return f"{state}  step {frame.step} of {self.film.steps}  {format_elapsed(frame.time)}  {frame.said}".rstrip()
 
 
-def jumped(playback: Playback, words: str) -> str | None:
+def jump_with_message(playback: Playback, words: str) -> str | None:
     """Jump, and return what is to be said where there is no such place."""
     try:
         playback.jump(words)

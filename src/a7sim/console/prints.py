@@ -7,7 +7,7 @@ from textual import events
 from textual.message import Message
 
 from a7sim.console.panels import Panel
-from a7sim.console.sketches import Place, Sketch, marked, pricked
+from a7sim.console.sketches import Place, Sketch, draw_points, overlay_mark
 
 
 class Pointed(Message):
@@ -52,8 +52,8 @@ class SketchPanel(Panel):
             return
         points, mark = self._given
         if self._pricked[0] != (points, width, height):
-            self._pricked = (points, width, height), pricked(points, width, height, self.dot)
-        sketch = marked(self._pricked[1], mark, width, height)
+            self._pricked = (points, width, height), draw_points(points, width, height, self.dot)
+        sketch = overlay_mark(self._pricked[1], mark, width, height)
         if (sketch, going_to) != (self._sketch, self._going_to):
             self._sketch, self._going_to = sketch, going_to
             self.refresh()

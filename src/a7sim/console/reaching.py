@@ -11,7 +11,7 @@ import numpy as np
 
 from a7sim.console.dials import Dials
 from a7sim.console.sketches import Place
-from a7sim.console.station import seen_point
+from a7sim.console.station import view_point
 from a7sim.geometry import GON, Array, at_level, image_of, mxm, mxv, ray_of, rotation
 from a7sim.link.client import Client
 from a7sim.manual import Variant
@@ -57,7 +57,7 @@ class Presets:
         self.origins["Z"] = dials.counter("Z") - height * units
 
 
-def pose(variant: Variant, dials: Dials, projector: int) -> tuple[Array, Array]:
+def displayed_pose(variant: Variant, dials: Dials, projector: int) -> tuple[Array, Array]:
     """Return centre ``(3,)`` and rotation ``(3, 3)`` of a projector as its counters show them."""
     show = {name: float(dials.elements.get(name, "0")) for name in (*variant.elements, "by1", "by2", "bz1", "bz2")}
     counts = {name: np.asarray(reading) for name, reading in show.items()}
@@ -71,16 +71,16 @@ def pose(variant: Variant, dials: Dials, projector: int) -> tuple[Array, Array]:
     return centre, turned
 
 
-def on_print(variant: Variant, dials: Dials, presets: Presets, projector: int) -> Place:
+def print_position(variant: Variant, dials: Dials, presets: Presets, projector: int) -> Place:
     """Return about where on the print in a projector the mark stands, mm."""
-    centre, turned = pose(variant, dials, projector)
+    centre, turned = displayed_pose(variant, dials, projector)
     x, y = image_of(presets.frame(variant, dials), centre, turned, dials.element(f"c{projector}"))
     return float(x), float(y)
 
 
 def readings_over(variant: Variant, dials: Dials, presets: Presets, projector: int, place: Place) -> dict[str, float]:
     """Return the X and Y readings that bring the mark over a place of the print, at its present height."""
-    centre, turned = pose(variant, dials, projector)
+    centre, turned = displayed_pose(variant, dials, projector)
     ray = ray_of(np.array(place), turned, dials.element(f"c{projector}"))
     met = at_level(centre, ray, presets.frame(variant, dials)[2])
     return {
@@ -104,7 +104,7 @@ class Reach:
         for dx, dy in _outward():
             x, y = self.sketch[point]
             self._drive(client, (x + dx, y + dy))
-            seen = seen_point(client, self._eye, point)
+            seen = view_point(client, self._eye, point)
             if seen is not None:
                 self._approach(client, point, seen)
                 return True
@@ -124,13 +124,13 @@ class Reach:
         for _ in range(3):
             if max(map(abs, seen)) <= 1e3 * NEAR_MM:
                 return
-            centre, _ = pose(self.variant, self.dials, self.projector)
+            centre, _ = displayed_pose(self.variant, self.dials, self.projector)
             height = abs(self.presets.frame(self.variant, self.dials)[2] - centre[2])
             scale = 1e-3 * height / self.dials.element(f"c{self.projector}")
             dx, dy = (round(each / 1e3 / NEAR_MM) * NEAR_MM * 1e3 * scale for each in seen)
             units = [self.presets.unit(self.variant, axis) for axis in "XY"]
             client.send(f"WHE:X {dx * units[0]:.2f};Y {dy * units[1]:.2f}")
-            again = seen_point(client, self._eye, point)
+            again = view_point(client, self._eye, point)
             if again is None or max(map(abs, again)) >= max(map(abs, seen)):
                 client.send(f"WHE:X {-dx * units[0]:.2f};Y {-dy * units[1]:.2f}")
                 return
@@ -144,7 +144,7 @@ def _outward() -> list[Place]:
     return sorted(places, key=lambda place: place[0] ** 2 + place[1] ** 2)
 
 
-def sketch_of(projector: int, picture: str, client: Client) -> dict[str, Place]:
+def fetch_sketch(projector: int, picture: str, client: Client) -> dict[str, Place]:
     """Ask for the points that are pricked on the print in a projector."""
     if not picture:
         return {}

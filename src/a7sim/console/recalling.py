@@ -4,9 +4,9 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from a7sim.console.dials import Dials, question, read_dials, unquoted
+from a7sim.console.dials import Dials, parse_readouts, readouts_query, unquote
 from a7sim.console.reaching import Presets
-from a7sim.link.replies import whole_reply
+from a7sim.link.replies import parse_reply
 from a7sim.manual import Variant
 
 
@@ -22,7 +22,7 @@ _PRESET = re.compile(r":?COUN(?:TER)?:([XYZ]):PRES(?:ET)? ([-+.\d]+)", re.IGNORE
 _GEARED = re.compile(r":?GEAR:HEIG(?:HT)? (.+)", re.IGNORECASE)
 
 
-def recalled(variant: Variant, past: Iterable[Said], gear: str = "") -> Presets:
+def recover_presets(variant: Variant, past: Iterable[Said], gear: str = "") -> Presets:
     """Return the presets that were made before, by what this console said and what it was told of the counters.
 
     `gear` is the height gear that is engaged now. Where nobody is known to have engaged it, the counter of Z is taken
@@ -30,31 +30,31 @@ def recalled(variant: Variant, past: Iterable[Said], gear: str = "") -> Presets:
     """
     presets = Presets()
     dials: Dials | None = None
-    asked, asks = question(variant), False
+    asked, asks = readouts_query(variant), False
     for said in past:
         if asks and said.answers:
-            reply = whole_reply(said.text.encode() + b"\n")
-            dials = read_dials(variant, reply.parts) if reply else dials
+            reply = parse_reply(said.text.encode() + b"\n")
+            dials = parse_readouts(variant, reply.parts) if reply else dials
         asks = said.text == asked
         if dials is not None and not said.answers:
-            follow(presets, variant, dials, said.text)
+            update_presets(presets, variant, dials, said.text)
     if gear:
-        presets.units.setdefault("Z", units_of(variant, gear))
+        presets.units.setdefault("Z", gear_units(variant, gear))
     return presets
 
 
-def units_of(variant: Variant, gear: str) -> float:
+def gear_units(variant: Variant, gear: str) -> float:
     """Return the units a mm that a height gear gives."""
     known = variant.height_gears.get(gear)
     return known.units_per_mm if known else float(gear)
 
 
-def follow(presets: Presets, variant: Variant, dials: Dials, line: str) -> None:
+def update_presets(presets: Presets, variant: Variant, dials: Dials, line: str) -> None:
     """Take note of what a line presets or engages, where that is what it does; the dials are those before it."""
     for unit in line.split(";"):
         if preset := _PRESET.fullmatch(unit):
             presets.preset(variant, dials, preset[1].upper(), float(preset[2]))
         elif geared := _GEARED.fullmatch(unit):
-            presets.regeared(variant, dials, units_of(variant, unquoted(geared[1])))
+            presets.regeared(variant, dials, gear_units(variant, unquote(geared[1])))
         elif unit.upper() == "*RST":
             presets.origins.clear()

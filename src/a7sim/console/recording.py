@@ -3,7 +3,7 @@
 from a7sim.console.book import Entry, record
 from a7sim.console.dialogs import Ask
 from a7sim.console.sitting import Sitting
-from a7sim.link.headers import quoted, recorded_as
+from a7sim.link.headers import quote_text, registration_word
 
 STRIKE_REASON = "struck out at the console"
 
@@ -27,7 +27,7 @@ class RecordingDeeds(Sitting):
         console = self._console
         if point is not None:
             console.point = point
-            elements = [recorded_as(console.hands.element)]
+            elements = [registration_word(console.hands.element)]
             console.ask(lambda client: record(client, point, elements), self._recorded)
 
     def _recorded(self, entry: Entry | None) -> None:
@@ -47,7 +47,7 @@ class RecordingDeeds(Sitting):
         if last is None:
             console.say("there is nothing in the book to strike out")
             return
-        console.station.say(f"REC:STR {last.number},{quoted(STRIKE_REASON)}")
+        console.station.say(f"REC:STR {last.number},{quote_text(STRIKE_REASON)}")
         console.entries = tuple(entry.struck_out() if entry is last else entry for entry in console.entries)
         console.say(f"struck out {last.number}: {last.point}")
         console.refresh_panels()
@@ -58,7 +58,7 @@ class RecordingDeeds(Sitting):
 
         def noted(text: str | None) -> None:
             if text is not None:
-                console.station.say(f"NOTE {quoted(text)}")
+                console.station.say(f"NOTE {quote_text(text)}")
                 console.say(f"noted: {text}")
 
         console.push_screen(Ask("note"), noted)

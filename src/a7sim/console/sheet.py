@@ -28,7 +28,7 @@ class Centred:
     principal_distance: float | None = None
 
 
-def centre(client: Client, projector: int, sheet: JobSheet) -> Centred:
+def centre_picture(client: Client, projector: int, sheet: JobSheet) -> Centred:
     """Centre what lies in a projector on its collimating marks, as the fiducials show it, in two rounds.
 
     Without a certificate the marks' places are not known, and the picture is shifted only.
@@ -48,14 +48,14 @@ def centre(client: Client, projector: int, sheet: JobSheet) -> Centred:
 def _lie(
     names: list[str], off: np.ndarray[tuple[int, ...], np.dtype[np.float64]], certificate: Camera | None
 ) -> tuple[Centred, tuple[float, float, float]]:
-    from a7sim.reduction import Undetermined, picture_lie  # noqa: PLC0415 # not before the screen is there
+    from a7sim.reduction import Undetermined, picture_placement  # noqa: PLC0415 # not before the screen is there
 
     marks = {each.name: (each.x, each.y) for each in certificate.fiducials} if certificate else {}
     if certificate is None or not set(names) <= set(marks):
         dx, dy = off.mean(axis=1)
         return Centred(f"centred by its {len(names)} fiducials, without a certificate"), (float(dx), float(dy), 0.0)
     try:
-        lie = picture_lie(off, np.array([marks[name] for name in names]).T)
+        lie = picture_placement(off, np.array([marks[name] for name in names]).T)
     except Undetermined:
         return Centred("too few fiducials to centre it by"), (0.0, 0.0, 0.0)
     x, y = certificate.principal_point

@@ -30,7 +30,7 @@ class Sketch:
         )
 
 
-def pricked(points: Mapping[str, Place], width: int, height: int, dot: str = "·") -> Sketch:
+def draw_points(points: Mapping[str, Place], width: int, height: int, dot: str = "·") -> Sketch:
     """Return the sketch of named places in so many columns and rows, without the mark.
 
     Names are written where there is room.
@@ -44,7 +44,7 @@ def pricked(points: Mapping[str, Place], width: int, height: int, dot: str = "·
     return Sketch(["".join(row) for row in rows], None, cells)
 
 
-def marked(sketch: Sketch, mark: Place | None, width: int, height: int) -> Sketch:
+def overlay_mark(sketch: Sketch, mark: Place | None, width: int, height: int) -> Sketch:
     """Return a sketch of so many columns and rows with the mark on it."""
     at = _cell(mark, width, height) if mark is not None else None
     if at is None:

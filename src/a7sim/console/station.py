@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from serial import SerialException
 
-from a7sim.console.dials import Dials, question, read_dials
+from a7sim.console.dials import Dials, parse_readouts, readouts_query
 from a7sim.console.eyepiece import Greys
 from a7sim.console.news import Look, Met, News, Refused, Sight, Silent
 from a7sim.link.client import Client, InstrumentRefused
@@ -120,7 +120,7 @@ class Station:
         self._forget_orders()
         self._tell(Met(identity, variant))
         self._shown = None
-        asked = question(variant)
+        asked = readouts_query(variant)
         self._refresh(client, variant, asked, 0)
         while not self._leaving.is_set():
             obeyed = self._obey_waiting(client)
@@ -158,7 +158,7 @@ class Station:
         reply = client.reply()
         if reply is None:
             raise Lost("no answer")
-        dials = read_dials(variant, reply)
+        dials = parse_readouts(variant, reply)
         if obeyed or (dials, look) != self._shown:
             self._show(client, dials, look)
         if dials.errors:
@@ -184,7 +184,7 @@ class Station:
 
     def _sight(self, client: Client, look: Look) -> Sight:
         pictures = {eye: self._picture(client, look, eye) for eye in look.eyes if look.columns and look.rows}
-        seen = {eye: seen_point(client, eye, look.point) for eye in (1, 2)} if look.point else {}
+        seen = {eye: view_point(client, eye, look.point) for eye in (1, 2)} if look.point else {}
         return Sight(look, pictures, seen)
 
     def _picture(self, client: Client, look: Look, eye: int) -> Greys:
@@ -192,7 +192,7 @@ class Station:
         return np.frombuffer(block, dtype=np.uint8).reshape(look.rows, look.columns)
 
 
-def seen_point(client: Client, eye: int, point: str) -> tuple[float, float] | None:
+def view_point(client: Client, eye: int, point: str) -> tuple[float, float] | None:
     """Ask an eye where a point stands from the mark: dx, dy in um, None outside its field of view."""
     doubled = point.replace('"', '""')
     dx, dy = client.numbers(f'EYEP{eye}? "{doubled}"')

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from a7sim.console.hands import title, unit
+from a7sim.console.hands import element_label, unit
 from a7sim.console.sitting import Sitting
 from a7sim.link.client import Client
 from a7sim.link.headers import header
@@ -105,7 +105,7 @@ class TurningDeeds(Sitting):
         data = variant.elements[element]
         note = f"{data.low:g} to {data.high:g} {unit(variant, element)}; it stands at {dials.elements[element]}"
         self._ask_number(
-            f"set {title(element)} to", note, lambda value: console.station.say(f"{header(element)} {value:g}")
+            f"set {element_label(element)} to", note, lambda value: console.station.say(f"{header(element)} {value:g}")
         )
 
     def do_drive(self) -> None:

@@ -3,17 +3,17 @@
 from typing import TYPE_CHECKING
 
 from a7sim.console.dialogs import Ask
-from a7sim.console.keymap import PLAYBACK_ACTIONS, VIEW_ACTIONS, deeds_of
-from a7sim.console.margins import keys_shown
-from a7sim.console.playback import Playback, jumped
+from a7sim.console.keymap import PLAYBACK_ACTIONS, VIEW_ACTIONS, actions_for
+from a7sim.console.margins import key_labels
+from a7sim.console.playback import Playback, jump_with_message
 from a7sim.console.reaching import Presets
 from a7sim.console.sitting import Sitting
 
 if TYPE_CHECKING:
     from a7sim.session.film import Frame
 
-_PLAYED = {deed.name for deed in deeds_of(watching=True) if deed.group == PLAYBACK_ACTIONS}
-_LOOKED = {deed.name for deed in deeds_of(watching=True) if deed.group in VIEW_ACTIONS}
+_PLAYED = {deed.name for deed in actions_for(watching=True) if deed.group == PLAYBACK_ACTIONS}
+_LOOKED = {deed.name for deed in actions_for(watching=True) if deed.group in VIEW_ACTIONS}
 
 
 class WatchingDeeds(Sitting):
@@ -28,7 +28,7 @@ class WatchingDeeds(Sitting):
             why = "there is nothing to play" if deed in _PLAYED else "hands are off"
             console.say(f"{why}: you watch what somebody else does at {console.seat.where} now", refused=True)
         else:
-            keys = keys_shown(console.seat.keymap, not console.utf8)
+            keys = key_labels(console.seat.keymap, not console.utf8)
             console.say(f"hands are off: what you watch has been done; {keys['play']} plays and pauses", refused=True)
         return True
 
@@ -85,7 +85,7 @@ class WatchingDeeds(Sitting):
         console = self._console
 
         def answered(words: str | None) -> None:
-            refused = jumped(self._playback(), words) if words is not None else None
+            refused = jump_with_message(self._playback(), words) if words is not None else None
             if refused is not None:
                 console.say(refused, refused=True)
 

@@ -6,40 +6,42 @@ ACUITY_UM = 10.0
 """What the eye tells apart, um at photo scale, unless somebody says otherwise."""
 
 
-def estimated(distance: float, acuity: float) -> float:
+def estimate(distance: float, acuity: float) -> float:
     """Return a distance in um as an eye estimates it: to its acuity, and to no more than two figures."""
     size = max(acuity, 10.0 ** (len(str(int(abs(distance)))) - 2), 1.0)
     return round(distance / size) * size
 
 
-def image_in_words(seen: tuple[float, float] | None, acuity: float = ACUITY_UM) -> str:
+def describe_image(seen: tuple[float, float] | None, acuity: float = ACUITY_UM) -> str:
     """Return where an image stands from the mark: dx, dy in um, +x right, +y up; None where it is not in view."""
     if seen is None:
         return "image not in the field of view"
-    across, up = (estimated(each, acuity) for each in seen)
+    across, up = (estimate(each, acuity) for each in seen)
     parts = [
-        *([f"{length(abs(across))} {'right' if across > 0 else 'left'} of"] if across else []),
-        *([f"{length(abs(up))} {'above' if up > 0 else 'below'}"] if up else []),
+        *([f"{format_length(abs(across))} {'right' if across > 0 else 'left'} of"] if across else []),
+        *([f"{format_length(abs(up))} {'above' if up > 0 else 'below'}"] if up else []),
     ]
     return f"image is about {' and '.join(parts)} the mark" if parts else "image is on the mark"
 
 
-def parallax_in_words(parallax: tuple[float, float] | None, acuity: float = ACUITY_UM) -> str:
+def describe_parallax(parallax: tuple[float, float] | None, acuity: float = ACUITY_UM) -> str:
     """Return how the two images disagree: px, py in um, left eye minus right eye."""
     if parallax is None:
         return "the two images cannot be compared"
-    across, up = (estimated(each, acuity) for each in parallax)
-    height = f"left image is about {length(abs(up))} {'higher' if up > 0 else 'lower'}" if up else "no y-parallax"
-    depth = f"x-parallax about {length(across)}" if across else "no x-parallax"
+    across, up = (estimate(each, acuity) for each in parallax)
+    height = (
+        f"left image is about {format_length(abs(up))} {'higher' if up > 0 else 'lower'}" if up else "no y-parallax"
+    )
+    depth = f"x-parallax about {format_length(across)}" if across else "no x-parallax"
     return f"{height}, {depth}"
 
 
-def length(um: float) -> str:
+def format_length(um: float) -> str:
     """Return a length for people, in um or mm."""
     return f"{um / 1e3:.2g} mm" if abs(um) >= 1000.0 else f"{um:.0f} um"
 
 
-def error_in_words(error: str) -> str:
+def describe_error(error: str) -> str:
     """Return an entry of the instrument's error queue as people read it, without number and header."""
     _, _, text = error.partition(",")
     message, _, detail = text.strip().strip('"').partition(";")

@@ -11,9 +11,9 @@ import numpy as np
 
 from a7sim.geometry import GON, Array, length_of, mxv, transposed
 from a7sim.instrument.carriers import Carrier
-from a7sim.instrument.condition import INSTRUMENT_STREAM, condition_of, local_coefficients, zero_error
-from a7sim.instrument.optics import as_they_act, projector_seen, view, wheel_senses
-from a7sim.instrument.projection import Turned, place_of_centre, place_on_carrier, pose, turned_by
+from a7sim.instrument.condition import INSTRUMENT_STREAM, draw_condition, local_coefficients, zero_error
+from a7sim.instrument.optics import effective_fittings, handwheel_senses, projector_in_view, view_matrix
+from a7sim.instrument.projection import Turned, attitude_from_angles, place_on_carrier, pose, projection_centre
 from a7sim.instrument.recorder import Recorder, Registration
 from a7sim.instrument.refusals import OutOfRange, SettingsConflict, UnknownName
 from a7sim.instrument.spindles import Counter, Runout, Spindle
@@ -84,7 +84,7 @@ class Autograph:
             axis: Counter(scale.units_per_mm, offset=scale.at_origin, slip_share=self._condition.counter_slip_share)
             for axis, scale in variant.scales.items()
         }
-        self._guides = guides_of(self._condition)
+        self._guides = guide_matrix(self._condition)
         self._carriers: dict[int, Carrier] = {}
         self.base_mode = variant.base_modes[0]
         self.fittings = REQUIRED_FITTINGS["positive", self.base_mode]
@@ -102,7 +102,7 @@ class Autograph:
         """Return the instrument of a scenario with its photographs in the drawer."""
         return cls(
             VARIANTS[instrument.variant],
-            condition_of(instrument, seed),
+            draw_condition(instrument, seed),
             photographs,
             instrument.serial,
             (instrument.laying_sigma_mm, instrument.laying_sigma_gon),
@@ -318,7 +318,7 @@ class Autograph:
     def wheel(self, axis: str, amount: float) -> None:
         """Turn a handwheel by so many counter units; its collar decides which way the carriage goes."""
         polarity = self._polarity()
-        sense = wheel_senses(self._acting_fittings(polarity), polarity)[axis]
+        sense = handwheel_senses(self._acting_fittings(polarity), polarity)[axis]
         step = sense * amount / self._counters[axis].units_per_mm
         self._move(axis, self._carriages[axis].at + step)
 
@@ -479,7 +479,7 @@ class Autograph:
             base = [self._really(name) for name in ("bx", f"by{projector}", f"bz{projector}")]
             common_phi = self._really("common_phi") * GON if "common_phi" in self._spindles else None
             camera = _camera(*tilts, self._axes[projector])
-            self._poses[projector] = pose(camera, place_of_centre(share, *base), common_phi)
+            self._poses[projector] = pose(camera, projection_centre(share, *base), common_phi)
         return self._poses[projector]
 
     def _really(self, name: str) -> float:
@@ -528,7 +528,7 @@ class Autograph:
 
     def eyepiece(self, eyepiece: int, name: str) -> tuple[float, float] | None:
         """Return dx, dy in um at photo scale of an image point from the mark, None outside the field of view."""
-        projector = projector_seen(eyepiece, self.fittings)
+        projector = projector_in_view(eyepiece, self.fittings)
         carrier = self._carriers.get(projector)
         place = carrier.point(name) if carrier else None
         if carrier is None or place is None:
@@ -553,7 +553,7 @@ class Autograph:
         At magnification 1 the longer side spans the field of view. Outside the field and without a picture
         all is dark.
         """
-        projector = projector_seen(eyepiece, self.fittings)
+        projector = projector_in_view(eyepiece, self.fittings)
         carrier = self._carriers.get(projector)
         pitch = 2.0 * self.variant.field_radius_mm / (magnification * max(columns, rows))
         x, y = np.meshgrid(
@@ -578,7 +578,7 @@ class Autograph:
 
     def _view(self, projector: int, carrier: Carrier) -> Array:
         polarity = carrier.photograph.polarity
-        return view(
+        return view_matrix(
             self._acting_fittings(polarity),
             polarity,
             self.base_mode,
@@ -588,13 +588,13 @@ class Autograph:
     def _acting_fittings(self, polarity: str) -> Fittings:
         if len(self.variant.fittings) == len(POSITIONS_OF):
             return self.fittings
-        return as_they_act(self.fittings, polarity, self.base_mode, self.variant.fittings)
+        return effective_fittings(self.fittings, polarity, self.base_mode, self.variant.fittings)
 
 
 @lru_cache(maxsize=CAMERA_CACHE_SIZE)
 def _camera(omega: float, phi: float, kappa: float, missed: tuple[float, ...]) -> Turned:
     """Return a camera turned by angles in radians; not to write."""
-    camera = turned_by(omega, phi, kappa, np.array(missed))
+    camera = attitude_from_angles(omega, phi, kappa, np.array(missed))
     camera.rotation.flags.writeable = False
     return camera
 
@@ -605,7 +605,7 @@ def _runout_of(condition: Condition, axis: str, lead: float) -> Runout | None:
     return Runout(1e-3 * amplitude, lead, condition.carriage_periodic_phase_gon[place] * GON) if amplitude else None
 
 
-def guides_of(condition: Condition) -> Array:
+def guide_matrix(condition: Condition) -> Array:
     """Return the matrix ``(3, 3)`` from positions on the spindles to places in the frame."""
     x, y, z = condition.carriage_scale_ppm
     xy, xz, yz = condition.carriage_skew_ppm

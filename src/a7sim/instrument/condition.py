@@ -106,7 +106,7 @@ FAULT_SIGMAS: Mapping[Upkeep, Faults] = MappingProxyType(
 )
 
 
-def condition_of(instrument: Instrument, seed: int) -> Condition:
+def draw_condition(instrument: Instrument, seed: int) -> Condition:
     """Return the whole state of the instrument that a scenario describes, every fault as a seed draws it.
 
     The faults have random numbers of their own: a worn instrument's pictures come to lie as those of a new one.

@@ -12,12 +12,12 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, among, put
+from a7sim.among import Who, put, take
 from a7sim.geometry import GON, Array, length_of, mxm, mxv, plane_rotation, rotation
-from a7sim.instrument.autograph import COUNTED_FROM_ZERO, MOVE_CENTRES, guides_of
-from a7sim.instrument.condition import INSTRUMENT_STREAM, condition_of, local_coefficients, zero_error
-from a7sim.instrument.fleet_parts import AXES, Carriages, Carriers, Drums, Runouts, Truths, rounded
-from a7sim.instrument.projection import place_of_centre, place_on_carrier
+from a7sim.instrument.autograph import COUNTED_FROM_ZERO, MOVE_CENTRES, guide_matrix
+from a7sim.instrument.condition import INSTRUMENT_STREAM, draw_condition, local_coefficients, zero_error
+from a7sim.instrument.fleet_parts import AXES, Carriages, Carriers, Drums, Runouts, Truths, round_like_counter
+from a7sim.instrument.projection import place_on_carrier, projection_centre
 from a7sim.instrument.spindles import UNITS_A_DRUM
 from a7sim.manual import COUNTER_DECIMALS, LEAST_COUNT, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Variant
 from a7sim.scenario.schema import Condition, Instrument, ProjectorCondition
@@ -65,7 +65,7 @@ class Bundles:
 
     def among(self, who: Who) -> "Bundles":
         """Return those of some, to be read at once and not written to."""
-        return self if who.size == self.c.size else Bundles(among(self._rows, who))
+        return self if who.size == self.c.size else Bundles(take(self._rows, who))
 
 
 class Fleet:
@@ -96,7 +96,7 @@ class Fleet:
         self._decimals = [COUNTER_DECIMALS] * len(AXES)
         self._offsets = np.empty((len(AXES), self.instruments))
         self._reset_offsets(everywhere)
-        self._guides = np.stack([guides_of(condition) for condition in conditions], axis=-1)
+        self._guides = np.stack([guide_matrix(condition) for condition in conditions], axis=-1)
         self._rods = {n: self._where_any(1e-3 * self._of_projectors(n, lambda each: each.rod_um)) for n in (1, 2)}
         self._local = {n: self._local_errors(n) for n in (1, 2)}
         self._axes = {n: 1e-3 * self._of_projectors(n, lambda projector: projector.axes_um) for n in (1, 2)}
@@ -237,14 +237,16 @@ class Fleet:
     def counter(self, who: Who, axis: str) -> Array:
         """Return what the X, Y or Z counters show ``(m,)``."""
         row = AXES.index(axis)
-        return rounded(self._unrounded(who, row, self._carriages.at[row][who]), self._decimals[row])
+        return round_like_counter(self._unrounded(who, row, self._carriages.at[row][who]), self._decimals[row])
 
     def counters(self, who: Who) -> Array:
         """Return what the X, Y and Z counters show ``(3, m)``."""
-        readings = among(self._offsets, who) + self._units[:, None] * among(self._carriages.at, who)
+        readings = take(self._offsets, who) + self._units[:, None] * take(self._carriages.at, who)
         if len(set(self._decimals)) == 1:
-            return rounded(readings, self._decimals[0])
-        return np.array([rounded(each, decimals) for each, decimals in zip(readings, self._decimals, strict=True)])
+            return round_like_counter(readings, self._decimals[0])
+        return np.array(
+            [round_like_counter(each, decimals) for each, decimals in zip(readings, self._decimals, strict=True)]
+        )
 
     def _unrounded(self, who: Who, row: int, position: Array) -> Array:
         return np.asarray(self._offsets[row][who] + self._units[row] * position)
@@ -265,12 +267,12 @@ class Fleet:
         position = self._carriages.at[row][who]
         reading = self._unrounded(who, row, position)
         self._units[row], self._decimals[row] = units, decimals
-        self._offsets[row, who] = rounded(reading, decimals) - units * position
+        self._offsets[row, who] = round_like_counter(reading, decimals) - units * position
 
     def drive(self, who: Who, axis: str, readings: Array) -> Truths:
         """Run carriages until their counters show readings ``(m,)``; return which went."""
         row = AXES.index(axis)
-        wanted = rounded(readings, self._decimals[row])
+        wanted = round_like_counter(readings, self._decimals[row])
         went = self._move(who, row, (wanted - self._offsets[row][who]) / self._units[row])
         slipping = went & (self._slip_shares[who] > 0.0)
         if slipping.any():
@@ -288,8 +290,8 @@ class Fleet:
         Their collars decide which way the carriages go.
         """
         k = len(amounts)
-        before = among(self._carriages.at, who)
-        steps = among(self._levers_stand.senses[:k], who) * amounts / self._units[:k, None]
+        before = take(self._carriages.at, who)
+        steps = take(self._levers_stand.senses[:k], who) * amounts / self._units[:k, None]
         after = before[:k] + steps
         if self._no_slips and who.size:
             low, high = after.min(axis=1), after.max(axis=1)
@@ -302,7 +304,7 @@ class Fleet:
     def _move(self, who: Who, row: int, positions: Array, silently: bool = False) -> Truths:
         positions = self._carriages.put_at_end(row, positions, self._half_a_count(row))
         before = self._carriages.at[row, who]
-        mark = among(self._carriages.at, who).copy()
+        mark = take(self._carriages.at, who).copy()
         mark[row] = positions
         allowed = self._carriages.allow(row, positions) & self._rods_can(who, mark=mark)
         if not silently:
@@ -328,17 +330,17 @@ class Fleet:
 
     def _rods_can(self, who: Who, centres: Mapping[int, Array] | None = None, mark: Array | None = None) -> Truths:
         """Return where no rod comes beyond its limit, nor further beyond it, with other centres or marks ``(3, m)``."""
-        now = among(self._carriages.at, who)
+        now = take(self._carriages.at, who)
         mark = now if mark is None else mark
         able = np.ones(who.size, dtype=bool)
         for n in (1, 2) if centres is None else centres:
-            beside, below = _reach(among(self._told[n], who) if centres is None else centres[n], mark)
+            beside, below = _reach(take(self._told[n], who) if centres is None else centres[n], mark)
             if (beside < self._surely_within * below).all():
                 continue
             then = np.arctan2(beside, below) / GON
             beyond = then > self.variant.rod_limit_gon
             if beyond.any():
-                able &= ~beyond | (then <= np.arctan2(*_reach(among(self._told[n], who), now)) / GON)
+                able &= ~beyond | (then <= np.arctan2(*_reach(take(self._told[n], who), now)) / GON)
         return able
 
     def _rods_surely_can(self, who: Who, before: Array, low: Array, high: Array) -> bool:
@@ -350,7 +352,7 @@ class Fleet:
         lowest, highest = before.min(axis=1), before.max(axis=1)
         lowest[:k], highest[:k] = np.minimum(lowest[:k], low), np.maximum(highest[:k], high)
         for n in (1, 2):
-            told = among(self._told[n], who)
+            told = take(self._told[n], who)
             least, most = told.min(axis=1), told.max(axis=1)
             x, y, _ = np.maximum(highest - least, most - lowest)
             if not math.hypot(x, y) < self._surely_within * (least[2] - highest[2]):
@@ -374,9 +376,9 @@ class Fleet:
         def drum(name: str) -> Array:
             if name in elements:
                 return elements[name]
-            return among(self._drums[name].at, who) if name in self._drums else np.zeros(who.size)
+            return take(self._drums[name].at, who) if name in self._drums else np.zeros(who.size)
 
-        inside = among(self._base_inside, who) if base_inside is None else base_inside
+        inside = take(self._base_inside, who) if base_inside is None else base_inside
         x, y, z = self._shares(n, inside) * drum("bx"), -drum(f"by{n}"), drum(f"bz{n}")
         if "common_phi" in self._drums:
             tilt = (drum("common_phi") - self.variant.elements["common_phi"].zero) * GON
@@ -421,7 +423,7 @@ class Fleet:
         """Put the projectors where their elements, the base and their faults bring them."""
         omega, phi, kappa = (self._really(who, f"{name}{n}") * GON for name in ("omega", "phi", "kappa"))
         turned = rotation(omega, phi, kappa)
-        self._missed[n][:, who] = mxv(turned, among(self._axes[n], who))
+        self._missed[n][:, who] = mxv(turned, take(self._axes[n], who))
         if "common_phi" in self._drums:
             common = rotation(0.0, self._really(who, "common_phi") * GON, 0.0)
             self._common[:, :, who] = common
@@ -435,10 +437,10 @@ class Fleet:
     def _shift(self, who: Who, n: int, told: Array) -> None:
         """Put the projectors, turned as they stand, where base, by and bz bring them and these are told ``(3, m)``."""
         base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
-        place = place_of_centre(self._shares(n, among(self._base_inside, who)), *base)
-        centre = place + among(self._missed[n], who) - among(self._axes[n], who)
+        place = projection_centre(self._shares(n, take(self._base_inside, who)), *base)
+        centre = place + take(self._missed[n], who) - take(self._axes[n], who)
         if "common_phi" in self._drums:
-            centre = mxv(among(self._common, who), centre)
+            centre = mxv(take(self._common, who), centre)
         put(centre, who, self._bundles[n].centre)
         put(told, who, self._told[n])
 
@@ -462,7 +464,7 @@ class Fleet:
 
     def mark(self, who: Who) -> Array:
         """Return where the floating marks really stand ``(3, m)``."""
-        return mxv(among(self._guides, who), self._carriages.position(who))
+        return mxv(take(self._guides, who), self._carriages.position(who))
 
     def _mark_on_carrier(self, who: Who, projector: int, bundles: Bundles, mark: Array) -> Array:
         """Return the places ``(2, m)`` in mm on carriers where the space rods bring floating marks ``(3, m)``."""
@@ -473,8 +475,8 @@ class Fleet:
             bundles.turned,
             bundles.c,
             bundles.principal_point,
-            None if local is None else among(local, who),
-            None if rods is None else among(rods, who),
+            None if local is None else take(local, who),
+            None if rods is None else take(rods, who),
         )
 
     def eyepiece(self, who: Who, eye: int, name: str) -> Array:
@@ -487,7 +489,7 @@ class Fleet:
         return np.concatenate([self._in_eyepiece(who, eye, name, mark) for eye in (1, 2)])
 
     def _in_eyepiece(self, who: Who, eye: int, name: str, mark: Array) -> Array:
-        straight = among(self._levers_stand.straight, who)
+        straight = take(self._levers_stand.straight, who)
         ways = ((eye, straight), (3 - eye, ~straight))
         for projector, looking in ways:
             if projector in self._carriers and looking.all():
@@ -502,7 +504,7 @@ class Fleet:
         bundles = self._bundles[projector].among(who)
         displacement = self._carriers[projector].point(who, name) - self._mark_on_carrier(who, projector, bundles, mark)
         turned = mxv(bundles.swung, displacement)
-        shown = among(self._levers_stand.signs[projector], who) * turned
+        shown = take(self._levers_stand.signs[projector], who) * turned
         return np.where(length_of(displacement) <= self.variant.field_radius_mm, shown, np.nan)
 
     # --- levers, prisms, collars ----------------------------------------------------------------------
@@ -541,12 +543,12 @@ def _reach(centre: Array, mark: Array) -> tuple[Array, Array]:
     return np.hypot(mark[0] - centre[0], mark[1] - centre[1]), centre[2] - mark[2]
 
 
-def build_fleet(instrument: Instrument, photographs: Sequence[Mapping[str, Photograph]], seeds: Sequence[int]) -> Fleet:
+def build_batch(instrument: Instrument, photographs: Sequence[Mapping[str, Photograph]], seeds: Sequence[int]) -> Fleet:
     """Return the instruments of a scenario, one a seed, with their photographs in their drawers."""
     rngs = [np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM,))) for seed in seeds]
     return Fleet(
         VARIANTS[instrument.variant],
-        [condition_of(instrument, seed) for seed in seeds],
+        [draw_condition(instrument, seed) for seed in seeds],
         photographs,
         (instrument.laying_sigma_mm, instrument.laying_sigma_gon),
         rngs,

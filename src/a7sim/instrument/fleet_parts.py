@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, among, put
+from a7sim.among import Who, put, take
 from a7sim.geometry import GON, Array, mxv, plane_rotation
 from a7sim.instrument.spindles import APPROXIMATIONS
 from a7sim.manual import COUNTER_DECIMALS, Variant
@@ -25,7 +25,7 @@ TIE_TOLERANCE = 1e-6
 """Of the last decimal."""
 
 
-def rounded(values: Array, decimals: int) -> Array:
+def round_like_counter(values: Array, decimals: int) -> Array:
     """Return values rounded as the counters of one instrument round them: a tie by what the number exactly is.
 
     Wheels turn by thousandths, so that ties are common; numpy scales before it rounds and would take some for halves.
@@ -51,7 +51,7 @@ class Runouts:
     def at(self, who: Who, position: Array) -> Array:
         """Return by how much the nuts have gone further ``(3, m)`` than the turns say, mm."""
         turns = 2.0 * math.pi * position / self.lead
-        return np.asarray(among(self.amplitude, who) * np.sin(turns + among(self.phase, who)))
+        return np.asarray(take(self.amplitude, who) * np.sin(turns + take(self.phase, who)))
 
 
 class Carriages:
@@ -66,7 +66,7 @@ class Carriages:
 
     def position(self, who: Who) -> Array:
         """Return where they really stand ``(3, m)``."""
-        position = among(self._shaft, who)
+        position = take(self._shaft, who)
         return position if self._runouts is None else position + self._runouts.at(who, position)
 
     def position_free_of_runout(self, who: Who, place: Array) -> Array:
@@ -94,9 +94,9 @@ class Carriages:
     def run_to(self, who: Who, first: int, places: Array) -> None:
         """Run carriages, from a first one on, to places ``(k, m)`` that they allow."""
         rows = slice(first, first + len(places))
-        half = among(self._half_play, who)
+        half = take(self._half_play, who)
         put(places, who, self.at[rows])
-        put(np.minimum(np.maximum(among(self._shaft[rows], who), places - half), places + half), who, self._shaft[rows])
+        put(np.minimum(np.maximum(take(self._shaft[rows], who), places - half), places + half), who, self._shaft[rows])
 
 
 class Drums:
@@ -120,12 +120,12 @@ class Drums:
 
     def position(self, who: Who) -> Array:
         """Return where the shafts really stand ``(m,)``."""
-        return np.asarray(among(self._shaft, who) + among(self._error, who) + among(self._fault, who))
+        return np.asarray(take(self._shaft, who) + take(self._error, who) + take(self._fault, who))
 
     def shown(self, who: Who) -> Array:
         """Return what the counters show ``(m,)``."""
-        shown = rounded(among(self.at, who), COUNTER_DECIMALS)
-        return rounded(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
+        shown = round_like_counter(take(self.at, who), COUNTER_DECIMALS)
+        return round_like_counter(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
 
     def allows(self, values: Array) -> Truths:
         """Return which values the drum can be turned to."""
@@ -133,17 +133,17 @@ class Drums:
 
     def after(self, who: Who, amounts: Array) -> Array:
         """Return to what values ``(m,)`` the drums come when they are turned by so much."""
-        values = among(self.at, who) + amounts
+        values = take(self.at, who) + amounts
         return np.asarray(values % self.high if self.endless else values)
 
     def turn_to(self, who: Who, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
         """Turn the drums to values ``(m,)`` that they allow; with dice, by their counters (see `Spindle.turn_to`)."""
         if self.endless:
-            values = values + self.high * np.round((among(self.at, who) - values) / self.high)
+            values = values + self.high * np.round((take(self.at, who) - values) / self.high)
         put(values, who, self.at)
-        half = among(self._half_play, who)
-        put(np.minimum(np.maximum(among(self._shaft, who), values - half), values + half), who, self._shaft)
-        for session in who[among(self._sigma, who) > 0.0] if rngs else ():
+        half = take(self._half_play, who)
+        put(np.minimum(np.maximum(take(self._shaft, who), values - half), values + half), who, self._shaft)
+        for session in who[take(self._sigma, who) > 0.0] if rngs else ():
             self._error[session] = self._sigma[session] * rngs[session].standard_normal()
 
 
@@ -175,7 +175,7 @@ class Carriers:
         placed = self._placed.get(name)
         if placed is None:
             placed = self._placed[name] = mxv(self._turn, self._film(name)) + self._shift
-        return among(placed, who)
+        return take(placed, who)
 
     def _film(self, name: str) -> Array:
         """Return where an image point lies on the films ``(2, instruments)``."""

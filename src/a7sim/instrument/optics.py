@@ -19,20 +19,20 @@ VIEW_CACHE_SIZE = 64
 
 
 @lru_cache(maxsize=VIEW_CACHE_SIZE)
-def as_they_act(fittings: Fittings, polarity: str, base: str, has: tuple[str, ...]) -> Fittings:
+def effective_fittings(fittings: Fittings, polarity: str, base: str, has: tuple[str, ...]) -> Fittings:
     """Return the fittings of an instrument that has only some: the others are built right for any picture."""
     right = REQUIRED_FITTINGS[polarity, base].as_words()
     return replace(fittings, **{name: position for name, position in right.items() if name not in has})
 
 
-def projector_seen(eyepiece: int, fittings: Fittings) -> int:
+def projector_in_view(eyepiece: int, fittings: Fittings) -> int:
     """Return which projector, 1 or 2, an eyepiece shows; eyepiece 1 is the observer's left eye."""
     straight = fittings.triangulation == "back"
     return eyepiece if straight else 3 - eyepiece
 
 
 @lru_cache(maxsize=VIEW_CACHE_SIZE)
-def view(fittings: Fittings, polarity: str, base: str, kappa_gon: float) -> Array:
+def view_matrix(fittings: Fittings, polarity: str, base: str, kappa_gon: float) -> Array:
     """Return the matrix ``(2, 2)`` from displacements on the carrier to those in the eyepiece, in mm; not to write.
 
     The optics stand still while the camera swings, so a swung picture is seen swung.
@@ -49,7 +49,7 @@ def view(fittings: Fittings, polarity: str, base: str, kappa_gon: float) -> Arra
     return seen
 
 
-def wheel_senses(fittings: Fittings, polarity: str) -> dict[str, float]:
+def handwheel_senses(fittings: Fittings, polarity: str) -> dict[str, float]:
     """Return +1, or -1 where a collar does not belong to the picture, for the X and Y handwheels and the Z disc."""
     right = REQUIRED_FITTINGS[polarity, "inside"]
     return {

@@ -12,7 +12,7 @@ from a7sim.geometry import Array, length_of, mxm, mxv, rotation, transposed
 from a7sim.instrument.local_errors import local_errors
 
 
-def place_of_centre(share: npt.ArrayLike, bx: npt.ArrayLike, by: npt.ArrayLike, bz: npt.ArrayLike) -> Array:
+def projection_centre(share: npt.ArrayLike, bx: npt.ArrayLike, by: npt.ArrayLike, bz: npt.ArrayLike) -> Array:
     """Return where a projection centre stands on the main frame ``(3, ...)``: (share bx, -by, bz) (geometry.md).
 
     `share` tells how the base is laid off: 0 and 1 for the two centres of an A7, -1/2 and 1/2 for those of an A8.
@@ -21,7 +21,7 @@ def place_of_centre(share: npt.ArrayLike, bx: npt.ArrayLike, by: npt.ArrayLike, 
     return np.array(np.broadcast_arrays(*place) if any(each.ndim for each in place) else place, dtype=float)
 
 
-def tilted(place: Array, common_phi: npt.ArrayLike) -> Array:
+def apply_common_tilt(place: Array, common_phi: npt.ArrayLike) -> Array:
     """Return places on the main frame ``(3, ...)`` when the frame is turned by the common Phi about the Y axis."""
     return mxv(rotation(0.0, common_phi, 0.0), place)
 
@@ -37,7 +37,7 @@ class Turned(NamedTuple):
     """The same in the frame's axes: it goes round with the camera."""
 
 
-def turned_by(omega: npt.ArrayLike, phi: npt.ArrayLike, kappa: npt.ArrayLike, missed: Array) -> Turned:
+def attitude_from_angles(omega: npt.ArrayLike, phi: npt.ArrayLike, kappa: npt.ArrayLike, missed: Array) -> Turned:
     """Return a camera with these tilts whose axes miss the projection centre by so much ``(3, ...)`` in mm."""
     turned = rotation(omega, phi, kappa)
     return Turned(turned, missed, mxv(turned, missed))
@@ -52,7 +52,7 @@ def pose(camera: Turned, place: Array, common_phi: npt.ArrayLike | None = None) 
     centre = place + camera.gone_round - camera.missed
     if common_phi is None:
         return centre, turned
-    return tilted(centre, common_phi), mxm(rotation(0.0, common_phi, 0.0), turned)
+    return apply_common_tilt(centre, common_phi), mxm(rotation(0.0, common_phi, 0.0), turned)
 
 
 def place_on_carrier(
@@ -74,7 +74,7 @@ def place_on_carrier(
         ray = _in_camera(turned, direction)
         image = ray[:2] * (-c / ray[2])
     else:
-        beside = beside_the_centre(direction, rod)
+        beside = eccentric_offset(direction, rod)
         ray, passed = _in_camera(turned, direction - beside), _in_camera(turned, beside)
         image = passed[:2] - ray[:2] * ((c + passed[2]) / ray[2])
     if local is not None:
@@ -87,7 +87,7 @@ def _in_camera(turned: Array, vector: Array) -> Array:
     return vector @ turned if vector.ndim == 1 else mxv(transposed(turned), vector)
 
 
-def beside_the_centre(direction: Array, eccentricity: Array) -> Array:
+def eccentric_offset(direction: Array, eccentricity: Array) -> Array:
     """Return by how much ``(3, ...)`` a rod of this direction ``(3, ...)``, downwards, passes beside its cardan.
 
     The outer axis of the cardan lies along X, the inner one goes round with it; `eccentricity` ``(2, ...)`` lies along

@@ -30,7 +30,7 @@ class Address:
             return False
 
 
-def address_of(text: str, option: str) -> Address:
+def parse_address(text: str, option: str) -> Address:
     """Return the address that a text such as 127.0.0.1:5025 or [::1]:5025 names. Raises Mistake."""
     found = _ADDRESS.fullmatch(text)
     if found is None or int(found[3]) > 65535:

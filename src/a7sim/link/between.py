@@ -5,10 +5,10 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from a7sim.instrument.language import MAX_LINE_LENGTH, LinkEvent, Listener, as_heard, without_token
+from a7sim.instrument.language import MAX_LINE_LENGTH, LinkEvent, Listener, loggable_reply, redact_token
 from a7sim.link.clock import WallClock
-from a7sim.link.opening import open_port, told
-from a7sim.link.replies import NotAReply, Part, whole_reply
+from a7sim.link.opening import open_port, port_errors
+from a7sim.link.replies import NotAReply, Part, parse_reply
 from a7sim.mistakes import Mistake
 
 POLL_INTERVAL_S = 0.1
@@ -50,7 +50,7 @@ class Between:
         name = f"client{self._clients}"
         client.settimeout(POLL_INTERVAL_S)
         gone = threading.Event()
-        with told(self._url):
+        with port_errors(self._url):
             port = open_port(self._url, POLL_INTERVAL_S)
             try:
                 self._hear(name, "+", "")
@@ -90,7 +90,7 @@ class Between:
                 if too_long or len(line.removesuffix(b"\r")) > MAX_LINE_LENGTH:
                     self._hear(name, "!", f"(a line of more than {MAX_LINE_LENGTH} bytes)")
                 elif line.strip(b" \t\r"):
-                    self._hear(name, ">", without_token(line.removesuffix(b"\r").decode("latin-1"), None))
+                    self._hear(name, ">", redact_token(line.removesuffix(b"\r").decode("latin-1"), None))
                 port.write(line + b"\n")
                 too_long = False
             if len(come) > MAX_LINE_LENGTH + 1:
@@ -118,7 +118,7 @@ class Between:
 def _taken(come: bytearray) -> tuple[str, int] | None:
     """Return the text of the first whole reply and how many bytes it is."""
     try:
-        taken = whole_reply(come)
+        taken = parse_reply(come)
     except NotAReply:
         end = come.find(b"\n") + 1
         return (come[: end - 1].decode("latin-1"), end) if end else None
@@ -129,4 +129,4 @@ def _heard(part: Part) -> str:
     if isinstance(part, str):
         return part
     length = str(len(part))
-    return as_heard(f"#{len(length)}{length}".encode("ascii") + part)
+    return loggable_reply(f"#{len(length)}{length}".encode("ascii") + part)

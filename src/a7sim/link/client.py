@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Protocol, Self
 
 from a7sim.link.opening import TIMEOUT_S, open_port
-from a7sim.link.replies import NotAReply, Part, whole_reply
+from a7sim.link.replies import NotAReply, Part, parse_reply
 
 
 class Port(Protocol):
@@ -139,7 +139,7 @@ class Client:
             more = self._port.readline()
             received += more
             try:
-                taken = whole_reply(received)
+                taken = parse_reply(received)
             except NotAReply:
                 return None
             if taken is not None:

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from a7sim.instrument.language import Desk, ErrorNumber, entry
+from a7sim.instrument.language import Desk, ErrorNumber, format_entry
 from a7sim.link.clock import Clock, WallClock
 from a7sim.link.faults import Cut, Faults, Noise
 from a7sim.link.pacing import Pace
@@ -216,7 +216,7 @@ class Conversation:
         if left > 0.0:
             self._sleeper = self._loop.call_later(left, self._asleep)
         else:
-            text = entry(ErrorNumber.TIME_OUT_ERROR, f"expected something to do within {idle:g} s")
+            text = format_entry(ErrorNumber.TIME_OUT_ERROR, f"expected something to do within {idle:g} s")
             self._wire.close(f"{text}\n".encode("ascii"))
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from a7sim.link.client import Client
-from a7sim.link.replies import Part, as_text
+from a7sim.link.replies import Part, part_as_text
 from a7sim.manual import SCPI_VERSION
 from a7sim.mistakes import Mistake
 
@@ -22,10 +22,10 @@ class Exchange:
     @property
     def shown(self) -> str | None:
         """The reply for people, blocks as their sizes; None where there is none."""
-        return None if self.reply is None else ";".join(map(as_text, self.reply))
+        return None if self.reply is None else ";".join(map(part_as_text, self.reply))
 
 
-def say(client: Client, line: str) -> Exchange:
+def send_line(client: Client, line: str) -> Exchange:
     """Send a line and return what came of it. Raises Mistake when the instrument does not answer at all."""
     client.send(line)
     client.send(_MARKER)
@@ -41,7 +41,7 @@ def say(client: Client, line: str) -> Exchange:
 def _marker(client: Client, line: str) -> tuple[Part, ...]:
     marker = _expected(client, line)
     if not _is_marker(marker):
-        raise Mistake(f"{line}: expected one reply to a line, got another: {';'.join(map(as_text, marker))}")
+        raise Mistake(f"{line}: expected one reply to a line, got another: {';'.join(map(part_as_text, marker))}")
     return marker
 
 

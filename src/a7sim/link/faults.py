@@ -30,7 +30,7 @@ class Faults:
     """s by which every reply is late."""
 
 
-def faults_of(text: str) -> Faults:
+def parse_faults(text: str) -> Faults:
     """Return the faults that a text such as EXAMPLE names. Raises Mistake."""
     found: dict[str, float] = {}
     for part in text.split(","):

@@ -27,7 +27,7 @@ FITTING_NODES: Mapping[str, str] = MappingProxyType(
 _SHORT: Mapping[str, str] = MappingProxyType({"inside": "IN", "outside": "OUT", "front": "FRON", "right": "RIGH"})
 
 
-def short(position: str) -> str:
+def short_form(position: str) -> str:
     """Return the short form of a position of a fitting or of the base, as it is said and shown."""
     return _SHORT.get(position, position.upper())
 
@@ -41,14 +41,14 @@ def header(element: str) -> str:
     return f"PROJ{element[-1]}:{ELEMENT_NODES[element[:-1]]}"
 
 
-def recorded_as(element: str) -> str:
+def registration_word(element: str) -> str:
     """Return the word under which an element is registered, such as BY1."""
     if element == "common_phi":
         return "CPHI"
     return "BX" if element == "bx" else f"{ELEMENT_NODES[element[:-1]]}{element[-1]}"
 
 
-def quoted(text: str) -> str:
+def quote_text(text: str) -> str:
     """Return a text in the quotes of the language."""
     doubled = text.replace('"', '""')
     return f'"{doubled}"'

@@ -7,7 +7,7 @@ from serial import PortNotOpenError, SerialBase, SerialException, to_bytes
 
 from a7sim.instrument.language import MAX_BUFFERED_BYTES, Desk, Engine
 from a7sim.link.clock import Clock
-from a7sim.link.waiting import obeyed
+from a7sim.link.waiting import feed_until_idle
 
 
 class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
@@ -76,7 +76,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
             engine = self._opened()
             replies = b""
             for start in range(0, len(received), MAX_BUFFERED_BYTES):
-                replies += obeyed(engine, received[start : start + MAX_BUFFERED_BYTES], self.clock)
+                replies += feed_until_idle(engine, received[start : start + MAX_BUFFERED_BYTES], self.clock)
             if replies:
                 self._unread, self._read_up_to = self._unread[self._read_up_to :] + replies, 0
                 self._arrived.notify_all()

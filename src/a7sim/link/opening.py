@@ -37,7 +37,7 @@ def open_port(url: str, timeout: float = TIMEOUT_S) -> Any:
 
 
 @contextmanager
-def told(url: str) -> Iterator[None]:
+def port_errors(url: str) -> Iterator[None]:
     """Turn what goes wrong on a line that was open into a sentence that names it. Raises Mistake."""
     try:
         yield

@@ -20,7 +20,7 @@ class Taken:
     length: int
 
 
-def whole_reply(received: bytes | bytearray) -> Taken | None:
+def parse_reply(received: bytes | bytearray) -> Taken | None:
     """Return the reply at the beginning of what was received, None while it is not whole. Raises NotAReply."""
     parts: list[Part] = []
     at = 0
@@ -63,6 +63,6 @@ def _block(received: bytes | bytearray, start: int) -> tuple[bytes, int] | None:
     return (bytes(received[begins:ends]), ends) if len(received) >= ends else None
 
 
-def as_text(part: Part) -> str:
+def part_as_text(part: Part) -> str:
     """Return a part for people: a block as its size."""
     return part if isinstance(part, str) else f"#block of {len(part)} bytes"

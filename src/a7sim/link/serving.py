@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from a7sim.instrument.language import Desk, ErrorNumber, entry
+from a7sim.instrument.language import Desk, ErrorNumber, format_entry
 from a7sim.link.addresses import Address
 from a7sim.link.clock import Clock, WallClock
 from a7sim.link.conversation import Conversation, Terms, Wire
 from a7sim.link.pty_wire import PtyWire
 from a7sim.link.wires import MAX_READ, TcpWire, TelnetWire
 from a7sim.mistakes import Mistake
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 MAX_REJECTION_NOTICES = 64
 """Clients at a time that are told why they are turned away; the others are just turned away."""
@@ -97,7 +97,7 @@ class Server:
             if len(self._turned_away) >= MAX_REJECTION_NOTICES:
                 wire.abort()
             self._turned_away.add(wire)
-            text = entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {counted(most, 'client')} at a time")
+            text = format_entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {pluralize(most, 'client')} at a time")
             return f"{text}\n".encode("ascii")
         self._wires.add(wire)
         return Conversation(self.desk, self._clock, self._terms, wire, self.desk.opened + 1, serial)

@@ -5,9 +5,9 @@ from contextlib import contextmanager
 from typing import Any
 
 from a7sim.link.client import Client, Port
-from a7sim.link.exchange import say
+from a7sim.link.exchange import send_line
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.link.opening import open_port, told
+from a7sim.link.opening import open_port, port_errors
 from a7sim.mistakes import Mistake
 
 
@@ -61,15 +61,15 @@ def _shown(data: bytes, around: int = 0) -> str:
 
 
 @contextmanager
-def served_at(url: str, timeout: float, token: str | None = None) -> Iterator[Any]:
+def open_checked_port(url: str, timeout: float, token: str | None = None) -> Iterator[Any]:
     """Yield the port of a served instrument, its lock held. Raises Mistake, also when the line breaks."""
     port = open_port(url, timeout)
     try:
-        with told(url):
+        with port_errors(url):
             client = Client(port)
             if token is not None:
                 client.log_in(token)
-            if say(client, "SYST:LOCK:REQ?").shown != "1":
+            if send_line(client, "SYST:LOCK:REQ?").shown != "1":
                 raise Mistake(f"{url}: expected the instrument to be free, but another client holds its lock")
             yield port
             client.send("SYST:LOCK:REL;*OPC?")

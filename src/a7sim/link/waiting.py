@@ -4,7 +4,7 @@ from a7sim.instrument.language import Engine
 from a7sim.link.clock import Clock
 
 
-def obeyed(engine: Engine, received: bytes, clock: Clock) -> bytes:
+def feed_until_idle(engine: Engine, received: bytes, clock: Clock) -> bytes:
     """Feed an engine and let the clock run to where each wait ends; return the bytes of all replies."""
     replies = engine.feed(received, clock.now)
     while engine.waits_until is not None:

@@ -2,6 +2,6 @@
 
 from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.person import DoesNotFit, Person
-from a7sim.operator.work import ModelRecord, work
+from a7sim.operator.work import ModelRecord, measure_models
 
-__all__ = ["DoesNotFit", "Job", "ModelJob", "ModelRecord", "Person", "work"]
+__all__ = ["DoesNotFit", "Job", "ModelJob", "ModelRecord", "Person", "measure_models"]

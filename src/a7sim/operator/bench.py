@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, without
+from a7sim.among import Who, exclude
 from a7sim.geometry import Array
 from a7sim.operator.crew import Crew
 from a7sim.operator.eyes import Eyes
 from a7sim.operator.floating_mark import Clearing, FloatingMark, Judgement
 from a7sim.operator.hands import Hands, Truths
 from a7sim.operator.job import Job, ModelJob
-from a7sim.operator.seat import Seat, side, wrapped
+from a7sim.operator.seat import Seat, side_name, wrap_gon
 from a7sim.operator.slips import neighbours
 
 MAX_POINTINGS = 12
@@ -170,7 +170,7 @@ class Bench:
         self.eyes.bring_into_view(who, hand, point)
         self.eyes.bisect(crew.still(who), hand, point, errors)
         who = crew.still(who)
-        items = [f"{name} {side(hand)} at Z {level:.2f}" for name in "XY"]
+        items = [f"{name} {side_name(hand)} at Z {level:.2f}" for name in "XY"]
         for axis, item in enumerate(items):
             readings[axis, who] = self._read(who, point, item, slips[axis])
         self.eyes.learn_straying(who, hand, point, readings[:, who])
@@ -206,7 +206,7 @@ class Bench:
             places[:, i, fused] = self.seat.place(fused, readings_there)
             self.eyes.learn_straying(fused, 1, point, readings_there) if fused.size else None
             cleared = self._parallax(fused, point, judgement, projectors, rest, errors[i], slips[i], p[i])
-            lost = without(crew.still(measuring), cleared)
+            lost = exclude(crew.still(measuring), cleared)
             apart[lost] = point
             if lost.size:
                 self._turn_back(lost, ("by1", "by2"), rest)
@@ -306,7 +306,7 @@ class Bench:
             off = deviations.max(axis=0) > tolerance[doubtful]
             doubtful, worst = doubtful[off], worst[off]
             if not doubtful.size:
-                return without(crew.still(who), lost)
+                return exclude(crew.still(who), lost)
             for i in np.unique(worst // readings):
                 of_this = worst // readings == i
                 again, k = doubtful[of_this], np.zeros(crew.sessions, dtype=np.intp)
@@ -318,12 +318,12 @@ class Bench:
                 slips = crew.slips_again(again, 1)[0]
                 found = self._clear_with_by(again, projectors[i], point, judgement, errors, slips, rest, value, entry)
                 values[i, k[found], found], numbers[i, k[found], found] = value[found], entry[found]
-                lost = np.concatenate([lost, without(again, found)])
+                lost = np.concatenate([lost, exclude(again, found)])
                 if found.size:
                     self._turn_back(found, (by,), rest)
-            doubtful = without(doubtful, lost)
+            doubtful = exclude(doubtful, lost)
         crew.give_up(doubtful, f"{self.seat.model.name}: the readings of {bys} at {point} do not agree")
-        return without(crew.still(who), lost)
+        return exclude(crew.still(who), lost)
 
     # --- clearing -------------------------------------------------------------------------------------
 
@@ -345,14 +345,14 @@ class Bench:
         found, turn, gain = np.zeros((3, crew.sessions))
         place = np.zeros((3, crew.sessions))
         fused = self._arrive(who, point, judgement, error, place, found)
-        apart = without(crew.still(who), fused)
+        apart = exclude(crew.still(who), fused)
         if not fused.size:
             return Cleared(fused, apart, found, place, turn)
         gain[fused] = gain_at(fused, place[:, fused])
         turning = fused[np.abs(found[fused]) > unless_within]
         turned = self._turn_until_clear(turning, point, judgement, Clearing(element, gain, error), turn)
         self._tick()
-        return Cleared(without(fused, without(turning, turned)), apart, found, place, turn)
+        return Cleared(exclude(fused, exclude(turning, turned)), apart, found, place, turn)
 
     def parallaxes_seen(self, who: Who, points: Sequence[str]) -> Parallaxes:
         """Look at what y-parallax is left at points, without turning anything but the handwheels."""
@@ -362,7 +362,7 @@ class Bench:
         for i, point in enumerate(points):
             judgement, error = self._judgement(who)
             fused = self._arrive(who, point, judgement, error, places[:, i], p[i])
-            apart[without(crew.still(who), fused)] = point
+            apart[exclude(crew.still(who), fused)] = point
             who = fused
             if not who.size:
                 break
@@ -408,7 +408,7 @@ class Bench:
         written = crew.write(who, point, element, shown, slips)
         crew.enter(who, point, element, written)
         turned = seat.in_hand(who, element) - before[who]
-        turn[who] = (wrapped(turned) if seat.manual.elements[element].endless else turned) + written - shown
+        turn[who] = (wrap_gon(turned) if seat.manual.elements[element].endless else turned) + written - shown
         seat.learn_settings(who)
         seat.see_that_it_obeyed(who, f"{seat.model.name}: clearing {point} with {element}")
         return crew.still(who)
@@ -450,7 +450,7 @@ class Bench:
                 slip = crew.slips_again(repeating, 3)
             readings = np.full((3, crew.sessions), np.nan)
             found, numbers = self._pointing(repeating, point, sigmas * (at_point + error), slip, readings)
-            apart = without(crew.still(repeating), found)
+            apart = exclude(crew.still(repeating), found)
             crew.remark(apart, f"point {point}: its two images cannot be fused, not measured")
             pointings.append(readings)
             entries.append(numbers)
@@ -458,7 +458,7 @@ class Bench:
             if k:
                 agreed = found[self._agree(pointings[-2][:, found], readings[:, found])]
                 into[:, agreed] = (pointings[-2][:, agreed] + readings[:, agreed]) / 2.0
-                repeating = without(found, agreed)
+                repeating = exclude(found, agreed)
         if repeating.size:
             into[:, repeating] = np.median([each[:, repeating] for each in pointings], axis=0)
         crew.remark(repeating, f"point {point}: no two of {MAX_POINTINGS} pointings agree, median taken")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.among import Who, without
+from a7sim.among import Who, exclude
 from a7sim.geometry import Array
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Crew, NobodyGoesOn
@@ -20,20 +20,20 @@ from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
 from a7sim.operator.relative import (
     RelativeOrientations,
-    assessed,
-    corrections_of,
+    assess_residuals,
+    compute_corrections,
+    expand_to_batch,
     relative_orientation,
-    spread,
-    unknowns_of,
+    unknown_elements,
 )
 from a7sim.operator.work import (
     begin_form,
+    load_prints,
     model_coordinates,
-    mount,
+    mount_photographs,
     preset_counters,
-    see_that_somebody_goes_on,
+    require_active,
     set_base_and_fittings,
-    take_up_prints,
 )
 
 MAX_SCALINGS = 4
@@ -68,7 +68,7 @@ class BridgedModels:
         return {name: (x, y, z) for name, (x, y, z) in each.items() if np.isfinite(x)}
 
 
-def bridge(
+def bridge_strip(
     person: Person,
     job: Job,
     tick: Callable[[], None] = lambda: None,
@@ -76,10 +76,10 @@ def bridge(
 ) -> Iterator[BridgedModels]:
     """Yield the models of a strip as a person bridges it. Raises DoesNotFit when one cannot be set up."""
     person.book.head("", "preparation")
-    yield from bridged(Bench(Crew.of_one(person), LineHands(person), job, tick), begins)
+    yield from bridge_strip_batch(Bench(Crew.of_one(person), LineHands(person), job, tick), begins)
 
 
-def bridged(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[BridgedModels]:
+def bridge_strip_batch(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[BridgedModels]:
     """Yield the models of a strip as a crew bridges it, each session at its own instrument.
 
     Every model must have the photograph of the one before it as its left-hand one and the other base; give up if not.
@@ -100,28 +100,28 @@ def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedMod
         begin_form(bench, model, "interior orientation", begins)
         if last is not None:
             _see_that_it_follows(bench, last, model)
-            carry_on(bench, model)
+            extend_strip(bench, model)
         set_base_and_fittings(bench, model.base, model.polarity)
-        mount(bench, model, interior)
-        prints = take_up_prints(bench, model)
-        see_that_somebody_goes_on(bench)
+        mount_photographs(bench, model, interior)
+        prints = load_prints(bench, model)
+        require_active(bench)
         bench.begin(crew.everybody, model, prints)
         if last is None:
             preset_counters(bench, model)
         else:
-            set_as_its_neighbour(bench, model)
+            copy_common_photo_orientation(bench, model)
         begin_form(bench, model, "relative orientation", begins)
         orientation = _oriented(bench, model)
         scale = np.ones(crew.sessions)
         if last is not None:
             begin_form(bench, model, "scale", begins)
-            scale = carry_scale_on(bench, crew.everybody, model, before)
+            scale = transfer_scale(bench, crew.everybody, model, before)
         orientation = _refined(bench, model, orientation)
         if last is not None:
-            scale *= carry_scale_on(bench, crew.everybody, model, before)
+            scale *= transfer_scale(bench, crew.everybody, model, before)
         begin_form(bench, model, "model coordinates", begins)
         points = model_coordinates(bench, model)
-        see_that_somebody_goes_on(bench)
+        require_active(bench)
         common = {name: points[name] - before[name] for name in points if name in before}
         yield BridgedModels(model, crew.everybody, orientation, points, common, scale, seat.units_per_mm)
         before, last = points, model
@@ -134,13 +134,13 @@ def _see_that_it_follows(bench: Bench, last: ModelJob, model: ModelJob) -> None:
             f"model {model.name} does not go on from model {last.name}: expected {last.right} on the left and base "
             f"{'outside' if last.base == 'inside' else 'inside'}, got {model.left} and base {model.base}",
         )
-        see_that_somebody_goes_on(bench)
+        require_active(bench)
 
 
 # --- from one model to the next ---------------------------------------------------------------------------------------
 
 
-def carry_on(bench: Bench, model: ModelJob) -> None:
+def extend_strip(bench: Bench, model: ModelJob) -> None:
     """Preset X for the oriented photograph's new place on the left, and Y and Z where its by and bz run out.
 
     With the base changed over, its centre comes from X = bx to X = 0: what stands in X = 0 has to read bx more.
@@ -156,7 +156,7 @@ def carry_on(bench: Bench, model: ModelJob) -> None:
             seat.set_elements(who[far], {name: np.full(int(far.sum()), element.zero)})
 
 
-def set_as_its_neighbour(bench: Bench, model: ModelJob) -> None:
+def copy_common_photo_orientation(bench: Bench, model: ModelJob) -> None:
     """Start the new photograph from the tilts and the by and bz of the oriented one, and bx from the plan."""
     seat, who = bench.seat, bench.crew.everybody
     left, right = model.left_projector, model.right_projector
@@ -177,7 +177,7 @@ def _oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
 # --- scale ------------------------------------------------------------------------------------------------------------
 
 
-def carry_scale_on(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]) -> Array:
+def transfer_scale(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]) -> Array:
     """Change the base until common points read the heights that they had; return the factor ``(sessions,)``.
 
     by and bz of the new photograph follow, so that the base keeps its direction and the parallaxes stay cleared.
@@ -188,7 +188,7 @@ def carry_scale_on(bench: Bench, who: Who, model: ModelJob, before: Mapping[str,
     names = [name for name in map(model.standard_points.get, "135") if name is not None and name in before]
     if not names:
         crew.give_up(who, f"{model.name}: none of its points 1, 3 and 5 was measured before, to carry the scale on")
-        see_that_somebody_goes_on(bench)
+        require_active(bench)
     for number in range(1, MAX_SCALINGS + 1):
         bench.begin_round(who, number)
         readings = bench.measure(who, names)[:, :, who]
@@ -227,18 +227,18 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
     parallaxes stand.
     """
     crew, seat = bench.crew, bench.seat
-    unknowns = unknowns_of("dependent", model)
+    unknowns = unknown_elements("dependent", model)
     points = [model.standard_points[label] for label in model.all_positions()]
     everybody = who = crew.everybody
-    best = spread(seat.standing(who, unknowns), who, crew.sessions)
+    best = expand_to_batch(seat.standing(who, unknowns), who, crew.sessions)
     least = np.full(crew.sessions, np.inf)
     for number in range(1, MAX_REFINEMENTS + 1):
         bench.begin_round(who, number)
         seen = bench.parallaxes_seen(who, points)
         who = crew.still(who)
-        who = without(who, seen.parted(who))
+        who = exclude(who, seen.parted(who))
         rms = np.sqrt((seen.p**2).mean(axis=0))
-        now = spread(seat.standing(who, unknowns), who, crew.sessions)
+        now = expand_to_batch(seat.standing(who, unknowns), who, crew.sessions)
         better = who[rms[who] < least[who]]
         falling = who[rms[who] < STILL_FALLING * least[who]]
         least[better] = rms[better]
@@ -247,13 +247,13 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
         who = falling
         if not who.size or number == MAX_REFINEMENTS:
             break
-        corrections, _ = corrections_of(bench, who, model, seen.places, seen.p, unknowns, seat.bx(who))
+        corrections, _ = compute_corrections(bench, who, model, seen.places, seen.p, unknowns, seat.bx(who))
         who = crew.still(who)
         seat.turn_elements(who, {name: (now[name] + corrections[name])[who] for name in unknowns})
     everybody = crew.still(everybody)
     seat.turn_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
     bench.begin_round(everybody, MAX_REFINEMENTS + 1)
     job = bench.job
-    return assessed(
+    return assess_residuals(
         bench, everybody, model, found, model.all_positions(), job.plan.parallax_readings, job.tolerated_parallax_mm
     )

@@ -14,8 +14,8 @@ from a7sim.manual import LEAST_COUNT
 from a7sim.operator.bench import Bench
 from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import ModelJob
-from a7sim.operator.plate import Crosses, lie_of_plate, places_of, point_at_crosses, prints_of
-from a7sim.operator.seat import side
+from a7sim.operator.plate import Crosses, cross_positions, locate_plate, point_at_crosses, sketch_positions
+from a7sim.operator.seat import side_name
 from a7sim.reduction import (
     PerspectiveCentre,
     PlateLie,
@@ -146,7 +146,7 @@ def _by_levels(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Level
         else:
             crew.give_up(
                 them,
-                f"{model.name}: {len(chosen)} of the standard points are pricked on the print of the {side(hand)} "
+                f"{model.name}: {len(chosen)} of the standard points are pricked on the print of the {side_name(hand)} "
                 f"photograph: there must be {MIN_POINTS} for its perspective centre",
             )
     return _gathered(groups, crew.sessions)
@@ -242,8 +242,8 @@ def _by_grid_plate(bench: Bench, who: Who, model: ModelJob, hand: int, levels: L
     projector = bench.seat.projector(hand)
     picture = model.left if hand == 1 else model.right
     centre_picture(bench, who, projector, plate.name, certificate)
-    lie = lie_of_plate(bench, crew.still(who), projector, certificate, times=1)
-    bench.eyes.take_prints({hand: prints_of(bench, crew.still(who), projector)})
+    lie = locate_plate(bench, crew.still(who), projector, certificate, times=1)
+    bench.eyes.take_prints({hand: sketch_positions(bench, crew.still(who), projector)})
     crosses = _crosses_in_model(bench, crew.still(who), hand, levels)
     if len(crosses) < MIN_CROSSES:
         crew.give_up(who, f"{model.name}: too few crosses of plate {plate.name} lie within the model for a centre")
@@ -259,7 +259,7 @@ def _by_grid_plate(bench: Bench, who: Who, model: ModelJob, hand: int, levels: L
     centres = _among_all(found, who, crew.sessions)
     centre_picture(bench, who, projector, picture, job.certificate)
     who = crew.still(who)
-    bench.eyes.take_prints({side: prints_of(bench, who, bench.seat.projector(side)) for side in (1, 2)})
+    bench.eyes.take_prints({side: sketch_positions(bench, who, bench.seat.projector(side)) for side in (1, 2)})
     return centres
 
 
@@ -289,7 +289,7 @@ def _resected(
     """Return the centres ``(m,)`` from pointings ``(2, k, n, m)`` at crosses, in counter units."""
     k, n = pointings.shape[1:3]
     units = bench.seat.units_per_mm
-    placed = np.tile(lie.placed(places_of(crosses)), (1, k, 1))
+    placed = np.tile(lie.placed(cross_positions(crosses)), (1, k, 1))
     heights = np.repeat(levels / units, n)[:, None]
     found = grid_plate_centre(placed, pointings.reshape(2, k * n, -1), heights, c)
     return _in_counter_units(found, levels, units, c, lie)

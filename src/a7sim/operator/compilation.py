@@ -22,14 +22,14 @@ from a7sim.operator.map_lines import (
     Spots,
     Traced,
     Tracing,
-    chained,
-    crosses,
+    as_polyline,
     distance_to,
+    intersects,
     length_along,
 )
 from a7sim.operator.person import Person
-from a7sim.operator.stereo_view import COARSE_MM, FINE_MM, MIDDLING_MM, Look, StereoView, Surface, rectified
-from a7sim.wording import counted
+from a7sim.operator.stereo_view import COARSE_MM, FINE_MM, MIDDLING_MM, Look, StereoView, Surface, rectify
+from a7sim.wording import pluralize
 
 MAX_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
 """From vertex to vertex."""
@@ -179,7 +179,7 @@ class Compilation:
         name = f"contour {height:g}"
         lines: list[Traced] = []
         for guess, begin, end in spots.crossings(height):
-            if any(crosses(line.readings[:2], begin, end) for line in lines):
+            if any(intersects(line.readings[:2], begin, end) for line in lines):
                 continue
             middle = np.array([*guess, spots.nearest(guess)])
             z = float(self.model.readings_of(_at_height(self.model.on_ground(middle), height))[2])
@@ -191,7 +191,7 @@ class Compilation:
             vertices = found.readings.shape[1]
             if vertices < 2 or ("joined" in found.endings and length_along(found.readings[:2]) < _STUB_MM):
                 self._person.client.send(
-                    f'NOTE "{name}: {counted(vertices, "vertex", "vertices")}, no line or more of one drawn before"'
+                    f'NOTE "{name}: {pluralize(vertices, "vertex", "vertices")}, no line or more of one drawn before"'
                 )
             else:
                 lines.append(found)
@@ -200,10 +200,10 @@ class Compilation:
     def _both_ways(self, name: str, height: float, start: _Vertex, z: float, drawn: Sequence[Traced]) -> Traced:
         there, ending = self._followed(name, start, drawn)
         if ending == "closed":
-            return Traced(name, CONTOUR, height, chained([*there, there[0]]), ("closed", "closed"))
+            return Traced(name, CONTOUR, height, as_polyline([*there, there[0]]), ("closed", "closed"))
         self._drive(start.place, z)
         back, other = self._followed(name, _Vertex(start.place, -start.heading, start.surface), drawn)
-        return Traced(name, CONTOUR, height, chained([*back[::-1], *there]), (other, ending))
+        return Traced(name, CONTOUR, height, as_polyline([*back[::-1], *there]), (other, ending))
 
     def _followed(self, name: str, start: _Vertex, drawn: Sequence[Traced]) -> tuple[list[Array], Ending]:
         """Follow a contour from a place on it; return its vertices and how it ended."""
@@ -354,7 +354,7 @@ def _band(
     look: Look, surface: Surface, light: float, heading: Array, within: float, width: float
 ) -> tuple[float, Array, Array, float]:
     """Return correlation, middle ``(2,)``, direction ``(2,)`` and width of the light band that fits best."""
-    inside, grey, plan = rectified(look, surface, _ROAD_SIDE)
+    inside, grey, plan = rectify(look, surface, _ROAD_SIDE)
     radius = look.spacing * (_ROAD_SIDE - 1) / 2.0
     inside &= length_of(plan) <= radius
     grey, plan = light * grey[inside], plan[:, inside]

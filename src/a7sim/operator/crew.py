@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, add, among
+from a7sim.among import Who, add_at, take
 from a7sim.geometry import Array
 from a7sim.manual import POSITIONS_OF
-from a7sim.operator.dice import Dice, misread
+from a7sim.operator.dice import Dice, misreading
 from a7sim.operator.person import Person
 from a7sim.operator.skill import MINUTE, acuity_factor, needs_a_break, slip_factor
 from a7sim.operator.slips import OF_READINGS, Occasion, Slips
@@ -89,7 +89,7 @@ class Crew:
             self._rested_at[tired] = self.seconds[tired]
 
     def _since_rest(self, who: Who) -> Array:
-        return np.asarray(among(self.seconds, who) - among(self._rested_at, who))
+        return np.asarray(take(self.seconds, who) - take(self._rested_at, who))
 
     # --- chance ---------------------------------------------------------------------------------------
 
@@ -100,7 +100,7 @@ class Crew:
     def slips(self, who: Who, shape: tuple[int, ...]) -> Array:
         """Return what is misread at planned readings ``(*shape, sessions)``, in counter units."""
         luck = self._drawn(who, (3, *shape), Dice.luck)
-        return self._among_all(who, misread(self.observer, luck, self._slip_factors(who)))
+        return self._among_all(who, misreading(self.observer, luck, self._slip_factors(who)))
 
     def errors_again(self, who: Who, sigma: float, count: int) -> Array:
         """Return the errors ``(count, sessions)`` of settings made once more."""
@@ -110,7 +110,7 @@ class Crew:
     def slips_again(self, who: Who, count: int) -> Array:
         """Return what is misread ``(count, sessions)`` at readings made once more."""
         luck = self._drawn(who, (3, count), Dice.luck_again)
-        return self._among_all(who, misread(self.observer, luck, self._slip_factors(who)))
+        return self._among_all(who, misreading(self.observer, luck, self._slip_factors(who)))
 
     def _drawn(self, who: Who, shape: tuple[int, ...], draw: Callable[[Dice, Array], None]) -> Array:
         """Return what the dice of those who act draw ``(*shape, m)``."""
@@ -127,7 +127,7 @@ class Crew:
         return every
 
     def _acuity_factors(self, who: Who, sigma: float) -> Array:
-        return np.asarray(sigma * acuity_factor(self.observer, among(self.seconds, who), self._since_rest(who)))
+        return np.asarray(sigma * acuity_factor(self.observer, take(self.seconds, who), self._since_rest(who)))
 
     def _slip_factors(self, who: Who) -> Array:
         return slip_factor(self.observer, self._since_rest(who))
@@ -184,7 +184,7 @@ class Crew:
 
     def write(self, who: Who, point: str, item: str, shown: Array, misread: Array) -> Array:
         """Return what is written ``(m,)`` of what counters show; `misread` ``(sessions,)`` is what chance adds."""
-        wrongly = among(misread, who)
+        wrongly = take(misread, who)
         written = np.asarray(shown + wrongly).round(4)
         tempted = np.arange(who.size) if self._slips.possible(*OF_READINGS) else np.flatnonzero(wrongly)
         factors = self._slip_factors(who[tempted])
@@ -233,7 +233,7 @@ class Crew:
         self._let_go_by(who, seconds * self.observer.pace, act)
 
     def _let_go_by(self, who: Who, seconds: float, act: Act) -> None:
-        add(seconds, who, self.seconds)
+        add_at(seconds, who, self.seconds)
         self.timesheet.spend(who, seconds, self._form, act)
         if self.person is not None:
             self.person.clock.spend(seconds)

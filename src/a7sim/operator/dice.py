@@ -61,7 +61,7 @@ def _luck(rng: np.random.Generator, into: Array) -> None:
     into[2] = rng.integers(len(_GROSS_SLIPS), size=shape)
 
 
-def misread(observer: Observer, luck: Array, factor: Array) -> Array:
+def misreading(observer: Observer, luck: Array, factor: Array) -> Array:
     """Return what is misread ``(*shape, m)``, in counter units, with a luck ``(3, *shape, m)``; zero mostly.
 
     Slips are so many times as frequent ``(m,)`` as the observer's rates say.

@@ -14,11 +14,19 @@ from functools import partial
 
 import numpy as np
 
-from a7sim.among import Who, without
+from a7sim.among import Who, exclude
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, parallax_coefficients, rotation
 from a7sim.operator.bench import Bench
 from a7sim.operator.job import ModelJob
-from a7sim.operator.relative import RelativeOrientations, Rounds, assessed, merged, spread, stand_of, unknowns_of
+from a7sim.operator.relative import (
+    RelativeOrientations,
+    Rounds,
+    assess_residuals,
+    expand_to_batch,
+    merge_groups,
+    projector_pose,
+    unknown_elements,
+)
 from a7sim.reduction import Stand
 from a7sim.standard_points import CASES, FIGURE_4_1, PLACES, POSITIONS
 
@@ -98,7 +106,7 @@ def clearing_coefficients(points: Array, left: Stand, right: Stand) -> Array:
     return np.array([rows[name] for name in PARALLAX_ELEMENTS])
 
 
-def steps_of(method: str, model: ModelJob, usable: Sequence[str]) -> tuple[Step, ...] | None:
+def clearing_steps(method: str, model: ModelJob, usable: Sequence[str]) -> tuple[Step, ...] | None:
     """Return where to clear with what, given the positions that can be seen; none where they do not suffice.
 
     Two points on the base line, two in one outer row and one in the other, as near the corners as there are any: with
@@ -132,12 +140,12 @@ def _apart(ends: tuple[str, str] | None) -> bool:
     return ends is not None and PLACES[ends[1]][0] - PLACES[ends[0]][0] >= 0.5
 
 
-def set_off(bench: Bench, who: Who, model: ModelJob, method: str, most: float) -> None:
+def perturb_elements(bench: Bench, who: Who, model: ModelJob, method: str, most: float) -> None:
     """Set the elements that a method turns off by anything up to so many gon, alike on both sides.
 
     A component of the base by as much as tilts the base by that angle.
     """
-    unknowns = unknowns_of(method, model)
+    unknowns = unknown_elements(method, model)
     shares = np.vectorize(math.erf)(bench.crew.errors(who, 0.5**0.5, (len(unknowns),)))
     now = bench.seat.elements(who, unknowns)
     base = np.abs(bench.seat.bx(who)) * GON
@@ -176,7 +184,7 @@ def empirical_orientation(
     while waiting:
         missing, group = waiting.popitem()
         usable = [label for label in labels if label not in missing]
-        steps = steps_of(method, model, usable)
+        steps = clearing_steps(method, model, usable)
         if steps is None:
             crew.give_up(group, _too_few(model, missing))
             continue
@@ -186,7 +194,7 @@ def empirical_orientation(
             waiting[missing | {label}] = np.union1d(waiting.get(missing | {label}, lost), lost)
         found = RelativeOrientations(method, case, clearing.rounds, clearing.rough, {}, {}, {}, "empirical")
         done.append((ended, _assessed(bench, ended, model, found, missing, readings, tolerated_rms)))
-    return merged(done, method, case, crew.sessions, "empirical")
+    return merge_groups(done, method, case, crew.sessions, "empirical")
 
 
 def _checks(usable: Sequence[str], steps: Sequence[Step]) -> list[str]:
@@ -208,7 +216,7 @@ def _assessed(
     bench.begin_round(who, len(found.rounds) + 1)
     there = [label for label in model.all_positions() if label not in missing]
     there = [label for label in there if bench.pricked(who, model.standard_points[label]).all()]
-    return assessed(bench, who, model, found, there, readings, tolerated_rms)
+    return assess_residuals(bench, who, model, found, there, readings, tolerated_rms)
 
 
 def _with_pricked(bench: Bench, who: Who, model: ModelJob, labels: Sequence[str]) -> dict[frozenset[str], Who]:
@@ -255,7 +263,7 @@ class _Clearing:
         ended = who[:0]
         while who.size:
             self.bench.begin_round(who, len(self.rounds) + 1)
-            settings = spread(self.bench.seat.elements(who, self._elements()), who, self.crew.sessions)
+            settings = expand_to_batch(self.bench.seat.elements(who, self._elements()), who, self.crew.sessions)
             who = self._clear_first_four(who)
             if not who.size:
                 break
@@ -265,7 +273,7 @@ class _Clearing:
             if len(self.rounds) == MAX_ROUNDS:
                 ended = np.union1d(ended, self._clear_first_four(turning))
                 turning = turning[:0]
-            ended = np.union1d(ended, without(who, np.flatnonzero(n)))
+            ended = np.union1d(ended, exclude(who, np.flatnonzero(n)))
             who = self._going(turning)
         return self._going(ended)
 
@@ -279,7 +287,7 @@ class _Clearing:
     def _going(self, who: Who) -> Who:
         who = self.crew.still(np.asarray(who, dtype=np.intp))
         for lost, _ in self.lost:
-            who = without(who, lost)
+            who = exclude(who, lost)
         return who
 
     # --- a round --------------------------------------------------------------------------------------
@@ -356,8 +364,8 @@ class _Clearing:
             if turn is not None:
                 turn[done.who] = done.turn[done.who]
             cleared = np.union1d(cleared, done.who)
-            who = without(self.crew.still(who), done.who)
-            parted = without(who, done.apart)
+            who = exclude(self.crew.still(who), done.who)
+            parted = exclude(who, done.apart)
             if tries_left:
                 for session in np.intersect1d(who, done.apart):
                     self._bring_together(np.array([session]), point, step)
@@ -415,8 +423,8 @@ class _Clearing:
     def _stands(self, who: Who) -> tuple[Stand, Stand]:
         model = self.model
         return (
-            stand_of(self.bench, who, model.left_projector, np.zeros(who.size)),
-            stand_of(self.bench, who, model.right_projector, self.bench.seat.bx(who)),
+            projector_pose(self.bench, who, model.left_projector, np.zeros(who.size)),
+            projector_pose(self.bench, who, model.right_projector, self.bench.seat.bx(who)),
         )
 
 

@@ -4,11 +4,11 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from a7sim.among import Who, among, put, without
+from a7sim.among import Who, exclude, put, take
 from a7sim.geometry import Array
 from a7sim.operator.hands import Truths
-from a7sim.operator.levers import put_levers_right
-from a7sim.operator.seat import Seat, side
+from a7sim.operator.levers import correct_fittings
+from a7sim.operator.seat import Seat, side_name
 
 MAX_LOOKS = 40
 """At one setting of the mark."""
@@ -52,7 +52,9 @@ class Eyes:
         seat = self.seat
         printed = self.crew.printed(self._prints[hand], point)
         nowhere = np.isnan(printed[0, who])
-        self.crew.give_up(who[nowhere], f"point {point} is not pricked on the print of the {side(hand)} photograph")
+        self.crew.give_up(
+            who[nowhere], f"point {point} is not pricked on the print of the {side_name(hand)} photograph"
+        )
         who = who[~nowhere]
         if not who.size:
             return
@@ -66,18 +68,18 @@ class Eyes:
             went = looking[seat.drive(who[looking], {"X": x, "Y": y})]
             found = went[~np.isnan(self.seen(who[went], hand, point)[0])] if went.size else went
             self._seen_from[:, who[found]] = places[:, found]
-            looking = without(looking, found)
+            looking = exclude(looking, found)
             if not looking.size:
                 return
         looking_on = who[looking]
-        again = put_levers_right(seat, looking_on)
+        again = correct_fittings(seat, looking_on)
         if again.any():
             self.bring_into_view(looking_on[again], hand, point)
             looking = looking[~again]
         seat.see_that_it_obeyed(who[looking], f"{seat.model.name}: looking for point {point}")
         self.crew.give_up(
             self.crew.still(who[looking]),
-            f"{seat.model.name}: point {point} is nowhere near where the print shows it in the {side(hand)} eye, "
+            f"{seat.model.name}: point {point} is nowhere near where the print shows it in the {side_name(hand)} eye, "
             f"not within {SEARCH_RINGS * SEARCH_STEP_MM:.0f} mm: wrong picture in the projector, or the base "
             "setting does not belong to this model",
         )
@@ -110,7 +112,7 @@ class Eyes:
                     self._look_again_with_levers_right(who, hand, point, seen, lost)
                     self._ran_away(who[lost], hand, point)
                     who, seen = who[~lost], seen[:, ~lost]
-            steps = (seen + among(errors, who)) * (1e-3 * among(seat.z, who) / seat.c)
+            steps = (seen + take(errors, who)) * (1e-3 * take(seat.z, who) / seat.c)
             moving = ~(np.abs(steps) < self.at_rest_mm(looks)).all(axis=0)
             who = who[moving]
             if not who.size:
@@ -124,7 +126,7 @@ class Eyes:
     def _look_again_with_levers_right(self, who: Who, hand: int, point: str, seen: Array, lost: Truths) -> None:
         """Put right the levers of those from whom a point ran away, go back to where it was seen and look, in place."""
         away = np.flatnonzero(lost)
-        mended = away[put_levers_right(self.seat, who[away])]
+        mended = away[correct_fittings(self.seat, who[away])]
         if mended.size:
             self._go_back(who[mended])
             seen[:, mended] = self.seen(who[mended], hand, point)
@@ -138,7 +140,7 @@ class Eyes:
             one = np.array([session])
             self.crew.give_up(
                 one,
-                f"{self.seat.model.name}: point {point} runs away from the mark in the {side(hand)} eye: "
+                f"{self.seat.model.name}: point {point} runs away from the mark in the {side_name(hand)} eye: "
                 f"{self._why_it_ran_away(one, hand, point)}",
             )
 
@@ -179,17 +181,17 @@ class Watch:
 
     def growing(self, who: Who) -> Truths:
         """Return which of the displacements ``(k, m)`` had grown when they were last seen."""
-        return among(self._times, who) > 0
+        return take(self._times, who) > 0
 
     def running_away(self, who: Who, seen: Array) -> Truths:
         """Return which of the displacements ``(k, m)`` in um have grown in look after look."""
         now = np.abs(seen)
-        grown = (now > 1.4 * among(self._before, who)) & (now > DIVERGENCE_UM)
+        grown = (now > 1.4 * take(self._before, who)) & (now > DIVERGENCE_UM)
         put(now, who, self._before)
         if not grown.any() and not self._any_grew:
             return grown
         self._any_grew = True
-        times = np.where(grown, among(self._times, who) + 1, 0)
+        times = np.where(grown, take(self._times, who) + 1, 0)
         self._times[:, who] = times
         return np.asarray(times >= DIVERGENCE_LOOKS)
 

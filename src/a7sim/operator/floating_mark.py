@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, among, put, without
+from a7sim.among import Who, exclude, put, take
 from a7sim.geometry import Array
 from a7sim.operator.eyes import MAX_LOOKS, Eyes, Watch
 from a7sim.operator.hands import Truths
-from a7sim.operator.levers import put_levers_right
+from a7sim.operator.levers import correct_fittings
 
 MAX_RISE_MM = 20.0
 """The foot disc is not turned further than this between two looks."""
@@ -69,7 +69,7 @@ class FloatingMark:
             seen = there[~np.isnan(eyes.seen(there, 2, point)[0])]
             if seen.size:
                 fused.append(self.settle(seen, point, judgement))
-            who = without(crew.still(who), seen)
+            who = exclude(crew.still(who), seen)
             if not who.size:
                 return _together(fused)
         seat.drive_z_to(who, height[who])
@@ -99,12 +99,12 @@ class FloatingMark:
             if looks == 0:
                 put(readings, who, begun)
             x, y, _ = seat.place(who, readings)
-            z, bx = among(seat.z, who), seat.bx(who)
+            z, bx = take(seat.z, who), seat.bx(who)
             scale = 1e-3 * z / seat.c
-            rise = (seen[2] + among(judgement.height, who)) * scale * z / np.abs(bx)
+            rise = (seen[2] + take(judgement.height, who)) * scale * z / np.abs(bx)
             rise = np.minimum(np.maximum(rise, -MAX_RISE_MM), MAX_RISE_MM)
             along_the_rays = -rise / z * np.array([x - bx / 2.0, y])
-            steps = (seen[:2] + among(judgement.plan, who)) * scale + along_the_rays
+            steps = (seen[:2] + take(judgement.plan, who)) * scale + along_the_rays
             at_rest = eyes.at_rest_mm(looks)
             moving = np.maximum(np.abs(steps).max(axis=0), np.abs(rise)) >= at_rest
             wheels = np.concatenate([seat.in_units(steps), [rise * seat.units_per_mm]])
@@ -160,7 +160,7 @@ class FloatingMark:
         Return whose levers were put right, as indices into `who`.
         """
         away = np.flatnonzero(parallaxes_grow.any(axis=0))
-        mended = away[put_levers_right(self.seat, who[away])]
+        mended = away[correct_fittings(self.seat, who[away])]
         if mended.size:
             self.seat.drive(who[mended], dict(zip("XYZ", begun[:, who[mended]], strict=True)))
             seen[:, mended] = self.looked(who[mended], point)
@@ -196,8 +196,8 @@ class _Drum:
 
     def to_turn(self, who: Who, parallax: Array, scale: Array, at_rest: float) -> tuple[Array, Truths]:
         """Return by how much to turn, nothing where it is clear, and where that is out of range ``(m,)``."""
-        left = parallax + among(self._clearing.error, who) * scale
-        amounts = np.where(np.abs(left) < at_rest, 0.0, -left / among(self._clearing.gain, who))
+        left = parallax + take(self._clearing.error, who) * scale
+        amounts = np.where(np.abs(left) < at_rest, 0.0, -left / take(self._clearing.gain, who))
         if self._element.endless:
             return amounts, np.zeros(who.size, dtype=bool)
         wanted = self._seat.in_hand(who, self._clearing.element) + amounts

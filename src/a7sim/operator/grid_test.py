@@ -15,8 +15,8 @@ from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
-from a7sim.operator.plate import Crosses, lie_of_plate, places_of, point_at_crosses, prints_of
-from a7sim.operator.seat import side, wrapped
+from a7sim.operator.plate import Crosses, cross_positions, locate_plate, point_at_crosses, sketch_positions
+from a7sim.operator.seat import side_name, wrap_gon
 from a7sim.operator.work import set_base_and_fittings
 from a7sim.reduction import Elements, PlateLie, ProjectorTest, grid_test
 from a7sim.scenario import Camera, GridPlate, Plan
@@ -62,7 +62,7 @@ class GridTestOrder:
 
     def heights(self, manual: Variant) -> list[float]:
         """Return the levels in mm of the frame, from the highest to the lowest, as far apart as the carriages allow."""
-        return level_heights(manual, self.camera.c, float(np.abs(places_of(self.chosen)).max()), self.levels)
+        return level_heights(manual, self.camera.c, float(np.abs(cross_positions(self.chosen)).max()), self.levels)
 
 
 def level_heights(manual: Variant, c: float, outermost: float, levels: int) -> list[float]:
@@ -94,17 +94,17 @@ class ProjectorSheet:
     """Simulated seconds."""
 
 
-def calibrate(
+def measure_grid(
     person: Person,
     order: GridTestOrder,
     tick: Callable[[], None] = lambda: None,
     begins: Callable[[str], None] = lambda _: None,
 ) -> Iterator[ProjectorSheet]:
     """Yield both projectors as one person tests them. Raises DoesNotFit when one cannot be tested."""
-    yield from calibrated(Bench(Crew.of_one(person), LineHands(person), order.job, tick), order, begins)
+    yield from measure_grid_batch(Bench(Crew.of_one(person), LineHands(person), order.job, tick), order, begins)
 
 
-def calibrated(
+def measure_grid_batch(
     bench: Bench, order: GridTestOrder, begins: Callable[[str], None] = lambda _: None
 ) -> Iterator[ProjectorSheet]:
     """Yield the left and the right projector as a crew tests them, each session at its own instrument."""
@@ -113,7 +113,7 @@ def calibrated(
     bench.seat.prepare(crew.everybody)
     set_base_and_fittings(bench, "inside", order.polarity)
     for hand in (1, 2):
-        form = f"grid test, {side(hand)} projector"
+        form = f"grid test, {side_name(hand)} projector"
         begins(form)
         crew.begin(crew.everybody, order.plate.name, form)
         bench.hands.note(crew.everybody, form)
@@ -127,8 +127,8 @@ def _tested(bench: Bench, order: GridTestOrder, hand: int) -> ProjectorSheet:
     certificate = bench.job.certificate
     _set_to_zeros(bench, hand)
     centre_picture(bench, crew.everybody, hand, plate.name, certificate)
-    lie = lie_of_plate(bench, crew.everybody, hand, certificate, TIMES_REGISTERED)
-    bench.begin(crew.everybody, model, {hand: prints_of(bench, crew.everybody, hand)})
+    lie = locate_plate(bench, crew.everybody, hand, certificate, TIMES_REGISTERED)
+    bench.begin(crew.everybody, model, {hand: sketch_positions(bench, crew.everybody, hand)})
     heights = order.heights(seat.manual)
     sets = np.stack([_pointings(bench, order, hand, height) for height in heights], axis=2)
     who = crew.everybody
@@ -136,7 +136,7 @@ def _tested(bench: Bench, order: GridTestOrder, hand: int) -> ProjectorSheet:
     counters = _counters(bench, who, hand)
     means = sets.mean(axis=0)[..., who]
     its_lie = PlateLie(*(getattr(lie, field.name)[who] for field in fields(lie)))
-    test = grid_test(places_of(order.chosen), means, heights, _elements(seat.manual, counters, hand), its_lie)
+    test = grid_test(cross_positions(order.chosen), means, heights, _elements(seat.manual, counters, hand), its_lie)
     enlarged = -np.array(heights)[:, None, None] / seat.c
     pointing = _repeatability(sets[..., who], enlarged)
     return ProjectorSheet(hand, who, counters, tuple(heights), order.chosen, test, pointing, crew.seconds[who].copy())
@@ -179,7 +179,7 @@ def _elements(manual: Variant, counters: Mapping[str, Array], projector: int) ->
         c=counters[f"c{projector}"],
         omega=omega * GON,
         phi=phi * GON,
-        kappa=wrapped(kappa) * GON,
+        kappa=wrap_gon(kappa) * GON,
         bx=nothing if projector == 1 else counters["bx"],
         by=counters.get(f"by{projector}", nothing),
         bz=counters.get(f"bz{projector}", nothing),

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from a7sim.among import Who
 from a7sim.geometry import GON, Array
 from a7sim.operator.bench import Bench
-from a7sim.reduction import PictureLie, Undetermined, picture_lie
+from a7sim.reduction import PictureLie, Undetermined, picture_placement
 from a7sim.scenario import Camera
 
 CENTRED_MM = 0.02
@@ -80,12 +80,12 @@ def centre_picture(
     found = InteriorOrientations(photograph, np.zeros(crew.sessions, dtype=np.intp), *np.zeros((3, crew.sessions)))
     centring = crew.still(who)
     for round_ in range(1, MAX_ROUNDS + 1):
-        names, displacements = fiducials_seen(bench, centring, projector)
+        names, displacements = view_fiducials(bench, centring, projector)
         places = np.array([marks[name] for name in names]).T
         right = _rightly_laid(bench, centring, projector, photograph, displacements, places)
         centring, displacements = centring[right], displacements[:, :, right]
         try:
-            lie = picture_lie(displacements, places)
+            lie = picture_placement(displacements, places)
         except Undetermined as undetermined:
             crew.give_up(centring, f"the fiducials of {photograph} do not tell how it lies: {undetermined}")
             return found
@@ -118,7 +118,7 @@ def _mount(bench: Bench, who: Who, projector: int, photograph: str) -> None:
         crew.give_up(who, f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it")
 
 
-def fiducials_seen(bench: Bench, who: Who, projector: int) -> tuple[list[str], Array]:
+def view_fiducials(bench: Bench, who: Who, projector: int) -> tuple[list[str], Array]:
     """Return the names of a picture's fiducials and their displacements ``(2, n, m)`` as they are registered, mm."""
     names, exact = bench.hands.fiducials(who, projector)
     crew = bench.crew

@@ -48,7 +48,7 @@ class LevelModel:
         return float(self.absolute.similarity.scale)
 
 
-def levelled(
+def level_model(
     bench: Bench,
     view: StereoView,
     points: Mapping[str, Place],
@@ -71,7 +71,7 @@ def levelled(
         rounds = len(levelling.turned_until_level(crew.everybody, fit, scale_number)[0]) - 1
         view.learn()
         points = _measured(bench, wanted)
-    absolute = oriented(bench, points, control, units)
+    absolute = orient_model(bench, points, control, units)
     return LevelModel(absolute, points, scale_number, _tilt(absolute), units, rounds)
 
 
@@ -84,7 +84,7 @@ def _measured(bench: Bench, names: Sequence[str]) -> dict[str, Place]:
     }
 
 
-def oriented(bench: Bench, points: Mapping[str, Place], control: Ground, units: float) -> AbsoluteOrientation:
+def orient_model(bench: Bench, points: Mapping[str, Place], control: Ground, units: float) -> AbsoluteOrientation:
     """Return the orientation to the ground of a model in which the control was measured, gives up where it has none."""
     names = tuple(name for name in points if name in control.points)
     coordinates = np.array([points[name] for name in names]).reshape(-1, 3).T / np.array([[1.0], [1.0], [units]])

@@ -18,8 +18,8 @@ from a7sim.manual import Variant
 from a7sim.operator.bench import Bench
 from a7sim.operator.hands import Truths
 from a7sim.operator.job import ModelJob
-from a7sim.operator.relative import spread
-from a7sim.reduction import Ground, Undetermined, adjusted
+from a7sim.operator.relative import expand_to_batch
+from a7sim.reduction import Ground, Undetermined, solve_least_squares
 
 MAX_ROUNDS = 6
 STILL_FALLING = 0.8
@@ -117,7 +117,7 @@ class Levelling:
 
     def settings(self, who: Who) -> dict[str, Array]:
         """Return where all elements stand ``(sessions,)``."""
-        return spread(self.seat.standing(who, self.names), who, self.crew.sessions)
+        return expand_to_batch(self.seat.standing(who, self.names), who, self.crew.sessions)
 
     def measured(self, who: Who, number: int) -> Array:
         """Return places ``(3, n, m)`` of the control in the frame as a round measures them, mm, Z up."""
@@ -147,7 +147,9 @@ class Levelling:
         design = np.moveaxis(np.array([at[0], at[1], np.ones_like(at[0])]), 0, 1)
         for _ in range(5):
             try:
-                slopes = adjusted(design, given - np.sqrt(1.0 - (slopes**2).sum(axis=0)) * at[2]).unknowns[:2]
+                slopes = solve_least_squares(design, given - np.sqrt(1.0 - (slopes**2).sum(axis=0)) * at[2]).unknowns[
+                    :2
+                ]
             except Undetermined as undetermined:
                 self.crew.give_up(who, f"{self.model.name}: the height control does not level it: {undetermined}")
                 break
@@ -175,7 +177,7 @@ class Levelling:
             if not who.size or round_number > MAX_ROUNDS:
                 break
             settings = {name: values[who] for name, values in now.items()}
-            upright = turned_upright(settings, self.model, self.seat.manual, fit.up, fit.factor(number))
+            upright = levelled_elements(settings, self.model, self.seat.manual, fit.up, fit.factor(number))
             self.seat.turn_changed(who, upright)
             who = crew.still(who)
             if not who.size:
@@ -191,16 +193,20 @@ def _note(rounds: Mapping[int, list[LevellingRound]], who: Who, fit: Fit, number
         rounds[session].append(LevellingRound(float(rms), float(factor), (float(tilts[0]), float(tilts[1]))))
 
 
-def turned_upright(settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array) -> dict[str, Array]:
+def levelled_elements(
+    settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array
+) -> dict[str, Array]:
     """Return the elements ``(m,)`` that set a whole model upright and larger by a factor, of those the plotter has.
 
     `up` ``(3, m)`` is the direction in the frame that is to point upward.
     """
-    turned = turned_by_common_phi if "common_phi" in manual.elements else turned_together
+    turned = levelled_by_common_phi if "common_phi" in manual.elements else levelled_by_all_elements
     return turned(settings, model, manual, up, factor)
 
 
-def turned_together(settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array) -> dict[str, Array]:
+def levelled_by_all_elements(
+    settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array
+) -> dict[str, Array]:
     """Return the elements ``(m,)`` at which the whole model stands upright and is larger by a factor.
 
     bz' and bz" share what the base rises.
@@ -232,7 +238,7 @@ def turned_together(settings: Settings, model: ModelJob, manual: Variant, up: Ar
     }
 
 
-def turned_by_common_phi(
+def levelled_by_common_phi(
     settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array
 ) -> dict[str, Array]:
     """Return the elements ``(m,)`` that do the same where a common Phi tilts the whole along the base."""

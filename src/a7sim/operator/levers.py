@@ -21,20 +21,20 @@ FITTING_NAMES: Mapping[str, str] = MappingProxyType(
 )
 
 
-def right_fittings(manual: Variant, polarity: str, base: str) -> dict[str, str]:
+def required_fittings(manual: Variant, polarity: str, base: str) -> dict[str, str]:
     """Return by name where the fittings that a plotter has belong, for pictures of a polarity and a base."""
     words = REQUIRED_FITTINGS[polarity, base].as_words()
     return {name: position for name, position in words.items() if name in manual.fittings}
 
 
-def put_levers_right(seat: Seat, who: Who) -> Truths:
+def correct_fittings(seat: Seat, who: Who) -> Truths:
     """Look at every lever and put right those that were forgotten, with a remark.
 
     Return for whom there was one ``(m,)`` and all now stands as the table asks; a lever that does not stay is no help.
     """
     crew, hands, model = seat.crew, seat.hands, seat.model
     mended, astray = np.zeros((2, who.size), dtype=bool)
-    for name, position in right_fittings(seat.manual, model.polarity, model.base).items():
+    for name, position in required_fittings(seat.manual, model.polarity, model.base).items():
         crew.spend(who, crew.observer.seconds_to_look, "looking")
         wrong = hands.fitting(who, name) != position
         if wrong.any():

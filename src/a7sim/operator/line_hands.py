@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from a7sim.among import Who
 from a7sim.geometry import Array
-from a7sim.link.headers import FITTING_NODES, header, short
+from a7sim.link.headers import FITTING_NODES, header, short_form
 from a7sim.manual import NOT_VISIBLE, POSITIONS_OF
 from a7sim.operator.hands import Truths
 from a7sim.operator.person import Person
@@ -39,14 +39,14 @@ class LineHands:
         self._send(f'GEAR:PLAN "{plan_gear}"')
 
     def set_base_mode(self, who: Who, mode: str) -> None:
-        self._send(f"BASE:MODE {short(mode)}")
+        self._send(f"BASE:MODE {short_form(mode)}")
 
     def set_fitting(self, who: Who, name: str, position: str) -> None:
-        self._send(f"FITT:{FITTING_NODES[name]} {short(position)}")
+        self._send(f"FITT:{FITTING_NODES[name]} {short_form(position)}")
 
     def fitting(self, who: Who, name: str) -> npt.NDArray[np.str_]:
         shown = self._person.client.ask(f"FITT:{FITTING_NODES[name]}?")
-        return np.array([each for each in POSITIONS_OF[name] if short(each) == shown])
+        return np.array([each for each in POSITIONS_OF[name] if short_form(each) == shown])
 
     def set_element(self, who: Who, name: str, values: Array) -> None:
         self._send(f"{header(name)} {values[0]:.2f}")

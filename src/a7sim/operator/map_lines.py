@@ -135,7 +135,7 @@ class Spots:
         return float(self.readings[2].flat[np.nanargmin(np.where(np.isnan(self.heights), np.nan, distance))])
 
 
-def crosses(chain: Array, begin: Array, end: Array) -> bool:
+def intersects(chain: Array, begin: Array, end: Array) -> bool:
     """Return whether a chain ``(2, n)`` crosses the straight piece between two places ``(2,)``."""
     piece = end - begin
 
@@ -150,7 +150,7 @@ def crosses(chain: Array, begin: Array, end: Array) -> bool:
     return bool(((of_chain[:-1] * of_chain[1:] <= 0.0) & (of_begin * of_end <= 0.0)).any())
 
 
-def chained(vertices: Sequence[Array]) -> Array:
+def as_polyline(vertices: Sequence[Array]) -> Array:
     """Return vertices ``(3,)`` as a chain ``(3, n)``."""
     return np.array(vertices).reshape(-1, 3).T
 

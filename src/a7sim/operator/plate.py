@@ -8,8 +8,8 @@ import numpy.typing as npt
 from a7sim.among import Who
 from a7sim.geometry import Array
 from a7sim.operator.bench import Bench
-from a7sim.operator.interior import fiducials_seen
-from a7sim.reduction import PlateLie, plane_fit, plate_lie
+from a7sim.operator.interior import view_fiducials
+from a7sim.reduction import PlateLie, plane_fit, plate_placement
 from a7sim.scenario import Camera
 
 Crosses = Mapping[str, tuple[float, float]]
@@ -26,12 +26,12 @@ MAX_REPETITIONS = 12
 _MIN_REDUNDANCY_NUMBER = 0.05
 
 
-def places_of(crosses: Crosses) -> Array:
+def cross_positions(crosses: Crosses) -> Array:
     """Return nominal places ``(2, n)`` in mm."""
     return np.array(list(crosses.values())).T
 
 
-def prints_of(bench: Bench, who: Who, projector: int) -> dict[str, Array]:
+def sketch_positions(bench: Bench, who: Who, projector: int) -> dict[str, Array]:
     """Return where the sketch of what lies in a projector shows points ``(2, sessions)``, nan for those not asked."""
     prints = {}
     for name, place in bench.hands.prints(who, projector).items():
@@ -40,14 +40,14 @@ def prints_of(bench: Bench, who: Who, projector: int) -> dict[str, Array]:
     return prints
 
 
-def lie_of_plate(bench: Bench, who: Who, projector: int, certificate: Camera, times: int) -> PlateLie:
+def locate_plate(bench: Bench, who: Who, projector: int, certificate: Camera, times: int) -> PlateLie:
     """Register a mounted plate's fiducials so many times and return how it lies ``(sessions,)``."""
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
-    registered = [fiducials_seen(bench, who, projector) for _ in range(times)]
+    registered = [view_fiducials(bench, who, projector) for _ in range(times)]
     displacements = np.concatenate([seen for _, seen in registered], axis=1)
     every = np.zeros((*displacements.shape[:2], bench.crew.sessions))
     every[:, :, who] = displacements
-    return plate_lie(every, np.array([marks[name] for names, _ in registered for name in names]).T)
+    return plate_placement(every, np.array([marks[name] for names, _ in registered for name in names]).T)
 
 
 def point_at_crosses(bench: Bench, who: Who, hand: int, crosses: Crosses, level: float) -> Array:
@@ -61,7 +61,9 @@ def point_at_crosses(bench: Bench, who: Who, hand: int, crosses: Crosses, level:
     readings = bench.point_with(who, hand, names, level)
     looking = crew.still(who)
     for _ in range(MAX_REPETITIONS):
-        misread = _misread(readings[:, :, looking], places_of(crosses)) if looking.size else np.zeros(0, dtype=np.intp)
+        misread = (
+            _misread(readings[:, :, looking], cross_positions(crosses)) if looking.size else np.zeros(0, dtype=np.intp)
+        )
         looking, misread = looking[misread >= 0], misread[misread >= 0]
         for place in np.unique(misread):
             again = looking[misread == place]

@@ -13,13 +13,13 @@ from a7sim.operator.bench import Bench
 from a7sim.operator.compilation import Compilation
 from a7sim.operator.crew import Crew
 from a7sim.operator.job import Job
-from a7sim.operator.level_model import LevelModel, levelled, oriented
+from a7sim.operator.level_model import LevelModel, level_model, orient_model
 from a7sim.operator.line_hands import LineHands
 from a7sim.operator.map_lines import Area, Errand, Spots, Traced, Tracing
 from a7sim.operator.person import Person
 from a7sim.operator.preparation import PLAN_GEARS
 from a7sim.operator.stereo_view import StereoView
-from a7sim.operator.work import ModelRecord, begin_form, worked
+from a7sim.operator.work import ModelRecord, begin_form, measure_models_batch
 from a7sim.reduction import Ground
 
 TABLE_GEARS: Mapping[str, float] = MappingProxyType({"1-1-1": 1.0, **PLAN_GEARS})
@@ -78,7 +78,7 @@ class Sheet:
         return np.asarray(self.gear * np.einsum("ij,j...->i...", turn, readings[:2]))
 
 
-def plotted(
+def compile_map(
     person: Person,
     job: Job,
     control: Ground,
@@ -92,14 +92,14 @@ def plotted(
     """
     person.book.head("", "preparation")
     bench = Bench(Crew.of_one(person), LineHands(person), job, tick)
-    record = next(worked(bench, begins)).of(0)
+    record = next(measure_models_batch(bench, begins)).of(0)
     view = StereoView(bench, person)
     begin_form(bench, bench.seat.model, "absolute orientation", begins)
     gear = TABLE_GEARS[job.plan.plan_gear]
     corners = {label: record.model.standard_points.get(label, "") for label in "3456"}
-    first = oriented(bench, record.points, control, record.z_units_per_mm)
+    first = orient_model(bench, record.points, control, record.z_units_per_mm)
     number = gear * (order.map_scale or _round_scale(1e3 * float(first.similarity.scale) / gear))
-    model = levelled(bench, view, record.points, control, number, list(corners.values()))
+    model = level_model(bench, view, record.points, control, number, list(corners.values()))
     seen = [label for label, name in corners.items() if name in model.points]
     if not all(any(label in seen for label in border) for border in ("34", "56", "35", "46")):
         bench.crew.give_up(

@@ -126,7 +126,7 @@ class Preparation:
     reason: str
 
 
-def preparation(flight: Flight, variant: Variant, map_scale: float | None = None) -> Preparation:
+def choose_settings(flight: Flight, variant: Variant, map_scale: float | None = None) -> Preparation:
     """Return the settings for a flight on a plotter, from a flight in mm and m and a map's scale number.
 
     The optimum puts the mean ground at the longest projection distance, equation 3.1. Of the scales for which there is

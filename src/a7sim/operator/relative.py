@@ -9,14 +9,14 @@ from typing import overload
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, without
+from a7sim.among import Who, exclude
 from a7sim.geometry import GON, Array
 from a7sim.manual import TILTS
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import NobodyGoesOn
 from a7sim.operator.hands import Truths
 from a7sim.operator.job import ModelJob
-from a7sim.operator.seat import wrapped
+from a7sim.operator.seat import wrap_gon
 from a7sim.reduction import Stand, Undetermined, element_corrections
 from a7sim.reduction.hallert import REGULAR_POINTS, regular_corrections
 from a7sim.standard_points import CASES, POSITIONS, determine_orientation
@@ -181,7 +181,7 @@ def _there(values: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in values.items() if not math.isnan(value)}
 
 
-def unknowns_of(method: str, model: ModelJob) -> tuple[str, ...]:
+def unknown_elements(method: str, model: ModelJob) -> tuple[str, ...]:
     """Return the elements that a method turns.
 
     Independent (swing-swing): kappa', kappa", phi', phi", omega'. Dependent: kappa, phi, omega, by, bz of the
@@ -216,10 +216,10 @@ def relative_orientation(
         labels = [label for label in there if label in CASES[case]]
         if determine_orientation(labels):
             found = _oriented(bench, them, model, method, case, labels, readings, base)
-            done.append((them, assessed(bench, crew.still(them), model, found, there, readings, tolerated_rms)))
+            done.append((them, assess_residuals(bench, crew.still(them), model, found, there, readings, tolerated_rms)))
         else:
             crew.give_up(them, _too_few(model, case, labels))
-    return merged(done, method, case, crew.sessions, "numerical")
+    return merge_groups(done, method, case, crew.sessions, "numerical")
 
 
 def _too_few(model: ModelJob, case: str, labels: Sequence[str]) -> str:
@@ -234,7 +234,7 @@ def _oriented(
 ) -> RelativeOrientations:
     """Return what came of the rounds on the points at some positions, the best settings standing."""
     crew, seat, plan = bench.crew, bench.seat, bench.job.plan
-    unknowns = unknowns_of(method, model)
+    unknowns = unknown_elements(method, model)
     measured_with = {"both": (1, 2), "by1": (1,), "by2": (2,)}[plan.measure_with]
     points = [model.standard_points[label] for label in labels]
     rounds: list[Rounds] = []
@@ -242,12 +242,12 @@ def _oriented(
     best = _Best(unknowns, crew.sessions)
     measuring = who
     while measuring.size:
-        settings = spread(seat.elements(measuring, unknowns), measuring, crew.sessions)
+        settings = expand_to_batch(seat.elements(measuring, unknowns), measuring, crew.sessions)
         bench.begin_round(measuring, int(done[measuring].max()) + 1)
         seen = bench.parallaxes(measuring, points, readings, measured_with)
         measuring = crew.still(measuring)
         apart = seen.parted(measuring)
-        together = without(measuring, apart)
+        together = exclude(measuring, apart)
         rough_rounds[apart] += 1
         _bring_together(bench, apart, model, points, unknowns, base, seen.apart, rough_rounds)
         done[together] += 1
@@ -255,7 +255,7 @@ def _oriented(
         falling = together[rms[together] < STILL_FALLING * best.rms[together]]
         best.see(together, settings, mean, rms)
         to_clear = seen.p - mean if method == "independent" else seen.p
-        corrections, sigmas = corrections_of(
+        corrections, sigmas = compute_corrections(
             bench, falling, model, seen.places, to_clear, unknowns, np.full(falling.size, base), labels
         )
         falling = crew.still(falling)
@@ -272,7 +272,7 @@ def _oriented(
     return RelativeOrientations(method, case, rounds, rough_rounds, {}, {}, {})
 
 
-def merged(
+def merge_groups(
     groups: Sequence[tuple[Who, RelativeOrientations]], method: str, case: str, sessions: int, procedure: str
 ) -> RelativeOrientations:
     """Return the orientations of all groups in one."""
@@ -318,7 +318,7 @@ def _mean_and_rms(p: Array, who: Who) -> tuple[Array, Array]:
     return mean, rms
 
 
-def assessed(
+def assess_residuals(
     bench: Bench,
     who: Who,
     model: ModelJob,
@@ -339,7 +339,7 @@ def assessed(
     there = [name for name in ALL_ELEMENTS if name in bench.seat.manual.elements]
     orientations = replace(
         found,
-        elements=spread(bench.seat.elements(who, there), who, crew.sessions),
+        elements=expand_to_batch(bench.seat.elements(who, there), who, crew.sessions),
         residuals=dict(zip(labels, left.p, strict=True)),
         places=dict(zip(labels, np.moveaxis(left.places, 1, 0), strict=True)),
     )
@@ -355,7 +355,7 @@ def assessed(
     return orientations
 
 
-def spread(values: Mapping[str, Array], who: Who, sessions: int) -> dict[str, Array]:
+def expand_to_batch(values: Mapping[str, Array], who: Who, sessions: int) -> dict[str, Array]:
     """Return values ``(m,)`` of those who act among all sessions."""
     spread = {name: np.zeros(sessions) for name in values}
     for name, each in values.items():
@@ -401,12 +401,12 @@ def _bring_together(
         parallaxes[:, one] = (left[1] - right[1]) * where_they_meet
         places[:, :, one] = left * where_they_meet
         settings = seat.elements(one, unknowns)
-        corrections, _ = corrections_of(bench, one, model, places, parallaxes, unknowns, np.array([base]))
+        corrections, _ = compute_corrections(bench, one, model, places, parallaxes, unknowns, np.array([base]))
         if crew.still(one).size:
             seat.set_elements(one, {name: settings[name] + corrections[name][one] for name in unknowns})
 
 
-def corrections_of(
+def compute_corrections(
     bench: Bench,
     who: Who,
     model: ModelJob,
@@ -425,8 +425,8 @@ def corrections_of(
     if not who.size:
         return nothing, nothing
     hands = [f"{name[:-1]}{model.hand_of(int(name[-1]))}" for name in unknowns]
-    left = stand_of(bench, who, model.left_projector, np.zeros(who.size))
-    right = stand_of(bench, who, model.right_projector, base)
+    left = projector_pose(bench, who, model.left_projector, np.zeros(who.size))
+    right = projector_pose(bench, who, model.right_projector, base)
     bench.compute(who)
     in_frame = places[:, :, who] * np.array([1.0, 1.0, -1.0])[:, None, None]
     try:
@@ -442,7 +442,7 @@ def corrections_of(
             b, d, h = _pattern(places[:, :, who[on_pattern]], base[on_pattern])
             found[:, :, on_pattern] = regular_corrections(parallaxes[:, who[on_pattern]], b, d, h, hands)
     values, sigmas = (
-        spread(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.sessions) for each in found
+        expand_to_batch(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.sessions) for each in found
     )
     return values, sigmas
 
@@ -471,9 +471,9 @@ def _on_pattern(bench: Bench, who: Who, labels: Sequence[str], places: Array, ba
     return near
 
 
-def stand_of(bench: Bench, who: Who, projector: int, x: Array) -> Stand:
+def projector_pose(bench: Bench, who: Who, projector: int, x: Array) -> Stand:
     """Return how projectors stand by their counters, the centres at x ``(m,)`` of the instrument frame."""
     counts = bench.seat.elements(who, [f"{name}{projector}" for name in (*TILTS, "by", "bz")])
     omega, phi, kappa = bench.seat.manual.tilts(counts, projector)
     by, bz = counts[f"by{projector}"], counts[f"bz{projector}"]
-    return Stand(np.array([x, -by, bz]), GON * np.array([omega, phi, wrapped(kappa)]))
+    return Stand(np.array([x, -by, bz]), GON * np.array([omega, phi, wrap_gon(kappa)]))

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from a7sim.among import Who, among, put
+from a7sim.among import Who, put, take
 from a7sim.geometry import GON, Array, mxv, plane_rotation
 from a7sim.manual import LEAST_COUNT, VARIANTS, Variant
 from a7sim.operator.crew import Crew
@@ -223,14 +223,14 @@ class Seat:
 
     def bx(self, who: Who) -> Array:
         """Return the base as it is set ``(m,)``, mm."""
-        return among(self._settings["bx"], who)
+        return take(self._settings["bx"], who)
 
     # --- places ---------------------------------------------------------------------------------------
 
     def counters(self, who: Who) -> Array:
         """Read X, Y and Z ``(3, m)``, and bear in mind how deep the mark stands."""
         readings = self.hands.counters(who)
-        put((among(self._offset[2], who) - readings[2]) / self.units_per_mm, who, self.z)
+        put((take(self._offset[2], who) - readings[2]) / self.units_per_mm, who, self.z)
         return readings
 
     def levels_shown(self, who: Who, levels: Sequence[float]) -> Array:
@@ -269,7 +269,7 @@ class Seat:
 
     def place(self, who: Who, readings: Array) -> Array:
         """Return readings ``(3, m)`` as x, y, z in mm: from the left-hand centre, the base line, downward."""
-        offset = among(self._offset, who)
+        offset = take(self._offset, who)
         x, y = self.in_mm(readings[:2] - offset[:2])
         z = (offset[2] - readings[2]) / self.units_per_mm
         return np.array([x - self._share(1) * self.bx(who), y, z])
@@ -311,7 +311,7 @@ class Seat:
 
     def on_carrier(self, who: Who, hand: int, print_place: Array) -> Array:
         """Return places of paper prints ``(2, m)`` as the swing of their photograph turns them."""
-        swing = wrapped(self._settings[f"kappa{self.projector(hand)}"][who]) * GON
+        swing = wrap_gon(self._settings[f"kappa{self.projector(hand)}"][who]) * GON
         return mxv(plane_rotation(swing), print_place)
 
 
@@ -320,7 +320,7 @@ def _by_dimensions(units: Array) -> Mapping[int, Array]:
     return {1: units, 2: units[:, None], 3: units[:, None, None]}
 
 
-def wrapped(gon: Array) -> Array:
+def wrap_gon(gon: Array) -> Array:
     """Return angles within 200 gon of zero."""
     return np.asarray((gon + 200.0) % 400.0 - 200.0)
 
@@ -332,9 +332,9 @@ def counter_value(name: str, value: Array) -> Array:
 
 def _difference(name: str, value: Array, other: Array) -> Array:
     """Return one value of an element minus another, the shorter way round for kappa."""
-    return wrapped(value - other) if name.startswith("kappa") else np.asarray(value - other)
+    return wrap_gon(value - other) if name.startswith("kappa") else np.asarray(value - other)
 
 
-def side(hand: int) -> str:
+def side_name(hand: int) -> str:
     """Return left or right for a hand."""
     return "left" if hand == 1 else "right"

@@ -265,7 +265,7 @@ def _correlation(look: Look, surface: Array) -> float:
     return float(((left - left.mean()) * (right - right.mean())).mean()) / spread if spread > 0.0 else 0.0
 
 
-def rectified(look: Look, surface: Surface, side: int) -> tuple[npt.NDArray[np.bool_], Array, Array]:
+def rectify(look: Look, surface: Surface, side: int) -> tuple[npt.NDArray[np.bool_], Array, Array]:
     """Return what the left eye sees laid out on the ground: where it sees, greys, both ``(n,)``, and places ``(2, n)``.
 
     The patch is `side` picture elements each way; places are displacements from the mark in plan, mm in the model.

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from a7sim.among import Who, add
+from a7sim.among import Who, add_at
 from a7sim.geometry import Array
 
 Act = Literal["looking", "turning", "reading", "setting", "driving", "mounting", "computing", "resting", "other"]
@@ -37,8 +37,8 @@ class Timesheet:
     def spend(self, who: Who, seconds: float, form: str, act: Act) -> None:
         """Write down that those who act spent so many seconds each."""
         activity = _OF_ACT.get(act) or _OF_FORM.get(form, form)
-        add(seconds, who, self.by_activity[activity])
-        add(seconds, who, self.by_act[act])
+        add_at(seconds, who, self.by_activity[activity])
+        add_at(seconds, who, self.by_act[act])
 
     def activities_of(self, session: int) -> dict[str, float]:
         """Return the seconds of one session by activity, in the order in which they were first taken up."""

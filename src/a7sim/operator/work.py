@@ -13,13 +13,13 @@ from a7sim.operator.absolute import OnGround, absolute_orientation_at
 from a7sim.operator.bench import Bench
 from a7sim.operator.centres import centre_of, observe_centre
 from a7sim.operator.crew import Crew, NobodyGoesOn
-from a7sim.operator.empirical import empirical_orientation, set_off
+from a7sim.operator.empirical import empirical_orientation, perturb_elements
 from a7sim.operator.interior import InteriorOrientation, InteriorOrientations, interior_orientation
 from a7sim.operator.job import Job, ModelJob
-from a7sim.operator.levers import right_fittings
+from a7sim.operator.levers import required_fittings
 from a7sim.operator.line_hands import LineHands
 from a7sim.operator.person import Person
-from a7sim.operator.plate import prints_of
+from a7sim.operator.plate import sketch_positions
 from a7sim.operator.relative import RelativeOrientation, RelativeOrientations, relative_orientation
 from a7sim.reduction import PerspectiveCentre
 from a7sim.standard_points import CASES
@@ -81,7 +81,7 @@ class ModelRecords:
         )
 
 
-def work(
+def measure_models(
     person: Person,
     job: Job,
     tick: Callable[[], None] = lambda: None,
@@ -92,11 +92,11 @@ def work(
     `begins` is told of every activity, `tick` comes after every point.
     """
     person.book.head("", "preparation")
-    for records in worked(Bench(Crew.of_one(person), LineHands(person), job, tick), begins):
+    for records in measure_models_batch(Bench(Crew.of_one(person), LineHands(person), job, tick), begins):
         yield records.of(0)
 
 
-def worked(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[ModelRecords]:
+def measure_models_batch(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[ModelRecords]:
     """Yield the models of a job as a crew does them, each session at its own instrument."""
     try:
         yield from _worked(bench, begins)
@@ -111,14 +111,14 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
     for model in job.models:
         begin_form(bench, model, "interior orientation", begins)
         set_base_and_fittings(bench, model.base, model.polarity)
-        mount(bench, model, interior)
-        prints = take_up_prints(bench, model)
-        see_that_somebody_goes_on(bench)
+        mount_photographs(bench, model, interior)
+        prints = load_prints(bench, model)
+        require_active(bench)
         bench.begin(crew.everybody, model, prints)
-        remark_on_absent_points(bench, model)
+        note_missing_points(bench, model)
         preset_counters(bench, model)
         begin_form(bench, model, "relative orientation", begins)
-        orientation = oriented(bench, model)
+        orientation = orient_model(bench, model)
         begin_form(bench, model, "model coordinates", begins)
         points = model_coordinates(bench, model)
         centres = {}
@@ -129,7 +129,7 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
         if job.control:
             begin_form(bench, model, "absolute orientation", begins)
             on_ground = absolute_orientation_at(bench, model, job.control)
-        see_that_somebody_goes_on(bench)
+        require_active(bench)
         yield ModelRecords(
             model,
             crew.everybody,
@@ -144,13 +144,13 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
         )
 
 
-def see_that_somebody_goes_on(bench: Bench) -> None:
+def require_active(bench: Bench) -> None:
     """Raise NobodyGoesOn when all have given up."""
     if not bench.crew.everybody.size:
         raise NobodyGoesOn
 
 
-def remark_on_absent_points(bench: Bench, model: ModelJob) -> None:
+def note_missing_points(bench: Bench, model: ModelJob) -> None:
     """Write into the book which points of the case lie in water, or are not pricked on both prints."""
     crew = bench.crew
     listed = {label: model.standard_points.get(label, "") for label in CASES[bench.job.plan.case]}
@@ -191,17 +191,17 @@ def model_coordinates(bench: Bench, model: ModelJob) -> dict[str, Array]:
 
 def begin_form(bench: Bench, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
     """Begin a form of a model in book and journal."""
-    see_that_somebody_goes_on(bench)
+    require_active(bench)
     begins(f"model {model.name}: {form}")
     bench.crew.begin(bench.crew.everybody, model.name, form)
     bench.hands.note(bench.crew.everybody, f"{model.name}: {form}")
 
 
-def oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
+def orient_model(bench: Bench, model: ModelJob) -> RelativeOrientations:
     """Orient a model by the procedure on the job sheet."""
     plan, who, tolerated = bench.job.plan, bench.crew.everybody, bench.job.tolerated_parallax_mm
     if plan.start_off_gon:
-        set_off(bench, who, model, plan.method, plan.start_off_gon)
+        perturb_elements(bench, who, model, plan.method, plan.start_off_gon)
     if plan.procedure == "empirical":
         return empirical_orientation(
             bench, who, model, plan.method, plan.case, plan.over_correction, plan.parallax_readings, tolerated
@@ -212,7 +212,7 @@ def oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
 def set_base_and_fittings(bench: Bench, base: str, polarity: str) -> None:
     """Set base in or out, and the fittings that belong to it and to the pictures."""
     who, hands = bench.crew.everybody, bench.hands
-    right = right_fittings(bench.seat.manual, polarity, base)
+    right = required_fittings(bench.seat.manual, polarity, base)
     bench.seat.spend_setting(who, 1 + len(right))
     hands.set_base_mode(who, base)
     for name, position in right.items():
@@ -221,7 +221,7 @@ def set_base_and_fittings(bench: Bench, base: str, polarity: str) -> None:
     bench.seat.see_that_it_obeyed(who, f"setting base {base} and its fittings")
 
 
-def mount(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientations]) -> None:
+def mount_photographs(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientations]) -> None:
     """Mount what is not yet in its projector; a projector with a new picture starts from its counter zeros."""
     seat, hands = bench.seat, bench.hands
     for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
@@ -241,13 +241,13 @@ def mount(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientation
         )
 
 
-def take_up_prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]:
+def load_prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]:
     """Take up the paper prints of both photographs and see that they overlap the right way round."""
     crew = bench.crew
     who = crew.everybody
     prints = {}
     for hand, projector in ((1, model.left_projector), (2, model.right_projector)):
-        prints[hand] = prints_of(bench, who, projector)
+        prints[hand] = sketch_positions(bench, who, projector)
     common = [name for name in prints[1] if name in prints[2]]
     shifts = np.array([prints[1][name][0] - prints[2][name][0] for name in common]).reshape(-1, crew.sessions)[:, who]
     nowhere = np.isnan(shifts).all(axis=0)

@@ -16,16 +16,16 @@ from a7sim.reduction.centres import (
 )
 from a7sim.reduction.coplanarity import RelativeOrientation, relative_orientation
 from a7sim.reduction.corrections import corrected_image
-from a7sim.reduction.grid_test import Elements, PlateLie, ProjectorTest, grid_test, plate_lie
+from a7sim.reduction.grid_test import Elements, PlateLie, ProjectorTest, grid_test, plate_placement
 from a7sim.reduction.hallert import orientation_by_parallaxes
 from a7sim.reduction.interior import (
     PictureLie,
     PlaneFit,
-    picture_lie,
+    picture_placement,
     plane_fit,
     principal_distance_for_film,
 )
-from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
+from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 from a7sim.reduction.modelling import a8_model_coordinates, model_coordinates
 from a7sim.reduction.parallax import Stand, element_corrections
 from a7sim.reduction.polynomials import StripAdjustment, StripDeformation, strip_adjustment
@@ -63,7 +63,6 @@ __all__ = [
     "a8_centres",
     "a8_model_coordinates",
     "absolute_orientation",
-    "adjusted",
     "block_adjustment",
     "corrected_image",
     "deck_lines",
@@ -80,9 +79,9 @@ __all__ = [
     "output_lines",
     "perspective_centre",
     "perspective_centre_of_levels",
-    "picture_lie",
+    "picture_placement",
     "plane_fit",
-    "plate_lie",
+    "plate_placement",
     "principal_distance_for_film",
     "read_cards",
     "relative_orientation",
@@ -90,6 +89,7 @@ __all__ = [
     "similarity_by_iteration",
     "similarity_by_quaternion",
     "snooped_orientation",
+    "solve_least_squares",
     "strip_adjustment",
     "write_cards",
 ]

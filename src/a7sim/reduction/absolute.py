@@ -112,7 +112,7 @@ def root_mean_square(residuals: Array) -> Array:
     return np.asarray(np.where(count > 0, np.sqrt(squares.sum(axis=1) / np.maximum(count, 1)), np.nan))
 
 
-def largest(residuals: Array) -> Array:
+def max_abs_residual(residuals: Array) -> Array:
     """Return the largest absolute residual ``(3, ...)`` in X, Y and Z of ``(3, m, ...)``; nan where all are nan."""
     known = np.isfinite(residuals)
     return np.asarray(np.where(known.any(axis=1), np.where(known, np.abs(residuals), 0.0).max(axis=1), np.nan))

@@ -17,9 +17,9 @@ from a7sim.geometry import Array, length_of, rotation
 from a7sim.mistakes import Mistake
 from a7sim.reduction.absolute import Ground, GroundFit
 from a7sim.reduction.least_squares import Undetermined
-from a7sim.reduction.similarity import similarity_columns, turn_by
+from a7sim.reduction.similarity import rotation_from_vector, similarity_columns
 from a7sim.reduction.strips import Model
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 MAX_MODELS = 500
 MAX_ITERATIONS = 30
@@ -106,7 +106,9 @@ def block_adjustment(models: Sequence[Model], ground: Ground, height_weight: flo
         normal, scale, solution = _solved(design, missing, weights)
         step = solution[: UNKNOWNS_OF_A_MODEL * len(models)].reshape((len(models), UNKNOWNS_OF_A_MODEL)).T
         turns = np.einsum(
-            "ijm,jkm->ikm", turn_by(step[1:4] * np.minimum(1.0, 0.5 / length_of(step[1:4] + 1e-300))), turns
+            "ijm,jkm->ikm",
+            rotation_from_vector(step[1:4] * np.minimum(1.0, 0.5 / length_of(step[1:4] + 1e-300))),
+            turns,
         )
         scales = np.maximum(scales + step[0], scales / 3.0)
         shifts = shifts + step[4:]
@@ -116,7 +118,7 @@ def block_adjustment(models: Sequence[Model], ground: Ground, height_weight: flo
         if max(moves) < CONVERGED:
             return _result(e, ground, (scales, turns, shifts, free), weights, iteration, normal, scale)
     raise Undetermined(
-        f"the block of {counted(len(models), 'model')} does not come to rest in {MAX_ITERATIONS} iterations"
+        f"the block of {pluralize(len(models), 'model')} does not come to rest in {MAX_ITERATIONS} iterations"
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array
-from a7sim.reduction.least_squares import Undetermined, adjusted
+from a7sim.reduction.least_squares import Undetermined, solve_least_squares
 from a7sim.reduction.resection import Resection, resection
 
 MIN_POINTS = 2
@@ -65,7 +65,7 @@ def perspective_centre(low: Array, high: Array, level_low: float, level_high: fl
         axis=1,
     )
     observed = np.concatenate([low[0], low[1], np.full_like(zero, level_low)])
-    solution = adjusted(np.swapaxes(design, 0, 1), observed, redundancy=2 * n - 3)
+    solution = solve_least_squares(np.swapaxes(design, 0, 1), observed, redundancy=2 * n - 3)
     residuals = solution.residuals.reshape((3, n, *low.shape[2:]))
     X0, Y0, Z0, T0 = solution.unknowns
     sigma_X0, sigma_Y0, sigma_Z0, sigma_T0 = solution.sigmas

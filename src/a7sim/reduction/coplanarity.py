@@ -18,10 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array, angles_of, dots, length_of, mxm, mxv, rotation, transposed
-from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
+from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 from a7sim.reduction.normal_equations import MAX_CONDITION
 from a7sim.reduction.relative_poses import RelativePoses, relative_poses
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 Unknowns = Literal["independent", "dependent"]
 
@@ -118,7 +118,7 @@ def relative_orientation(
         rotation1 = np.broadcast_to(np.eye(3).reshape((3, 3, *right.shape[1:])), poses.rotations[0].shape)
         rotation2 = poses.rotation
         centre2 = poses.base * (bx / np.abs(poses.base[0]))
-    return finished(
+    return finish_orientation(
         (image1, image2), (c1, c2), names, (rotation1, rotation2), centre2, poses.iterations, poses.converged
     )
 
@@ -135,7 +135,7 @@ def _why(poses: RelativePoses, n: int) -> str:
         )
     return (
         f"no relative orientation brings the rays of all {n} points{which} together before both cameras "
-        f"(condition number {condition:.1e}, {counted(int(poses.iterations.flat[first]), 'iteration')})"
+        f"(condition number {condition:.1e}, {pluralize(int(poses.iterations.flat[first]), 'iteration')})"
     )
 
 
@@ -191,7 +191,7 @@ def rays_of(image: Array, c: float) -> Array:
     return np.concatenate([image, np.full_like(image[:1], -c)])
 
 
-def finished(
+def finish_orientation(
     images: tuple[Array, Array],
     c: tuple[float, float],
     unknowns: tuple[str, ...],
@@ -229,7 +229,7 @@ def finished(
         values.append(angles[axis])
         columns.append(dots(_axes(angles, m)[axis][:, None], by_turn))
     design = np.swapaxes(np.array(columns) / unit, 0, 1)
-    adjustment = adjusted(design, -condition.discrepancies / unit)
+    adjustment = solve_least_squares(design, -condition.discrepancies / unit)
     per_coordinate = -condition.discrepancies / steepness**2
     return RelativeOrientation(
         unknowns=unknowns,

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array, mxv, plane_rotation, rotation, transposed
-from a7sim.reduction.interior import picture_lie
-from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
+from a7sim.reduction.interior import picture_placement
+from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 
 UNKNOWNS = ("c", "x0", "y0", "omega", "phi", "kappa", "bx", "by", "bz")
 """Order of the unknowns: mm and radians; bx, by and bz place the centre at (bx, -by, bz)."""
@@ -62,12 +62,12 @@ class PlateLie:
         return np.asarray(mxv(plane_rotation(turn)[:, :, None], crosses) + np.array([self.dx, self.dy])[:, None])
 
 
-def plate_lie(displacements: Array, marks: Array) -> PlateLie:
+def plate_placement(displacements: Array, marks: Array) -> PlateLie:
     """Return how a plate lies from displacements ``(2, n, ...)`` of its fiducials at collimating marks ``(2, n)``, mm.
 
     Fiducials registered several times stand there as often. Raises Undetermined for one fiducial.
     """
-    lie = picture_lie(displacements, marks)
+    lie = picture_placement(displacements, marks)
     n = marks.shape[1]
     x, y = (each.reshape((n, *(1,) * (displacements.ndim - 2))) for each in marks)
     fitted = np.array([lie.dx + lie.scale * x - lie.turn * y, lie.dy + lie.scale * y + lie.turn * x])
@@ -133,7 +133,7 @@ def _adjusted(seen: Array, mark: Array, start: Array, sought: list[int]) -> tupl
     for iteration in range(1, MAX_ITERATIONS + 1):
         computed, design = _computed(mark, now)
         observed = (seen - computed).reshape(-1, *seen.shape[3:])
-        step = adjusted(design[:, sought], observed)
+        step = solve_least_squares(design[:, sought], observed)
         if not (step.condition < MAX_CONDITION).all():
             raise Undetermined(
                 "expected crosses and levels that tell principal distance, principal point and element zeros apart, "

@@ -14,11 +14,11 @@ from a7sim.geometry import (
     rotation,
     stereoscopic_intersection,
 )
-from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, coplanarity, finished, rays_of
-from a7sim.reduction.least_squares import Undetermined, adjusted
+from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, coplanarity, finish_orientation, rays_of
+from a7sim.reduction.least_squares import Undetermined, solve_least_squares
 from a7sim.reduction.normal_equations import MAX_CONDITION
 from a7sim.reduction.relative_poses import MAX_ITERATIONS, MIN_POINTS, TOLERANCE
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 Scalars = float | Array
 """One number, or one for each pair of a batch ``(...)``."""
@@ -99,7 +99,7 @@ def regular_corrections(
     rows = [PARALLAX_ELEMENTS.index(name) for name in unknowns]
     n = len(parallaxes)
     design = near_vertical_parallax_coefficients(x[:n] * b, y[:n] * d, h, b)[rows]
-    cofactors = adjusted(np.swapaxes(design, 0, 1), parallaxes).cofactors
+    cofactors = solve_least_squares(np.swapaxes(design, 0, 1), parallaxes).cofactors
     spreads = np.sqrt(np.einsum("ii...->i...", cofactors))
     return np.array([corrections[name] for name in unknowns]), np.asarray(s0 * spreads)
 
@@ -145,7 +145,7 @@ def orientation_by_parallaxes(
         coefficients = parallax_coefficients(
             points, points, centre1[:, None], centre2[:, None], angles[0][:, None], angles[1][:, None]
         )
-        step = adjusted(np.swapaxes(coefficients[rows], 0, 1), -parallaxes)
+        step = solve_least_squares(np.swapaxes(coefficients[rows], 0, 1), -parallaxes)
         for name, correction in zip(names, step.unknowns * active, strict=True):
             kind, projector = name[:-1], int(name[-1]) - 1
             if kind in ("by", "bz"):
@@ -163,8 +163,8 @@ def orientation_by_parallaxes(
     if active.any() or not (step.condition < MAX_CONDITION).all() or not (condition.ahead > 0.0).all():
         raise Undetermined(
             f"the y-parallaxes of {n} points do not orient the pair (condition number "
-            f"{float(np.max(step.condition)):.1e}, {counted(int(iterations.max()), 'iteration')})"
+            f"{float(np.max(step.condition)):.1e}, {pluralize(int(iterations.max()), 'iteration')})"
         )
     scale = -points[2].mean(axis=0) / np.sqrt(c1 * c2)
     unit = -np.sqrt(2.0) * scale * condition.by_base[1]  # p = b . (a1 x a2) / (x1 z2 - z1 x2)
-    return finished((image1, image2), (c1, c2), names, turns, bx * centre2, iterations, ~active, bx * unit)
+    return finish_orientation((image1, image2), (c1, c2), names, turns, bx * centre2, iterations, ~active, bx * unit)

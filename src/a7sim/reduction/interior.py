@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array, mxm
-from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
+from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 
 UNKNOWNS = {
     "conformal": ("a", "b", "tx", "ty"),
@@ -38,7 +38,7 @@ class PictureLie:
     """Relative: 1e-4 for a picture that is too large by as much."""
 
 
-def picture_lie(displacements: Array, marks: Array) -> PictureLie:
+def picture_placement(displacements: Array, marks: Array) -> PictureLie:
     """Return how a picture lies from its fiducials' displacements ``(2, n, ...)`` at collimating marks ``(2, n)``, mm.
 
     Small-angle similarity ``d = t + (scale, turn) x`` by least squares. Raises Undetermined for one fiducial.
@@ -47,7 +47,7 @@ def picture_lie(displacements: Array, marks: Array) -> PictureLie:
     one, zero = np.ones_like(x), np.zeros_like(x)
     design = np.array([np.concatenate(pair) for pair in ((one, zero), (zero, one), (-y, x), (x, y))]).T
     design = design.reshape((*design.shape, *(1,) * (displacements.ndim - 2)))
-    return PictureLie(*adjusted(design, np.concatenate([displacements[0], displacements[1]])).unknowns)
+    return PictureLie(*solve_least_squares(design, np.concatenate([displacements[0], displacements[1]])).unknowns)
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def plane_fit(measured: Array, calibrated: Array, kind: str = "affine") -> Plane
     basis = _basis(kind)
     try:
         # Multiplied out by the denominator the equations are linear: a start for the projective fit, else the fit.
-        start = adjusted(*_linear_equations(source, target, basis))
+        start = solve_least_squares(*_linear_equations(source, target, basis))
         solution, iterations = start, np.ones(measured.shape[2:], dtype=int)
         if kind == "projective":
             solution, iterations = _refined(start.unknowns, source, target, basis)
@@ -207,7 +207,7 @@ def _refined(unknowns: Array, source: Array, target: Array, basis: Array) -> tup
             raise Undetermined("the fitted vanishing line passes between them")
         fitted = np.array([u, v]) / w
         design = np.concatenate([np.swapaxes((shares[k] - fitted[k] * shares[2]) / w, 0, 1) for k in (0, 1)])
-        step = adjusted(design, np.concatenate([target[0] - fitted[0], target[1] - fitted[1]]))
+        step = solve_least_squares(design, np.concatenate([target[0] - fitted[0], target[1] - fitted[1]]))
         unknowns = unknowns + step.unknowns
         iterations = iterations + moving
         moving = np.abs(np.einsum("nu...,u...->n...", design, step.unknowns)).max(axis=0) > MIN_STEP

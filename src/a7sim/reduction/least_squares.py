@@ -60,7 +60,9 @@ class Adjustment:
         return np.asarray(1.0 - explained * (1.0 if self.weights is None else self.weights))
 
 
-def adjusted(design: Array, observed: Array, redundancy: int | None = None, weights: Array | None = None) -> Adjustment:
+def solve_least_squares(
+    design: Array, observed: Array, redundancy: int | None = None, weights: Array | None = None
+) -> Adjustment:
     """Return the least-squares solution of ``design x = observed``.
 
     `design` has shape ``(n, u, ...)``, `observed` ``(n, ...)``, `weights` that of `observed` or one each. The

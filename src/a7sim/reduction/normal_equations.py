@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array, mxv
-from a7sim.reduction.turns import TurningWork, aligned
+from a7sim.reduction.turns import TurningWork, aligned_array
 
 MAX_CONDITION = 3e5
 """Of the scaled normal equations for turns about the axes of the base. Six standard points have some 3e2, the weak pair
@@ -26,7 +26,7 @@ class Work(TurningWork):
     def __init__(self, n: int, batch: tuple[int, ...]) -> None:
         super().__init__(batch)
         self.shape = (n, *batch)
-        empty = aligned if batch else np.empty
+        empty = aligned_array if batch else np.empty
         self.rays = empty((2, 3, n, *batch))
         self.turned = empty((2, 3, n, *batch))
         self.spare = empty((6, n, *batch))
@@ -38,17 +38,17 @@ class Work(TurningWork):
         self.shares = empty((5, *batch))
 
 
-def all_of(mask: npt.NDArray[np.bool_]) -> bool:
+def fast_all(mask: npt.NDArray[np.bool_]) -> bool:
     """Tell what `mask.all()` does, of a single pair in less time."""
     return bool(mask.all() if mask.ndim else mask)
 
 
-def any_of(mask: npt.NDArray[np.bool_]) -> bool:
+def fast_any(mask: npt.NDArray[np.bool_]) -> bool:
     """Tell what `mask.any()` does, of a single pair in less time."""
     return bool(mask.any() if mask.ndim else mask)
 
 
-def conditions_of(work: Work) -> Array:
+def condition_numbers(work: Work) -> Array:
     """Return the condition numbers ``(...)`` of the scaled normal equations, in the 1-norm, or small bounds of them.
 
     Their determinant bounds them, so that hardly any inverse is needed.
@@ -57,12 +57,12 @@ def conditions_of(work: Work) -> Array:
     shares = np.divide(pivots, normal.diagonal().T, out=work.shares)
     bound = np.array(CONDITION_BY_DETERMINANT / shares.prod(axis=0))
     doubtful = ~((bound > 0.0) & (bound < MAX_CONDITION))
-    if any_of(doubtful):
+    if fast_any(doubtful):
         bound[doubtful] = _condition(normal[..., doubtful]) if normal.ndim > 2 else _condition(normal)
     return bound
 
 
-def symmetric(normal: Array) -> Array:
+def symmetrize(normal: Array) -> Array:
     """Return normal equations that stand above the diagonal in full."""
     full = normal.copy()
     for i in range(len(full) - 1):
@@ -73,22 +73,22 @@ def symmetric(normal: Array) -> Array:
 def _condition(normal: Array) -> Array:
     """Return the condition numbers ``(...)`` of normal equations ``(5, 5, ...)`` when scaled, in the 1-norm."""
     spread = np.sqrt(normal.diagonal().T)
-    scaled = symmetric(normal) / (spread[:, None] * spread)
-    condition = np.abs(scaled).sum(axis=0).max(axis=0) * np.abs(inverse_of(scaled)).sum(axis=0).max(axis=0)
+    scaled = symmetrize(normal) / (spread[:, None] * spread)
+    condition = np.abs(scaled).sum(axis=0).max(axis=0) * np.abs(invert(scaled)).sum(axis=0).max(axis=0)
     return np.where(np.isfinite(condition), condition, np.inf)
 
 
-def times(matrix: Array, vector: Array) -> Array:
+def fast_mxv(matrix: Array, vector: Array) -> Array:
     """Multiply as `mxv` does, in less time for a single matrix."""
     return np.asarray(matrix @ vector) if matrix.ndim == 2 else mxv(matrix, vector)
 
 
-def in_base_frame(R: Array, rays: Array) -> Array:
+def rotate_to_base(R: Array, rays: Array) -> Array:
     """Turn the rays ``(2, 3, n, ...)`` of both cameras by rows of their rotations ``(2, i, 3, ...)``."""
     return R @ rays if rays.ndim == 3 else np.asarray(np.einsum("kij...,kjn...->kin...", R, rays))
 
 
-def discrepancies_of(across: Array) -> Array:
+def compute_discrepancies(across: Array) -> Array:
     """Return ``y1 z2 - z1 y2`` of ray components y, z ``(2, 2, n, ...)``."""
     return np.asarray(across[0, 0] * across[1, 1] - across[0, 1] * across[1, 0])
 
@@ -158,7 +158,7 @@ def form_products(work: Work) -> None:
         np.einsum("n...,vn...->v...", row, rows[i:], out=normal[i, i:])
 
 
-def solved(work: Work, stiffness: Array) -> Array:
+def solve(work: Work, stiffness: Array) -> Array:
     """Return the corrections ``(5, ...)`` of the normal equations, stiffened by a share of their diagonal.
 
     What elimination leaves stands in `work.reduced`: the pivots and, last of all, the sum of squared residuals.
@@ -208,7 +208,7 @@ def _solved_alone(work: Work, stiffness: float) -> Array:
     return np.array(corrections)
 
 
-def inverse_of(matrix: Array) -> Array:
+def invert(matrix: Array) -> Array:
     """Return the inverses of positive definite matrices ``(u, u, ...)``; of singular ones, what is not finite.
 
     A batch is worked elementwise by exchange of one unknown after the other, a single matrix by LAPACK.
@@ -218,7 +218,7 @@ def inverse_of(matrix: Array) -> Array:
             return np.asarray(np.linalg.inv(matrix))
         except np.linalg.LinAlgError:
             return np.full_like(matrix, np.nan)
-    inverse, product = aligned(matrix.shape), aligned(matrix.shape)
+    inverse, product = aligned_array(matrix.shape), aligned_array(matrix.shape)
     inverse[:] = matrix
     for j in range(len(matrix)):
         reciprocal = 1.0 / inverse[j, j]

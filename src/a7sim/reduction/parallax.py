@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import PARALLAX_ELEMENTS, Array, parallax_coefficients
-from a7sim.reduction.least_squares import Adjustment, adjusted
+from a7sim.reduction.least_squares import Adjustment, solve_least_squares
 
 
 @dataclass(frozen=True)
@@ -31,4 +31,4 @@ def element_corrections(
         points, points, left.centre[:, None], right.centre[:, None], left.angles, right.angles
     )
     rows = [PARALLAX_ELEMENTS.index(name) for name in unknowns]
-    return adjusted(np.swapaxes(coefficients[rows], 0, 1), -parallaxes)
+    return solve_least_squares(np.swapaxes(coefficients[rows], 0, 1), -parallaxes)

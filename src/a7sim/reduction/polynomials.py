@@ -16,7 +16,7 @@ import numpy as np
 from a7sim.geometry import Array
 from a7sim.mistakes import Mistake
 from a7sim.reduction.absolute import Ground, GroundFit
-from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
+from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 from a7sim.reduction.strips import Model, is_centre
 
 Degree = Literal[2, 3]
@@ -148,8 +148,8 @@ def strip_adjustment(
             missing[1][plan] * along - missing[0][plan] * across,
         ]
     )
-    in_plan = adjusted(design, turned)
-    in_height = adjusted(_height_columns(axis.plan(points[:, height]), degree), missing[2][height])
+    in_plan = solve_least_squares(design, turned)
+    in_height = solve_least_squares(_height_columns(axis.plan(points[:, height]), degree), missing[2][height])
     done = Model(model.name, model.points, corrected(model.coordinates, axis, in_plan.unknowns, in_height.unknowns))
     return StripAdjustment(
         degree, axis, in_plan, in_height, done, GroundFit(known, done.at(known.points)), GroundFit(known, points)

@@ -17,20 +17,20 @@ from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.normal_equations import (
     MAX_CONDITION,
     Work,
-    all_of,
-    any_of,
-    conditions_of,
-    discrepancies_of,
+    compute_discrepancies,
+    condition_numbers,
+    fast_all,
+    fast_any,
+    fast_mxv,
     form_equations,
     form_level_equations,
     form_products,
-    in_base_frame,
-    inverse_of,
-    solved,
-    symmetric,
-    times,
+    invert,
+    rotate_to_base,
+    solve,
+    symmetrize,
 )
-from a7sim.reduction.turns import aligned, turned_by
+from a7sim.reduction.turns import aligned_array, rotate_by
 
 MIN_POINTS = 5
 MAX_ITERATIONS = 30
@@ -159,7 +159,7 @@ def _oriented_from_near(
         for i in range(NEAR_ITERATIONS):
             state = _iterated(state, rays, tolerance, work, level=i == 0, chords=False)
             if i == 0:
-                sound = conditions_of(work) < HOPELESS * MAX_CONDITION
+                sound = condition_numbers(work) < HOPELESS * MAX_CONDITION
             if not (state.active & ~state.far).any():
                 break
         poses = _assessed(state, work)
@@ -179,7 +179,7 @@ def _resolved(images: tuple[Array, Array], c1: float, c2: float, tolerance: floa
     rays = _loaded(images, c1, c2, work)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # singular pairs of a batch
         found = _oriented(rays, (0, 0), tolerance, work)
-        if all_of(found.converged):
+        if fast_all(found.converged):
             return found
         return _tried_again(found, rays, tolerance)
 
@@ -222,7 +222,7 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Work
     for i in range(MAX_ITERATIONS):
         state = _iterated(state, rays, tolerance, work, level=level and i == 0)
         if i == 0:
-            first = conditions_of(work)
+            first = condition_numbers(work)
         rest = np.count_nonzero(state.active)
         last = rest == 0 or i == MAX_ITERATIONS - 1
         if last or 2 * rest < state.active.size:
@@ -238,7 +238,7 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Work
             places, rays = going if places is None else places[going], rays[..., going]
             state, work = state.of(going), Work(rays.shape[2], going.shape)
     hopeless = first >= HOPELESS * MAX_CONDITION
-    if not any_of(hopeless):
+    if not fast_any(hopeless):
         return done
     condition = np.where(hopeless, first, done.condition)
     return replace(done, condition=condition, converged=np.asarray(done.converged & ~hopeless))
@@ -252,7 +252,7 @@ def _swung(swings: tuple[int, int], batch: tuple[int, ...]) -> Array:
             turned[camera] = rotation(0.0, 0.0, 0.5 * np.pi * swing)
     if not batch:
         return turned
-    R = aligned((2, 3, 3, *batch))
+    R = aligned_array((2, 3, 3, *batch))
     R[:] = turned.reshape((2, 3, 3, *(1,) * len(batch)))
     return R
 
@@ -295,18 +295,18 @@ def _iterated(
         form_equations(state.rotations, rays, work)
     form_products(work)
     per_square = 1.0 / (rays.shape[2] * rays[0, 2].flat[0] * rays[1, 2].flat[0])
-    corrections = solved(work, (DAMPING * per_square) * work.normal[5, 5])
+    corrections = solve(work, (DAMPING * per_square) * work.normal[5, 5])
     size = np.abs(corrections).max(axis=0)
-    all_active = all_of(active)
+    all_active = fast_all(active)
     if not all_active:
         corrections *= active
-    if any_of(size > MAX_TURN):
+    if fast_any(size > MAX_TURN):
         corrections *= np.minimum(1.0, MAX_TURN / np.maximum(size, MAX_TURN))
-    R = turned_by(state.rotations, corrections, work, level)
+    R = rotate_by(state.rotations, corrections, work, level)
     left = size * (2.0 * size + np.sqrt(per_square * np.abs(work.reduced[5, 5])))
     from_far = state.far | (size > (FAR if level else FAR_LATER))
     far = active & from_far & (size > NEAR)
-    if chords and any_of(far):
+    if chords and fast_any(far):
         R, left = _chords(R, left, np.minimum(size, MAX_TURN), far, _Chord.of_all(rays, work, size), CHORDS)
     goes_on = active & ~(left < tolerance) & np.isfinite(size)
     before = size if all_active else np.where(active, size, state.before)
@@ -346,7 +346,7 @@ class _Chord:
     @cached_property
     def inverse(self) -> Array:
         """Inverse ``(5, 5, ...)`` of the normal equations."""
-        return inverse_of(symmetric(self.normal))
+        return invert(symmetrize(self.normal))
 
 
 def _chords(
@@ -362,11 +362,11 @@ def _chords(
         R[..., some], left[some] = _chords(R[..., some], left[some], last[some], far[some], equations.of(some), most)
         return R, left
     rays = equations.rays
-    discrepancies = discrepancies_of(in_base_frame(R[:, 1:], rays))
-    corrections = -times(equations.inverse, times(equations.weighted, discrepancies))
+    discrepancies = compute_discrepancies(rotate_to_base(R[:, 1:], rays))
+    corrections = -fast_mxv(equations.inverse, fast_mxv(equations.weighted, discrepancies))
     size = np.abs(corrections).max(axis=0)
     far = far & (size < STEADY * last)
-    R = turned_by(R, np.where(far, corrections, 0.0))
+    R = rotate_by(R, np.where(far, corrections, 0.0))
     rms = np.sqrt(dots(discrepancies, discrepancies) / rays.shape[2]) / (rays[0, 2, 0] * rays[1, 2, 0])
     left = np.where(far, np.minimum(left, np.maximum(size * size / last, WEAKNESS * equations.size * rms)), left)
     far = far & (size > NEAR)
@@ -376,7 +376,7 @@ def _chords(
 def _assessed(state: _Iteration, work: Work) -> RelativePoses:
     """Judge where iterations ended, by the equations of the last one."""
     n = work.shape[0]
-    condition = conditions_of(work)
+    condition = condition_numbers(work)
     squares = work.reduced[5, 5]
     s0 = np.sqrt(np.maximum(squares, 0.0) / (n - MIN_POINTS)) if n > MIN_POINTS else np.zeros_like(condition)
     R, before_both = (state.rotations, True) if _all_ahead(work) else _facing(state.rotations, work.turned)

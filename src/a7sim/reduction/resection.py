@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array, angles_of, dots, image_of, length_of, mxm, mxv, transposed
-from a7sim.reduction.least_squares import Adjustment, Undetermined, adjusted
+from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 
 MIN_POINTS = 3
 
@@ -96,7 +96,7 @@ def _refined(seen: Array, local: Array, turn: Array, centre: Array) -> tuple[Arr
         computed = image_of(local, centre[:, None], turn[:, :, None], 1.0)
         design = _coefficients(local - centre[:, None], computed, turn)
         try:
-            step = adjusted(design, np.concatenate([seen[0] - computed[0], seen[1] - computed[1]]))
+            step = solve_least_squares(design, np.concatenate([seen[0] - computed[0], seen[1] - computed[1]]))
         except Undetermined as error:
             raise Undetermined(
                 f"expected ground points that fix the centre, got {seen.shape[1]} with the centre on or by "

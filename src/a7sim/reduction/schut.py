@@ -3,12 +3,12 @@
 import numpy as np
 
 from a7sim.geometry import Array, mxm
-from a7sim.reduction.coplanarity import RelativeOrientation, coplanarity, finished, rays_of
-from a7sim.reduction.least_squares import Undetermined, adjusted
+from a7sim.reduction.coplanarity import RelativeOrientation, coplanarity, finish_orientation, rays_of
+from a7sim.reduction.least_squares import Undetermined, solve_least_squares
 from a7sim.reduction.normal_equations import MAX_CONDITION
 from a7sim.reduction.relative_poses import MAX_ITERATIONS, MIN_POINTS, TOLERANCE
-from a7sim.reduction.turns import turn_about
-from a7sim.wording import counted
+from a7sim.reduction.turns import rotation_about
+from a7sim.wording import pluralize
 
 
 def orientation_by_schut(image1: Array, image2: Array, c1: float, c2: float, bx: float = 1.0) -> RelativeOrientation:
@@ -31,9 +31,9 @@ def orientation_by_schut(image1: Array, image2: Array, c1: float, c2: float, bx:
     for _ in range(MAX_ITERATIONS):
         condition = coplanarity(rays1, rays2, left, right, base)
         design = np.concatenate([condition.by_turn2, condition.by_base[1:]]) / unit
-        step = adjusted(np.swapaxes(design, 0, 1), -condition.discrepancies / unit)
+        step = solve_least_squares(np.swapaxes(design, 0, 1), -condition.discrepancies / unit)
         corrections = step.unknowns * active
-        right = mxm(turn_about(corrections[:3]), right)
+        right = mxm(rotation_about(corrections[:3]), right)
         base = base + np.array([np.zeros_like(corrections[3]), corrections[3], corrections[4]])
         size = np.abs(corrections).max(axis=0)
         iterations += active
@@ -45,7 +45,9 @@ def orientation_by_schut(image1: Array, image2: Array, c1: float, c2: float, bx:
     if active.any() or not (step.condition < MAX_CONDITION).all() or not meets:
         raise Undetermined(
             f"Schut's equations do not orient the {n} points (condition number {float(np.max(step.condition)):.1e}, "
-            f"{counted(int(iterations.max()), 'iteration')})"
+            f"{pluralize(int(iterations.max()), 'iteration')})"
         )
     names = ("omega2", "phi2", "kappa2", "by2", "bz2")
-    return finished((image1, image2), (c1, c2), names, (left, right), bx * base, iterations, ~active, unit * bx)
+    return finish_orientation(
+        (image1, image2), (c1, c2), names, (left, right), bx * base, iterations, ~active, unit * bx
+    )

@@ -15,8 +15,8 @@ from a7sim.reduction.least_squares import (
     MAX_CONDITION,
     Adjustment,
     Undetermined,
-    adjusted,
     inverse_of_definite,
+    solve_least_squares,
 )
 
 MIN_POINTS = 3
@@ -161,11 +161,13 @@ def similarity_by_iteration(
         turned = np.einsum("ij...,jn...->in...", turn, x)
         discrepancies = np.where(known, X - scale * turned - shift[:, None], 0.0)
         design = similarity_columns(turned, scale, np.eye(3))
-        step = adjusted(_rows(design, rows), _rows(discrepancies[:, :, None], rows)[:, 0], weights=row_weights).unknowns
+        step = solve_least_squares(
+            _rows(design, rows), _rows(discrepancies[:, :, None], rows)[:, 0], weights=row_weights
+        ).unknowns
         angle = length_of(step[1:4])
         damping = np.minimum(1.0, MAX_TURN / np.maximum(angle, 1e-300))
         near = angle < (SCALE_FOLLOWS if full else MAX_TURN)
-        turn = mxm(turn_by(step[1:4] * damping), turn)
+        turn = mxm(rotation_from_vector(step[1:4] * damping), turn)
         scale = np.where(near, np.maximum(scale + step[0], scale / 3.0), first_scale if full else scale)
         shift = shift + step[4:]
         relative = np.maximum(np.abs(step[0] / scale), (np.abs(step[4:]) / extent).max(axis=0))
@@ -175,7 +177,9 @@ def similarity_by_iteration(
                 translation = centre_X + shift - scale * mxv(turn, centre_x)
                 return Similarity(np.asarray(scale), turn, translation, points, targets, each, iteration - kicks)
             kicks += 1
-            off = turn_by(np.where(on_a_saddle, 1.0, 0.0) * np.array([0.3, 0.6, 0.9]).reshape((3, *(1,) * near.ndim)))
+            off = rotation_from_vector(
+                np.where(on_a_saddle, 1.0, 0.0) * np.array([0.3, 0.6, 0.9]).reshape((3, *(1,) * near.ndim))
+            )
             turn = mxm(off, turn)
     raise Undetermined(f"the similarity of {n} points does not come to rest in {MAX_ITERATIONS} iterations")
 
@@ -235,7 +239,7 @@ def _rows(columns: Array, keep: npt.NDArray[np.bool_]) -> Array:
     return flat if keep.all() else flat[keep]
 
 
-def turn_by(vector: Array) -> Array:
+def rotation_from_vector(vector: Array) -> Array:
     """Return the rotation ``(3, 3, ...)`` about a vector ``(3, ...)`` by its length in radians."""
     angle = length_of(vector)
     half = np.sinc(angle / (2.0 * np.pi)) / 2.0  # sin(angle / 2) / angle
@@ -398,7 +402,7 @@ def _statistics(found: Similarity) -> Adjustment:
     turned = np.einsum("ij...,jn...->in...", found.rotation, found.points - centre[:, None])
     design = _rows(similarity_columns(turned, found.scale, axes), keep)
     observed = -_rows(found.residuals[:, :, None], keep)[:, 0]
-    local = adjusted(design, observed, weights=weights)
+    local = solve_least_squares(design, observed, weights=weights)
     at_centre = similarity_columns(mxv(found.rotation, centre)[:, None], found.scale, axes)[:, 0]
     carry = np.zeros_like(local.cofactors)
     for i in range(7):

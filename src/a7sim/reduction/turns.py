@@ -11,14 +11,14 @@ class TurningWork:
     """Arrays of pairs ``(...)`` that are filled anew when cameras are turned."""
 
     def __init__(self, batch: tuple[int, ...]) -> None:
-        empty = aligned if batch else np.empty
+        empty = aligned_array if batch else np.empty
         self.halves = empty((2, 3, *batch))
         self.turn = empty((2, 3, 3, *batch))
         self.rotations = empty((2, 2, 3, 3, *batch))
         self.turning = empty((2, 3, 3, *batch))
 
 
-def aligned(shape: tuple[int, ...]) -> Array:
+def aligned_array(shape: tuple[int, ...]) -> Array:
     """Return an array that begins at a line of 64 bytes."""
     size = prod(shape)
     room = np.empty(size + 8)
@@ -26,7 +26,7 @@ def aligned(shape: tuple[int, ...]) -> Array:
     return room[first : first + size].reshape(shape)
 
 
-def turned_by(R: Array, turns: Array, work: TurningWork | None = None, level: bool = False) -> Array:
+def rotate_by(R: Array, turns: Array, work: TurningWork | None = None, level: bool = False) -> Array:
     """Turn both cameras ``(2, 3, 3, ...)`` about the axes of the base by the unknowns of the equations, radians.
 
     Only the difference of the omegas is determined; each camera takes half.
@@ -68,7 +68,7 @@ def _half_turns() -> Array:
 _HALF_TURNS = _half_turns()
 
 
-def turn_about(turns: Array) -> Array:
+def rotation_about(turns: Array) -> Array:
     """Return rotations ``(3, 3, ...)`` about axes ``(3, ...)`` whose length is twice the tangent of half the angle.
 
     For a small turn that is the angle in radians.

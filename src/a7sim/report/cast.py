@@ -12,10 +12,10 @@ from a7sim.mistakes import Mistake
 from a7sim.operator.book import Entry
 from a7sim.report.kept import Kept
 from a7sim.session import tables
-from a7sim.session.bridge import tables_of as of_bridge
-from a7sim.session.compiled_tables import of_compilation
+from a7sim.session.bridge import bridge_tables as of_bridge
+from a7sim.session.compiled_tables import map_tables
 from a7sim.session.folder import JOURNAL
-from a7sim.session.grid_test import sheet_of as of_grid_test
+from a7sim.session.grid_test import report_tables as of_grid_test
 from a7sim.session.lines import read_journal
 
 COLUMNS, LINES = 100, 32
@@ -35,7 +35,7 @@ class Line:
     marker: str = ""
 
 
-def cast_of(kept: Kept, speed: float) -> str:
+def make_cast(kept: Kept, speed: float) -> str:
     """Return the film of a session in which simulated time runs `speed` times as fast. Raises Mistake."""
     with kept.read():
         lines = sorted(_lines(kept), key=lambda line: line.time)
@@ -73,7 +73,7 @@ def _lines(kept: Kept) -> Iterator[Line]:
     yield from notes
     yield from (_reading(entry) for entry in kept.book if entry.reading or not notes)
     for model in document.get("models", ()):
-        yield Line(model["finished_at_s"], _printed(Group(*tables.of_model(model))))
+        yield Line(model["finished_at_s"], _printed(Group(*tables.model_tables(model))))
     yield Line(3600.0 * document["operator"]["hours"], _printed(_end(kept)))
 
 
@@ -106,8 +106,8 @@ def _end(kept: Kept) -> RenderableType:
     """Return what the command shows at its end, but for the models, which have been shown when they were done."""
     document = kept.document
     if kept.command == "run":
-        return tables.of_session({**document, "models": ()})
-    shown: RenderableType = {"calibrate": of_grid_test, "compile": of_compilation, "bridge": of_bridge}[kept.command](
+        return tables.session_tables({**document, "models": ()})
+    shown: RenderableType = {"calibrate": of_grid_test, "compile": map_tables, "bridge": of_bridge}[kept.command](
         document
     )
     return Group(shown, Text())

@@ -19,22 +19,22 @@ from a7sim.report.figures.model import (
 )
 from a7sim.report.figures.sessions import all_strips, hours
 from a7sim.report.figures.strip import Places, plan_and_profile, residuals_in_height, residuals_in_plan
-from a7sim.report.forms import forms_of
+from a7sim.report.forms import make_forms
 from a7sim.report.kept import Kept
 from a7sim.report.page import Chapter, Folded, Part, Picture, Sheet
-from a7sim.report.rays import rays_of
-from a7sim.report.terminal import parts_of
+from a7sim.report.rays import pointing_rays
+from a7sim.report.terminal import terminal_parts
 from a7sim.session import tables
 from a7sim.session.bridge import INDEPENDENT
-from a7sim.session.bridge import tables_of as of_bridge
-from a7sim.session.compiled_tables import of_compilation
+from a7sim.session.bridge import bridge_tables as of_bridge
+from a7sim.session.compiled_tables import map_tables
 from a7sim.session.folder import RESIDUALS, STRIP, STRIP_OF_WAY, SVG
-from a7sim.session.grid_test import sheet_of as of_grid_test
+from a7sim.session.grid_test import report_tables as of_grid_test
 
 Chapters = Iterator[Chapter]
 
 
-def chapters_of(kept: Kept) -> Chapters:
+def make_chapters(kept: Kept) -> Chapters:
     """Yield the chapters of what a folder keeps."""
     yield from _OF_COMMAND[kept.command](kept)
     yield from _of_operator(kept)
@@ -53,8 +53,8 @@ def _of_run(kept: Kept) -> Chapters:
     for name, strip in document.get("ways", {}).items():
         yield _of_strip(strip, _places(kept, STRIP_OF_WAY.format(name.lower())), f"Strip, {name}", f"w{name}")
     if "a8_minus_comparator_m" in document:
-        each = tables.of_accuracy({"points": document["a8_minus_comparator_m"]})
-        yield Chapter("A8 minus comparator", list(parts_of(each, caption="A8 minus comparator, m")))
+        each = tables.accuracy_table({"points": document["a8_minus_comparator_m"]})
+        yield Chapter("A8 minus comparator", list(terminal_parts(each, caption="A8 minus comparator, m")))
 
 
 def _of_model(kept: Kept, model: Document, name: str) -> Chapter:
@@ -63,24 +63,24 @@ def _of_model(kept: Kept, model: Document, name: str) -> Chapter:
     parts: list[Part] = [residual_parallaxes(model, f"{name}p")]
     if orientation["rounds"]:
         parts.append(iterations(model, f"{name}i"))
-    parts += parts_of(tables.of_rounds(orientation))
+    parts += terminal_parts(tables.rounds_table(orientation))
     parts += [Folded("Residual y-parallaxes in a table", [parallax_table(model)])]
-    parts += parts_of(tables.of_elements(orientation["elements"], model["truth"].get("elements", {})))
-    rays = {side: rays_of(kept, model, side) for side in model["perspective_centres"]}
+    parts += terminal_parts(tables.elements_table(orientation["elements"], model["truth"].get("elements", {})))
+    rays = {side: pointing_rays(kept, model, side) for side in model["perspective_centres"]}
     parts += [perspective_centre(model, side, rays[side], f"{name}c{side}") for side in rays]
-    parts += parts_of(tables.of_centres(model))
+    parts += terminal_parts(tables.centres_table(model))
     missed = centre_residuals(model, rays)
     if missed is not None:
         parts.append(Folded("Rays of the points beside the centres", [missed]))
     if "absolute_orientation" in model:
-        parts += parts_of(tables.of_ground(model["absolute_orientation"]))
-    parts += parts_of(tables.of_truth(model["truth"]))
+        parts += terminal_parts(tables.ground_table(model["absolute_orientation"]))
+    parts += terminal_parts(tables.truth_table(model["truth"]))
     return Chapter(title, parts)
 
 
 def _of_strip(strip: Document, places: Places, title: str, name: str) -> Chapter:
     shown = [] if "message" in strip else _strip_figures(strip, places, title, name)
-    return Chapter(title, [*shown, *parts_of(*tables.of_strip(strip), caption=title)])
+    return Chapter(title, [*shown, *terminal_parts(*tables.strip_tables(strip), caption=title)])
 
 
 def _strip_figures(strip: Document, places: Places, title: str, name: str) -> list[Part]:
@@ -96,20 +96,20 @@ def _of_all_strips(document: Document) -> Chapter:
     figures = [all_strips(document["strips"], "all")] if document["strips"] else []
     spent = {f"case {case}": each["hours"] for case, each in document["sessions"].items()}
     times = [hours(spent, "cases", "Hours at the instrument by case")] if spent else []
-    return Chapter("Strips of all cases", [*figures, *parts_of(tables.of_strips(document)), *times])
+    return Chapter("Strips of all cases", [*figures, *terminal_parts(tables.strips_table(document)), *times])
 
 
 def _of_calibration(kept: Kept) -> Chapters:
     rows = kept.rows(RESIDUALS)
     figures = [grid_residuals(rows, side, f"g{side}") for side in kept.document["projectors"]]
-    yield Chapter("Grid test", [*(each for each in figures if each), *parts_of(of_grid_test(kept.document))])
+    yield Chapter("Grid test", [*(each for each in figures if each), *terminal_parts(of_grid_test(kept.document))])
 
 
 def _of_compilation(kept: Kept) -> Chapters:
     document = kept.document
     drawn = kept.text(SVG)
     sheet = [_map(drawn, f"Map of model {document['model']}")] if drawn else []
-    yield Chapter("Map", [*sheet, *parts_of(of_compilation(document), caption="Lines beside the true ground")])
+    yield Chapter("Map", [*sheet, *terminal_parts(map_tables(document), caption="Lines beside the true ground")])
     if "levelling" in document:
         yield _of_strip(document["levelling"] | {"joins": []}, {}, "Levelling on the ground control", "l")
 
@@ -122,7 +122,7 @@ def _map(svg: str, title: str) -> Picture:
 
 def _of_bridge(kept: Kept) -> Chapters:
     document = kept.document
-    yield Chapter("Bridge", list(parts_of(of_bridge(document), caption="Bridged models")))
+    yield Chapter("Bridge", list(terminal_parts(of_bridge(document), caption="Bridged models")))
     independent = _places(kept, f"{INDEPENDENT}/{STRIP}")
     ground = {point: at for point, at in independent.items() if not is_centre(point)}
     for way, places in (("bridged", ground), (INDEPENDENT, independent)):
@@ -150,8 +150,8 @@ def _of_operator(kept: Kept) -> Chapters:
                 [(what, f"{each:.4f}") for what, each in operator[key].items()],
             )
         )
-    parts += parts_of(tables.of_hours(operator))
-    parts += parts_of(*(Text(remark) for remark in operator["remarks"]))
+    parts += terminal_parts(tables.hours_table(operator))
+    parts += terminal_parts(*(Text(remark) for remark in operator["remarks"]))
     slips = kept.document["truth"]["slips"]
     if slips:
         parts.append(Folded(f"What the operator did wrongly without knowing: {len(slips)}", [_slips(slips)]))
@@ -165,7 +165,7 @@ def _slips(slips: list[Document]) -> Sheet:
 
 
 def _of_forms(kept: Kept) -> Chapters:
-    forms = [Folded(form.caption, form.as_parts()) for form in forms_of(kept) if form.columns]
+    forms = [Folded(form.caption, form.as_parts()) for form in make_forms(kept) if form.columns]
     if forms:
         yield Chapter("Observation book", list(forms))
 

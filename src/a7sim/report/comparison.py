@@ -10,11 +10,11 @@ import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from a7sim.documents import Document, head
+from a7sim.documents import Document, document_header
 from a7sim.mistakes import Mistake
 from a7sim.report.kept import Kept
-from a7sim.sheets import sheet
-from a7sim.wording import counted
+from a7sim.sheets import text_table
+from a7sim.wording import pluralize
 
 EXCLUDED_KEYS = frozenset(
     {
@@ -62,7 +62,7 @@ class Row:
         return len(set(self.values)) > 1
 
 
-def compared(sessions: Sequence[Kept], everything: bool = False) -> list[Row]:
+def compare_sessions(sessions: Sequence[Kept], everything: bool = False) -> list[Row]:
     """Return the facts that differ between two sessions or more of one kind, or all of them. Raises Mistake."""
     kinds = {kept.command: kept.folder for kept in reversed(sessions)}
     if len(kinds) > 1:
@@ -122,15 +122,15 @@ def _as_text(value: Any) -> str:
     return msgspec.json.encode(value).decode()
 
 
-def of_comparison(sessions: Sequence[Kept], rows: Sequence[Row]) -> Document:
+def comparison_document(sessions: Sequence[Kept], rows: Sequence[Row]) -> Document:
     """Return a comparison as a document."""
-    return head("compare") | {
+    return document_header("compare") | {
         "sessions": [str(kept.folder) for kept in sessions],
         "rows": [{"fact": row.fact, "values": list(row.values)} for row in rows],
     }
 
 
-def table_of(sessions: Sequence[Kept], rows: Sequence[Row], width: int) -> RenderableType:
+def comparison_table(sessions: Sequence[Kept], rows: Sequence[Row], width: int) -> RenderableType:
     """Return a comparison for a terminal of so many columns."""
     if not rows:
         return Text(f"{len(sessions)} sessions of a7sim {sessions[0].command}, all the same")
@@ -138,10 +138,10 @@ def table_of(sessions: Sequence[Kept], rows: Sequence[Row], width: int) -> Rende
     each_value = max(MIN_WIDTH, (width - leaves - 2) // len(sessions) - 2)
     parts: list[RenderableType] = [Text(f"{i}: {kept.folder}") for i, kept in enumerate(sessions, start=1)]
     for group, members in groupby(rows, key=lambda row: row.fact.rpartition(".")[0]):
-        table = sheet("", *map(str, range(1, len(sessions) + 1)), left=range(len(sessions) + 1), fold=range(1, 99))
+        table = text_table("", *map(str, range(1, len(sessions) + 1)), left=range(len(sessions) + 1), fold=range(1, 99))
         for column, wide in zip(table.columns, (leaves, *[each_value] * len(sessions)), strict=True):
             column.width = wide
         for row in members:
             table.add_row(row.fact.rpartition(".")[2], *row.values)
         parts += [Text(), Text(group.replace(".", " ") or "session", style="bold"), table]
-    return Group(*parts, Text(f"\n{counted(sum(row.differs for row in rows), 'difference')}"))
+    return Group(*parts, Text(f"\n{pluralize(sum(row.differs for row in rows), 'difference')}"))

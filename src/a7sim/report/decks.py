@@ -7,10 +7,10 @@ from a7sim.mistakes import Mistake
 from a7sim.reduction import Ground, Model, Undetermined
 from a7sim.report.kept import Kept
 from a7sim.session.folder import CARDS, MODELS_OF_WAY, STRIP, STRIP_OF_WAY
-from a7sim.session.strips import cards_of, grounded, models_of
+from a7sim.session.strips import models_from_documents, orient_strip, strip_cards
 
 
-def deck_of(kept: Kept, way: str | None = None) -> str:
+def strip_deck(kept: Kept, way: str | None = None) -> str:
     """Return the deck of a session's strip, or of the one measured in a `way`. Raises Mistake where there is none."""
     if way is None and (there := kept.text(CARDS)):
         return there
@@ -18,7 +18,7 @@ def deck_of(kept: Kept, way: str | None = None) -> str:
         strip, models, points = _measured(kept, way)
         ground = _ground(kept, strip, points)
     try:
-        cards = cards_of(grounded(models, ground), models, ground)
+        cards = strip_cards(orient_strip(models, ground), models, ground)
     except Undetermined as reason:
         raise Mistake(f"{kept.folder}: expected a strip that can be put on cards: {reason}") from reason
     return "\n".join([*cards.deck, ""])
@@ -34,7 +34,7 @@ def _measured(kept: Kept, way: str | None) -> tuple[Document, list[Model], str]:
         return document["ways"][way], _models(kept, MODELS_OF_WAY.format(way.lower())), STRIP_OF_WAY.format(way.lower())
     if "residuals_m" not in document.get("strip", {}):
         raise Mistake(f"{kept.folder}: expected a session with a strip on the ground, got one without{_hint(document)}")
-    return document["strip"], models_of(document["models"]), STRIP
+    return document["strip"], models_from_documents(document["models"]), STRIP
 
 
 def _hint(document: Document) -> str:

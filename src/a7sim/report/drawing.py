@@ -151,7 +151,7 @@ def _safe(text: str) -> str:
     return text.replace("\\", r"\\")
 
 
-def nice(value: float) -> float:
+def nice_number(value: float) -> float:
     """Return the largest 1, 2 or 5 times a power of ten that is not above a value over zero."""
     power = 10.0 ** int(f"{value:e}".partition("e")[2])
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))

@@ -78,10 +78,10 @@ def forms_text(kept: Kept) -> str:
     if not kept.book:
         raise Mistake(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
     with kept.read():
-        return PAGE_BREAK.join(form.as_text() for form in forms_of(kept))
+        return PAGE_BREAK.join(form.as_text() for form in make_forms(kept))
 
 
-def forms_of(kept: Kept) -> Iterator[Form]:
+def make_forms(kept: Kept) -> Iterator[Form]:
     """Yield the forms of a session in the order in which they were filled."""
     for (model, form, number), entries in groupby(kept.book, key=lambda entry: (entry.model, entry.form, entry.round)):
         yield _filled(kept.document, model, form, number, list(entries))
@@ -128,7 +128,7 @@ def _as_it_went(observed: Sequence[Entry]) -> Iterator[Column]:
 def _columns(observed: Sequence[Entry], parallaxes: Mapping[str, float]) -> Iterator[Column]:
     points = list(dict.fromkeys(entry.point for entry in observed))
     yield Column("point", "", points)
-    kept = readings_of(observed)
+    kept = valid_readings(observed)
     for item in dict.fromkeys(entry.item for entry in observed):
         by_point = [kept.get((point, item), []) for point in points]
         most = max(map(len, by_point))
@@ -141,7 +141,7 @@ def _columns(observed: Sequence[Entry], parallaxes: Mapping[str, float]) -> Iter
         yield Column("p", "", [f"{parallaxes[point]:+.3f}" if point in parallaxes else "" for point in points])
 
 
-def readings_of(entries: Iterable[Entry]) -> dict[tuple[str, str], list[str]]:
+def valid_readings(entries: Iterable[Entry]) -> dict[tuple[str, str], list[str]]:
     """Return the readings that were not struck out by point and item."""
     readings: dict[tuple[str, str], list[str]] = {}
     for entry in entries:

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 
 from a7sim.documents import Document
-from a7sim.report.forms import mean, readings_of
+from a7sim.report.forms import mean, valid_readings
 from a7sim.report.kept import Kept
 
 _ITEM = re.compile(r"(?P<axis>[XY]) (left|right) at Z (?P<level>-?[0-9.]+)")
@@ -14,7 +14,7 @@ TOLERATED = 2e-3
 """Counter units within which the rays must give the rms that the results have."""
 
 
-def rays_of(kept: Kept, model: Document, side: str) -> dict[str, tuple[float, float]]:
+def pointing_rays(kept: Kept, model: Document, side: str) -> dict[str, tuple[float, float]]:
     """Return X and Y by point where its pointings at two levels, gone on by T0, come to the centre's height.
 
     They are the residuals of the centre's equations, seen from it. None where a centre was found in another way, or
@@ -24,7 +24,7 @@ def rays_of(kept: Kept, model: Document, side: str) -> dict[str, tuple[float, fl
     entries = [entry for entry in kept.book if entry.model == model["model"] and entry.form == form]
     found = model["perspective_centres"][side]
     by_point: dict[str, dict[tuple[str, float], float]] = {}
-    for (point, item), readings in readings_of(entries).items():
+    for (point, item), readings in valid_readings(entries).items():
         if match := _ITEM.fullmatch(item):
             by_point.setdefault(point, {})[match["axis"], float(match["level"])] = mean(readings)
     levels = sorted({level for readings in by_point.values() for _, level in readings})

@@ -10,7 +10,7 @@ from rich.text import Text
 from a7sim.report.page import Heading, Paragraph, Part, Sheet
 
 
-def parts_of(*shown: RenderableType, caption: str = "") -> Iterator[Part]:
+def terminal_parts(*shown: RenderableType, caption: str = "") -> Iterator[Part]:
     """Yield the parts of a page that say what a terminal shows.
 
     A bold line is the caption of the table after it; a table without one has the last heading's, else `caption`.

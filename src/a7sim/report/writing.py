@@ -1,7 +1,7 @@
 """The report of a session as one page."""
 
 from a7sim.documents import Document
-from a7sim.report.chapters import chapters_of
+from a7sim.report.chapters import make_chapters
 from a7sim.report.kept import Kept
 from a7sim.report.page import Paragraph, Part, page
 
@@ -14,12 +14,12 @@ _ENDS = {
 }
 
 
-def report_of(kept: Kept) -> str:
+def render_report(kept: Kept) -> str:
     """Return a session's report as a page of HTML. Raises Mistake for damaged results or files."""
     with kept.read():
         document = kept.document
         title = f"{document['scenario']}: {_TITLES[kept.command]}"
-        return page(title, list(_lead(document)), list(chapters_of(kept)))
+        return page(title, list(_lead(document)), list(make_chapters(kept)))
 
 
 def _lead(document: Document) -> list[Part]:

@@ -1,15 +1,15 @@
 """Scenarios: what a file may say about a flight, photographs, an instrument and an operator."""
 
-from a7sim.scenario.carried import carried, hash_of, scenario_from
+from a7sim.scenario.carried import from_data, hash_scenario, to_data
 from a7sim.scenario.loading import (
     ScenarioError,
-    bare_name,
+    build_scenario,
     find_scenario,
     load_scenario,
-    scenario_of,
+    scenario_name,
     scenario_schema,
 )
-from a7sim.scenario.requests import Request, RequestedScenario, rephrased, requested
+from a7sim.scenario.requests import Request, RequestedScenario, amend_provenance, with_provenance
 from a7sim.scenario.schema import (
     SCHEMA_VERSION,
     Camera,
@@ -47,15 +47,15 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "StripPlan",
-    "bare_name",
-    "carried",
+    "amend_provenance",
+    "build_scenario",
     "find_scenario",
-    "hash_of",
+    "from_data",
+    "hash_scenario",
     "load_scenario",
     "observer_of_skill",
-    "rephrased",
-    "requested",
-    "scenario_from",
-    "scenario_of",
+    "scenario_name",
     "scenario_schema",
+    "to_data",
+    "with_provenance",
 ]

@@ -12,7 +12,7 @@ from a7sim.scenario.requests import RequestedScenario
 from a7sim.scenario.schema import Scenario
 
 
-def carried(scenario: Scenario) -> dict[str, Any]:
+def to_data(scenario: Scenario) -> dict[str, Any]:
     """Return a scenario as data for JSON, whole; measurements that come with a7sim are named by their file alone.
 
     Where somebody asked for it in a certain way, that is carried along.
@@ -20,7 +20,7 @@ def carried(scenario: Scenario) -> dict[str, Any]:
     return _naming(msgspec.to_builtins(scenario), _shelved)
 
 
-def scenario_from(data: Any) -> Scenario:
+def from_data(data: Any) -> Scenario:
     """Return the scenario that was carried. Raises Mistake for data that is none."""
     try:
         return msgspec.convert(_naming(data, _found), RequestedScenario if "request" in data else Scenario)
@@ -28,12 +28,12 @@ def scenario_from(data: Any) -> Scenario:
         raise Mistake(f"expected a scenario of this version of a7sim, got another: {error}") from error
 
 
-def hash_of(scenario: Scenario) -> str:
+def hash_scenario(scenario: Scenario) -> str:
     """Return the SHA-256 of a scenario and of the measurements that it names, however it was asked for.
 
     Raises Mistake where one is missing.
     """
-    content = {name: value for name, value in carried(scenario).items() if name != "request"}
+    content = {name: value for name, value in to_data(scenario).items() if name != "request"}
     digest = hashlib.sha256(msgspec.json.encode(content, order="sorted"))
     for file in sorted({photo.measured.file for photo in scenario.photos if photo.measured}):
         try:

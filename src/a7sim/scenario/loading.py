@@ -10,15 +10,15 @@ from typing import Any
 
 import msgspec
 
-from a7sim.files import read_toml, what_is_at
+from a7sim.files import describe_missing_file, read_toml
 from a7sim.mistakes import Mistake
-from a7sim.scenario.references import mistakes_of_reference
+from a7sim.scenario.references import cross_check_errors
 from a7sim.scenario.schema import Scenario
 from a7sim.scenario.skills import PROFILES
-from a7sim.scenario.validation import mistakes_of_form
-from a7sim.shelves import names_of, shelves_of
+from a7sim.scenario.validation import schema_errors
+from a7sim.shelves import bundled_dirs, bundled_names
 
-SEARCH_PATH = shelves_of("scenarios")
+SEARCH_PATH = bundled_dirs("scenarios")
 """Where the scenarios are that come with a7sim."""
 
 
@@ -46,11 +46,11 @@ def find_scenario(name: str | Path) -> Path:
         found = shelf / f"{path.name.removesuffix('.toml')}.toml"
         if path.parent in (Path(), Path("scenarios")) and found.is_file():
             return found
-    known = ", ".join(names_of("scenarios"))
-    raise ScenarioError(str(name), [f"expected a scenario file or one of {known}, found {what_is_at(path)}"])
+    known = ", ".join(bundled_names("scenarios"))
+    raise ScenarioError(str(name), [f"expected a scenario file or one of {known}, found {describe_missing_file(path)}"])
 
 
-def bare_name(name: str | Path) -> str:
+def scenario_name(name: str | Path) -> str:
     """Return what a scenario is called wherever it stands: its bare name if it comes with a7sim, else its file's."""
     path = find_scenario(name).resolve()
     return path.stem if path.parent in [shelf.resolve() for shelf in SEARCH_PATH] else path.name
@@ -74,17 +74,17 @@ def load_scenario(
         _set(raw, key, _value_of(text), f"--set {key}={text}")
     for key, value in (settings or {}).items():
         _set(raw, key, deepcopy(value), key)
-    return scenario_of(raw, path.parent, str(path))
+    return build_scenario(raw, path.parent, str(path))
 
 
-def scenario_of(raw: Mapping[str, Any], folder: Path, source: str = "scenario") -> Scenario:
+def build_scenario(raw: Mapping[str, Any], folder: Path, source: str = "scenario") -> Scenario:
     """Return the scenario of raw tables whose files stand in `folder`. Raises ScenarioError."""
     if "photos" not in raw and "responses" in raw:
         raise ScenarioError(source, ["expected a scenario, got a study (`a7sim study` takes it)"])
     raw = _with_models(_with_profile(_with_skill_as_table(raw)))
     mistakes = [
-        *mistakes_of_form(raw, _expected()),
-        *mistakes_of_reference(raw, folder),
+        *schema_errors(raw, _expected()),
+        *cross_check_errors(raw, folder),
     ]
     if mistakes:
         raise ScenarioError(source, mistakes)

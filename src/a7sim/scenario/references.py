@@ -18,7 +18,7 @@ MIN_IN_PLAN, MIN_IN_HEIGHT = 2, 3
 """Points of control that place a strip on the ground (S)."""
 
 
-def mistakes_of_reference(raw: Mapping[str, Any], folder: Path) -> Iterator[str]:
+def cross_check_errors(raw: Mapping[str, Any], folder: Path) -> Iterator[str]:
     """Yield a sentence for everything in the tables that does not fit the rest."""
     yield from _mistakes_in_names(raw)
     yield from _mistakes_in_camera(_table(raw, "camera"))

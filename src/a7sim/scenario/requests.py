@@ -25,13 +25,13 @@ class RequestedScenario(Scenario, frozen=True, kw_only=True):
     request: Request
 
 
-def requested(scenario: Scenario, request: Request) -> RequestedScenario:
+def with_provenance(scenario: Scenario, request: Request) -> RequestedScenario:
     """Return a scenario with the request that chose it."""
     values = {name: getattr(scenario, name) for name in Scenario.__struct_fields__}
     return RequestedScenario(**values, request=request)
 
 
-def rephrased(scenario: Scenario, words: str, instead: str, settings: Mapping[str, str] = NOTHING) -> Scenario:
+def amend_provenance(scenario: Scenario, words: str, instead: str, settings: Mapping[str, str] = NOTHING) -> Scenario:
     """Return a scenario whose request, where it has one, says something instead of words and changes more settings."""
     if not isinstance(scenario, RequestedScenario):
         return scenario

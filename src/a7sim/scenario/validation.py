@@ -12,7 +12,7 @@ from msgspec import inspect
 Raw = Any
 
 
-def mistakes_of_form(raw: Raw, expected: inspect.Type, path: str = "") -> Iterator[str]:
+def schema_errors(raw: Raw, expected: inspect.Type, path: str = "") -> Iterator[str]:
     """Yield a sentence for every value of `raw` that is not of the expected type, range or name."""
     constraint, described = _unwrap(expected)
     if isinstance(constraint, inspect.StructType):
@@ -45,14 +45,14 @@ def _mistakes_in_table(raw: Raw, table: inspect.StructType, described: str | Non
             yield f"{_join(path, key)}: expected {known}"
     for name, field in fields.items():
         if name in raw:
-            yield from mistakes_of_form(raw[name], field.type, _join(path, name))
+            yield from schema_errors(raw[name], field.type, _join(path, name))
         elif field.required:
             constraint, described = _unwrap(field.type)
             yield f"{_join(path, name)}: expected {described or _in_words(constraint)}, got nothing"
 
 
 def _mistakes_in_union(raw: Raw, union: inspect.UnionType, path: str) -> Iterator[str]:
-    found = [list(mistakes_of_form(raw, each, path)) for each in union.types]
+    found = [list(schema_errors(raw, each, path)) for each in union.types]
     if all(found):
         structured = [
             mistakes
@@ -85,7 +85,7 @@ def _mistakes_in_list(
     if not right_length:
         yield f"{path}: expected {described or _in_words(expected)}, got {len(raw)}"
     for index, (item, item_type) in enumerate(zip(raw, item_types, strict=False)):
-        yield from mistakes_of_form(item, item_type, f"{path}[{index}]")
+        yield from schema_errors(item, item_type, f"{path}[{index}]")
 
 
 def _mistakes_in_dictionary(raw: Raw, expected: inspect.DictType, path: str) -> Iterator[str]:
@@ -93,7 +93,7 @@ def _mistakes_in_dictionary(raw: Raw, expected: inspect.DictType, path: str) -> 
         yield f"{path}: expected a table, got {_shown(raw)}"
         return
     for key, value in raw.items():
-        yield from mistakes_of_form(value, expected.value_type, _join(path, key))
+        yield from schema_errors(value, expected.value_type, _join(path, key))
 
 
 def _fits(raw: Raw, constraint: inspect.Type) -> bool:

@@ -132,12 +132,12 @@ def _undone(imaging: Callable[[Array], Array], imaged: Array) -> Array:
     return image
 
 
-def picture_of_marks(points: Marks) -> Content:
+def marks_image(points: Marks) -> Content:
     """Return the picture of measured points: signals on grey."""
     covered = signals(points)
     return lambda xy, element: np.maximum(0.45, covered(xy, element))
 
 
-def sharply(content: Content) -> Content:
+def point_sampled(content: Content) -> Content:
     """Return a picture in elements without width: every edge is sharp, and what is narrow may fall between them."""
     return lambda xy, _: content(xy, 0.0)

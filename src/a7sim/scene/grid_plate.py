@@ -4,8 +4,8 @@ import numpy as np
 
 from a7sim.scenario.schema import Camera, GridPlate
 from a7sim.scene.camera import fiducial_places
-from a7sim.scene.content import picture_of_marks
-from a7sim.scene.photograph import Marks, Photograph, sketched
+from a7sim.scene.content import marks_image
+from a7sim.scene.photograph import Marks, Photograph, prick_points
 
 GRID_PLATE_STREAM = 6
 """Spawn key of a plate's random numbers, under the plate's own seed."""
@@ -29,7 +29,7 @@ def grid_plate(plate: GridPlate, camera: Camera, polarity: str) -> Photograph:
         certificate,
         fiducials,
         points,
-        sketched(points, rng),
+        prick_points(points, rng),
         polarity,
-        content=picture_of_marks(points),
+        content=marks_image(points),
     )

@@ -53,7 +53,7 @@ def distance_from(chain: Array, plan: Array, within: float) -> Array:
     return np.asarray(np.sqrt(nearest).reshape(plan.shape[1:]))
 
 
-def lines_of(lines: Sequence[Line]) -> dict[str, GroundLine]:
+def make_lines(lines: Sequence[Line]) -> dict[str, GroundLine]:
     """Return the lines of a scenario by name. Raises Mistake when two have the same name."""
     found: dict[str, GroundLine] = {}
     for line in lines:

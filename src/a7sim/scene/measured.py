@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from a7sim.files import read_rows, unique
+from a7sim.files import read_rows, rows_by_key
 from a7sim.geometry import Array
 from a7sim.mistakes import Mistake
 from a7sim.scenario.schema import FORMAT_MM, Camera, Measured
@@ -29,10 +29,10 @@ def measured_marks(measured: Measured, name: str, camera: Camera) -> tuple[Marks
     path = Path(measured.file)
     if measured.side:
         x, y = ("xl", "yl") if measured.side == "left" else ("xr", "yr")
-        by_point = unique(path, read_rows(path, ["point"], [x, y]), "point")
+        by_point = rows_by_key(path, read_rows(path, ["point"], [x, y]), "point")
         found = {key[0]: (row.numbers[x], row.numbers[y]) for key, row in by_point.items()}
     else:
-        by_photo = unique(path, read_rows(path, ["photo", "point"], ["x", "y"]), "photo", "point")
+        by_photo = rows_by_key(path, read_rows(path, ["photo", "point"], ["x", "y"]), "photo", "point")
         wanted = measured.photo or name
         found = {key[1]: (row.numbers["x"], row.numbers["y"]) for key, row in by_photo.items() if key[0] == wanted}
         if not found:

@@ -50,7 +50,7 @@ class Photograph:
     content: Content | None = field(default=None, compare=False)
 
 
-def sketched(points: Marks, rng: np.random.Generator) -> Marks:
+def prick_points(points: Marks, rng: np.random.Generator) -> Marks:
     """Return the points as somebody pricked them on the paper print."""
     return Marks(points.names, points.xy + rng.normal(0.0, SKETCH_SIGMA_MM, points.xy.shape))
 
@@ -86,7 +86,7 @@ def within_format(xy: Array, half_width_mm: float = 107.0) -> npt.NDArray[np.boo
     return np.asarray((np.abs(xy) <= half_width_mm).all(axis=0))
 
 
-def chosen(marks: Marks, keep: Sequence[bool] | npt.NDArray[np.bool_]) -> Marks:
+def select(marks: Marks, keep: Sequence[bool] | npt.NDArray[np.bool_]) -> Marks:
     """Return the marks for which `keep` is true."""
     kept = np.asarray(keep, dtype=bool)
     if kept.all():

@@ -9,12 +9,12 @@ from a7sim.geometry import GON, Array, image_of, length_of, mxm, mxv, rotation, 
 from a7sim.mistakes import Mistake
 from a7sim.scenario.schema import Measured, Model, Photo, Published, Scenario
 from a7sim.scene.camera import distorted, fiducial_places, lowered_by_curvature, refracted
-from a7sim.scene.content import Depicted, PictureOfGround, picture_of_marks, sharply
+from a7sim.scene.content import Depicted, PictureOfGround, marks_image, point_sampled
 from a7sim.scene.emulsion import Emulsion
 from a7sim.scene.grid_plate import grid_plate
-from a7sim.scene.lines import GroundLine, lines_of
+from a7sim.scene.lines import GroundLine, make_lines
 from a7sim.scene.measured import measured_marks
-from a7sim.scene.photograph import Content, Deformation, Marks, Photograph, chosen, sketched, within_format
+from a7sim.scene.photograph import Content, Deformation, Marks, Photograph, prick_points, select, within_format
 from a7sim.scene.terrain import Ground, Truths
 from a7sim.standard_points import PLACES
 
@@ -116,7 +116,7 @@ class Flight:
     @classmethod
     def of(cls, scenario: Scenario, pictures: int = PICTURES) -> "Flight":
         """Return what the scenes of a scenario share. Raises Mistake for bad files."""
-        ground, lines = Ground.of(scenario.terrain), lines_of(scenario.lines)
+        ground, lines = Ground.of(scenario.terrain), make_lines(scenario.lines)
         depicted = Depicted(ground, tuple(lines.values()), None if pictures < 2 else scenario.terrain.seed)
         stations = {
             photo.name: Station(
@@ -179,14 +179,14 @@ class Flight:
         sketching = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(SKETCH_STREAM, exposure.index)))
         if exposure.picture is None:
             fiducials, points = exposure.fiducials, exposure.points
-            content = picture_of_marks(points)
+            content = marks_image(points)
         else:
             stream = (FILM_STREAM, exposure.index)
             filming = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=stream))
             deformation = Deformation.drawn(self.scenario.film, filming)
             fiducials = Marks(exposure.fiducials.names, deformation.of_fiducials(exposure.fiducials.xy, filming))
             imaged = Marks(exposure.points.names, deformation.of_points(exposure.points.xy, filming))
-            points = chosen(imaged, within_format(imaged.xy) & exposure.visible)
+            points = select(imaged, within_format(imaged.xy) & exposure.visible)
             emulsion = None if self.pictures < 2 else Emulsion(seed, stream)
             content = exposure.picture(deformation.matrix, points, emulsion)
         return Photograph(
@@ -194,7 +194,7 @@ class Flight:
             self.scenario.camera,
             fiducials,
             points,
-            sketched(points, sketching),
+            prick_points(points, sketching),
             photo.polarity,
             photo.laid,
             content,
@@ -282,7 +282,7 @@ def _exposed(
 def _sharp_before_2(photograph: Photograph, pictures: int) -> Photograph:
     if pictures >= 2 or photograph.content is None:
         return photograph
-    return replace(photograph, content=sharply(photograph.content))
+    return replace(photograph, content=point_sampled(photograph.content))
 
 
 def _imaged(scenario: Scenario, station: Station, imaging: Callable[[Array], Array], points: Array) -> Array:

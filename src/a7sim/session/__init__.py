@@ -7,9 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from a7sim.session.running import Cable, Session, Watcher, open_session, run, straight
+    from a7sim.session.running import Cable, Session, Watcher, direct, open_session, run
 
-__all__ = ["Cable", "Session", "Watcher", "open_session", "run", "straight"]
+__all__ = ["Cable", "Session", "Watcher", "direct", "open_session", "run"]
 
 
 def __getattr__(name: str) -> Any:

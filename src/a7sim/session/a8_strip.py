@@ -11,22 +11,22 @@ import numpy as np
 from a7sim.geometry import Array, plane_rotation
 from a7sim.instrument.condition import INSTRUMENT_STREAM
 from a7sim.operator.dice import OPERATOR_STREAM
-from a7sim.reduction import Model, Undetermined, a8_centres, a8_model_coordinates, picture_lie
+from a7sim.reduction import Model, Undetermined, a8_centres, a8_model_coordinates, picture_placement
 from a7sim.scenario import ModelPlan, Observer, Scenario
 from a7sim.scene import Photograph, Scene
 from a7sim.session.analytical import (
     StripResult,
-    blamed_on_model,
+    add_centres,
     calibrated_fiducials,
     common_points,
+    errors_for_model,
+    mark_coordinates,
     measured_points,
-    on_the_ground,
-    places_of,
+    orient_measured_strip,
     pointing_errors,
-    rounded,
-    with_centres,
+    round_to_count,
 )
-from a7sim.session.clearing import Cleared, cleared
+from a7sim.session.clearing import Cleared, clear_parallaxes
 from a7sim.session.projectors import Projector
 from a7sim.standard_points import CASES
 
@@ -54,15 +54,15 @@ class Laid:
     c: float
 
 
-def laid(photograph: Photograph, names: tuple[str, ...], observer: Observer, rng: np.random.Generator) -> Laid:
+def centre_photo(photograph: Photograph, names: tuple[str, ...], observer: Observer, rng: np.random.Generator) -> Laid:
     """Centre a photograph by its fiducials and set the principal distance for the size its film has."""
     camera = photograph.camera
     marks = calibrated_fiducials(photograph)
     seen = photograph.fiducials.xy + 1e-3 * observer.fiducial_um * rng.standard_normal(marks.shape)
-    lie = picture_lie(seen - marks, marks)
+    lie = picture_placement(seen - marks, marks)
     shift = np.array([lie.dx, lie.dy]) + np.array(camera.principal_point)
-    centred = plane_rotation(-lie.turn) @ places_of(photograph.points, names) - shift[:, None]
-    return Laid(centred, float(rounded(np.array(camera.c * (1.0 + lie.scale)), C_STEP_MM)))
+    centred = plane_rotation(-lie.turn) @ mark_coordinates(photograph.points, names) - shift[:, None]
+    return Laid(centred, float(round_to_count(np.array(camera.c * (1.0 + lie.scale)), C_STEP_MM)))
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class A8Setup:
         """Lay the photographs of a model on their carriers; draw how they are shown, and all that is seen wrongly."""
         photographs = scene.photographs[model.left], scene.photographs[model.right]
         names = common_points(photographs[0].points, photographs[1].points, wanted)
-        pictures = tuple(laid(each, names, self.observer, self.rng) for each in photographs)
+        pictures = tuple(centre_photo(each, names, self.observer, self.rng) for each in photographs)
         left, right = (
             projector.shown(picture.image, self.rng)
             for projector, picture in zip(self.projectors, pictures, strict=True)
@@ -100,15 +100,17 @@ class A8Setup:
             left, right = (np.stack([each.at_standard_points[side] for each in models], axis=-1) for side in range(2))
             c1, c2 = np.array([each.c for each in models]).T
             try:
-                stands = cleared(left, right, (c1, c2), self.bx, np.stack([each.errors for each in models], axis=-1))
+                stands = clear_parallaxes(
+                    left, right, (c1, c2), self.bx, np.stack([each.errors for each in models], axis=-1)
+                )
             except Undetermined:
                 pass
             else:
                 return [stands.of(i) for i in range(len(models))]
         alone = []
         for each in models:
-            with blamed_on_model(each.model.name):
-                alone.append(cleared(*each.at_standard_points, each.c, self.bx, each.errors))
+            with errors_for_model(each.model.name):
+                alone.append(clear_parallaxes(*each.at_standard_points, each.c, self.bx, each.errors))
         return alone
 
     def measured(self, shown: "Shown", stand: Cleared) -> Model:
@@ -116,7 +118,7 @@ class A8Setup:
         readings = self._read(stand.seen(shown.left, shown.right)[0], stand, shown.pointing)
         centres = np.array(a8_centres(self.bx, COLUMN_MM, REFERENCE_MM)).T
         points, ends = (a8_model_coordinates(each, self.bx, COLUMN_MM, REFERENCE_MM) for each in (readings, centres))
-        return with_centres(shown.model, shown.names, points, ends)
+        return add_centres(shown.model, shown.names, points, ends)
 
     def _read(self, points: Array, stand: Cleared, pointing: Array) -> Array:
         """Return the scales' readings ``(3, n)`` for points ``(3, n)`` from the left centre, as pointed at."""
@@ -126,7 +128,7 @@ class A8Setup:
         height = 1e-3 * observer.height_um * enlargement * -points[2] / self.bx
         x, y, z = points[..., None] + np.array([plan, plan, height])[..., None] * pointing
         readings = np.array([x / 2.0 + 200.0 - self.bx / 4.0, y / 2.0 + 200.0, z + COLUMN_MM + REFERENCE_MM])
-        return np.asarray(rounded(readings, SCALE_STEP).mean(axis=-1))
+        return np.asarray(round_to_count(readings, SCALE_STEP).mean(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -179,4 +181,4 @@ def strip_on_a8(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
         for positions in [scene.standard_points[model.name]]
     ]
     models = tuple(a8.measured(each, stand) for each, stand in zip(shown, a8.cleared(shown), strict=True))
-    return on_the_ground(models, scenario, scene)
+    return orient_measured_strip(models, scenario, scene)

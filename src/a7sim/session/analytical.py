@@ -22,8 +22,8 @@ from a7sim.reduction.strips import CENTRE, is_centre
 from a7sim.scenario import ModelPlan, Scenario
 from a7sim.scenario.schema import Comparator, Observer
 from a7sim.scene import Marks, Photograph, Scene
-from a7sim.session.clearing import cleared
-from a7sim.session.strips import GroundedStrip, ground_of, grounded
+from a7sim.session.clearing import clear_parallaxes
+from a7sim.session.strips import GroundedStrip, ground_control, orient_strip
 from a7sim.standard_points import CASES
 
 COMPARATOR_STREAM = 5
@@ -102,7 +102,9 @@ def _in_pairs(scenario: Scenario, scene: Scene, wanted: frozenset[str], seed: in
         for index, (name, photograph) in enumerate(scene.photographs.items())
     }
     return [
-        Pair(model, names, places_of(measured[model.left], names), places_of(measured[model.right], names))
+        Pair(
+            model, names, mark_coordinates(measured[model.left], names), mark_coordinates(measured[model.right], names)
+        )
         for model in scenario.models
         for names in [common_points(measured[model.left], measured[model.right], wanted)]
     ]
@@ -113,7 +115,7 @@ def _measured_alone(
 ) -> Marks:
     """Return all points of a photograph from a monocomparator."""
     stage = _Stage.laid(photograph, observer, comparator, rng)
-    seen = pointed_at(
+    seen = simulate_pointings(
         stage.at(photograph.points.xy), 1e-3 * observer.monocular_um, observer.repeat_share, comparator.pointings, rng
     )
     return Marks(photograph.points.names, stage.read(seen))
@@ -131,14 +133,16 @@ def _measured_in_stereo(
     photographs = scene.photographs[model.left], scene.photographs[model.right]
     names = common_points(photographs[0].points, photographs[1].points, wanted)
     stages = [_Stage.laid(each, observer, comparator, rng) for each in photographs]
-    left, right = (stage.at(places_of(each.points, names)) for stage, each in zip(stages, photographs, strict=True))
+    left, right = (
+        stage.at(mark_coordinates(each.points, names)) for stage, each in zip(stages, photographs, strict=True)
+    )
     share, pointings = observer.repeat_share, comparator.pointings
-    seen = pointed_at(left, 1e-3 * observer.stereo_um, share, pointings, rng)
-    px = pointed_at((right - left)[:1], 1e-3 * observer.height_um, share, pointings, rng)
-    py = pointed_at((right - left)[1:], 1e-3 * observer.parallax_um, 1.0, pointings, rng)
+    seen = simulate_pointings(left, 1e-3 * observer.stereo_um, share, pointings, rng)
+    px = simulate_pointings((right - left)[:1], 1e-3 * observer.height_um, share, pointings, rng)
+    py = simulate_pointings((right - left)[1:], 1e-3 * observer.parallax_um, 1.0, pointings, rng)
     step = 1e-3 * comparator.least_count_um
-    parallaxes = rounded(np.concatenate([px, py]), step)
-    return Pair(model, names, stages[0].read(seen), stages[1].read(rounded(seen, step) + parallaxes))
+    parallaxes = round_to_count(np.concatenate([px, py]), step)
+    return Pair(model, names, stages[0].read(seen), stages[1].read(round_to_count(seen, step) + parallaxes))
 
 
 @dataclass(frozen=True)
@@ -157,8 +161,10 @@ class _Stage:
         turn, shift = plane_rotation(STAGE_TURN * rng.standard_normal()), STAGE_MM + rng.standard_normal(2)
         step = 1e-3 * comparator.least_count_um
         fiducials = turn @ photograph.fiducials.xy + shift[:, None]
-        seen = pointed_at(fiducials, 1e-3 * observer.monocular_um, observer.repeat_share, comparator.pointings, rng)
-        read = rounded(seen, step).mean(axis=-1)
+        seen = simulate_pointings(
+            fiducials, 1e-3 * observer.monocular_um, observer.repeat_share, comparator.pointings, rng
+        )
+        read = round_to_count(seen, step).mean(axis=-1)
         return cls(turn, shift, step, plane_fit(read, calibrated_fiducials(photograph), comparator.fit))
 
     def at(self, film: Array) -> Array:
@@ -167,7 +173,7 @@ class _Stage:
 
     def read(self, seen: Array) -> Array:
         """Return the means of readings ``(2, n, pointings)`` in mm of the calibrated system."""
-        return self.fit.calibrated(rounded(seen, self.step).mean(axis=-1))
+        return self.fit.calibrated(round_to_count(seen, self.step).mean(axis=-1))
 
 
 def calibrated_fiducials(photograph: Photograph) -> Array:
@@ -176,7 +182,9 @@ def calibrated_fiducials(photograph: Photograph) -> Array:
     return np.array([calibrated[name] for name in photograph.fiducials.names]).T
 
 
-def pointed_at(places: Array, sigma: Array | float, share: float, pointings: int, rng: np.random.Generator) -> Array:
+def simulate_pointings(
+    places: Array, sigma: Array | float, share: float, pointings: int, rng: np.random.Generator
+) -> Array:
     """Return places ``(k, n)`` as pointed at so many times ``(k, n, pointings)``.
 
     `share` of the error is new when the pointing is repeated at once; the rest is how the point itself is seen.
@@ -191,7 +199,7 @@ def pointing_errors(shape: tuple[int, ...], share: float, pointings: int, rng: n
     return np.asarray(seen[..., None] + share * rng.standard_normal((*shape, pointings)))
 
 
-def rounded(values: Array, least_count: float) -> Array:
+def round_to_count(values: Array, least_count: float) -> Array:
     """Return readings as a scale of this least count shows them; zero for one without steps."""
     return np.asarray(np.round(values / least_count) * least_count) if least_count else values
 
@@ -201,7 +209,7 @@ def common_points(left: Marks, right: Marks, wanted: frozenset[str]) -> tuple[st
     return tuple(sorted(wanted.intersection(left.names) & wanted.intersection(right.names)))
 
 
-def places_of(marks: Marks, names: Sequence[str]) -> Array:
+def mark_coordinates(marks: Marks, names: Sequence[str]) -> Array:
     """Return the places ``(2, len(names))`` of named marks."""
     place = {name: i for i, name in enumerate(marks.names)}
     return marks.xy[:, [place[name] for name in names]]
@@ -232,26 +240,26 @@ def _of_air(image: Array, scenario: Scenario, flying_height: float, ground_heigh
 
 def _strip_of(pairs: Sequence[Pair], scenario: Scenario, scene: Scene) -> StripResult:
     c, way = scenario.camera.c, scenario.comparator.orientation
-    return on_the_ground(tuple(_computed(pair, c, way) for pair in pairs), scenario, scene)
+    return orient_measured_strip(tuple(_computed(pair, c, way) for pair in pairs), scenario, scene)
 
 
-def on_the_ground(models: tuple[Model, ...], scenario: Scenario, scene: Scene) -> StripResult:
+def orient_measured_strip(models: tuple[Model, ...], scenario: Scenario, scene: Scene) -> StripResult:
     """Return the strip of a scenario's models, joined and adjusted as it asks for."""
     plan = scenario.strip
-    return StripResult(models, grounded(models, ground_of(scenario, scene), plan.join, plan.polynomial))
+    return StripResult(models, orient_strip(models, ground_control(scenario, scene), plan.join, plan.polynomial))
 
 
 def _computed(pair: Pair, c: float, way: str) -> Model:
     """Return a model computed from its images, at the scale of the photographs, in the left photograph's frame."""
-    with blamed_on_model(pair.model.name):
+    with errors_for_model(pair.model.name):
         turn, base = _oriented(pair.left, pair.right, c, way)
     base_length = float(length_of((pair.left - pair.right).mean(axis=1)))
     points, _ = model_coordinates(pair.left, pair.right, c, c, turn, base, base_length)
-    return with_centres(pair.model, pair.points, points, np.array([np.zeros(3), base_length * base]).T)
+    return add_centres(pair.model, pair.points, points, np.array([np.zeros(3), base_length * base]).T)
 
 
 @contextmanager
-def blamed_on_model(name: str) -> Iterator[None]:
+def errors_for_model(name: str) -> Iterator[None]:
     """Name the model in what its points leave undetermined."""
     try:
         yield
@@ -259,7 +267,7 @@ def blamed_on_model(name: str) -> Iterator[None]:
         raise Undetermined(f"model {name}: {undetermined}") from undetermined
 
 
-def with_centres(model: ModelPlan, names: Sequence[str], points: Array, centres: Array) -> Model:
+def add_centres(model: ModelPlan, names: Sequence[str], points: Array, centres: Array) -> Model:
     """Return a model of points ``(3, n)`` and of its left and right centre ``(3, 2)``."""
     ends = (f"{model.left}{CENTRE}", f"{model.right}{CENTRE}")
     return Model(model.name, (*names, *ends), np.concatenate([points, centres], axis=1))
@@ -268,7 +276,7 @@ def with_centres(model: ModelPlan, names: Sequence[str], points: Array, centres:
 def _oriented(left: Array, right: Array, c: float, way: str) -> tuple[Array, Array]:
     """Return the rotation ``(3, 3)`` of the right photograph into the left one's frame, and the unit base there."""
     if way == "parallax":
-        stand = cleared(left, right, (c, c), bx=1.0)
+        stand = clear_parallaxes(left, right, (c, c), bx=1.0)
         return stand.rotation, stand.base
     found = orientation_by_schut(left, right, c, c) if way == "schut" else relative_orientation(left, right, c, c)
     return found.rotation, found.base

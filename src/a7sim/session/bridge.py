@@ -9,22 +9,22 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 import a7sim
-from a7sim.documents import Document, as_json, head, of_absolute, of_adjustment
+from a7sim.documents import Document, absolute_document, adjustment_document, as_json, document_header
 from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit
-from a7sim.operator.bridging import BridgedModels, bridge, bridged
+from a7sim.operator.bridging import BridgedModels, bridge_strip, bridge_strip_batch
 from a7sim.reduction import Ground, Model, Strip, Undetermined, absolute_orientation, strip_adjustment
-from a7sim.scenario import Scenario, rephrased
+from a7sim.scenario import Scenario, amend_provenance
 from a7sim.scene import Scene
 from a7sim.session.analytical import StripResult
-from a7sim.session.crowd import open_crowd
-from a7sim.session.folder import MODELS, RESULTS, write_whole
-from a7sim.session.journal import Journal, Keeping, header_of
-from a7sim.session.results import models_csv, of_hours, of_request
+from a7sim.session.crowd import open_batch
+from a7sim.session.folder import MODELS, RESULTS, write_atomic
+from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.results import hours_document, models_csv, request_document
 from a7sim.session.running import Watcher, open_session, run
-from a7sim.session.sitting import sitting
-from a7sim.session.strips import GroundedStrip, ground_of
-from a7sim.sheets import sheet
+from a7sim.session.sitting import recorded_session
+from a7sim.session.strips import GroundedStrip, ground_control
+from a7sim.sheets import text_table
 
 INDEPENDENT = "independent"
 """Folder of the independent models within that of the bridge."""
@@ -57,7 +57,7 @@ def run_bridge(
     keeping.prepare(out, force, (INDEPENDENT,))
     done: list[Document] = []
     places: dict[str, Places] = {}
-    document = head("bridge") | of_request(scenario)
+    document = document_header("bridge") | request_document(scenario)
     document |= {"software": f"a7sim {a7sim.__version__}", "scenario": scenario.title, "seed": seed}
     document |= {"variant": scenario.instrument.variant, "status": "failed", "message": ""}
     document["bridged"] = {"models": done}
@@ -65,22 +65,22 @@ def run_bridge(
     def leaves() -> dict[str, str]:
         return {MODELS: models_csv([_as_model(name, each) for name, each in places.items()])}
 
-    about = header_of("bridge", scenario, seed)
-    with sitting(document, session, journal, about, out, leaves):
-        for model in bridge(session.person, job, watcher.tick, watcher.begins):
+    about = make_header("bridge", scenario, seed)
+    with recorded_session(document, session, journal, about, out, leaves):
+        for model in bridge_strip(session.person, job, watcher.tick, watcher.begins):
             places[model.model.name] = model.places_of(0)
             done.append(_of_model(model))
     if document["status"] != "complete":
         return document
     document["bridged"] |= {
-        "strip": _on_ground(bridged_strip([*places.values()]), ground_of(scenario, session.scene), scenario),
+        "strip": _on_ground(strip_points([*places.values()]), ground_control(scenario, session.scene), scenario),
         "hours": round(session.person.clock.now / 3600.0, 3),
     }
     document |= {"status": "interrupted", "message": "the session was interrupted among the independent models"}
     _leave(document, out)
     folder = out / INDEPENDENT if out else None
     alone = run(
-        rephrased(scenario, "a7sim bridge", "a7sim run"),
+        amend_provenance(scenario, "a7sim bridge", "a7sim run"),
         seed,
         folder,
         watcher,
@@ -95,7 +95,7 @@ def run_bridge(
 
 def _leave(document: Document, out: Path | None) -> None:
     if out is not None:
-        write_whole(out / RESULTS, as_json(document))
+        write_atomic(out / RESULTS, as_json(document))
 
 
 @dataclass(frozen=True)
@@ -107,25 +107,25 @@ class Bridging:
     operator: Document
 
 
-def bridged_alone(scenario: Scenario, seed: int) -> Bridging:
+def bridge_over_link(scenario: Scenario, seed: int) -> Bridging:
     """Bridge the strip of a scenario over the link."""
     session = open_session(scenario, seed)
     models: list[Model] = []
     message = ""
     try:
-        for each in bridge(session.person, session.job):
+        for each in bridge_strip(session.person, session.job):
             models.append(_as_model(each.model.name, each.places_of(0)))
     except (DoesNotFit, Undetermined) as trouble:
         message = str(trouble)
-    operator = of_hours(session.person.clock.now, session.person.timesheet)
+    operator = hours_document(session.person.clock.now, session.person.timesheet)
     return _bridging(models, message, operator, scenario, session.scene)
 
 
-def bridged_together(scenario: Scenario, seeds: Sequence[int]) -> list[Bridging]:
+def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[Bridging]:
     """Bridge the strip once a seed, all sessions at once, each to the digit what `bridged_alone` gives."""
-    crowd = open_crowd(scenario, seeds)
+    crowd = open_batch(scenario, seeds)
     models: list[list[Model]] = [[] for _ in seeds]
-    for each in bridged(crowd.bench):
+    for each in bridge_strip_batch(crowd.bench):
         for session in each.who.tolist():
             models[session].append(_as_model(each.model.name, each.places_of(session)))
     crew = crowd.bench.crew
@@ -133,7 +133,7 @@ def bridged_together(scenario: Scenario, seeds: Sequence[int]) -> list[Bridging]
         _bridging(
             models[session],
             crew.reasons.get(session, ""),
-            of_hours(float(crew.seconds[session]), crew.timesheet, session),
+            hours_document(float(crew.seconds[session]), crew.timesheet, session),
             scenario,
             scene,
         )
@@ -144,8 +144,8 @@ def bridged_together(scenario: Scenario, seeds: Sequence[int]) -> list[Bridging]
 def _bridging(models: Sequence[Model], message: str, operator: Document, scenario: Scenario, scene: Scene) -> Bridging:
     if message:
         return Bridging(None, message, operator)
-    ground, degree = ground_of(scenario, scene), scenario.strip.polynomial
-    strip = averaged(models)
+    ground, degree = ground_control(scenario, scene), scenario.strip.polynomial
+    strip = average_points(models)
     try:
         oriented = absolute_orientation(strip, ground)
         adjusted = strip_adjustment(oriented.model, ground, degree) if degree else None
@@ -158,12 +158,12 @@ def _as_model(name: str, places: Places) -> Model:
     return Model(name, tuple(places), np.array([*places.values()]).T)
 
 
-def averaged(models: Iterable[Model]) -> Model:
+def average_points(models: Iterable[Model]) -> Model:
     """Return all points of the models of a bridged strip, those of several models averaged."""
-    return bridged_strip([dict(zip(each.points, each.coordinates.T.tolist(), strict=True)) for each in models])
+    return strip_points([dict(zip(each.points, each.coordinates.T.tolist(), strict=True)) for each in models])
 
 
-def bridged_strip(places: Iterable[Places]) -> Model:
+def strip_points(places: Iterable[Places]) -> Model:
     """Return all points of a bridged strip in mm, those of several models averaged."""
     found: dict[str, list[tuple[float, float, float]]] = {}
     for model in places:
@@ -175,9 +175,11 @@ def bridged_strip(places: Iterable[Places]) -> Model:
 def _on_ground(strip: Model, ground: Ground, scenario: Scenario) -> Document:
     try:
         oriented = absolute_orientation(strip, ground)
-        document = of_absolute(oriented)
+        document = absolute_document(oriented)
         if scenario.strip.polynomial:
-            document["polynomial"] = of_adjustment(strip_adjustment(oriented.model, ground, scenario.strip.polynomial))
+            document["polynomial"] = adjustment_document(
+                strip_adjustment(oriented.model, ground, scenario.strip.polynomial)
+            )
     except (Mistake, Undetermined) as reason:
         return {"message": str(reason)}
     return document
@@ -199,7 +201,7 @@ def _of_model(bridged: BridgedModels) -> Document:
     }
 
 
-def tables_of(document: Document) -> RenderableType:
+def bridge_tables(document: Document) -> RenderableType:
     """Return the tables of a bridged strip and of the independent models, for a terminal."""
     said = f"{document['status']}: {document['message']}" if document["message"] else ""
     parts: list[RenderableType] = [_models(document["bridged"]["models"])]
@@ -215,7 +217,7 @@ def tables_of(document: Document) -> RenderableType:
 
 
 def _models(models: Sequence[Document]) -> RenderableType:
-    table = sheet("model", "base", "bx, mm", "scale", "rms p, mm", "common X", "Y", "Z, mm")
+    table = text_table("model", "base", "bx, mm", "scale", "rms p, mm", "common X", "Y", "Z, mm")
     for model in models:
         common = np.array(list(model["common_mm"].values())).reshape(-1, 3)
         rms = [f"{value:.3f}" for value in np.sqrt((common**2).mean(axis=0))] if common.size else ["", "", ""]
@@ -231,7 +233,7 @@ def _models(models: Sequence[Document]) -> RenderableType:
 
 
 def _beside(document: Document) -> RenderableType:
-    table = sheet("strip", "points", "X", "Y", "Z", "plan", "height", fold=(1,))
+    table = text_table("strip", "points", "X", "Y", "Z", "plan", "height", fold=(1,))
     for way in ("bridged", "independent"):
         strip = document[way]["strip"]
         for label, part in ((way, strip), (f"{way}, polynomial", strip.get("polynomial", {}))):

@@ -11,9 +11,9 @@ from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import TIMEOUT_S
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.journal import Journal, Keeping, header_of
+from a7sim.session.journal import Journal, Keeping, make_header
 from a7sim.session.lines import Event
-from a7sim.session.resuming import Begun, served_again
+from a7sim.session.resuming import Begun, restore_instrument
 from a7sim.session.shelf import COMMAND, new_folder
 
 
@@ -45,11 +45,11 @@ class Chair:
         scenario, seed = self._scenario, self._seed
         desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed), self._journal.heard)
         self.folder = new_folder(self.folder)
-        self._journal.opened(self.folder, header_of(COMMAND, scenario, seed), desk)
+        self._journal.opened(self.folder, make_header(COMMAND, scenario, seed), desk)
         return desk
 
     def _again(self, begun: Begun) -> Desk:
-        desk, now, held_by = served_again(begun, self._journal, from_checkpoint=True)
+        desk, now, held_by = restore_instrument(begun, self._journal, from_checkpoint=True)
         self.clock.pass_to(now)
         self._held = held_by is not None
         return desk

@@ -27,12 +27,12 @@ class Checkpoint(msgspec.Struct, frozen=True):
     state: State
 
 
-def hash_of_state(state: State) -> str:
+def state_hash(state: State) -> str:
     """Return the SHA-256 of a state."""
     return hashlib.sha256(msgspec.json.encode(state, order="sorted")).hexdigest()
 
 
-def as_lines(checkpoints: Iterable[Checkpoint]) -> bytes:
+def to_lines(checkpoints: Iterable[Checkpoint]) -> bytes:
     """Return checkpoints as lines of JSON."""
     return b"".join(msgspec.json.encode(each) + b"\n" for each in checkpoints)
 
@@ -48,7 +48,7 @@ def read_checkpoints(path: Path) -> Iterator[Checkpoint]:
             checkpoint = msgspec.json.decode(line, type=Checkpoint)
         except (msgspec.DecodeError, UnicodeDecodeError):
             return
-        if hash_of_state(checkpoint.state) != checkpoint.hash:
+        if state_hash(checkpoint.state) != checkpoint.hash:
             return
         yield checkpoint
 

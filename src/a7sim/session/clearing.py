@@ -58,7 +58,7 @@ class Cleared:
         return stereoscopic_intersection(centre1, rays[0], centre2, rays[1])
 
 
-def cleared(
+def clear_parallaxes(
     left: Array, right: Array, c: tuple[float | Array, float | Array], bx: float, errors_mm: Array | float = 0.0
 ) -> Cleared:
     """Clear the y-parallaxes of image points ``(2, n, ...)`` in mm, in rounds of seeing, computing and setting.

@@ -11,14 +11,14 @@ from a7sim.documents import Document, as_json
 from a7sim.mistakes import Mistake
 from a7sim.operator import ModelJob
 from a7sim.reduction import Ground, Model, Undetermined
-from a7sim.scenario import Scenario, rephrased
+from a7sim.scenario import Scenario, amend_provenance
 from a7sim.scenario.schema import StripPlan
 from a7sim.scene import build_scene
 from a7sim.session import results
-from a7sim.session.folder import RESULTS, STRIPS, write_whole
-from a7sim.session.journal import Keeping, begin_folder, header_of
-from a7sim.session.running import Watcher, job_of, run
-from a7sim.session.strips import ground_of, grounded, models_of, of_grounded
+from a7sim.session.folder import RESULTS, STRIPS, write_atomic
+from a7sim.session.journal import Keeping, make_header, write_header_only
+from a7sim.session.running import Watcher, make_job, run
+from a7sim.session.strips import ground_control, models_from_documents, orient_strip, oriented_strip_document
 from a7sim.standard_points import CASES
 
 MAX_STRIPS = 700
@@ -50,17 +50,17 @@ def run_combinations(
     does not fit ends the work. Raises Mistake for a scenario without ground control or of too many models.
     """
     watcher = watcher or Watcher()
-    see_that_strips_can_be_made(scenario)
+    check_strips_possible(scenario)
     keeping = keeping or Keeping()
     keeping.prepare(out, force, map(FOLDER_OF_CASE.format, CASES))
     if out is not None and not keeping.resumes:
-        begin_folder(out, header_of("run", scenario, seed, strips="all"))
-    document = results.header(scenario, seed) | {"case": "all", "status": "complete", "message": ""}
+        write_header_only(out, make_header("run", scenario, seed, strips="all"))
+    document = results.results_header(scenario, seed) | {"case": "all", "status": "complete", "message": ""}
     sessions: dict[str, Document] = {}
     for case in CASES:
         folder = out / FOLDER_OF_CASE.format(case) if out is not None else None
         sessions[case] = run(
-            in_case(scenario, case),
+            with_case(scenario, case),
             seed,
             folder,
             watcher,
@@ -73,18 +73,18 @@ def run_combinations(
     document["sessions"] = {case: each["operator"] for case, each in sessions.items()}
     document["strips"] = _strips(scenario, seed, sessions) if document["status"] == "complete" else []
     if out is not None:
-        write_whole(out / STRIPS, results.strips_csv(document["strips"]))
-        write_whole(out / RESULTS, as_json(document))
+        write_atomic(out / STRIPS, results.strips_csv(document["strips"]))
+        write_atomic(out / RESULTS, as_json(document))
     return document
 
 
-def in_case(scenario: Scenario, case: str) -> Scenario:
+def with_case(scenario: Scenario, case: str) -> Scenario:
     """Return a scenario whose models are all oriented on the points of a case."""
     of_case = msgspec.structs.replace(scenario, plotting=msgspec.structs.replace(scenario.plan, case=case))
-    return rephrased(of_case, "--strips all", f"--case {case}", {"plan.case": f'"{case}"'})
+    return amend_provenance(of_case, "--strips all", f"--case {case}", {"plan.case": f'"{case}"'})
 
 
-def see_that_strips_can_be_made(scenario: Scenario) -> None:
+def check_strips_possible(scenario: Scenario) -> None:
     """Raise Mistake for a scenario of too many models or without ground control."""
     strips = len(CASES) ** len(scenario.models)
     if strips > MAX_STRIPS:
@@ -97,8 +97,8 @@ def see_that_strips_can_be_made(scenario: Scenario) -> None:
 
 def _strips(scenario: Scenario, seed: int, sessions: Mapping[str, Document]) -> list[Document]:
     scene = build_scene(scenario, seed)
-    ground, jobs = ground_of(scenario, scene), job_of(scenario, scene).models
-    by_case = {case: models_of(session["models"]) for case, session in sessions.items()}
+    ground, jobs = ground_control(scenario, scene), make_job(scenario, scene).models
+    by_case = {case: models_from_documents(session["models"]) for case, session in sessions.items()}
     return [_of_combination(each, jobs, ground, scenario.strip) for each in combinations(by_case)]
 
 
@@ -113,15 +113,15 @@ def _of_combination(combination: Combination, jobs: Sequence[ModelJob], ground: 
     described = {
         "number": combination.number,
         "cases": list(combination.cases),
-        "in_words": in_words(combination, jobs),
+        "in_words": describe(combination, jobs),
     }
     try:
-        return described | of_grounded(grounded(combination.models, ground, plan.join, plan.polynomial))
+        return described | oriented_strip_document(orient_strip(combination.models, ground, plan.join, plan.polynomial))
     except Undetermined as undetermined:
         raise Mistake(f"strip {combination.number}: {undetermined}") from undetermined
 
 
-def in_words(combination: Combination, jobs: Sequence[ModelJob]) -> str:
+def describe(combination: Combination, jobs: Sequence[ModelJob]) -> str:
     """Return what the diagram of a strip shows (thesis fig. 4.3), in words."""
     parts = [
         f"model {job.name} ({job.left} and {job.right}) case {case}, oriented on {' '.join(job.points_of_case(case))}"

@@ -7,11 +7,11 @@ from rich.table import Table
 from rich.text import Text
 
 from a7sim.session.compiling import USUAL_C_FACTORS
-from a7sim.sheets import sheet
-from a7sim.wording import counted
+from a7sim.sheets import text_table
+from a7sim.wording import pluralize
 
 
-def of_compilation(document: dict[str, Any]) -> RenderableType:
+def map_tables(document: dict[str, Any]) -> RenderableType:
     """Return the lines of a compiled model beside the truth, and what interval its contours are good for."""
     if document["message"]:
         return Text(f"{document['status']}: {document['message']}", style="bold")
@@ -19,10 +19,10 @@ def of_compilation(document: dict[str, Any]) -> RenderableType:
     low, high = document["range_m"]
     parts: list[RenderableType] = [
         Text(
-            f"Model {document['model']} levelled in {counted(levelling['rounds'], 'round')} to "
+            f"Model {document['model']} levelled in {pluralize(levelling['rounds'], 'round')} to "
             f"1:{levelling['scale_found']:.1f}, {levelling['tilt_left_gon']:.3f} gon left; "
             f"drawn at 1:{document['map_scale']:.0f} by {document['plan_gear']}\n"
-            f"{counted(document['spot_heights'], 'spot height')}, {low:.1f} to {high:.1f} m; "
+            f"{pluralize(document['spot_heights'], 'spot height')}, {low:.1f} to {high:.1f} m; "
             f"expected standard errors: height {expected['sigma_height_m']:.3f} m, "
             f"plan {expected['sigma_plan_m']:.3f} m"
         ),
@@ -34,14 +34,14 @@ def of_compilation(document: dict[str, Any]) -> RenderableType:
         parts += [Text(), Text(_in_words(contours))]
     operator = document["operator"]
     parts.append(
-        Text(f"{operator['hours']:.1f} hours at the instrument, {counted(operator['lines_over_the_link'], 'line')}")
+        Text(f"{operator['hours']:.1f} hours at the instrument, {pluralize(operator['lines_over_the_link'], 'line')}")
     )
     return Group(*parts)
 
 
 def _lines(lines: list[dict[str, Any]]) -> Table:
     columns = ("line", "ends", "vertices", "m", "rms z, m", "largest", "rms off", "largest")
-    table = sheet(*columns, left=(0, 1))
+    table = text_table(*columns, left=(0, 1))
     for each in lines:
         off = (each.get("rms_off_m"), each.get("largest_off_m"))
         values = (each["rms_height_m"], each["largest_height_m"], *off)

@@ -10,20 +10,20 @@ import msgspec
 import numpy as np
 
 import a7sim
-from a7sim.documents import Document, head, of_absolute
+from a7sim.documents import Document, absolute_document, document_header
 from a7sim.geometry import Array, length_of
 from a7sim.manual import BASE_COMPONENTS, VARIANTS
 from a7sim.mistakes import Mistake
 from a7sim.operator.map_lines import CONTOUR, Errand, Traced, Tracing
-from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, plotted
+from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, compile_map
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
 from a7sim.session.folder import GEOJSON, SVG
-from a7sim.session.journal import Journal, Keeping, header_of
-from a7sim.session.map_sheet import as_geojson, as_svg
-from a7sim.session.results import of_request
+from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.map_sheet import to_geojson, to_svg
+from a7sim.session.results import request_document
 from a7sim.session.running import Session, Watcher, open_session
-from a7sim.session.sitting import sitting
+from a7sim.session.sitting import recorded_session
 from a7sim.session.strips import given_control
 
 OLD_MAP_M = 5.0
@@ -75,8 +75,8 @@ def compile_model(
     session = open_session(scenario, seed, journal.heard)
     order = _order(wanted, scenario, session.scene)
     keeping.prepare(out, force)
-    document = head("compile") | {
-        **of_request(scenario),
+    document = document_header("compile") | {
+        **request_document(scenario),
         "software": f"a7sim {a7sim.__version__}",
         "scenario": scenario.title,
         "seed": seed,
@@ -85,11 +85,11 @@ def compile_model(
         "message": "",
     }
     drawn: dict[str, str] = {}
-    header = header_of("compile", scenario, seed, **asdict(wanted))
-    with sitting(document, session, journal, header, out, lambda: drawn):
+    header = make_header("compile", scenario, seed, **asdict(wanted))
+    with recorded_session(document, session, journal, header, out, lambda: drawn):
         sheet = _sheet(session, wanted, order, watcher)
         document |= _of_sheet(sheet, session.scene, scenario)
-        drawn |= {GEOJSON: as_geojson(sheet), SVG: as_svg(sheet, scenario.title)}
+        drawn |= {GEOJSON: to_geojson(sheet), SVG: to_svg(sheet, scenario.title)}
     return document
 
 
@@ -141,7 +141,7 @@ def _errand(scene: Scene, name: str) -> Errand:
 def _sheet(session: Session, wanted: Wanted, order: Order, watcher: Watcher) -> Sheet:
     models = tuple(model for model in session.job.models if model.name == wanted.model)
     control = given_control(session.scenario, session.scene)
-    return plotted(
+    return compile_map(
         session.person, replace(session.job, models=models, control={}), control, order, watcher.tick, watcher.begins
     )
 
@@ -163,7 +163,7 @@ def _of_sheet(sheet: Sheet, scene: Scene, scenario: Scenario) -> Document:
             "tilt_left_gon": round(sheet.model.tilt_gon, 5),
             "scale_found": round(1e3 * sheet.model.metres_per_mm, 2),
         }
-        | of_absolute(sheet.model.absolute),
+        | absolute_document(sheet.model.absolute),
         "expected": {"sigma_height_m": round(sheet.sigma_height, 4), "sigma_plan_m": round(sheet.sigma_plan, 4)},
         "spot_heights": int(np.isfinite(sheet.spots.heights).sum()),
         "range_m": [round(each, 2) for each in sheet.spots.range],

@@ -9,7 +9,7 @@ from a7sim.session.lines import Event
 _IN_WORDS = {"+": "+ comes", "-": "- goes", "~": "~ goes on"}
 
 
-def line_of_event(event: Event) -> str:
+def format_event(event: Event) -> str:
     """Return a line of a journal for people."""
     if event.kind == "entry":
         words = (event.model, event.form, event.point, event.item, event.reading, event.remark)
@@ -37,4 +37,4 @@ class Told:
         """Tell what happened on the link."""
         self.first(event)
         self.until(event.time)
-        self.tell(line_of_event(Event(event.time, event.client, event.direction, event.text)))
+        self.tell(format_event(Event(event.time, event.client, event.direction, event.text)))

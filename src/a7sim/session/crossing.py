@@ -12,7 +12,7 @@ from a7sim.mistakes import Mistake
 from a7sim.reduction import Ground, GroundFit, Model, Strip, Undetermined, formed_strip
 from a7sim.reduction.absolute import fitted_to_ground, root_mean_square
 from a7sim.scenario.schema import StripPlan
-from a7sim.session.strips import grounded, models_of, of_grounded
+from a7sim.session.strips import models_from_documents, orient_strip, oriented_strip_document
 
 CHUNK_SIZE = 64
 """Replicates on one array, so that memory stays small."""
@@ -28,7 +28,9 @@ def cases_of_strips(cases: Sequence[str], models: int) -> list[Cases]:
     return list(product(cases, repeat=models))
 
 
-def crossed(replicates: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan) -> Iterator[list[Document]]:
+def combine_strips(
+    replicates: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan
+) -> Iterator[list[Document]]:
     """Yield a document for each strip of each replicate, as if one session had worked its models in these cases.
 
     It holds models, hours, and the strip with its joins and accuracy; its `status` is that of the session that gave up,
@@ -52,7 +54,7 @@ def _on_arrays(
     groups: dict[tuple[Cases, ...], list[tuple[int, dict[str, list[Model]]]]] = defaultdict(list)
     for i, replicate in enumerate(some):
         if plan.polynomial is None and all(each["status"] == "complete" for each in replicate.values()):
-            by_case = {case: models_of(each["models"]) for case, each in replicate.items()}
+            by_case = {case: models_from_documents(each["models"]) for case, each in replicate.items()}
             alike = {tuple(model.points for model in each) for each in by_case.values()}
             if len(alike) == 1:
                 groups[alike.pop()].append((i, by_case))
@@ -116,9 +118,9 @@ def _accuracy(residuals: Array) -> tuple[list[float], ...]:
 def _by_itself(replicate: Replicate, cases: Cases, ground: Ground, plan: StripPlan) -> Document:
     if any(replicate[case]["status"] != "complete" for case in cases):
         return {}
-    models = [models_of(replicate[case]["models"])[place] for place, case in enumerate(cases)]
+    models = [models_from_documents(replicate[case]["models"])[place] for place, case in enumerate(cases)]
     try:
-        return of_grounded(grounded(models, ground, plan.join, plan.polynomial))
+        return oriented_strip_document(orient_strip(models, ground, plan.join, plan.polynomial))
     except Undetermined as undetermined:
         raise Mistake(f"strip of the cases {' and '.join(cases)}: {undetermined}") from undetermined
 

@@ -4,18 +4,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from a7sim.documents import Document
-from a7sim.instrument.fleet import Fleet, build_fleet
+from a7sim.instrument.fleet import Fleet, build_batch
 from a7sim.operator import Job
 from a7sim.operator.bench import Bench
 from a7sim.operator.crew import Crew
 from a7sim.operator.dice import Dice
-from a7sim.operator.work import ModelRecords, worked
+from a7sim.operator.work import ModelRecords, measure_models_batch
 from a7sim.scenario import Scenario
 from a7sim.scene import Flight, RelativeTruth, Scene
 from a7sim.session import results
 from a7sim.session.fleet_hands import FleetHands
-from a7sim.session.running import job_of, strip_of
-from a7sim.session.strips import ground_of
+from a7sim.session.running import make_job, strip_document
+from a7sim.session.strips import ground_control
 from a7sim.session.truth import Beside
 
 
@@ -32,7 +32,7 @@ class Crowd:
 
     def worked(self) -> Iterator[ModelRecords]:
         """Yield the models as they are done; what a session gives up for stands in `bench.crew.reasons`."""
-        return worked(self.bench)
+        return measure_models_batch(self.bench)
 
     def documents(self, strips: bool = True, whole: bool = True) -> list[Document]:
         """Work to the end and return a document a seed, as `run` gives it, without what is told of line and book.
@@ -47,9 +47,9 @@ class Crowd:
             for member, session in enumerate(records.who.tolist()):
                 record = records.of(session)
                 found[session].append(
-                    results.of_model(record, beside, member, plan.published)
+                    results.model_document(record, beside, member, plan.published)
                     if whole
-                    else results.of_model_in_brief(record, beside, member)
+                    else results.brief_model_document(record, beside, member)
                 )
         return [self._document(session, models, strips) for session, models in enumerate(found)]
 
@@ -66,22 +66,22 @@ class Crowd:
     def _document(self, session: int, models: list[Document], strips: bool) -> Document:
         crew, scenario = self.bench.crew, self.scenario
         why = crew.reasons.get(session)
-        document: Document = results.header(scenario, self.seeds[session]) | {
+        document: Document = results.results_header(scenario, self.seeds[session]) | {
             "status": "complete" if why is None else "does not fit",
             "message": why or "",
             "models": models,
-            "operator": results.of_hours(float(crew.seconds[session]), crew.timesheet, session),
+            "operator": results.hours_document(float(crew.seconds[session]), crew.timesheet, session),
         }
         if strips and why is None:
-            document["strip"], _ = strip_of(scenario, ground_of(scenario, self.scenes[session]), models)
+            document["strip"], _ = strip_document(scenario, ground_control(scenario, self.scenes[session]), models)
         return document
 
 
-def open_crowd(scenario: Scenario, seeds: Sequence[int]) -> Crowd:
+def open_batch(scenario: Scenario, seeds: Sequence[int]) -> Crowd:
     """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
     flight = Flight.of(scenario)
     scenes = tuple(flight.scene(seed) for seed in seeds)
-    fleet = build_fleet(scenario.instrument, [scene.drawer for scene in scenes], seeds)
+    fleet = build_batch(scenario.instrument, [scene.drawer for scene in scenes], seeds)
     crew = Crew(scenario.observer, [Dice(scenario.observer, seed) for seed in seeds])
-    job = job_of(scenario, scenes[0])
+    job = make_job(scenario, scenes[0])
     return Crowd(scenario, tuple(seeds), scenes, fleet, Bench(crew, FleetHands(fleet), job), job)

@@ -94,13 +94,13 @@ class DurableFile:
             self._failed(error)
 
     def _failed(self, error: OSError) -> JournalStopped:
-        self._trouble = stopped(self._path, error)
+        self._trouble = write_failure_message(self._path, error)
         with suppress(OSError):
             os.ftruncate(self._file, self._size)
         return self._trouble
 
 
-def being_written(path: Path) -> bool:
+def is_being_written(path: Path) -> bool:
     """Return whether somebody writes a file of lines now."""
     try:
         file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
@@ -115,7 +115,7 @@ def being_written(path: Path) -> bool:
     return False
 
 
-def stopped(path: Path, error: OSError) -> JournalStopped:
+def write_failure_message(path: Path, error: OSError) -> JournalStopped:
     """Return what is said where a file of a journal can no longer be written."""
     return JournalStopped(f"{path}: it can no longer be written, so the session stops here: {error.strerror}")
 

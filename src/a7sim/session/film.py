@@ -15,12 +15,12 @@ from a7sim.link.opening import TIMEOUT_S
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
 from a7sim.session.folder import JOURNAL
-from a7sim.session.journal import header_of, registers
+from a7sim.session.journal import is_registration, make_header
 from a7sim.session.lines import Chain, Event, Journalled, read_journal
 from a7sim.session.playing import Player
 from a7sim.session.replaying import Replay
 from a7sim.session.scripts import SUFFIX, find_script, read_script
-from a7sim.session.seeking import line_sought
+from a7sim.session.seeking import find_line
 
 _SAID = (">", "!")
 
@@ -86,7 +86,7 @@ class Film:
         elif event.dir in _SAID and not _DRAWS.match(event.text):
             self._numbers.append(number)
             self._times.append(event.t)
-            if registers(event.text):
+            if is_registration(event.text):
                 self._records.append(len(self._numbers))
 
     @property
@@ -141,7 +141,7 @@ class Film:
         """Return the step that a number, a time, @LINE or the text of a note names. Raises Mistake for another."""
         if words.isdecimal() and int(words) <= self.steps:
             return int(words)
-        line = None if words.isdecimal() else line_sought(self.journalled, words)
+        line = None if words.isdecimal() else find_line(self.journalled, words)
         if line is None:
             raise Mistake(
                 f"jump to {words}: expected a step up to {self.steps}, a time up to {self._times[-1]:.0f}s, "
@@ -174,7 +174,7 @@ class Film:
         return None
 
 
-def film_of(session: str) -> Film:
+def open_recording(session: str) -> Film:
     """Return the film of a session's folder, of a journal, or of a script as it is played. Raises Mistake."""
     path = Path(session)
     if path.is_dir():
@@ -190,6 +190,6 @@ def _played(file: Path) -> Film:
     heard: list[LinkEvent] = []
     Player(script, heard.append).play()
     chain = Chain()
-    header = chain.line(header_of("replay", script.scenario, script.seed, script=file.name).line)
+    header = chain.line(make_header("replay", script.scenario, script.seed, script=file.name).line)
     lines = [chain.line(Event(each.time, each.client, each.direction, each.text)) for each in heard]
     return Film(Journalled(file, msgspec.json.decode(header), [header, *lines], b"", chain.crc), script.scenario)

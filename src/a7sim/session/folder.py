@@ -54,7 +54,7 @@ def prepare_folder(out: Path, force: bool, parts: Iterable[str] = ()) -> None:
         raise Mistake(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
 
 
-def write_whole(path: Path, text: str) -> None:
+def write_atomic(path: Path, text: str) -> None:
     """Write a file so that it is there whole or not at all."""
     temporary = path.with_name(path.name + ".part")
     try:

@@ -10,23 +10,23 @@ from rich.table import Table
 from rich.text import Text
 
 import a7sim
-from a7sim.documents import Document, head, of_statistics
-from a7sim.files import csv_text
+from a7sim.documents import Document, document_header, statistics_document
+from a7sim.files import to_csv
 from a7sim.geometry import GON, angles_of
 from a7sim.instrument import Autograph
-from a7sim.instrument.condition import condition_of
-from a7sim.operator.grid_test import GridTestOrder, ProjectorSheet, calibrate
-from a7sim.operator.seat import side, wrapped
+from a7sim.instrument.condition import draw_condition
+from a7sim.operator.grid_test import GridTestOrder, ProjectorSheet, measure_grid
+from a7sim.operator.seat import side_name, wrap_gon
 from a7sim.reduction import Adjustment
 from a7sim.reduction.grid_test import UNKNOWNS
 from a7sim.scenario import Condition, Scenario
 from a7sim.session.folder import RESIDUALS
-from a7sim.session.journal import Journal, Keeping, header_of
-from a7sim.session.results import of_request
+from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.results import request_document
 from a7sim.session.running import Watcher, open_session
-from a7sim.session.sitting import sitting
-from a7sim.sheets import sheet
-from a7sim.wording import counted
+from a7sim.session.sitting import recorded_session
+from a7sim.sheets import text_table
+from a7sim.wording import pluralize
 
 SYMBOLS = {"omega": "ω", "phi": "φ", "kappa": "κ"}
 
@@ -57,20 +57,22 @@ def run_grid_test(
     sheets: list[ProjectorSheet] = []
 
     def leaves() -> dict[str, str]:
-        return {RESIDUALS: csv_text(RESIDUAL_COLUMNS, _residual_rows(sheets))}
+        return {RESIDUALS: to_csv(RESIDUAL_COLUMNS, _residual_rows(sheets))}
 
-    about = header_of("calibrate", scenario, seed, points=order.crosses, levels=order.levels, pointings=order.pointings)
-    with sitting(document, session, journal, about, out, leaves, called="test"):
-        for sheet in calibrate(session.person, order, watcher.tick, watcher.begins):
+    about = make_header(
+        "calibrate", scenario, seed, points=order.crosses, levels=order.levels, pointings=order.pointings
+    )
+    with recorded_session(document, session, journal, about, out, leaves, called="test"):
+        for sheet in measure_grid(session.person, order, watcher.tick, watcher.begins):
             sheets.append(sheet)
-            truth = true_errors(autograph, condition_of(scenario.instrument, seed), sheet.projector)
-            document["projectors"][side(sheet.projector)] = of_projector(sheet, truth)
+            truth = true_errors(autograph, draw_condition(scenario.instrument, seed), sheet.projector)
+            document["projectors"][side_name(sheet.projector)] = projector_document(sheet, truth)
     return document
 
 
 def _header(scenario: Scenario, seed: int, order: GridTestOrder, autograph: Autograph) -> Document:
-    return head("calibrate") | {
-        **of_request(scenario),
+    return document_header("calibrate") | {
+        **request_document(scenario),
         "software": f"a7sim {a7sim.__version__}",
         "scenario": scenario.title,
         "seed": seed,
@@ -89,7 +91,7 @@ def _header(scenario: Scenario, seed: int, order: GridTestOrder, autograph: Auto
 # --- the document -------------------------------------------------------------------------------------
 
 
-def of_projector(sheet: ProjectorSheet, truth: Document) -> Document:
+def projector_document(sheet: ProjectorSheet, truth: Document) -> Document:
     """Return a projector's sheet of one session, um at photo scale, with the truth and what is left of it."""
     test = sheet.test
     found = _found(sheet)
@@ -110,7 +112,7 @@ def of_projector(sheet: ProjectorSheet, truth: Document) -> Document:
         "residuals_um": {
             cross: [round(float(v), 3) for v in residuals.mean(axis=1)[:, i]] for i, cross in enumerate(names)
         },
-        "statistics": of_statistics(_of_one(sheet), list(test.errors), observations),
+        "statistics": statistics_document(_of_one(sheet), list(test.errors), observations),
         "finished_at_s": round(float(sheet.finished_at[0]), 1),
         "truth": truth
         | {"differences": {name: round(found[name]["error"] - truth["errors"][name], 5) for name in test.errors}},
@@ -152,7 +154,7 @@ def _residual_rows(sheets: list[ProjectorSheet]) -> Iterator[tuple[str, ...]]:
         for k, height in enumerate(each.heights):
             for i, (cross, place) in enumerate(each.crosses.items()):
                 yield (
-                    side(each.projector),
+                    side_name(each.projector),
                     f"{height:.2f}",
                     cross,
                     *(f"{at:.1f}" for at in place),
@@ -190,7 +192,7 @@ def true_errors(autograph: Autograph, condition: Condition, projector: int) -> D
         "y0": 1e-3 * of_projector.principal_point_um[1],
         "omega": omega + elements[f"omega{projector}"].zero - shown["omega"],
         "phi": phi + elements[f"phi{projector}"].zero - shown["phi"],
-        "kappa": float(wrapped(np.asarray(kappa - shown["kappa"]))),
+        "kappa": float(wrap_gon(np.asarray(kappa - shown["kappa"]))),
         "bx": float(centre[0]) - base,
         "by": -float(centre[1]) - shown["by"],
         "bz": float(centre[2]) - shown["bz"],
@@ -204,14 +206,14 @@ def true_errors(autograph: Autograph, condition: Condition, projector: int) -> D
 # --- the sheet ----------------------------------------------------------------------------------------
 
 
-def sheet_of(document: Document) -> RenderableType:
+def report_tables(document: Document) -> RenderableType:
     """Return the sheet that a service engineer would file."""
     parts: list[RenderableType] = [
         Text(f"Grid test of Wild {document['variant']} no. {document['serial']}", style="bold"),
         Text(
-            f"{counted(document['crosses'], 'cross', 'crosses')} of plate {document['plate']} at Z "
+            f"{pluralize(document['crosses'], 'cross', 'crosses')} of plate {document['plate']} at Z "
             f"{' and '.join(f'{-z:g}' for z in document['levels_mm'])} mm below the centre, "
-            f"{counted(document['pointings'], 'pointing')} each"
+            f"{pluralize(document['pointings'], 'pointing')} each"
         ),
     ]
     for projector, each in document["projectors"].items():
@@ -222,7 +224,7 @@ def sheet_of(document: Document) -> RenderableType:
 
 
 def _element_table(projector: Document) -> Table:
-    table = sheet("", "counter", "found", "error", "±", "true", "", left=(0, 6))
+    table = text_table("", "counter", "found", "error", "±", "true", "", left=(0, 6))
     for name, each in projector["elements"].items():
         counter = f"{each['counter']:.2f}" if "counter" in each else ""
         found = f"{each['found']:.4f}" if "found" in each else ""

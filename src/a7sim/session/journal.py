@@ -13,24 +13,24 @@ import a7sim
 from a7sim.instrument.language import Desk, LinkEvent
 from a7sim.mistakes import Mistake
 from a7sim.operator.book import Entry
-from a7sim.scenario import Scenario, carried, hash_of
+from a7sim.scenario import Scenario, hash_scenario, to_data
 from a7sim.scene import PICTURES
-from a7sim.session.checkpoints import LINES_PER_CHECKPOINT, Checkpoint, as_lines, hash_of_state
-from a7sim.session.durable import Durability, DurableFile, JournalStopped, stopped
+from a7sim.session.checkpoints import LINES_PER_CHECKPOINT, Checkpoint, state_hash, to_lines
+from a7sim.session.durable import Durability, DurableFile, JournalStopped, write_failure_message
 from a7sim.session.folder import JOURNAL, SCENARIO_SUFFIX, STATES, TORN, prepare_folder
-from a7sim.session.lines import SCHEMA_VERSION, Chain, Event, Journalled, is_begun, read_journal
+from a7sim.session.lines import SCHEMA_VERSION, Chain, Event, Journalled, has_header, read_journal
 
 _REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
 
 _MAX_SHOWN_LENGTH = 300
 
 
-def registers(line: str) -> bool:
+def is_registration(line: str) -> bool:
     """Return whether a line registers something or strikes it out."""
     return _REGISTERS.search(line) is not None
 
 
-def software() -> str:
+def software_version() -> str:
     """Return the name and version under which journals are written."""
     return f"a7sim {a7sim.__version__}"
 
@@ -43,14 +43,14 @@ class Header:
     scenario: Scenario | None = None
 
 
-def header_of(command: str, scenario: Scenario, seed: int, **settings: Any) -> Header:
+def make_header(command: str, scenario: Scenario, seed: int, **settings: Any) -> Header:
     """Return what a journal says first: all that a session follows from, beside what is said in it."""
     line = {
         "schema_version": SCHEMA_VERSION,
-        "software": software(),
+        "software": software_version(),
         "command": command,
         "title": scenario.title,
-        "scenario_hash": hash_of(scenario),
+        "scenario_hash": hash_scenario(scenario),
         "seed": seed,
         "variant": scenario.instrument.variant,
         "pictures": PICTURES,
@@ -59,9 +59,9 @@ def header_of(command: str, scenario: Scenario, seed: int, **settings: Any) -> H
     return Header(line, scenario)
 
 
-def header_of_unknown(command: str, **settings: Any) -> Header:
+def make_header_without_scenario(command: str, **settings: Any) -> Header:
     """Return what a journal says first where nobody knows what the instrument is of."""
-    first = {"schema_version": SCHEMA_VERSION, "software": software(), "command": command}
+    first = {"schema_version": SCHEMA_VERSION, "software": software_version(), "command": command}
     return Header(first | {"scenario_hash": None, "settings": settings})
 
 
@@ -81,7 +81,7 @@ class Keeping:
 
     def of_part(self, folder: Path | None) -> "Keeping":
         """Return how a session is kept that is part of another, which may have been cut off before this one began."""
-        begun = folder is not None and is_begun(folder / JOURNAL)
+        begun = folder is not None and has_header(folder / JOURNAL)
         return replace(self, resumes=self.resumes and begun)
 
 
@@ -115,7 +115,7 @@ class Journal:
         if folder is not None:
             if self._keeping.resumes:
                 self._there = read_journal(folder / JOURNAL)
-                set_aside(self._there)
+                save_truncated_tail(self._there)
             self._begin(folder, self._there.size if self._there else 0, b"")
             try:
                 if self._there is None:
@@ -131,9 +131,9 @@ class Journal:
 
     def continued(self, there: Journalled, desk: Desk, checkpoints: list[Checkpoint]) -> "Journal":
         """Go on behind a journal whose session stands at a desk. Raises Mistake where it cannot be written."""
-        set_aside(there)
+        save_truncated_tail(there)
         self._desk = desk
-        self._begin(there.path.parent, there.size, as_lines(checkpoints))
+        self._begin(there.path.parent, there.size, to_lines(checkpoints))
         self._chain.crc, self._line = there.crc, len(there)
         last = checkpoints[-1].line if checkpoints else 1
         self._since_checkpoint = sum(not there.event(number).kind for number in range(last + 1, len(there) + 1))
@@ -165,7 +165,7 @@ class Journal:
         if event.direction == ">":
             if self._since_checkpoint >= LINES_PER_CHECKPOINT and self._desk is not None and self._desk.quiet:
                 self._checkpoint(event.time, self._desk)
-            at_once = registers(event.text)
+            at_once = is_registration(event.text)
         self._since_checkpoint += 1
         self._write(Event(event.time, event.client, event.direction, event.text), at_once)
 
@@ -212,14 +212,14 @@ class Journal:
         state = desk.state(self._changes)
         self._changes = len(desk.autograph.recorder.changes)
         self._since_checkpoint = 0
-        found = hash_of_state(state)
+        found = state_hash(state)
         self._write(Event(time, kind="state", hash=found))
         if self._states is not None:
             try:
                 with self._states.open("ab") as states:
-                    states.write(as_lines([Checkpoint(self._line, time, found, state)]))
+                    states.write(to_lines([Checkpoint(self._line, time, found, state)]))
             except OSError as error:
-                raise stopped(self._states, error) from error
+                raise write_failure_message(self._states, error) from error
 
     def _write(self, data: Any, at_once: bool = False) -> None:
         if self._file is None:
@@ -242,7 +242,7 @@ class Journal:
             self.stopped(error)
 
 
-def begin_folder(folder: Path, header: Header) -> None:
+def write_header_only(folder: Path, header: Header) -> None:
     """Leave a journal of nothing but its header: what is worked in a folder's folders. Raises Mistake."""
     file = DurableFile(folder / JOURNAL)
     _leave_scenario(folder, header)
@@ -252,7 +252,7 @@ def begin_folder(folder: Path, header: Header) -> None:
 
 def _leave_scenario(folder: Path, header: Header) -> None:
     if header.scenario is not None:
-        data = msgspec.json.format(msgspec.json.encode(carried(header.scenario))) + b"\n"
+        data = msgspec.json.format(msgspec.json.encode(to_data(header.scenario))) + b"\n"
         file = DurableFile((folder / JOURNAL).with_suffix(SCENARIO_SUFFIX), "always")
         try:
             file.add(data)
@@ -260,7 +260,7 @@ def _leave_scenario(folder: Path, header: Header) -> None:
             file.close()
 
 
-def set_aside(there: Journalled) -> None:
+def save_truncated_tail(there: Journalled) -> None:
     """Put what is torn of a journal beside it. Raises Mistake where that cannot be written."""
     if there.torn:
         try:
@@ -272,5 +272,5 @@ def set_aside(there: Journalled) -> None:
 def _not_the_same(there: Journalled, number: int, line: bytes) -> str:
     was, is_now = (each[:_MAX_SHOWN_LENGTH].decode("utf-8", "replace") for each in (there.lines[number - 1], line))
     if number == 1:
-        return f"{there.where(number)}: expected a session of {software()} and its scenario, got another: {was}"
+        return f"{there.where(number)}: expected a session of {software_version()} and its scenario, got another: {was}"
     return f"{there.where(number)}: expected what this session does again, {is_now}, got another's, {was}"

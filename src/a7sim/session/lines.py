@@ -117,7 +117,7 @@ def read_journal(path: Path) -> Journalled:
     return Journalled(path, _header(path, lines[0]), lines, torn, crc)
 
 
-def is_begun(path: Path) -> bool:
+def has_header(path: Path) -> bool:
     """Return whether there is a journal with a whole line: its header, from which a session goes on."""
     try:
         with path.open("rb") as file:

@@ -37,7 +37,7 @@ text { font-family: 'Liberation Sans', Arial, sans-serif; fill: #222; }
 """
 
 
-def as_geojson(sheet: Sheet) -> str:
+def to_geojson(sheet: Sheet) -> str:
     """Return lines, spot heights and control as GeoJSON: east, north and height in m of the control's own system."""
     features = [
         *(_line_feature(each, sheet) for each in sheet.lines if each.readings.shape[1] > 1),
@@ -136,7 +136,7 @@ def _corners(sheet: Sheet) -> Array:
     return sheet.on_table(np.array([[x0, x1, x1, x0], [y0, y0, y1, y1]]))
 
 
-def as_svg(sheet: Sheet, title: str) -> str:
+def to_svg(sheet: Sheet, title: str) -> str:
     """Return the sheet in mm at map scale, with neat line, grid, contours, lines, control, scale bar and north."""
     paper = _Paper.of(sheet)
     width, height = paper.size
@@ -180,7 +180,7 @@ def _points(places: Array) -> str:
     return " ".join(f"{x:.2f},{y:.2f}" for x, y in places.T)
 
 
-def index_heights(heights: Sequence[float]) -> set[float]:
+def index_contours(heights: Sequence[float]) -> set[float]:
     """Return which contours are drawn heavier: every fifth of their interval; all where there is no interval."""
     if len(heights) < 2:
         return set(heights)
@@ -192,7 +192,7 @@ def index_heights(heights: Sequence[float]) -> set[float]:
 
 
 def _contours(paper: _Paper) -> Iterator[str]:
-    index = index_heights(paper.sheet.heights)
+    index = index_contours(paper.sheet.heights)
     labelled = index or set(paper.sheet.heights)
     labels: list[str] = []
     yield '<g id="contours">'

@@ -6,8 +6,8 @@ from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk, Engine, Listener
 from a7sim.instrument.language.engine import MAX_LINE_LENGTH
 from a7sim.link.clock import Clock
-from a7sim.link.replies import Part, as_text, whole_reply
-from a7sim.link.waiting import obeyed
+from a7sim.link.replies import Part, parse_reply, part_as_text
+from a7sim.link.waiting import feed_until_idle
 from a7sim.scene import build_scene
 from a7sim.session.scripts import Expect, Place, Say, Script, Statement, Wait
 
@@ -54,10 +54,10 @@ class Player:
         if isinstance(statement, Wait):
             self._clock.spend(statement.seconds)
             return None
-        reply = obeyed(engine, _said(statement).encode("latin-1", "replace") + b"\n", self._clock)
+        reply = feed_until_idle(engine, _said(statement).encode("latin-1", "replace") + b"\n", self._clock)
         if isinstance(statement, Say):
             return None
-        taken = whole_reply(reply)
+        taken = parse_reply(reply)
         answer = () if taken is None else tuple(field for part in taken.parts for field in _fields(part))
         if statement.met_by(answer):
             return None
@@ -82,7 +82,7 @@ def _asks_for_errors(statement: Statement | None) -> bool:
 
 def _fields(part: Part) -> list[str]:
     """Return the values of an answer, texts with their quotes."""
-    text, fields, within = as_text(part), [""], False
+    text, fields, within = part_as_text(part), [""], False
     for character in text:
         within ^= character == '"'
         if character == "," and not within:

@@ -12,11 +12,11 @@ from a7sim.instrument.language import MAX_LINE_LENGTH, Desk, LinkEvent
 from a7sim.instrument.language.desk import POLL_SECONDS
 from a7sim.instrument.language.logins import TOKEN_PLACEHOLDER
 from a7sim.link.clock import Clock
-from a7sim.link.waiting import obeyed
+from a7sim.link.waiting import feed_until_idle
 from a7sim.mistakes import Mistake
-from a7sim.scenario import Scenario, hash_of, scenario_from
+from a7sim.scenario import Scenario, from_data, hash_scenario
 from a7sim.scene import build_scene
-from a7sim.session.checkpoints import Checkpoint, Differing, differences, hash_of_state, read_checkpoints
+from a7sim.session.checkpoints import Checkpoint, Differing, differences, read_checkpoints, state_hash
 from a7sim.session.folder import SCENARIO_SUFFIX, STATES
 from a7sim.session.lines import Event, Journalled
 
@@ -30,11 +30,11 @@ def scenario_of_journal(journalled: Journalled, known: Scenario | None = None) -
     Raises Mistake where they are not those the session was begun with.
     """
     header = journalled.header
-    if not names_scenario(journalled):
+    if not knows_scenario(journalled):
         raise Mistake(f"{journalled.where(1)}: expected a session whose scenario is known, got one that names none")
     scenario = known or _scenario_beside(journalled)
     try:
-        found = hash_of(scenario)
+        found = hash_scenario(scenario)
     except Mistake as mistake:
         raise Mistake(f"{journalled.where(1)}: {mistake}") from mistake
     if found != header.get("scenario_hash"):
@@ -45,7 +45,7 @@ def scenario_of_journal(journalled: Journalled, known: Scenario | None = None) -
     return scenario, header["seed"]
 
 
-def names_scenario(journalled: Journalled) -> bool:
+def knows_scenario(journalled: Journalled) -> bool:
     """Whether it is said of what scenario the instrument is."""
     return journalled.header.get("scenario_hash") is not None
 
@@ -63,7 +63,7 @@ def _scenario_beside(journalled: Journalled) -> Scenario:
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise Mistake(f"{path}: expected the scenario of the session as JSON, got something else") from error
     try:
-        return scenario_from(data)
+        return from_data(data)
     except Mistake as mistake:
         raise Mistake(f"{where}: {mistake}") from mistake
 
@@ -199,12 +199,12 @@ class Replay:
                 engine.feed(received, event.t)
             else:
                 self._clock.pass_to(event.t)
-                obeyed(engine, received, self._clock)
+                feed_until_idle(engine, received, self._clock)
 
     def _compared(self, number: int, event: Event) -> Difference | None:
         state = self.desk.state(self._changes)
         self._changes = len(self.desk.autograph.recorder.changes)
-        found = hash_of_state(state)
+        found = state_hash(state)
         self.checkpoints.append(Checkpoint(number, event.t, found, state))
         if found == event.hash:
             return None
@@ -226,7 +226,7 @@ class Replay:
         return ()
 
 
-def replayed(replay: Replay, first: int = 2) -> Iterator[tuple[int, Event, Difference | None]]:
+def replay_lines(replay: Replay, first: int = 2) -> Iterator[tuple[int, Event, Difference | None]]:
     """Say the lines of a journal again, from a line on; yield each with its number and how it differs."""
     for number in range(first, len(replay.journalled) + 1):
         event = replay.journalled.event(number)

@@ -7,8 +7,8 @@ from typing import Any
 import msgspec
 
 import a7sim
-from a7sim.documents import Document, head
-from a7sim.files import csv_text
+from a7sim.documents import Document, document_header
+from a7sim.files import to_csv
 from a7sim.geometry import Array
 from a7sim.operator import ModelRecord, Person
 from a7sim.operator.absolute import OnGround
@@ -23,11 +23,11 @@ SIDES = {1: "left", 2: "right"}
 _CENTRE_FIELDS = ("X0", "Y0", "Z0", "T0", "sigma_X0", "sigma_Y0", "sigma_Z0", "sigma_T0", "rms")
 
 
-def header(scenario: Scenario, seed: int) -> dict[str, Any]:
+def results_header(scenario: Scenario, seed: int) -> dict[str, Any]:
     """Return what a document of results says first."""
     plan = scenario.plotting
     return (
-        head("run")
+        document_header("run")
         | {
             "software": f"a7sim {a7sim.__version__}",
             "scenario": scenario.title,
@@ -36,16 +36,16 @@ def header(scenario: Scenario, seed: int) -> dict[str, Any]:
             "work": scenario.work,
         }
         | ({"method": plan.method, "case": plan.case} if plan else {})
-        | of_request(scenario)
+        | request_document(scenario)
     )
 
 
-def of_request(scenario: Scenario) -> dict[str, Any]:
+def request_document(scenario: Scenario) -> dict[str, Any]:
     """Return the command that gives a session again, and what it changed in the scenario's file."""
     return msgspec.structs.asdict(scenario.request) if isinstance(scenario, RequestedScenario) else {}
 
 
-def of_model(
+def model_document(
     record: ModelRecord, beside: Beside, member: int = 0, published: Published | None = None
 ) -> dict[str, Any]:
     """Return the results of a model beside the truth, of which this session's is that of a member."""
@@ -92,7 +92,7 @@ def of_model(
     }
 
 
-def of_model_in_brief(record: ModelRecord, beside: Beside, member: int) -> dict[str, Any]:
+def brief_model_document(record: ModelRecord, beside: Beside, member: int) -> dict[str, Any]:
     """Return of the results of a model what its strip and the responses of a study that have names are read from."""
     orientation = record.orientation
     found = {hand: _centre(centre, _CENTRE_FIELDS[:3]) for hand, centre in record.centres.items()}
@@ -125,10 +125,10 @@ def _points(record: ModelRecord) -> dict[str, dict[str, float]]:
     return {point: {"X": round(x, 3), "Y": round(y, 3), "Z": round(z, 3)} for point, (x, y, z) in record.points.items()}
 
 
-def of_operator(person: Person, lines: int) -> dict[str, Any]:
+def operator_document(person: Person, lines: int) -> dict[str, Any]:
     """Return what an operator wrote and where the time went, hours."""
     book = person.book
-    return of_hours(person.clock.now, person.timesheet) | {
+    return hours_document(person.clock.now, person.timesheet) | {
         "lines_over_the_link": lines,
         "book_entries": len(book.entries),
         "struck_out": sum(bool(entry.struck) for entry in book.entries),
@@ -136,7 +136,7 @@ def of_operator(person: Person, lines: int) -> dict[str, Any]:
     }
 
 
-def of_hours(seconds: float, timesheet: Timesheet, session: int = 0) -> dict[str, Any]:
+def hours_document(seconds: float, timesheet: Timesheet, session: int = 0) -> dict[str, Any]:
     """Return how long a session took and where the time went, hours."""
     return {
         "hours": round(seconds / 3600.0, 3),
@@ -145,7 +145,7 @@ def of_hours(seconds: float, timesheet: Timesheet, session: int = 0) -> dict[str
     }
 
 
-def of_slips(person: Person) -> list[dict[str, Any]]:
+def slips_document(person: Person) -> list[dict[str, Any]]:
     """Return what an operator did wrongly without knowing it, beside what was right."""
     struck = {entry.number for entry in person.book.entries if entry.struck}
     return [
@@ -268,12 +268,12 @@ def _matrix(values: Array) -> list[list[float]]:
 def models_csv(models: Sequence[Model]) -> str:
     """Return model coordinates and centres in mm, Z upward."""
     rows = ((model.name, name, *_mm(*at)) for model in models for name, at in _named(model))
-    return "# mm at model scale, Z up\n" + csv_text(("model", "point", "X", "Y", "Z"), rows)
+    return "# mm at model scale, Z up\n" + to_csv(("model", "point", "X", "Y", "Z"), rows)
 
 
 def points_csv(model: Model) -> str:
     """Return the points of a strip in the system of the ground, m."""
-    return csv_text(("point", "X", "Y", "Z"), ((name, *_mm(*at)) for name, at in _named(model)))
+    return to_csv(("point", "X", "Y", "Z"), ((name, *_mm(*at)) for name, at in _named(model)))
 
 
 def _named(model: Model) -> Iterator[tuple[str, list[float]]]:
@@ -283,7 +283,7 @@ def _named(model: Model) -> Iterator[tuple[str, list[float]]]:
 def strips_csv(strips: Sequence[Document]) -> str:
     """Return the accuracies of all strips in m, one a line."""
     header = ("strip", "cases", "scale", "max_join_mm", *(f"{on}_{what}_m" for on in ON for what in WHAT))
-    return csv_text(header, (_strip_row(strip) for strip in strips))
+    return to_csv(header, (_strip_row(strip) for strip in strips))
 
 
 def _strip_row(strip: Document) -> tuple[str, ...]:

@@ -8,9 +8,9 @@ from a7sim.instrument.language import Desk
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
 from a7sim.session.folder import JOURNAL
-from a7sim.session.journal import Journal, software
+from a7sim.session.journal import Journal, software_version
 from a7sim.session.lines import SCHEMA_VERSION, Journalled, read_journal
-from a7sim.session.replaying import Difference, Replay, replayed, scenario_of_journal
+from a7sim.session.replaying import Difference, Replay, replay_lines, scenario_of_journal
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class Begun:
         return self.settings.get(name)
 
 
-def begun_in(folder: Path, command: str) -> Begun:
+def find_resumable(folder: Path, command: str) -> Begun:
     """Return the session that a command began in a folder. Raises Mistake where that cannot be gone on with."""
     journalled = read_journal(folder / JOURNAL)
-    for name, expected in (("command", command), ("software", software())):
+    for name, expected in (("command", command), ("software", software_version())):
         got = journalled.header.get(name)
         if got != expected:
             raise Mistake(f"{journalled.where(1)}: expected a session of {expected} to go on with, got one of {got}")
@@ -55,14 +55,14 @@ class Again(NamedTuple):
     held_by: str | None
 
 
-def served_again(begun: Begun, journal: Journal, from_checkpoint: bool = False) -> Again:
+def restore_instrument(begun: Begun, journal: Journal, from_checkpoint: bool = False) -> Again:
     """Return an instrument as its journal leaves it; the journal goes on.
 
     All that it holds happens again, or what stands behind its last checkpoint. Raises Mistake where it does not.
     """
     replay = Replay(begun.journalled)
     first = replay.seek(len(begun.journalled) + 1) if from_checkpoint else 2
-    for number, _, difference in replayed(replay, first):
+    for number, _, difference in replay_lines(replay, first):
         if difference is not None:
             raise Mistake(f"{begun.journalled.where(number)}: {_not_again(difference)}")
     desk = replay.desk

@@ -6,14 +6,14 @@ from functools import cached_property
 from pathlib import Path
 
 from a7sim.documents import Document, as_json
-from a7sim.files import csv_text
+from a7sim.files import to_csv
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Desk, Listener
 from a7sim.link.client import Client, Port
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.mistakes import Mistake
-from a7sim.operator import Job, ModelJob, Person, work
+from a7sim.operator import Job, ModelJob, Person, measure_models
 from a7sim.reduction import Ground, Model, Undetermined
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene, build_scene
@@ -25,18 +25,26 @@ from a7sim.session.folder import (
     OUTPUT_CARDS,
     RESULTS,
     STRIP,
-    write_whole,
+    write_atomic,
 )
-from a7sim.session.journal import Journal, Keeping, header_of
-from a7sim.session.sitting import sitting
-from a7sim.session.strips import GroundedStrip, cards_of, given_control, ground_of, grounded, models_of, of_grounded
+from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.sitting import recorded_session
+from a7sim.session.strips import (
+    GroundedStrip,
+    given_control,
+    ground_control,
+    models_from_documents,
+    orient_strip,
+    oriented_strip_document,
+    strip_cards,
+)
 from a7sim.session.truth import Beside
 
 Cable = Callable[[InProcessSerial], Port]
 """What lies between instrument and operator: it takes the instrument's end and returns the operator's."""
 
 
-def straight(port: InProcessSerial) -> Port:
+def direct(port: InProcessSerial) -> Port:
     """Return the instrument's end itself: a cable without length."""
     return port
 
@@ -55,10 +63,10 @@ class Session:
     @cached_property
     def job(self) -> Job:
         """The job sheet. Raises Mistake where the scenario has no settings of a plotter."""
-        return job_of(self.scenario, self.scene)
+        return make_job(self.scenario, self.scene)
 
 
-def open_session(scenario: Scenario, seed: int, listener: Listener | None = None, cable: Cable = straight) -> Session:
+def open_session(scenario: Scenario, seed: int, listener: Listener | None = None, cable: Cable = direct) -> Session:
     """Return a session ready to begin. Raises Mistake when a file of measurements is bad."""
     scene = build_scene(scenario, seed)
     autograph = build_autograph(scenario.instrument, scene.drawer, seed)
@@ -69,7 +77,7 @@ def open_session(scenario: Scenario, seed: int, listener: Listener | None = None
     return Session(scenario, seed, scene, autograph, person, desk)
 
 
-def job_of(scenario: Scenario, scene: Scene) -> Job:
+def make_job(scenario: Scenario, scene: Scene) -> Job:
     """Return the job sheet: what of a scenario an operator is told."""
     models = tuple(
         ModelJob(
@@ -106,7 +114,7 @@ def run(
     out: Path | None = None,
     watcher: Watcher | None = None,
     force: bool = False,
-    cable: Cable = straight,
+    cable: Cable = direct,
     keeping: Keeping | None = None,
 ) -> Document:
     """Work through a scenario up to its strip and return the document of results; with `out`, leave the files there.
@@ -124,17 +132,17 @@ def run(
     job = session.job
     keeping.prepare(out, force)
     done: list[Document] = []
-    document = results.header(scenario, seed) | {"status": "failed", "message": "", "models": done}
+    document = results.results_header(scenario, seed) | {"status": "failed", "message": "", "models": done}
 
     def leaves() -> dict[str, str]:
-        return {MODELS: results.models_csv(models_of(done))}
+        return {MODELS: results.models_csv(models_from_documents(done))}
 
-    with sitting(document, session, journal, header_of("run", scenario, seed), out, leaves):
-        for record in work(session.person, job, watcher.tick, watcher.begins):
+    with recorded_session(document, session, journal, make_header("run", scenario, seed), out, leaves):
+        for record in measure_models(session.person, job, watcher.tick, watcher.begins):
             plan = next(model for model in scenario.models if model.name == record.model.name)
             truth = session.scene.relative_truth(plan)
             beside = Beside.of_record(record, session.autograph, truth)
-            done.append(results.of_model(record, beside, published=plan.published))
+            done.append(results.model_document(record, beside, published=plan.published))
     return _concluded(session, document, out)
 
 
@@ -142,29 +150,31 @@ def _concluded(session: Session, document: Document, out: Path | None) -> Docume
     """Return the document of a session, with the strip on the ground if the session did not stop early."""
     if document["status"] != "complete":
         return document
-    ground = ground_of(session.scenario, session.scene)
-    document["strip"], strip = strip_of(session.scenario, ground, document["models"])
+    ground = ground_control(session.scenario, session.scene)
+    document["strip"], strip = strip_document(session.scenario, ground, document["models"])
     if out is not None and strip is not None:
-        write_whole(out / STRIP, results.points_csv(strip.points))
-        _write_cards(out, strip, models_of(document["models"]), ground)
+        write_atomic(out / STRIP, results.points_csv(strip.points))
+        _write_cards(out, strip, models_from_documents(document["models"]), ground)
     if out is not None:
-        write_whole(out / RESULTS, as_json(document))
+        write_atomic(out / RESULTS, as_json(document))
     return document
 
 
-def strip_of(scenario: Scenario, ground: Ground, models: Sequence[Document]) -> tuple[Document, GroundedStrip | None]:
+def strip_document(
+    scenario: Scenario, ground: Ground, models: Sequence[Document]
+) -> tuple[Document, GroundedStrip | None]:
     """Return the strip that the models of a document make on the ground, or why they make none in its `message`."""
     try:
         if not ground.used.any():
             raise Mistake("the scenario has no ground control")
-        strip = grounded(models_of(models), ground, scenario.strip.join, scenario.strip.polynomial)
+        strip = orient_strip(models_from_documents(models), ground, scenario.strip.join, scenario.strip.polynomial)
     except (Mistake, Undetermined) as reason:
         return {"message": str(reason)}, None
-    return of_grounded(strip), strip
+    return oriented_strip_document(strip), strip
 
 
 def _write_cards(out: Path, strip: GroundedStrip, models: Sequence[Model], ground: Ground) -> None:
-    cards = cards_of(strip, models, ground)
-    write_whole(out / CARDS, "\n".join([*cards.deck, ""]))
-    write_whole(out / OUTPUT_CARDS, "\n".join([*cards.output, ""]))
-    write_whole(out / CARD_KEY, csv_text(("point", "number"), cards.key.items()))
+    cards = strip_cards(strip, models, ground)
+    write_atomic(out / CARDS, "\n".join([*cards.deck, ""]))
+    write_atomic(out / OUTPUT_CARDS, "\n".join([*cards.output, ""]))
+    write_atomic(out / CARD_KEY, to_csv(("point", "number"), cards.key.items()))

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from a7sim.mistakes import Mistake
-from a7sim.scenario import Scenario, hash_of
-from a7sim.session.durable import being_written
+from a7sim.scenario import Scenario, hash_scenario
+from a7sim.session.durable import is_being_written
 from a7sim.session.folder import JOURNAL
 from a7sim.session.lines import read_journal
-from a7sim.session.resuming import Begun, begun_in
+from a7sim.session.resuming import Begun, find_resumable
 
 COMMAND = "console"
 
@@ -51,7 +51,7 @@ def _does(line: str) -> bool:
 
 def last_session(folder: Path, scenario: Scenario, seed: int) -> Left | None:
     """Return the last session of a scenario and a seed in a folder of this name, numbered or not, if there is one."""
-    wanted = hash_of(scenario), seed
+    wanted = hash_scenario(scenario), seed
     return next((left for each in _latest_first(folder) if (left := _left_in(each, *wanted)) is not None), None)
 
 
@@ -67,10 +67,10 @@ def _left_in(folder: Path, scenario_hash: str, seed: int) -> Left | None:
         return Left(folder, None, str(mistake))
     if (header.get("scenario_hash"), header.get("seed")) != (scenario_hash, seed):
         return None
-    if being_written(folder / JOURNAL):
+    if is_being_written(folder / JOURNAL):
         return Left(folder, None, f"{folder}: somebody sits there")
     try:
-        return Left(folder, begun_in(folder, COMMAND))
+        return Left(folder, find_resumable(folder, COMMAND))
     except Mistake as mistake:
         return Left(folder, None, str(mistake))
 

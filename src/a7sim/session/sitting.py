@@ -11,9 +11,9 @@ from a7sim.instrument.language import Desk
 from a7sim.mistakes import Mistake
 from a7sim.operator import DoesNotFit, Person
 from a7sim.reduction import Undetermined
-from a7sim.session.folder import BOOK, RESULTS, write_whole
+from a7sim.session.folder import BOOK, RESULTS, write_atomic
 from a7sim.session.journal import Header, Journal
-from a7sim.session.results import of_operator, of_slips
+from a7sim.session.results import operator_document, slips_document
 
 
 class Seated(Protocol):
@@ -24,7 +24,7 @@ class Seated(Protocol):
 
 
 @contextmanager
-def sitting(
+def recorded_session(
     document: Document,
     seated: Seated,
     journal: Journal,
@@ -56,8 +56,8 @@ def sitting(
             raise
         finally:
             document |= {
-                "operator": of_operator(person, journal.lines_over_the_link),
-                "truth": {"slips": of_slips(person)},
+                "operator": operator_document(person, journal.lines_over_the_link),
+                "truth": {"slips": slips_document(person)},
             }
             if out is not None:
                 _leave(out, {BOOK: person.book.as_csv(), **leaves(), RESULTS: as_json(document)})
@@ -68,7 +68,7 @@ def _leave(out: Path, files: Mapping[str, str]) -> None:
     wrong_before = sys.exception()
     try:
         for name, text in files.items():
-            write_whole(out / name, text)
+            write_atomic(out / name, text)
     except OSError:
         if wrong_before is None:
             raise

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.documents import Document, of_absolute, of_adjustment, of_joins
+from a7sim.documents import Document, absolute_document, adjustment_document, joins_document
 from a7sim.mistakes import Mistake
 from a7sim.reduction import (
     AbsoluteOrientation,
@@ -56,7 +56,7 @@ class GroundedStrip:
         return self.formed.transformed(self.oriented.similarity)
 
 
-def ground_of(scenario: Scenario, scene: Scene) -> Ground:
+def ground_control(scenario: Scenario, scene: Scene) -> Ground:
     """Return the list of ground control and checks that the computing room has."""
     names = tuple(point.point for point in scenario.ground)
     coordinates = np.array([scene.ground_points[name] for name in names]).reshape(-1, 3).T
@@ -65,13 +65,13 @@ def ground_of(scenario: Scenario, scene: Scene) -> Ground:
 
 def given_control(scenario: Scenario, scene: Scene) -> Ground:
     """Return the ground control as an operator is given it: no checks, and nan for what a point's role leaves out."""
-    ground = ground_of(scenario, scene)
+    ground = ground_control(scenario, scene)
     known = np.where(ground.used > 0.0, ground.coordinates, np.nan)
     given = np.flatnonzero(ground.used.any(axis=0))
     return Ground(tuple(ground.points[i] for i in given), known[:, given], tuple(ground.roles[i] for i in given))
 
 
-def grounded(
+def orient_strip(
     models: Sequence[Model], ground: Ground, method: JoinMethod = "points", degree: Degree | None = None
 ) -> GroundedStrip:
     """Return the strip of models on its control. Raises Undetermined or Mistake for models or control too few."""
@@ -80,13 +80,13 @@ def grounded(
     return GroundedStrip(formed, oriented, strip_adjustment(oriented.model, ground, degree) if degree else None)
 
 
-def of_grounded(strip: GroundedStrip) -> Document:
+def oriented_strip_document(strip: GroundedStrip) -> Document:
     """Return a strip on the ground as a document."""
-    document: Document = {"joins": of_joins(strip.formed)} | of_absolute(strip.oriented)
-    return document | ({"polynomial": of_adjustment(strip.adjusted)} if strip.adjusted else {})
+    document: Document = {"joins": joins_document(strip.formed)} | absolute_document(strip.oriented)
+    return document | ({"polynomial": adjustment_document(strip.adjusted)} if strip.adjusted else {})
 
 
-def models_of(documents: Sequence[Document]) -> list[Model]:
+def models_from_documents(documents: Sequence[Document]) -> list[Model]:
     """Return the models of a document of results in mm, Z upward, with their centres."""
     return [_model(each) for each in documents]
 
@@ -100,7 +100,7 @@ def _model(document: Document) -> Model:
     return Model(document["model"], tuple(places), coordinates)
 
 
-def cards_of(strip: GroundedStrip, models: Sequence[Model], ground: Ground) -> Cards:
+def strip_cards(strip: GroundedStrip, models: Sequence[Model], ground: Ground) -> Cards:
     """Return the N.R.C. cards of a strip: the deck that goes in, and the output with residuals and deviations.
 
     Names that are no numbers of five digits get one. Raises Mistake for coordinates that do not fit nine columns.

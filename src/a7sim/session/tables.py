@@ -8,9 +8,9 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
-from a7sim.sheets import sheet
+from a7sim.sheets import text_table
 from a7sim.standard_points import FIGURE_4_1, POSITIONS
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 _ELEMENTS = (
     ("κ", "kappa", "gon"),
@@ -22,41 +22,41 @@ _ELEMENTS = (
 )
 
 
-def of_session(document: dict[str, Any]) -> RenderableType:
+def session_tables(document: dict[str, Any]) -> RenderableType:
     """Return the tables of a session."""
     parts: list[RenderableType] = []
     for model in document.get("models", ()):
-        parts.extend(of_model(model))
+        parts.extend(model_tables(model))
     if "strip" in document:
-        parts += [Rule(Text("Strip"), align="left"), *of_strip(document["strip"]), Text()]
+        parts += [Rule(Text("Strip"), align="left"), *strip_tables(document["strip"]), Text()]
     for name, strip in document.get("ways", {}).items():
-        parts += [Rule(Text(f"Strip, {name}"), align="left"), *of_strip(strip), Text()]
+        parts += [Rule(Text(f"Strip, {name}"), align="left"), *strip_tables(strip), Text()]
     if "a8_minus_comparator_m" in document:
         each = document["a8_minus_comparator_m"]
-        parts += [_titled("A8 minus comparator", of_accuracy({"points": each})), Text()]
+        parts += [_titled("A8 minus comparator", accuracy_table({"points": each})), Text()]
     if "operator" in document:
-        parts.append(of_hours(document["operator"]))
+        parts.append(hours_table(document["operator"]))
     if document["message"]:
         parts.append(Text(f"{document['status']}: {document['message']}", style="bold"))
     return Group(*parts)
 
 
-def of_hours(operator: dict[str, Any]) -> Text:
+def hours_table(operator: dict[str, Any]) -> Text:
     """Return how long an operator took and for what; of one in a crowd nothing is told of line and book."""
     activities = (f"{name} {hours:.1f}" for name, hours in operator["time_by_activity_h"].items())
     told = [f"{operator['hours']:.1f} hours at the instrument"]
     if "book_entries" in operator:
         told += [
-            counted(operator["lines_over_the_link"], "line") + " over the link",
-            counted(operator["book_entries"], "reading") + " in the book",
+            pluralize(operator["lines_over_the_link"], "line") + " over the link",
+            pluralize(operator["book_entries"], "reading") + " in the book",
             f"{operator['struck_out']} struck out",
         ]
     return Text(f"{', '.join(told)}\nWhere they went: {', '.join(activities)}")
 
 
-def of_strips(document: dict[str, Any]) -> RenderableType:
+def strips_table(document: dict[str, Any]) -> RenderableType:
     """Return the table of all strips that the cases make, with the diagram of the first in words."""
-    table = sheet("strip", "cases", "join, mm", "control plan", "height", "checks plan", "height")
+    table = text_table("strip", "cases", "join, mm", "control plan", "height", "checks plan", "height")
     for strip in document["strips"]:
         accuracy = strip["accuracy_m"]
         cells = [f"{accuracy[on][what]:.3f}" if on in accuracy else "" for on in ON for what in WHAT]
@@ -67,7 +67,7 @@ def of_strips(document: dict[str, Any]) -> RenderableType:
     return Group(
         _titled("Strips of all cases, rms residuals in m", table),
         Text(f"\n{first}", overflow="fold"),
-        Text(f"{hours:.1f} hours at the instrument in {counted(len(document['sessions']), 'session')}"),
+        Text(f"{hours:.1f} hours at the instrument in {pluralize(len(document['sessions']), 'session')}"),
         *([Text(said, style="bold")] if said else []),
     )
 
@@ -79,7 +79,7 @@ def _worst_join(strip: dict[str, Any]) -> float:
     return max((join["max_residual_mm"] for join in strip["joins"]), default=0.0)
 
 
-def of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
+def strip_tables(strip: dict[str, Any]) -> Iterator[RenderableType]:
     """Yield joins, residuals and accuracy of a strip, or why it is not on the ground."""
     if "message" in strip:
         yield Text(f"No strip on the ground: {strip['message']}")
@@ -90,15 +90,15 @@ def of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
             f"closing within {join['max_residual_mm']:.3f} mm"
         )
     yield Text(f"On the ground at 1:{1e3 * strip['absolute']['scale']:.0f}")
-    residuals = sheet("point", "role", "X", "Y", "Z")
+    residuals = text_table("point", "role", "X", "Y", "Z")
     last = strip.get("polynomial", strip)
     for point, each in last["residuals_m"].items():
         residuals.add_row(point, each["role"], *("" if each[axis] is None else f"{each[axis]:+.3f}" for axis in "XYZ"))
     yield _titled("Residuals, computed minus given, m", residuals)
-    yield _titled("Accuracy", of_accuracy(strip["accuracy_m"]))
+    yield _titled("Accuracy", accuracy_table(strip["accuracy_m"]))
     if "polynomial" in strip:
         adjusted = strip["polynomial"]
-        yield _titled(f"After the polynomial of degree {adjusted['degree']}", of_accuracy(adjusted["accuracy_m"]))
+        yield _titled(f"After the polynomial of degree {adjusted['degree']}", accuracy_table(adjusted["accuracy_m"]))
         found = adjusted["deformation"]
         yield Text(
             f"The strip was bent by {found['vertical_sag_m']:+.2f} m in height and by "
@@ -108,27 +108,27 @@ def of_strip(strip: dict[str, Any]) -> Iterator[RenderableType]:
     yield from (Text(f"warning: {warning}") for warning in strip["warnings"])
 
 
-def of_accuracy(sets: dict[str, Any]) -> Table:
+def accuracy_table(sets: dict[str, Any]) -> Table:
     """Return rms and largest residuals of sets of points."""
-    accuracy = sheet("rms, m", "X", "Y", "Z", "plan", "height", "largest X", "Y", "Z")
+    accuracy = text_table("rms, m", "X", "Y", "Z", "plan", "height", "largest X", "Y", "Z")
     for on, each in sets.items():
         values = [*each["rms"].values(), each["plan"], each["height"], *each["largest"].values()]
         accuracy.add_row(f"{each['points']} {on}", *("" if value is None else f"{value:.3f}" for value in values))
     return accuracy
 
 
-def of_model(model: dict[str, Any]) -> Iterator[RenderableType]:
+def model_tables(model: dict[str, Any]) -> Iterator[RenderableType]:
     """Yield the tables of a model."""
     orientation = model["relative_orientation"]
     title = f"Model {model['model']}: {model['left']} and {model['right']}, base {model['base']}"
     yield Rule(Text(title), align="left")
-    yield of_rounds(orientation)
-    yield of_elements(orientation["elements"], model["truth"].get("elements", {}))
+    yield rounds_table(orientation)
+    yield elements_table(orientation["elements"], model["truth"].get("elements", {}))
     yield _residuals(orientation)
-    yield of_centres(model)
+    yield centres_table(model)
     if "absolute_orientation" in model:
-        yield of_ground(model["absolute_orientation"])
-    yield of_truth(model["truth"])
+        yield ground_table(model["absolute_orientation"])
+    yield truth_table(model["truth"])
     yield Text()
 
 
@@ -136,11 +136,11 @@ def _titled(title: str, table: Table) -> RenderableType:
     return Group(Text(), Text(title, style="bold"), table)
 
 
-def of_rounds(orientation: dict[str, Any]) -> RenderableType:
+def rounds_table(orientation: dict[str, Any]) -> RenderableType:
     """Return the iterations of a relative orientation."""
     if orientation["procedure"] == "empirical":
         return _cleared_rounds(orientation)
-    table = sheet("iteration", "mean p, mm", "rms, mm")
+    table = text_table("iteration", "mean p, mm", "rms, mm")
     for number, each in enumerate(orientation["rounds"], start=1):
         table.add_row(str(number), f"{each['mean_mm']:.4f}", f"{each['rms_mm']:.4f}")
     title = f"Numerical relative orientation, {orientation['method']}, case {orientation['case']}"
@@ -150,7 +150,7 @@ def of_rounds(orientation: dict[str, Any]) -> RenderableType:
 def _cleared_rounds(orientation: dict[str, Any]) -> RenderableType:
     """Return what was seen at the points before omega was turned, round by round, and how many times it was."""
     labels = [label for label in POSITIONS if any(label in each["parallax_mm"] for each in orientation["rounds"])]
-    table = sheet("iteration", *labels, "rms, mm", "n")
+    table = text_table("iteration", *labels, "rms, mm", "n")
     for number, each in enumerate(orientation["rounds"], start=1):
         seen = [f"{each['parallax_mm'][label]:+.3f}" if label in each["parallax_mm"] else "" for label in labels]
         n = each["over_correction"]
@@ -161,9 +161,9 @@ def _cleared_rounds(orientation: dict[str, Any]) -> RenderableType:
     )
 
 
-def of_elements(elements: dict[str, float], true: dict[str, float]) -> RenderableType:
+def elements_table(elements: dict[str, float], true: dict[str, float]) -> RenderableType:
     """Return the elements as the counters show them, the true ones beside."""
-    table = sheet("", "left '", "true", 'right "', "true", "")
+    table = text_table("", "left '", "true", 'right "', "true", "")
 
     def cells(name: str) -> list[str]:
         return [f"{elements[name]:.2f}", f"{true[name]:.3f}" if name in true else ""]
@@ -179,7 +179,7 @@ def of_elements(elements: dict[str, float], true: dict[str, float]) -> Renderabl
 def _residuals(orientation: dict[str, Any]) -> RenderableType:
     residuals = orientation["residual_parallax_mm"]
     rms = orientation["rms_parallax_mm"]
-    table = sheet(*[""] * 5)
+    table = text_table(*[""] * 5)
     table.show_header = False
     shown = [column for column in zip(*FIGURE_4_1, strict=True) if any(label in residuals for label in column)]
     for row in zip(*shown, strict=True):
@@ -187,9 +187,9 @@ def _residuals(orientation: dict[str, Any]) -> RenderableType:
     return _titled(f"Residual y-parallaxes at the standard points, mm (rms {rms:.4f})", table)
 
 
-def of_centres(model: dict[str, Any]) -> RenderableType:
+def centres_table(model: dict[str, Any]) -> RenderableType:
     """Return both perspective centres with their standard deviations, the true ones beside."""
-    table = sheet("", "left", "±", "true", "right", "±", "true")
+    table = text_table("", "left", "±", "true", "right", "±", "true")
     sides = ("left", "right")
     centres, truth = model["perspective_centres"], model["truth"]["centres"]
     for name in ("X0", "Y0", "Z0", "T0"):
@@ -202,9 +202,9 @@ def of_centres(model: dict[str, Any]) -> RenderableType:
     return _titled("Perspective centres, counter units", table)
 
 
-def of_ground(found: dict[str, Any]) -> RenderableType:
+def ground_table(found: dict[str, Any]) -> RenderableType:
     """Return how a model was levelled and scaled at the instrument."""
-    table = sheet("round", "heights, rms m", "scale", "along, gon", "across, gon")
+    table = text_table("round", "heights, rms m", "scale", "along, gon", "across, gon")
     for number, each in enumerate(found["rounds"], start=1):
         tilts = (f"{tilt:+.3f}" for tilt in each["tilts_gon"])
         table.add_row(str(number), f"{each['height_rms_m']:.3f}", f"{each['scale']:.5f}", *tilts)
@@ -223,7 +223,7 @@ def of_ground(found: dict[str, Any]) -> RenderableType:
     )
 
 
-def of_truth(truth: dict[str, Any]) -> Text:
+def truth_table(truth: dict[str, Any]) -> Text:
     """Return how far the relative orientation is off."""
     if "source" not in truth:
         return Text("\nNo true relative orientation is known.")

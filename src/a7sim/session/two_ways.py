@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.reduction.absolute import GroundFit, largest, root_mean_square
+from a7sim.reduction.absolute import GroundFit, max_abs_residual, root_mean_square
 from a7sim.reduction.strips import is_centre
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
@@ -35,7 +35,7 @@ class Comparison:
     difference_largest: Array
 
 
-def a8_and_comparator(scenario: Scenario, seeds: Iterable[int]) -> Comparison:
+def compare_a8_to_comparator(scenario: Scenario, seeds: Iterable[int]) -> Comparison:
     """Return what both ways leave at the check points, over seeds, each seed a flight's film, an A8 and two people."""
     seeds = tuple(seeds)
     both: list[tuple[StripResult, StripResult]] = []
@@ -43,13 +43,13 @@ def a8_and_comparator(scenario: Scenario, seeds: Iterable[int]) -> Comparison:
         scene = build_scene(scenario, seed)
         both.append((strip_by_comparator(scenario, scene, seed), strip_on_a8(scenario, scene, seed)))
     c = scenario.camera.c
-    apart = [differences(*pair) for pair in both]
+    apart = [coordinate_differences(*pair) for pair in both]
     return Comparison(
         seeds,
         _residuals([comparator for comparator, _ in both], c),
         _residuals([a8 for _, a8 in both], c),
         np.array([root_mean_square(each) for each in apart]).T,
-        np.array([largest(each) for each in apart]).T,
+        np.array([max_abs_residual(each) for each in apart]).T,
     )
 
 
@@ -57,7 +57,7 @@ def _residuals(results: list[StripResult], c: float) -> Residuals:
     fits = [_fit(result).at_checks for result in results]
     return Residuals(
         np.array([root_mean_square(fit) for fit in fits]).T,
-        np.array([largest(fit) for fit in fits]).T,
+        np.array([max_abs_residual(fit) for fit in fits]).T,
         np.array([_closing(result, c) for result in results]).T,
     )
 
@@ -75,7 +75,7 @@ def _closing(result: StripResult, c: float) -> tuple[float, float]:
     return float(np.sqrt((differences[:2] ** 2).mean())), float(np.sqrt((differences[2] ** 2).mean()))
 
 
-def differences(comparator: StripResult, a8: StripResult) -> Array:
+def coordinate_differences(comparator: StripResult, a8: StripResult) -> Array:
     """Return A8 minus comparator ``(3, n)`` at the points that are neither control nor centres."""
     one, other = comparator.strip.points, a8.strip.points
     ground = comparator.strip.oriented.fit.ground

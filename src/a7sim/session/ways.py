@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from a7sim.documents import Document, as_json, of_differences
+from a7sim.documents import Document, as_json, differences_document
 from a7sim.mistakes import Mistake
 from a7sim.reduction import Undetermined
 from a7sim.scenario import Scenario
@@ -11,22 +11,22 @@ from a7sim.scene import Flight, Scene, build_scene
 from a7sim.session import results
 from a7sim.session.a8_strip import strip_on_a8
 from a7sim.session.analytical import StripResult, strip_by_comparator
-from a7sim.session.bridge import Bridging, bridged_alone, bridged_together
-from a7sim.session.crowd import open_crowd
-from a7sim.session.folder import MODELS_OF_WAY, RESULTS, STRIP_OF_WAY, prepare_folder, write_whole
+from a7sim.session.bridge import Bridging, bridge_batch, bridge_over_link
+from a7sim.session.crowd import open_batch
+from a7sim.session.folder import MODELS_OF_WAY, RESULTS, STRIP_OF_WAY, prepare_folder, write_atomic
 from a7sim.session.journal import Keeping
-from a7sim.session.running import Cable, Watcher, run, straight
-from a7sim.session.strips import of_grounded
-from a7sim.session.two_ways import differences
+from a7sim.session.running import Cable, Watcher, direct, run
+from a7sim.session.strips import oriented_strip_document
+from a7sim.session.two_ways import coordinate_differences
 
 
-def run_all_ways(
+def run_all_methods(
     scenario: Scenario,
     seed: int,
     out: Path | None = None,
     watcher: Watcher | None = None,
     force: bool = False,
-    cable: Cable = straight,
+    cable: Cable = direct,
     keeping: Keeping | None = None,
 ) -> Document:
     """Measure the strip of a scenario in every way it asks for and return the document of results.
@@ -39,20 +39,20 @@ def run_all_ways(
     if "plotter" in scenario.work:
         document = run(scenario, seed, out, watcher, force, cable, keeping)
     else:
-        document = results.header(scenario, seed) | {"status": "complete", "message": ""}
+        document = results.results_header(scenario, seed) | {"status": "complete", "message": ""}
         if out is not None:
             prepare_folder(out, force)
-    strips, said = _measured(scenario, build_scene(scenario, seed), seed, bridged_alone)
+    strips, said = _measured(scenario, build_scene(scenario, seed), seed, bridge_over_link)
     _add(document, strips, said)
     if out is not None and strips:
         for name, each in strips.items():
-            write_whole(out / MODELS_OF_WAY.format(name.lower()), results.models_csv(each.models))
-            write_whole(out / STRIP_OF_WAY.format(name.lower()), results.points_csv(each.strip.points))
-        write_whole(out / RESULTS, as_json(document))
+            write_atomic(out / MODELS_OF_WAY.format(name.lower()), results.models_csv(each.models))
+            write_atomic(out / STRIP_OF_WAY.format(name.lower()), results.points_csv(each.strip.points))
+        write_atomic(out / RESULTS, as_json(document))
     return document
 
 
-def documents_of_all_ways(
+def run_all_methods_batch(
     scenario: Scenario, seeds: Sequence[int], strips: bool = True, whole: bool = True
 ) -> list[Document]:
     """Return what `run_all_ways` says of each seed, all sessions at once, without what is told of line and book.
@@ -61,12 +61,12 @@ def documents_of_all_ways(
     `whole`, of its models only what the responses of a study that have names are read from.
     """
     if "plotter" in scenario.work:
-        documents = open_crowd(scenario, seeds).documents(strips, whole)
+        documents = open_batch(scenario, seeds).documents(strips, whole)
     else:
-        documents = [results.header(scenario, seed) | {"status": "complete", "message": ""} for seed in seeds]
+        documents = [results.results_header(scenario, seed) | {"status": "complete", "message": ""} for seed in seeds]
     if scenario.work == ["plotter"]:
         return documents
-    bridgings = dict(zip(seeds, bridged_together(scenario, seeds), strict=True)) if "bridge" in scenario.work else {}
+    bridgings = dict(zip(seeds, bridge_batch(scenario, seeds), strict=True)) if "bridge" in scenario.work else {}
     flight = Flight.of(scenario)
     for document, seed in zip(documents, seeds, strict=True):
         _add(document, *_measured(scenario, flight.scene(seed), seed, lambda _, seed: bridgings[seed]))
@@ -76,13 +76,15 @@ def documents_of_all_ways(
 def _add(document: Document, strips: Mapping[str, StripResult], bridging: Bridging | None) -> None:
     """Add to a document what the ways beside the plotter came to."""
     if strips:
-        document["ways"] = {name: of_grounded(each.strip) for name, each in strips.items()}
+        document["ways"] = {name: oriented_strip_document(each.strip) for name, each in strips.items()}
     if bridging is not None:
         document.setdefault("operator", bridging.operator)
         if bridging.message and document["status"] == "complete":
             document |= {"status": "does not fit", "message": bridging.message}
     if "comparator" in strips and "A8" in strips:
-        document["a8_minus_comparator_m"] = of_differences(differences(strips["comparator"], strips["A8"]))
+        document["a8_minus_comparator_m"] = differences_document(
+            coordinate_differences(strips["comparator"], strips["A8"])
+        )
 
 
 def _measured(

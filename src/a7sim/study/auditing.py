@@ -10,7 +10,7 @@ import numpy as np
 
 from a7sim.study.loading import Laid
 from a7sim.study.responses import SIGNIFICANT
-from a7sim.study.simulating import seed_of
+from a7sim.study.simulating import replicate_seed
 from a7sim.study.tally import Tally
 
 _STREAM = 11
@@ -41,7 +41,7 @@ class Difference:
         )
 
 
-def audited(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] = lambda: None) -> list[Difference]:
+def audit_study(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] = lambda: None) -> list[Difference]:
     """Work so many picked replicates on both benches and return a difference for every one that is not the same.
 
     Over the link a replicate must give the responses that the tally holds, to the last digit, and all values of the
@@ -51,7 +51,7 @@ def audited(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] = lam
     picked = _picked(laid, tally, picks)
     found = []
     for i, replicates in picked.items():
-        seeds = [seed_of(laid.study.seed, replicate) for replicate in replicates]
+        seeds = [replicate_seed(laid.study.seed, replicate) for replicate in replicates]
         sample = tally.sample(i)
         task, cell = laid.task_of(i)
         for replicate, seed, on_the_bench in zip(replicates, seeds, task.crowded(cell, seeds), strict=True):

@@ -22,7 +22,7 @@ _RETRIES = 3
 
 
 @contextmanager
-def on_dask(scheduler: str | None, workers: int) -> Iterator[tuple[Executor, int]]:
+def open_dask_executor(scheduler: str | None, workers: int) -> Iterator[tuple[Executor, int]]:
     """Yield an executor of dask and how many chunks its workers work at once; a lost worker's are worked by another.
 
     Without the URL of a scheduler, so many processes of this computer work, which end with this one.

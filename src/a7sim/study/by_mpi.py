@@ -12,7 +12,7 @@ MPI_COMMAND = "mpiexec -n 5 a7sim study ... --executor mpi"
 
 
 @contextmanager
-def on_mpi(environment: Mapping[str, str]) -> Iterator[tuple[Executor, int]]:
+def open_mpi_executor(environment: Mapping[str, str]) -> Iterator[tuple[Executor, int]]:
     """Yield, in the first process of all that mpiexec started, an executor of the others and how many they are.
 
     Another process that comes here works until the first one is done, and ends. `environment` is set in the others

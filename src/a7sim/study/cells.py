@@ -33,7 +33,7 @@ class Cell:
         return ", ".join(f"{factor} {level}" for factor, level in self.levels.items()) or "as it stands"
 
 
-def cells_of(study: Study) -> list[Cell]:
+def make_cells(study: Study) -> list[Cell]:
     """Return the cells of a study, numbered from 1. Raises Mistake for factors that do not make a design."""
     for factor in study.factor:
         _see_that_it_varies(factor, study.design)
@@ -51,7 +51,7 @@ def cells_of(study: Study) -> list[Cell]:
     ]
 
 
-def cells_of_strips(cells: Sequence[Cell], models: Sequence[str]) -> list[Cell]:
+def make_strip_cells(cells: Sequence[Cell], models: Sequence[str]) -> list[Cell]:
     """Return cells of which each stands for all strips that its models, each in every case, make; numbered anew."""
     combinations = cases_of_strips(tuple(CASES), len(models))
     if len(cells) * len(combinations) > MAX_CELLS:
@@ -67,17 +67,17 @@ def cells_of_strips(cells: Sequence[Cell], models: Sequence[str]) -> list[Cell]:
     ]
 
 
-def levels_of(factor: Factor) -> list[Level]:
+def factor_levels(factor: Factor) -> list[Level]:
     """Return the levels of a factor as its file lists them."""
     if factor.groups:
         return [Level(name, settings) for name, settings in factor.groups.items()]
-    return [Level(label_of(each), {factor.path or "": each}) for each in factor.levels]
+    return [Level(value_label(each), {factor.path or "": each}) for each in factor.levels]
 
 
-def label_of(value: Any) -> str:
+def value_label(value: Any) -> str:
     """Return a value as a label: lists with dashes, numbers as short as they are."""
     if isinstance(value, list):
-        return " - ".join(label_of(each) for each in value)
+        return " - ".join(value_label(each) for each in value)
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
@@ -94,13 +94,13 @@ def _see_that_it_varies(factor: Factor, design: str) -> None:
         raise Mistake(f"{where}: expected either path and levels or groups, got both")
     if factor.levels and factor.path is None:
         raise Mistake(f"{where}: expected the path of the scenario value that its levels give, got none")
-    labels = [level.label for level in levels_of(factor)]
+    labels = [level.label for level in factor_levels(factor)]
     if len(labels) < 2 or len(set(labels)) < len(labels):
         raise Mistake(f"{where}: expected two different levels or more, got {', '.join(labels) or 'none'}")
 
 
 def _rows(study: Study) -> Sequence[tuple[Level, ...]]:
-    choices = [levels_of(factor) for factor in study.factor]
+    choices = [factor_levels(factor) for factor in study.factor]
     if study.design == "full":
         return list(product(*choices))
     first = tuple(levels[0] for levels in choices)
@@ -122,8 +122,8 @@ def _hypercube(study: Study) -> Sequence[tuple[Level, ...]]:
 def _at(factor: Factor, place: float) -> Level:
     """Return the level of a factor at a place from 0 to 1."""
     if factor.range is None:
-        levels = levels_of(factor)
+        levels = factor_levels(factor)
         return levels[int(place * len(levels))]
     low, high = factor.range
     value = float(f"{low + place * (high - low):.6g}")
-    return Level(label_of(value), {factor.path or "": value})
+    return Level(value_label(value), {factor.path or "": value})

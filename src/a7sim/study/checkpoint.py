@@ -45,12 +45,12 @@ class _Ragged:
 _Columns = Mapping[str, Any]
 
 
-def checkpoint_in(folder: Path) -> Path:
+def checkpoint_path(folder: Path) -> Path:
     """Return where a study leaves its checkpoint in a folder, by what is installed."""
     return folder / (NPZ if find_spec("pyarrow") is None else PARQUET)
 
 
-def newest_in(folder: Path) -> Path | None:
+def newest_checkpoint(folder: Path) -> Path | None:
     """Return the last checkpoint of any kind in a folder, if there is one."""
     there = [folder / name for name in KINDS if (folder / name).exists()]
     return max(there, key=lambda path: path.stat().st_mtime_ns, default=None)

@@ -12,7 +12,7 @@ from a7sim.geometry import Array
 from a7sim.mistakes import Mistake
 from a7sim.study.cells import Cell
 from a7sim.study.schema import Claim, Study
-from a7sim.study.statistics import CONFIDENCE, binned, compared, dependence, holm
+from a7sim.study.statistics import CONFIDENCE, binned, compare_cells, holm, regress_on
 
 SMALL_EFFECT = 0.2
 """Standard deviations of one replicate: a difference below is too small to matter (Cohen)."""
@@ -26,7 +26,7 @@ Values = Callable[[str], Array]
 """Replicates ``(cells, n)`` of a response."""
 
 
-def see_that_claims_can_be_tested(study: Study, cells: Sequence[Cell]) -> None:
+def validate_claims(study: Study, cells: Sequence[Cell]) -> None:
     """Raise Mistake for a claim about factors, levels or responses that the study has not."""
     for number, claim in enumerate(study.claim, start=1):
         where = f"claim {number}"
@@ -58,7 +58,7 @@ def _levels(claim: Claim) -> list[str]:
     return [*(claim.alike or []), *(level for group in claim.differ or [] for level in group)]
 
 
-def tested(
+def test_claims(
     claims: Sequence[Claim], cells: Sequence[Cell], responses: Mapping[str, Document], values: Values
 ) -> list[Document]:
     """Return claims with their tests, adjusted for the number of all of them, verdicts and answers in words."""
@@ -74,7 +74,7 @@ def _tests(claim: Claim, cells: Sequence[Cell], values: Values) -> Iterator[Docu
     for response in claim.responses:
         of_response = values(response)
         for on in claim.depends_on or []:
-            found = dependence(of_response, values(on))
+            found = regress_on(of_response, values(on))
             yield {"response": response, "on": on} | asdict(found) | {"bins": binned(of_response, values(on))}
         for one, other in _pairs(claim):
             first, second = (of_response[_having(cells, claim.factor or "", levels)] for levels in (one, other))
@@ -83,7 +83,7 @@ def _tests(claim: Claim, cells: Sequence[Cell], values: Values) -> Iterator[Docu
                 "response": response,
                 "levels": [" and ".join(one), " and ".join(other)],
                 "mean": against,
-            } | asdict(compared(second, first))
+            } | asdict(compare_cells(second, first))
 
 
 def _pairs(claim: Claim) -> Iterator[tuple[Sequence[str], Sequence[str]]]:
@@ -157,7 +157,8 @@ def _in_words(test: Document, responses: Mapping[str, Document]) -> str:
         (low, high), (r_low, r_high) = test["interval"], test["correlation_interval"]
         return (
             f"The {response['meaning']}, on the {other['meaning']}: slope {test['slope']:.3g} ({low:.3g} to {high:.3g})"
-            f"{per}, r = {test['correlation']:.2f} ({r_low:.2f} to {r_high:.2f}), {chance(test['p_adjusted'])}; it "
+            f"{per}, r = {test['correlation']:.2f} ({r_low:.2f} to {r_high:.2f}), "
+            f"{format_probability(test['p_adjusted'])}; it "
             f"explains {100.0 * test['correlation'] ** 2:.1f} % of the variance: {_said(test)}."
         )
     one, other_level = test["levels"]
@@ -165,7 +166,7 @@ def _in_words(test: Document, responses: Mapping[str, Document]) -> str:
     return (
         f"The {response['meaning']}, {other_level} minus {one}: {test['difference']:+.3g} ({low:+.3g} to {high:+.3g})"
         f"{unit}, {_share(test)}, d = {test['effect']:.2f} ({d_low:.2f} to {d_high:.2f}), "
-        f"{chance(test['p_adjusted'])}: {_said(test)}."
+        f"{format_probability(test['p_adjusted'])}: {_said(test)}."
     )
 
 
@@ -182,7 +183,7 @@ def _said(test: Document) -> str:
     }[test["verdict"]]
 
 
-def chance(p: float) -> str:
+def format_probability(p: float) -> str:
     """Return a probability as it is printed."""
     if math.isnan(p):
         return "p unknown"

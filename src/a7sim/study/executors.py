@@ -38,7 +38,9 @@ class InProcess(Executor):
 
 
 @contextmanager
-def opened(kind: Kind, workers: int | None = None, scheduler: str | None = None) -> Iterator[tuple[Executor, int]]:
+def open_executor(
+    kind: Kind, workers: int | None = None, scheduler: str | None = None
+) -> Iterator[tuple[Executor, int]]:
     """Yield an executor and how many chunks it works at once; what was not begun is dropped in the end.
 
     `workers` are of the pool, or of the cluster that dask makes on this computer where no `scheduler` is given.
@@ -56,14 +58,14 @@ def opened(kind: Kind, workers: int | None = None, scheduler: str | None = None)
         with _pool(workers) as pool:
             yield pool, workers
     elif kind == "dask":
-        from a7sim.study.by_dask import on_dask  # noqa: PLC0415
+        from a7sim.study.by_dask import open_dask_executor  # noqa: PLC0415
 
-        with on_dask(scheduler, workers) as working:
+        with open_dask_executor(scheduler, workers) as working:
             yield working
     else:
-        from a7sim.study.by_mpi import on_mpi  # noqa: PLC0415
+        from a7sim.study.by_mpi import open_mpi_executor  # noqa: PLC0415
 
-        with on_mpi(dict.fromkeys(_ONE_THREAD, "1")) as working:
+        with open_mpi_executor(dict.fromkeys(_ONE_THREAD, "1")) as working:
             yield working
 
 

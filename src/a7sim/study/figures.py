@@ -8,7 +8,7 @@ from a7sim.documents import Document
 from a7sim.report.drawing import FAINT, FILL, INK, LEFT, PANEL, RIGHT, SOFT, TRUE, drawing
 from a7sim.report.page import Picture
 from a7sim.study.claims import SMALL_CORRELATION, SMALL_EFFECT
-from a7sim.study.findings import in_words
+from a7sim.study.findings import cell_label
 from a7sim.study.responses import OF_MODEL
 
 if TYPE_CHECKING:
@@ -26,21 +26,21 @@ _UNITS = ("m", "mm", "gon")
 _MAX_IN_A_MAP, _MAX_BESIDE = 10, 3
 
 
-def of_response(document: Document, response: Document) -> Iterator[Picture]:
+def response_figures(document: Document, response: Document) -> Iterator[Picture]:
     """Yield what there is to draw of a response. Raises Mistake where matplotlib is not installed."""
     name = response["name"]
     cells = [cell for cell in document["cells"] if cell["responses"][name]["count"]]
     if _is_a_map(document, cells):
         yield heat_map(document, response)
     if places := [each for each in document["places"] if _levels(document, name, each)][:_MAX_BESIDE]:
-        yield against_places(document, response, places)
+        yield axis_figure(document, response, places)
     if curves := [each for each in document["densities"] if each["response"] == name][:_MAX_BESIDE]:
-        yield of_densities(curves, response)
+        yield density_figure(curves, response)
     if len(cells) <= MAX_CELLS_DRAWN:
         yield intervals(cells, response)
 
 
-def of_claims(document: Document) -> Iterator[Picture]:
+def claim_figures(document: Document) -> Iterator[Picture]:
     """Yield effects with their intervals, and how responses go with those on which they are said to depend."""
     tests = [(claim, test) for claim in document["claims"] for test in claim["tests"]]
     effects = [(c, t) for c, t in tests if "on" not in t and isfinite(t["effect_interval"][0])]
@@ -52,7 +52,7 @@ def of_claims(document: Document) -> Iterator[Picture]:
         yield from _dependences(document, [t for _, t in correlations])
 
 
-def with_unit(response: Document) -> str:
+def axis_label(response: Document) -> str:
     """Return the label of an axis: the name of a response in words, and its unit."""
     unit = response["unit"]
     name, at, model = response["name"].partition(OF_MODEL)
@@ -67,9 +67,9 @@ def _named(kind: str, response: Document) -> str:
 def intervals(cells: Sequence[Document], response: Document) -> Picture:
     """Return quantiles, medians, means and their intervals by cell."""
     spreads = [cell["responses"][response["name"]] for cell in cells]
-    means = "; ".join(f"{in_words(c)} {s['mean']:.4g}" for c, s in zip(cells, spreads, strict=True))
+    means = "; ".join(f"{cell_label(c)} {s['mean']:.4g}" for c, s in zip(cells, spreads, strict=True))
     size = (WIDTH_IN, _INCHES_BESIDE + _INCHES_A_ROW * len(cells))
-    title = f"{sentence(with_unit(response))} by cell"
+    title = f"{capitalize(axis_label(response))} by cell"
     with drawing(_named("intervals", response), title, f"Means: {means}.", size, wide=True) as drawn:
         (axes,) = drawn.axes
         places = range(len(cells))
@@ -79,9 +79,9 @@ def intervals(cells: Sequence[Document], response: Document) -> Picture:
         low, high = ([s["mean_interval"][end] for s in spreads] for end in (0, 1))
         axes.hlines(places, low, high, color=LEFT, linewidth=2.5)
         axes.plot([s["mean"] for s in spreads], places, "o", color=LEFT, markersize=5.0)
-        axes.set_yticks(places, [in_words(cell) for cell in cells])
+        axes.set_yticks(places, [cell_label(cell) for cell in cells])
         axes.set_ylim(len(cells) - 0.4, -0.6)
-        axes.set_xlabel(with_unit(response))
+        axes.set_xlabel(axis_label(response))
         axes.grid(axis="x", linewidth=0.6)
         drawn.legend = (
             "Bars hold 90 % of the replicates, strokes across are medians, dots means with their 95 % intervals"
@@ -89,18 +89,18 @@ def intervals(cells: Sequence[Document], response: Document) -> Picture:
     return drawn.picture
 
 
-def of_densities(curves: Sequence[Document], response: Document) -> Picture:
+def density_figure(curves: Sequence[Document], response: Document) -> Picture:
     """Return kernel densities of a response, an axes for each factor and a curve for each of its levels."""
     factors = " and ".join(each["factor"] for each in curves)
     size = (WIDTH_IN if len(curves) > 1 else 0.75 * WIDTH_IN, _INCHES_HIGH)
-    title = f"{sentence(with_unit(response))}: densities by {factors}"
+    title = f"{capitalize(axis_label(response))}: densities by {factors}"
     text = f"Kernel densities by {factors}."
     with drawing(_named("densities", response), title, text, size, [1.0] * len(curves), True, True) as drawn:
         for axes, each in zip(drawn.axes, curves, strict=True):
             for (level, density), (colour, line) in zip(each["densities"].items(), _SIGNS, strict=False):
                 axes.plot(each["places"], density, color=colour, linestyle=line, label=level, linewidth=1.6)
             axes.legend(title=each["factor"])
-            axes.set_xlabel(with_unit(response))
+            axes.set_xlabel(axis_label(response))
             axes.set_ylim(bottom=0.0)
             axes.set_yticks([])
             axes.spines["left"].set_visible(False)
@@ -122,8 +122,8 @@ def heat_map(document: Document, response: Document) -> Picture:
     means = [cell["responses"][name]["mean"] for cell in document["cells"]]
     low, span = min(means), (max(means) - min(means)) or 1.0
     size = (min(WIDTH_IN, 2.6 + 1.2 * len(columns)), _INCHES_BESIDE + 0.72 * len(rows))
-    title = f"{sentence(with_unit(response))} by {down} and {across}"
-    text = "; ".join(f"{in_words(c)} {m:.4g}" for c, m in zip(document["cells"], means, strict=True))
+    title = f"{capitalize(axis_label(response))} by {down} and {across}"
+    text = "; ".join(f"{cell_label(c)} {m:.4g}" for c, m in zip(document["cells"], means, strict=True))
     with drawing(_named("map", response), title, f"Means: {text}.", size, wide=True) as drawn:
         from matplotlib.patches import Rectangle  # noqa: PLC0415
 
@@ -154,11 +154,11 @@ def _levels(document: Document, response: str, factor: str) -> list[Document]:
     return [each for each in document["levels"] if (each["response"], each["factor"]) == (response, factor)]
 
 
-def against_places(document: Document, response: Document, factors: Sequence[str]) -> Picture:
+def axis_figure(document: Document, response: Document, factors: Sequence[str]) -> Picture:
     """Return means against what the levels of factors count: points, or how far levels lie apart."""
     size = (WIDTH_IN if len(factors) > 1 else 0.75 * WIDTH_IN, _INCHES_HIGH)
     counts = [document["places"][factor]["counts"] for factor in factors]
-    title = f"{sentence(with_unit(response))} against {' and '.join(counts)}"
+    title = f"{capitalize(axis_label(response))} against {' and '.join(counts)}"
     text = f"Means against {' and '.join(counts)}."
     with drawing(_named("against", response), title, text, size, [1.0] * len(factors), True, True) as drawn:
         for axes, factor in zip(drawn.axes, factors, strict=True):
@@ -166,7 +166,7 @@ def against_places(document: Document, response: Document, factors: Sequence[str
         low, high = (choose(axes.get_ylim()[end] for axes in drawn.axes) for end, choose in ((0, min), (1, max)))
         for axes in drawn.axes:
             axes.set_ylim(low, high)
-        drawn.axes[0].set_ylabel(with_unit(response))
+        drawn.axes[0].set_ylabel(axis_label(response))
         drawn.legend = (
             "Means with 95 % intervals, the other factors at all their levels; a single mark is the first level"
         )
@@ -238,8 +238,8 @@ def _dependences(document: Document, tests: Sequence[Document]) -> Iterator[Pict
     responses = {each["name"]: each for each in document["responses"]}
     for name in dict.fromkeys(test["response"] for test in tests):
         of = [test for test in tests if test["response"] == name][:_MAX_BESIDE]
-        words = with_unit(responses[name])
-        title = f"{sentence(words)} against what it is said to depend on"
+        words = axis_label(responses[name])
+        title = f"{capitalize(words)} against what it is said to depend on"
         text = "; ".join(f"{test['on']}: r = {test['correlation']:.2f}" for test in of)
         with drawing(
             _named("dependence", responses[name]), title, text, (WIDTH_IN, _INCHES_HIGH), [1.0] * len(of), True, True
@@ -248,7 +248,7 @@ def _dependences(document: Document, tests: Sequence[Document]) -> Iterator[Pict
                 bins = test["bins"]
                 axes.vlines(bins["on"], bins["low"], bins["high"], color=LEFT, linewidth=2.0)
                 axes.plot(bins["on"], bins["mean"], "o-", color=LEFT, markersize=4.5, linewidth=1.0)
-                axes.set_xlabel(with_unit(responses[test["on"]]).replace(" (", "\n("))
+                axes.set_xlabel(axis_label(responses[test["on"]]).replace(" (", "\n("))
                 axes.grid(axis="y", linewidth=0.6)
             low, high = (choose(axes.get_ylim()[end] for axes in drawn.axes) for end, choose in ((0, min), (1, max)))
             for axes in drawn.axes:
@@ -258,6 +258,6 @@ def _dependences(document: Document, tests: Sequence[Document]) -> Iterator[Pict
         yield drawn.picture
 
 
-def sentence(words: str) -> str:
+def capitalize(words: str) -> str:
     """Return words with a capital at their beginning."""
     return words[:1].upper() + words[1:]

@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 
 import a7sim
-from a7sim.documents import Document, head
+from a7sim.documents import Document, document_header
 from a7sim.geometry import Array
 from a7sim.study.cells import Cell
-from a7sim.study.claims import chance, tested
-from a7sim.study.latin import main_effects, share_of_chance
+from a7sim.study.claims import format_probability, test_claims
+from a7sim.study.latin import main_effects, noise_share
 from a7sim.study.loading import Laid
-from a7sim.study.places import places_of
-from a7sim.study.running import reached
+from a7sim.study.places import axis_positions
+from a7sim.study.running import precision_reached
 from a7sim.study.statistics import (
     CONFIDENCE,
     QUANTILES,
     Effect,
-    compared,
+    compare_cells,
     densities,
     holm,
     mean_interval,
@@ -29,17 +29,17 @@ from a7sim.study.statistics import (
     variance_by_factor,
 )
 from a7sim.study.tally import Tally
-from a7sim.study.theory import beside_theory, of_theory
+from a7sim.study.theory import theory_comparison, theory_sentence
 
 SIGNIFICANT = 1.0 - CONFIDENCE
 MAX_DENSITIES = 8
 """Levels of a factor whose curves can be told apart."""
 
 
-def document_of(laid: Laid, tally: Tally) -> Document:
+def findings_document(laid: Laid, tally: Tally) -> Document:
     """Return the document of a study; the same study and tally give the same document."""
     study = laid.study
-    document = head("study") | {
+    document = document_header("study") | {
         "software": f"a7sim {a7sim.__version__}",
         "study": study.title,
         "question": study.question,
@@ -50,7 +50,7 @@ def document_of(laid: Laid, tally: Tally) -> Document:
         "replicates": int(tally.done.min()),
         "strips": study.strips is not None,
         "factors": list(laid.factors),
-        "places": {name: places for name, places in places_of(laid).items() if places},
+        "places": {name: places for name, places in axis_positions(laid).items() if places},
         "responses": [{"name": each.name, "unit": each.unit, "meaning": each.meaning} for each in laid.responses],
         "confidence": CONFIDENCE,
         "cells": [_cell(laid, tally, i, cell) for i, cell in enumerate(laid.cells)],
@@ -62,9 +62,9 @@ def document_of(laid: Laid, tally: Tally) -> Document:
     }
     document["claims"] = _claims(laid, tally, document)
     if study.precision is not None:
-        document["precision_reached"] = reached(laid, tally)
-    document |= of_theory(document, laid.scenarios)
-    return document | {"in_a_sentence": in_a_sentence(document), "answer": list(_answer(document))}
+        document["precision_reached"] = precision_reached(laid, tally)
+    document |= theory_sentence(document, laid.scenarios)
+    return document | {"in_a_sentence": summary_sentence(document), "answer": list(_answer(document))}
 
 
 def _cell(laid: Laid, tally: Tally, i: int, cell: Cell) -> Document:
@@ -105,7 +105,7 @@ def _theory(laid: Laid, at: tuple[int, int], mean: float, sd: float) -> Document
     """Return what theory says of a response in a cell; nothing of strips, whose models differ in their plans."""
     if laid.study.strips is not None:
         return {}
-    return beside_theory(laid.scenarios[at[0]], laid.responses[at[1]].name, mean, sd)
+    return theory_comparison(laid.scenarios[at[0]], laid.responses[at[1]].name, mean, sd)
 
 
 def _comparisons(laid: Laid, tally: Tally) -> Iterator[Document]:
@@ -113,7 +113,7 @@ def _comparisons(laid: Laid, tally: Tally) -> Iterator[Document]:
     first = tally.sample(0)
     others = [tally.sample(i) for i in range(1, len(laid.cells))]
     for j, response in enumerate(laid.responses):
-        found = [compared(other[j], first[j]) for other in others]
+        found = [compare_cells(other[j], first[j]) for other in others]
         adjusted = holm([each.p for each in found])
         for cell, each, p in zip(laid.cells[1:], found, adjusted, strict=True):
             yield {
@@ -170,7 +170,7 @@ def _main_effects(laid: Laid, tally: Tally) -> Iterator[Document]:
         effects = main_effects(means, values)
         if effects:
             found = {
-                "chance": share_of_chance(_replicates(laid, tally, j)),
+                "chance": noise_share(_replicates(laid, tally, j)),
                 "factors": [asdict(each) for each in effects],
             }
             yield {"response": response.name} | found
@@ -186,7 +186,9 @@ def _replicates(laid: Laid, tally: Tally, response: int) -> Array:
 def _claims(laid: Laid, tally: Tally, document: Document) -> list[Document]:
     responses = {each["name"]: each for each in document["responses"]}
     names = laid.study.responses
-    return tested(laid.study.claim, laid.cells, responses, lambda name: _replicates(laid, tally, names.index(name)))
+    return test_claims(
+        laid.study.claim, laid.cells, responses, lambda name: _replicates(laid, tally, names.index(name))
+    )
 
 
 def _levels(laid: Laid, tally: Tally) -> Iterator[Document]:
@@ -232,7 +234,7 @@ def _effect(effect: Effect) -> Document:
     }
 
 
-def in_a_sentence(document: Document) -> str:
+def summary_sentence(document: Document) -> str:
     """Return the answer to the question of a study in one sentence: of its claims, or of its first response."""
     if document["claims"]:
         parts = "; ".join(each["short"] for each in document["claims"])
@@ -264,10 +266,10 @@ def _range(means: Sequence[tuple[float, Any]], unit: str) -> str:
         return f"{low:.4g}{unit} on the average"
     if low == high:
         return f"{low:.4g}{unit} on the average in every cell"
-    return f"from {low:.4g}{unit} ({in_words(at_low)}) to {high:.4g}{unit} ({in_words(at_high)}) on the average"
+    return f"from {low:.4g}{unit} ({cell_label(at_low)}) to {high:.4g}{unit} ({cell_label(at_high)}) on the average"
 
 
-def in_words(cell: Document) -> str:
+def cell_label(cell: Document) -> str:
     """Return the levels of a cell of a document in words."""
     return ", ".join(f"{factor} {level}" for factor, level in cell["levels"].items()) or "as it stands"
 
@@ -288,7 +290,7 @@ def _dependence(document: Document, response: str) -> str:
         return ""
     if not matters:
         return "; no factor was seen to matter"
-    listed = [f"{each['source']} ({chance(each['p'])}, {_share(each)})" for each in matters]
+    listed = [f"{each['source']} ({format_probability(each['p'])}, {_share(each)})" for each in matters]
     return f"; it depends on {', '.join(listed)}"
 
 

@@ -5,13 +5,13 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from a7sim.documents import Document, as_json
-from a7sim.files import csv_text
+from a7sim.files import to_csv
 from a7sim.mistakes import Mistake
-from a7sim.session.folder import RESULTS, write_whole
+from a7sim.session.folder import RESULTS, write_atomic
 from a7sim.study import checkpoint
 from a7sim.study.loading import Laid
-from a7sim.study.page import page_of
-from a7sim.study.simulating import seed_of
+from a7sim.study.page import study_page
+from a7sim.study.simulating import replicate_seed
 from a7sim.study.tally import Tally
 
 CELLS, COMPARISONS, REPLICATES, PAGE = (
@@ -23,7 +23,7 @@ CELLS, COMPARISONS, REPLICATES, PAGE = (
 FILES = (*checkpoint.KINDS, CELLS, COMPARISONS, REPLICATES, PAGE, RESULTS)
 
 
-def begun(laid: Laid, out: Path | None, force: bool) -> Tally:
+def open_tally(laid: Laid, out: Path | None, force: bool) -> Tally:
     """Return the tally of a study as its folder holds it, or an empty one, and make the folder.
 
     Raises Mistake for a folder that holds something else, unless forced to begin anew.
@@ -35,7 +35,7 @@ def begun(laid: Laid, out: Path | None, force: bool) -> Tally:
         if out.exists() and not out.is_dir():
             raise Mistake(f"{out}: expected a folder, got a file")
         if out.is_dir() and not force:
-            left = checkpoint.newest_in(out)
+            left = checkpoint.newest_checkpoint(out)
             if left is not None:
                 _see_that_it_can_be_written(out)
                 return _not_beyond(checkpoint.load(left, laid.identity), laid, left)
@@ -61,17 +61,17 @@ def _not_beyond(tally: Tally, laid: Laid, path: Path) -> Tally:
     return tally
 
 
-def leave(out: Path, laid: Laid, tally: Tally, document: Document) -> None:
+def write_results(out: Path, laid: Laid, tally: Tally, document: Document) -> None:
     """Leave results and tables in a folder."""
-    write_whole(out / CELLS, _cells_csv(document))
-    write_whole(out / COMPARISONS, _comparisons_csv(document))
-    write_whole(out / REPLICATES, _replicates_csv(laid, tally))
-    write_whole(out / RESULTS, as_json(document))
+    write_atomic(out / CELLS, _cells_csv(document))
+    write_atomic(out / COMPARISONS, _comparisons_csv(document))
+    write_atomic(out / REPLICATES, _replicates_csv(laid, tally))
+    write_atomic(out / RESULTS, as_json(document))
 
 
-def leave_page(out: Path, document: Document) -> None:
+def write_page(out: Path, document: Document) -> None:
     """Leave the page in a folder. Raises Mistake where matplotlib is not installed."""
-    write_whole(out / PAGE, page_of(document))
+    write_atomic(out / PAGE, study_page(document))
 
 
 def _cells_csv(document: Document) -> str:
@@ -85,7 +85,7 @@ def _cells_csv(document: Document) -> str:
         for response in document["responses"]
         if (spread := cell["responses"][response["name"]])["count"]
     ]
-    return csv_text(header, rows)
+    return to_csv(header, rows)
 
 
 def _spreads(document: Document) -> Iterator[Document]:
@@ -109,14 +109,19 @@ def _comparisons_csv(document: Document) -> str:
         values = (each["difference"], *each["interval"], each["sd"], each["effect"], each["p"], each["p_adjusted"])
         whole = (each["response"], str(each["cell"]), str(each["against"]), str(each["pairs"]))
         rows.append((*whole, *(f"{value:.10g}" for value in values)))
-    return csv_text(header, rows)
+    return to_csv(header, rows)
 
 
 def _replicates_csv(laid: Laid, tally: Tally) -> str:
     """Return the sample, a replicate a line; nan is a session that gave up."""
     rows = (
-        (str(cell.number), str(number), str(seed_of(laid.study.seed, number - 1)), *(f"{each:.10g}" for each in values))
+        (
+            str(cell.number),
+            str(number),
+            str(replicate_seed(laid.study.seed, number - 1)),
+            *(f"{each:.10g}" for each in values),
+        )
         for i, cell in enumerate(laid.cells)
         for number, values in enumerate(tally.sample(i).T.tolist(), start=1)
     )
-    return csv_text(("cell", "replicate", "seed", *laid.study.responses), rows)
+    return to_csv(("cell", "replicate", "seed", *laid.study.responses), rows)

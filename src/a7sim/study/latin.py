@@ -83,7 +83,7 @@ def main_effects(means: Array, factors: Mapping[str, Array | Sequence[str]]) -> 
     return effects
 
 
-def share_of_chance(values: Array) -> float:
+def noise_share(values: Array) -> float:
     """Return which share of the variance between the means of cells is chance, from values ``(cells, replicates)``.
 
     Replicates are blocks: what they have in common in all cells moves no cell against another. nan where it is

@@ -10,20 +10,20 @@ from typing import Any
 import msgspec
 
 import a7sim
-from a7sim.files import read_toml, what_is_at
+from a7sim.files import describe_missing_file, read_toml
 from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
-from a7sim.scenario.validation import mistakes_of_form
-from a7sim.session.combinations import see_that_strips_can_be_made
-from a7sim.shelves import shelves_of
-from a7sim.study.cells import Cell, cells_of, cells_of_strips
-from a7sim.study.claims import see_that_claims_can_be_tested
-from a7sim.study.reach import beyond_reach
-from a7sim.study.responses import Response, response_of
+from a7sim.scenario.validation import schema_errors
+from a7sim.session.combinations import check_strips_possible
+from a7sim.shelves import bundled_dirs
+from a7sim.study.cells import Cell, make_cells, make_strip_cells
+from a7sim.study.claims import validate_claims
+from a7sim.study.reach import settings_out_of_range
+from a7sim.study.responses import Response, find_response
 from a7sim.study.schema import Study
 from a7sim.study.simulating import Task
 
-SEARCH_PATH = shelves_of("studies")
+SEARCH_PATH = bundled_dirs("studies")
 """Where the studies are that come with a7sim."""
 
 
@@ -92,7 +92,9 @@ def find_study(name: str | Path) -> Path:
         if path.parent in (Path(), Path("studies")) and found.is_file():
             return found
     known = ", ".join(sorted({file.stem for shelf in SEARCH_PATH for file in shelf.glob("*.toml")}))
-    raise StudyError(str(name)[:200], [f"expected the file of a study or one of {known}, found {what_is_at(path)}"])
+    raise StudyError(
+        str(name)[:200], [f"expected the file of a study or one of {known}, found {describe_missing_file(path)}"]
+    )
 
 
 def load_study(name: str | Path, replicates: int | None = None) -> Laid:
@@ -101,19 +103,19 @@ def load_study(name: str | Path, replicates: int | None = None) -> Laid:
     raw = read_toml(path)
     if replicates is not None:
         raw["replicates"] = replicates
-    return study_of(raw, path.parent, str(path))
+    return build_study(raw, path.parent, str(path))
 
 
-def study_of(raw: Mapping[str, Any], folder: Path, source: str = "study") -> Laid:
+def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> Laid:
     """Return the study of raw tables whose scenario stands in `folder`, or comes with a7sim. Raises StudyError."""
     if "scenario" not in raw and "photos" in raw:
         raise StudyError(source, ["expected a study, got a scenario (`a7sim run` takes it)"])
-    mistakes = [mistake.replace("the scenario", "the study") for mistake in mistakes_of_form(raw, _expected())]
+    mistakes = [mistake.replace("the scenario", "the study") for mistake in schema_errors(raw, _expected())]
     if mistakes:
         raise StudyError(source, mistakes)
     study = msgspec.convert(raw, Study)
     try:
-        cells, responses = cells_of(study), [response_of(name) for name in study.responses]
+        cells, responses = make_cells(study), [find_response(name) for name in study.responses]
     except Mistake as mistake:
         raise StudyError(source, [str(mistake)]) from mistake
     mistakes = list(_mistakes_between(study))
@@ -122,8 +124,8 @@ def study_of(raw: Mapping[str, Any], folder: Path, source: str = "study") -> Lai
     scenarios = _scenarios(study, cells, folder, source)
     try:
         if study.strips is not None:
-            cells = cells_of_strips(cells, _models_of_strips(study, scenarios))
-        see_that_claims_can_be_tested(study, cells)
+            cells = make_strip_cells(cells, _models_of_strips(study, scenarios))
+        validate_claims(study, cells)
     except Mistake as mistake:
         raise StudyError(source, [str(mistake)]) from mistake
     return Laid(study, tuple(cells), scenarios, tuple(responses), source)
@@ -146,14 +148,14 @@ def _mistakes_between(study: Study) -> list[str]:
 
 def _models_of_strips(study: Study, scenarios: Sequence[Scenario]) -> list[str]:
     """Return the names of the models whose cases are combined. Raises Mistake where that cannot be done."""
-    paths = [*study.settings, *(path for cell in cells_of(study) for path in cell.settings)]
+    paths = [*study.settings, *(path for cell in make_cells(study) for path in cell.settings)]
     if "plan.case" in paths or study.design != "full":
         raise Mistake("strips = 'all': expected a full design without plan.case, since every case is worked")
     names = {tuple(model.name for model in scenario.models) for scenario in scenarios}
     if len(names) != 1 or any(scenario.work != ["plotter"] for scenario in scenarios):
         raise Mistake("strips = 'all': expected the same models in every cell and work at the plotter alone")
     for scenario in scenarios:
-        see_that_strips_can_be_made(scenario)
+        check_strips_possible(scenario)
     return list(names.pop())
 
 
@@ -168,7 +170,7 @@ def _scenarios(study: Study, cells: Sequence[Cell], folder: Path, source: str) -
             scenario = load_scenario(name, settings=cell.settings)
         except ScenarioError as error:
             raise StudyError(source, [f"{where}: {mistake}" for mistake in error.mistakes]) from error
-        beyond = [f"{where}: {mistake}" for mistake in beyond_reach(scenario)]
+        beyond = [f"{where}: {mistake}" for mistake in settings_out_of_range(scenario)]
         if beyond:
             raise StudyError(source, beyond)
         scenarios.append(scenario)

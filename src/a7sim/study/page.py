@@ -7,7 +7,7 @@ from a7sim.documents import Document
 from a7sim.report.markdown import markdown
 from a7sim.report.page import Chapter, Folded, Heading, Paragraph, Part, Sheet, page
 from a7sim.study import figures
-from a7sim.study.findings import in_words
+from a7sim.study.findings import cell_label
 
 _MAX_OPEN = 12
 """Cells beyond which their table is folded."""
@@ -15,12 +15,12 @@ _MAX_QUOTED = 3
 """Responses with figures in a short form, where no claim names any."""
 
 
-def page_of(document: Document) -> str:
+def study_page(document: Document) -> str:
     """Return the page of a study's document as HTML. Raises Mistake where matplotlib is not installed."""
     return page(document["study"], _lead(document), _chapters(document, document["responses"]))
 
 
-def markdown_of(document: Document, figures_at: str) -> tuple[str, dict[str, str]]:
+def study_markdown(document: Document, figures_at: str) -> tuple[str, dict[str, str]]:
     """Return the short form of the page as Markdown, and its figures as SVG by the names of their files.
 
     Of the responses it shows those that claims name, or the first. `figures_at` is where the Markdown finds them.
@@ -42,17 +42,17 @@ def _chapters(document: Document, responses: Sequence[Document]) -> list[Chapter
     return [
         Chapter("The answer", list(_answer(document))),
         Chapter("How it was asked", list(_how(document))),
-        *(Chapter(figures.with_unit(each), list(_response(document, each))) for each in responses),
+        *(Chapter(figures.axis_label(each), list(_response(document, each))) for each in responses),
     ]
 
 
 def _answer(document: Document) -> Iterator[Part]:
     yield Paragraph(document["in_a_sentence"])
     for claim in document["claims"]:
-        yield Heading(f"{figures.sentence(claim['about'])} {claim['verdict']}")
+        yield Heading(f"{figures.capitalize(claim['about'])} {claim['verdict']}")
         yield Paragraph(f"Claim: {claim['says']}")
         yield Paragraph("\n".join(claim["answer"]))
-    yield from figures.of_claims(document)
+    yield from figures.claim_figures(document)
     if document["claims"]:
         yield Heading("Response by response")
     yield Paragraph("\n".join(document["answer"]))
@@ -76,7 +76,13 @@ def _how(document: Document) -> Iterator[Part]:
             "the strips of all combinations of the cases of its models, and share these sessions."
         )
     rows = [
-        (str(cell["cell"]), in_words(cell), _settings(cell["settings"]), str(cell["replicates"]), str(cell["gave_up"]))
+        (
+            str(cell["cell"]),
+            cell_label(cell),
+            _settings(cell["settings"]),
+            str(cell["replicates"]),
+            str(cell["gave_up"]),
+        )
         for cell in document["cells"]
     ]
     cells = Sheet("Cells", ("Cell", "Levels", "Settings", "Sessions", "Gave up"), rows, frozenset({0, 1, 2}))
@@ -94,7 +100,7 @@ def _response(document: Document, response: Document) -> Iterator[Part]:
     if not there:
         yield Paragraph("Every session gave up.", loud=True)
         return
-    yield from figures.of_response(document, response)
+    yield from figures.response_figures(document, response)
     for analysis in document["variance"]:
         if analysis["response"] == name:
             yield _variance(analysis["sources"])
@@ -106,7 +112,7 @@ def _response(document: Document, response: Document) -> Iterator[Part]:
     sheets: list[Part] = [_spreads(there, name)]
     beside = [each for each in document["comparisons"] if each["response"] == name]
     if beside:
-        sheets.append(_comparisons(beside, {cell["cell"]: in_words(cell) for cell in document["cells"]}))
+        sheets.append(_comparisons(beside, {cell["cell"]: cell_label(cell) for cell in document["cells"]}))
     yield Folded("Cells in numbers", sheets)
 
 
@@ -127,7 +133,7 @@ def _spreads(cells: Sequence[Document], name: str) -> Sheet:
 def _spread(cell: Document, name: str) -> Sequence[str]:
     spread = cell["responses"][name]
     return (
-        *(in_words(cell), str(spread["count"])),
+        *(cell_label(cell), str(spread["count"])),
         *(_short(spread["mean"]), _between(spread["mean_interval"])),
         *(_short(spread["sd"]), _between(spread["sd_interval"])),
         *(_short(each["value"]) for each in spread["quantiles"].values()),

@@ -4,12 +4,12 @@ from typing import Any
 
 from a7sim.documents import Document
 from a7sim.standard_points import CASES
-from a7sim.study.cells import levels_of
+from a7sim.study.cells import factor_levels
 from a7sim.study.loading import Laid
 from a7sim.study.schema import Factor
 
 
-def places_of(laid: Laid) -> dict[str, Document]:
+def axis_positions(laid: Laid) -> dict[str, Document]:
     """Return by factor what its axis counts and the place of every level; nothing of a factor that has no axis."""
     own = {factor.name: factor for factor in laid.study.factor}
     found = {}
@@ -25,7 +25,7 @@ def _of_cases(name: str, cases: list[str]) -> Document:
 
 
 def _of_factor(factor: Factor) -> Document:
-    labels = [level.label for level in levels_of(factor)] if factor.levels else []
+    labels = [level.label for level in factor_levels(factor)] if factor.levels else []
     if factor.path == "plan.case":
         return _of_cases(factor.name, labels)
     if factor.levels and all(_is_number(each) for each in factor.levels):

@@ -13,7 +13,7 @@ from a7sim.scene import RelativeTruth
 from a7sim.session.truth import Relative, true_elements
 
 
-def beyond_reach(scenario: Scenario) -> Iterator[str]:
+def settings_out_of_range(scenario: Scenario) -> Iterator[str]:
     """Yield a sentence for every planned setting outside the range of its element or carriage."""
     if not {"plotter", "bridge"} & {*scenario.work} or scenario.plotting is None:
         return

@@ -65,7 +65,7 @@ class Response:
             raise Mistake(f"response {self.name!r}: expected a number in the results, found none ({error})") from error
 
 
-def response_of(name: str) -> Response:
+def find_response(name: str) -> Response:
     """Return a response by its name, its name in one model such as `base_error_gon@2`, or its path.
 
     Raises Mistake for none of these.
@@ -83,12 +83,12 @@ def response_of(name: str) -> Response:
     raise Mistake(f"responses: expected a response or a path that begins with models., got {name!r}; {hint}")
 
 
-def reads_strip(name: str) -> bool:
+def needs_strip(name: str) -> bool:
     """Return whether a response is read from the strip on the ground of a session at the plotter."""
     return "_at_" in name or name.startswith("strip.")
 
 
-def reads_path(name: str) -> bool:
+def is_path(name: str) -> bool:
     """Return whether a response is read by its path, wherever in the results that leads."""
     return "." in name
 

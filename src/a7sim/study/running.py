@@ -12,7 +12,7 @@ import numpy as np
 from a7sim.geometry import Array
 from a7sim.study.checkpoint import save
 from a7sim.study.loading import Laid
-from a7sim.study.simulating import Task, seed_of
+from a7sim.study.simulating import Task, replicate_seed
 from a7sim.study.tally import Tally
 
 STEP = 100
@@ -72,7 +72,7 @@ class _Chunk:
     seeds: tuple[int, ...]
 
 
-def work(
+def run_study(
     laid: Laid,
     tally: Tally,
     executor: Executor,
@@ -101,7 +101,7 @@ def work(
             save(tally, checkpoint, laid.identity)
 
 
-def reached(laid: Laid, tally: Tally) -> bool:
+def precision_reached(laid: Laid, tally: Tally) -> bool:
     """Return whether the mean that a study wants to know is known well enough in every cell."""
     wanted = laid.study.precision
     if wanted is None or int(tally.done.min()) == 0:
@@ -117,7 +117,7 @@ def _results(
     for stop in _stops(laid):
         if int(tally.done.min()) >= stop:
             continue
-        if _on_a_step(tally) and reached(laid, tally):
+        if _on_a_step(tally) and precision_reached(laid, tally):
             return
         yield from _up_to(stop, laid, tally, executor, most_waiting, pace)
 
@@ -147,7 +147,9 @@ def _up_to(
                 first, last = int(asked[at]), min(int(asked[at]) + size.best, stop)
                 task = laid.tasks[at]
                 cells = range(at * task.cells, (at + 1) * task.cells)
-                chunk = _Chunk(cells, first, tuple(seed_of(laid.study.seed, each) for each in range(first, last)))
+                chunk = _Chunk(
+                    cells, first, tuple(replicate_seed(laid.study.seed, each) for each in range(first, last))
+                )
                 waiting.append((chunk, executor.submit(_timed, task, chunk.seeds)))
                 asked[at] = last
             chunk, future = waiting.popleft()

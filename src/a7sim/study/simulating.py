@@ -9,18 +9,18 @@ from a7sim.documents import Document
 from a7sim.geometry import Array
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.combinations import in_case
-from a7sim.session.crossing import Cases, Replicate, cases_of_strips, crossed
-from a7sim.session.strips import ground_of
-from a7sim.session.ways import documents_of_all_ways, run_all_ways
+from a7sim.session.combinations import with_case
+from a7sim.session.crossing import Cases, Replicate, cases_of_strips, combine_strips
+from a7sim.session.strips import ground_control
+from a7sim.session.ways import run_all_methods, run_all_methods_batch
 from a7sim.standard_points import CASES
-from a7sim.study.responses import reads_path, reads_strip, response_of
+from a7sim.study.responses import find_response, is_path, needs_strip
 
 _STREAM = 9
 """Spawns the seeds of a study's replicates."""
 
 
-def seed_of(study_seed: int, replicate: int) -> int:
+def replicate_seed(study_seed: int, replicate: int) -> int:
     """Return the seed of a replicate, the same in every cell; `a7sim run --seed` takes it."""
     state = np.random.SeedSequence(study_seed, spawn_key=(_STREAM, replicate)).generate_state(1, np.uint64)
     return int(state[0] >> np.uint64(11))
@@ -45,7 +45,7 @@ class Task:
 
         Raises Mistake for a response that the results do not have.
         """
-        strips, whole = any(map(reads_strip, self.responses)), any(map(reads_path, self.responses))
+        strips, whole = any(map(needs_strip, self.responses)), any(map(is_path, self.responses))
         return self._values(self._crowded(seeds, tuple(CASES), strips, whole))
 
     def alone(self, cell: int, seed: int) -> Array:
@@ -60,9 +60,11 @@ class Task:
     def linked(self, cell: int, seed: int) -> Document:
         """Return the document of one cell, of sessions worked over the link."""
         if not self.strips:
-            return run_all_ways(self.scenario, seed)
+            return run_all_methods(self.scenario, seed)
         cases, place = self._cases_of(cell)
-        (strips,) = self._strips([{case: run_all_ways(in_case(self.scenario, case), seed) for case in cases}], [seed])
+        (strips,) = self._strips(
+            [{case: run_all_methods(with_case(self.scenario, case), seed) for case in cases}], [seed]
+        )
         return strips[place]
 
     def _cases_of(self, cell: int) -> tuple[Cases, int]:
@@ -76,20 +78,20 @@ class Task:
 
     def _crowded(self, seeds: Sequence[int], cases: Cases, strips: bool, whole: bool) -> Iterator[list[Document]]:
         if not self.strips:
-            return ([each] for each in documents_of_all_ways(self.scenario, seeds, strips, whole))
+            return ([each] for each in run_all_methods_batch(self.scenario, seeds, strips, whole))
         by_case = {
-            case: documents_of_all_ways(in_case(self.scenario, case), seeds, strips=False, whole=whole)
+            case: run_all_methods_batch(with_case(self.scenario, case), seeds, strips=False, whole=whole)
             for case in cases
         }
         return self._strips([{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))], seeds)
 
     def _strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> Iterator[list[Document]]:
         scenario = self.scenario
-        ground = ground_of(scenario, build_scene(scenario, seeds[0]))
-        return crossed(replicates, len(scenario.models), ground, scenario.strip)
+        ground = ground_control(scenario, build_scene(scenario, seeds[0]))
+        return combine_strips(replicates, len(scenario.models), ground, scenario.strip)
 
     def _values(self, replicates: Iterable[Sequence[Document]]) -> Array:
         """Return responses ``(cells, responses, replicates)`` of documents by replicate and cell."""
-        responses = [response_of(name) for name in self.responses]
+        responses = [find_response(name) for name in self.responses]
         read = [np.array([response.of_all(cells) for response in responses]).T for cells in replicates]
         return np.stack(read, axis=-1)

@@ -137,7 +137,7 @@ class Comparison:
     """Of no difference, by the paired t test."""
 
 
-def compared(values: Array, against: Array) -> Comparison:
+def compare_cells(values: Array, against: Array) -> Comparison:
     """Compare replicates ``(n,)`` with those of the same numbers in another cell, or ``(cells, n)`` in several.
 
     Several cells are averaged replicate by replicate. Who gave up in any is left out. The interval of the effect is by
@@ -184,7 +184,7 @@ class Dependence:
     """Of no dependence; cells share their replicates, so that these are counted once (cluster-robust)."""
 
 
-def dependence(values: Array, on: Array) -> Dependence:
+def regress_on(values: Array, on: Array) -> Dependence:
     """Regress values ``(cells, n)`` on those of another response ``(cells, n)``.
 
     The interval of the correlation is by its influence function and Fisher's transformation.

@@ -9,11 +9,11 @@ from rich.table import Table
 from rich.text import Text
 
 from a7sim.documents import Document
-from a7sim.sheets import sheet
-from a7sim.study.findings import in_words
+from a7sim.sheets import text_table
+from a7sim.study.findings import cell_label
 
 
-def of_study(document: Document) -> RenderableType:
+def study_tables(document: Document) -> RenderableType:
     """Return the tables of a study's document: cells and variance by response, and the answer."""
     return Group(*_parts(document))
 
@@ -53,11 +53,11 @@ def _cells(document: Document, name: str) -> Table:
     spreads = [cell["responses"][name] for cell in document["cells"]]
     theory = ("theory", "ratio") if any("theory" in each for each in spreads) else ()
     columns = ("cell", "levels", "n", "mean", "+-", "sd", "median", "minus 1", "p", *theory)
-    table = sheet(*columns, left=(0, 1), fold=(1,))
+    table = text_table(*columns, left=(0, 1), fold=(1,))
     beside = {each["cell"]: each for each in document["comparisons"] if each["response"] == name}
     for cell in document["cells"]:
         spread = cell["responses"][name]
-        first = (str(cell["cell"]), in_words(cell), str(spread["count"]))
+        first = (str(cell["cell"]), cell_label(cell), str(spread["count"]))
         if not spread["count"]:
             table.add_row(*first, "all gave up")
             continue
@@ -76,7 +76,7 @@ def _difference(comparison: Document | None) -> Sequence[str]:
 
 
 def _main_effects(hypercube: Document) -> Table:
-    table = sheet("factor", "share of variance", "from", "to", "p", "slope of ranks", "from", "to", left=(0,))
+    table = text_table("factor", "share of variance", "from", "to", "p", "slope of ranks", "from", "to", left=(0,))
     for each in hypercube["factors"]:
         numbers = (each["share"], *each["interval"], each["p"], each["slope"], *each["slope_interval"])
         table.add_row(each["factor"], *("" if math.isnan(value) else f"{value:.3f}" for value in numbers))
@@ -85,7 +85,7 @@ def _main_effects(hypercube: Document) -> Table:
 
 
 def _variance(sources: Sequence[Document]) -> Table:
-    table = sheet("source", "squares", "freedom", "F", "p", "partial eta²")
+    table = text_table("source", "squares", "freedom", "F", "p", "partial eta²")
     for each in sources:
         tested = each["source"] != "remaining"
         ratios = (

@@ -17,12 +17,12 @@ from a7sim.documents import Document
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, near_vertical_parallax_coefficients
 from a7sim.manual import LEAST_COUNT, VARIANTS
 from a7sim.operator import ModelJob
-from a7sim.operator.relative import unknowns_of
+from a7sim.operator.relative import unknown_elements
 from a7sim.reduction import perspective_centre
-from a7sim.reduction.least_squares import adjusted
+from a7sim.reduction.least_squares import solve_least_squares
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene, build_scene
-from a7sim.session.running import job_of
+from a7sim.session.running import make_job
 from a7sim.session.truth import Relative, true_elements
 from a7sim.standard_points import CASES, PLACES
 
@@ -68,7 +68,7 @@ def predicted_sd(scenario: Scenario, response: str) -> float | None:
     return None
 
 
-def limits_of(scenario: Scenario) -> Sequence[str]:
+def theory_limits(scenario: Scenario) -> Sequence[str]:
     """Return what of a scenario the theory of it leaves out, in words; nothing where it should hold."""
     film, observer = scenario.film, scenario.observer
     left_out = {
@@ -80,7 +80,7 @@ def limits_of(scenario: Scenario) -> Sequence[str]:
     return [name for name, there in left_out.items() if there]
 
 
-def beside_theory(scenario: Scenario, response: str, mean: float, sd: float) -> Document:
+def theory_comparison(scenario: Scenario, response: str, mean: float, sd: float) -> Document:
     """Return what theory says of a response, and how many times as much was simulated; nothing where it is silent."""
     predicted = predicted_sd(scenario, response)
     if predicted is None:
@@ -89,11 +89,11 @@ def beside_theory(scenario: Scenario, response: str, mean: float, sd: float) -> 
     return {"theory": predicted, "ratio": simulated / predicted if predicted > 0.0 else math.nan}
 
 
-def of_theory(document: Document, scenarios: Sequence[Scenario]) -> Document:
+def theory_sentence(document: Document, scenarios: Sequence[Scenario]) -> Document:
     """Return the sentence on the theory that stands in a study's document; nothing where it stands nowhere."""
     if not any("theory" in each for cell in document["cells"] for each in cell["responses"].values()):
         return {}
-    left_out = dict.fromkeys(name for scenario in scenarios for name in limits_of(scenario))
+    left_out = dict.fromkeys(name for scenario in scenarios for name in theory_limits(scenario))
     less = f" It leaves out {', '.join(left_out)}, so that more is to be expected." if left_out else ""
     return {"theory": f"Theory: the standard deviation (of an rms: the quadratic mean) that is propagated.{less}"}
 
@@ -110,12 +110,12 @@ def element_errors(scenario: Scenario, number: int) -> Propagated:
     """
     plan = scenario.plan
     scene = build_scene(scenario, scenario.seed)
-    model = job_of(scenario, scene).models[number]
-    names = unknowns_of(plan.method, model)
+    model = make_job(scenario, scene).models[number]
+    names = unknown_elements(plan.method, model)
     design = _design(scenario, model, names)
     n = len(design)
     anew, lasting = reading_sd(scenario) ** 2, _lasting(scenario)
-    solution = adjusted(design, np.zeros(n)).cofactors @ design.T
+    solution = solve_least_squares(design, np.zeros(n)).cofactors @ design.T
     errors = solution @ (lasting + anew * np.eye(n)) @ solution.T
     to_mean = solution @ np.ones(n)
     units = np.array([1.0 if name[:2] in ("by", "bz") else GON for name in names])
@@ -130,11 +130,13 @@ def element_errors(scenario: Scenario, number: int) -> Propagated:
 
 def _set_to_counts(sds: Array, fractions: Array) -> Array:
     """Return the gains and the variances of what counts add ``(2, m)``; nan is a fraction that may be any."""
-    found = [(1.0, ROUNDING**2) if math.isnan(f) else settled(f, sd) for f, sd in zip(fractions, sds, strict=True)]
+    found = [
+        (1.0, ROUNDING**2) if math.isnan(f) else quantised_error(f, sd) for f, sd in zip(fractions, sds, strict=True)
+    ]
     return np.array([[gain for gain, _ in found], [added for _, added in found]])
 
 
-def settled(fraction: float, sd: float) -> tuple[float, float]:
+def quantised_error(fraction: float, sd: float) -> tuple[float, float]:
     """Return what becomes of the error of an element that truly lies at a fraction of a count when it is set to one.
 
     The error is taken so many times, and to that comes something of this variance which goes with the error of no
@@ -171,7 +173,7 @@ def _lasting(scenario: Scenario) -> Array:
     mark = 1e-3 * scenario.observer.fiducial_um
     centring, swing = mark / math.sqrt(len(fiducials)), mark / float(np.linalg.norm(fiducials))
     c_of_film = camera.c * (1.0 - 5e-7 * sum(film.shrinkage_ppm))
-    gain, added = settled(c_of_film / LEAST_COUNT % 1.0, camera.c * swing)
+    gain, added = quantised_error(c_of_film / LEAST_COUNT % 1.0, camera.c * swing)
     of_c = math.sqrt((gain * camera.c * swing) ** 2 + added)
     constant, enlarged = np.full_like(x, z / camera.c), y / camera.c
     whole = [(constant, centring), (constant, centring), (x, swing), (x - plan.bx, swing), (enlarged, of_c)]
@@ -203,7 +205,7 @@ def _fractions(scenario: Scenario, scene: Scene, number: int, names: Sequence[st
     variant = VARIANTS[scenario.instrument.variant]
     counters = {name: element.zero for name, element in variant.elements.items()} | {"bx": scenario.plan.bx}
     zeros = {name: np.array([shown]) for name, shown in counters.items()}
-    model = job_of(scenario, scene).models[number]
+    model = make_job(scenario, scene).models[number]
     true = true_elements(Relative.of_truth(truth).of_many(), scenario.plan.method, zeros, model, variant)
     taking_the_mean = np.abs(to_mean) > 1e-6 * np.abs(to_mean).max()
     return np.where(taking_the_mean, np.nan, [true[name][0] / LEAST_COUNT % 1.0 for name in names])

@@ -8,7 +8,7 @@ from typing import Any
 from a7sim.operator import ModelJob
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
-from a7sim.session.running import job_of
+from a7sim.session.running import make_job
 from a7sim.training.exercise import OPENING, Exercise
 from a7sim.training.witness import Deed, Reading, Witness, WitnessedAutograph
 
@@ -49,7 +49,7 @@ class Account:
     @cached_property
     def model(self) -> ModelJob:
         """The model that the exercise is about, as the job sheet has it."""
-        models = job_of(self.scenario, self.scene).models
+        models = make_job(self.scenario, self.scene).models
         return next(each for each in models if each.name == self.exercise.model)
 
     @property
@@ -58,7 +58,7 @@ class Account:
         noted: dict[str, str] = {}
         for deed in self.deeds:
             if deed.what == "note" and deed.text.lower().startswith(ANSWER):
-                noted |= answers_in(deed.text[len(ANSWER) :].split())
+                noted |= parse_answers(deed.text[len(ANSWER) :].split())
         return noted | dict(self.written)
 
     def name_of(self, point: str) -> str:
@@ -66,7 +66,7 @@ class Account:
         return self.model.standard_points.get(point, point)
 
 
-def answers_in(words: Sequence[str]) -> dict[str, str]:
+def parse_answers(words: Sequence[str]) -> dict[str, str]:
     """Return the answers in words such as play=0.05; words that are none are passed over."""
     pairs = (word.partition("=") for word in words)
     return {key.strip().lower(): value.strip() for key, equals, value in pairs if equals and key.strip()}

@@ -7,15 +7,15 @@ from pathlib import Path
 
 from a7sim.files import read_text
 from a7sim.mistakes import Mistake
-from a7sim.session.folder import JOURNAL, write_whole
+from a7sim.session.folder import JOURNAL, write_atomic
 from a7sim.session.lines import read_journal
 from a7sim.session.playing import Player
 from a7sim.session.scripts import Script, read_script
-from a7sim.training.account import answers_in
+from a7sim.training.account import parse_answers
 from a7sim.training.exercise import OPENING, Played, Shelved
-from a7sim.training.handouts import handed_out
-from a7sim.training.procedures import play
-from a7sim.training.room import Room, entered, entered_again
+from a7sim.training.handouts import make_handout
+from a7sim.training.procedures import run_procedure
+from a7sim.training.room import Room, open_environment, resume_environment
 from a7sim.training.variation import scenario_for
 
 ANSWERS = "answers.txt"
@@ -31,55 +31,55 @@ STUDENT = "student"
 
 
 @contextmanager
-def begun(shelved: Shelved, seed: int, folder: Path, student: str, mode: str) -> Iterator[Room]:
+def start_attempt(shelved: Shelved, seed: int, folder: Path, student: str, mode: str) -> Iterator[Room]:
     """Begin an attempt in a folder: its papers are handed out and its opening is done. Raises Mistake."""
     folder.mkdir(parents=True, exist_ok=True)
     hand_out(shelved, seed, folder)
-    with entered(shelved, seed, folder, student, mode) as room:
-        open_(room)
+    with open_environment(shelved, seed, folder, student, mode) as room:
+        run_opening(room)
         yield room
 
 
 @contextmanager
-def gone_on(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
+def resume_attempt(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
     """Go on with an attempt that was left, or cut off. Raises Mistake."""
-    with entered_again(shelved, seed, folder) as room:
+    with resume_environment(shelved, seed, folder) as room:
         if not room.witness.opened:
-            open_(room)
+            run_opening(room)
         yield room
 
 
 def hand_out(shelved: Shelved, seed: int, folder: Path) -> None:
     """Put the papers of an exercise into a folder."""
-    for name, text in papers_of(shelved, seed).items():
-        write_whole(folder / name, text)
+    for name, text in make_papers(shelved, seed).items():
+        write_atomic(folder / name, text)
 
 
-def papers_of(shelved: Shelved, seed: int) -> Mapping[str, str]:
+def make_papers(shelved: Shelved, seed: int) -> Mapping[str, str]:
     """Return the papers of an exercise by file name, none where it has none."""
     exercise = shelved.exercise
     if not exercise.handout:
         return {}
-    return handed_out(exercise.handout, scenario_for(shelved, seed), seed, exercise.handout_options).papers
+    return make_handout(exercise.handout, scenario_for(shelved, seed), seed, exercise.handout_options).papers
 
 
-def open_(room: Room) -> None:
+def run_opening(room: Room) -> None:
     """Do the opening of an exercise. Raises Mistake where it cannot be done."""
     opening = room.shelved.exercise.opening
     if opening is not None:
-        trouble = done(room, opening, OPENING)
+        trouble = play_item(room, opening, OPENING)
         if trouble:
             raise Mistake(f"{room.shelved.name}: the opening cannot be done: {trouble}")
 
 
-def done(room: Room, played: Played, client: str = STUDENT) -> str:
+def play_item(room: Room, played: Played, client: str = STUDENT) -> str:
     """Let a script or a procedure be played; return what kept it from its end, empty where nothing did."""
     if played.procedure:
-        return play(room, played, client, papers_of(room.shelved, room.seed))
-    return played_script(room, read_script(room.shelved.folder / played.script), client)
+        return run_procedure(room, played, client, make_papers(room.shelved, room.seed))
+    return play_script(room, read_script(room.shelved.folder / played.script), client)
 
 
-def played_script(room: Room, script: Script, client: str = STUDENT) -> str:
+def play_script(room: Room, script: Script, client: str = STUDENT) -> str:
     """Play a script at the instrument of an attempt; return what it expected in vain, empty where nothing."""
     not_met = Player(script, desk=room.desk, clock=room.clock).play(client)
     if not_met is not None and client in room.desk.clients:
@@ -87,29 +87,29 @@ def played_script(room: Room, script: Script, client: str = STUDENT) -> str:
     return str(not_met) if not_met is not None else ""
 
 
-def seed_played(shelved: Shelved, played: Played, otherwise: int = 1) -> int:
+def seed_for(shelved: Shelved, played: Played, otherwise: int = 1) -> int:
     """Return the seed with which something is played: a script's own, or that of the exercise's reference."""
     if played.seed is not None:
         return played.seed
     if played.script:
         return read_script(shelved.folder / played.script).seed
     reference = shelved.exercise.reference
-    return otherwise if played is reference else seed_played(shelved, reference)
+    return otherwise if played is reference else seed_for(shelved, reference)
 
 
-def attempted(shelved: Shelved, played: Played, folder: Path, seed: int, student: str = "somebody") -> str:
+def run_attempt(shelved: Shelved, played: Played, folder: Path, seed: int, student: str = "somebody") -> str:
     """Do an exercise from its opening to its end in a folder; return what kept it from its end."""
     folder.mkdir(parents=True, exist_ok=True)
     hand_out(shelved, seed, folder)
-    with entered(shelved, seed, folder, student, "practice", dict(played.observer)) as room:
-        open_(room)
-        return done(room, played)
+    with open_environment(shelved, seed, folder, student, "practice", dict(played.observer)) as room:
+        run_opening(room)
+        return play_item(room, played)
 
 
 def write_answers(folder: Path, answers: dict[str, str]) -> dict[str, str]:
     """Add answers to those that were written down; return all of them. Raises Mistake where that fails."""
     known = written_answers(folder) | answers
-    write_whole(folder / ANSWERS, "".join(f"{key}={value}\n" for key, value in known.items()))
+    write_atomic(folder / ANSWERS, "".join(f"{key}={value}\n" for key, value in known.items()))
     return known
 
 
@@ -120,7 +120,7 @@ def written_answers(folder: Path) -> dict[str, str]:
         return {}
     answers: dict[str, str] = {}
     for line in read_text(path).splitlines():
-        answers |= answers_in([line])
+        answers |= parse_answers([line])
     return answers
 
 
@@ -139,7 +139,7 @@ def written_hints(folder: Path) -> tuple[int, float]:
     return len(costs), sum(costs)
 
 
-def mode_of(folder: Path) -> tuple[str, str, str]:
+def attempt_mode(folder: Path) -> tuple[str, str, str]:
     """Return exercise, student and mode of the attempt in a folder, as its journal names them. Raises Mistake."""
     settings = read_journal(folder / JOURNAL).header.get("settings", {})
     try:

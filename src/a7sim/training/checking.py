@@ -11,13 +11,13 @@ from a7sim.mistakes import Mistake
 from a7sim.scenario import Scenario
 from a7sim.session.scripts import Say, Script, read_script
 from a7sim.training.account import Account
-from a7sim.training.attempts import attempted, seed_played
+from a7sim.training.attempts import run_attempt, seed_for
 from a7sim.training.exercise import FULL_MARKS, Exercise, Shelved
-from a7sim.training.grading import Grade, account_in, found_in, grade_by
-from a7sim.training.measures import Found, measure_of
+from a7sim.training.grading import Grade, evaluate_metrics, grade_by, load_record
+from a7sim.training.measures import Found, make_metric
 from a7sim.training.rehearsing import Rehearsals
 from a7sim.training.variation import scenario_for
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 MIN_HINTS, MIN_FAULTY = 2, 2
 
@@ -43,14 +43,14 @@ class _Run:
 
     @classmethod
     def of(cls, account: Account) -> "_Run":
-        return cls(account, found_in(account))
+        return cls(account, evaluate_metrics(account))
 
     def grade(self, exercise: Exercise) -> Grade:
         """Grade it by the limits and weights of an exercise with the same measures."""
         return grade_by(exercise, self.found, self.account.seconds)
 
 
-def checked(shelved: Shelved) -> Checked:
+def check_exercise(shelved: Shelved) -> Checked:
     """Check an exercise whole."""
     exercise = shelved.exercise
     faults = list(_of_form(shelved))
@@ -58,7 +58,7 @@ def checked(shelved: Shelved) -> Checked:
         return Checked(shelved.name, tuple(faults))
     with tempfile.TemporaryDirectory() as place:
         try:
-            faults += _of_tolerances(exercise, scenario_for(shelved, seed_played(shelved, exercise.reference)))
+            faults += _of_tolerances(exercise, scenario_for(shelved, seed_for(shelved, exercise.reference)))
             accounts = _accounts(shelved, Path(place))
         except Mistake as mistake:
             return Checked(shelved.name, (*faults, str(mistake)))
@@ -94,7 +94,7 @@ def _all_there(shelved: Shelved) -> bool:
 
 def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
     for each in exercise.criteria:
-        measure = measure_of(each)
+        measure = make_metric(each)
         if not measure.more_is_better:
             floor = round(measure.floor(scenario), 4)
             for band, limit in (("excellent", each.excellent), ("pass", each.passing)):
@@ -116,7 +116,7 @@ def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
         accounts[f"faulty {i}"], trouble = rehearsals.attempted(played)
         if trouble and played.script:
             raise Mistake(f"{played.script}: {trouble}")
-    seed = seed_played(shelved, exercise.reference)
+    seed = seed_for(shelved, exercise.reference)
     script = read_script(shelved.folder / exercise.reference.script) if exercise.reference.script else None
     accounts["nothing"] = rehearsals.left(seed, None)
     accounts["slow"] = rehearsals.left(seed, script, 10.0 * exercise.minutes)
@@ -126,11 +126,11 @@ def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
 
 def _of_reference(shelved: Shelved, place: Path) -> Account:
     reference = shelved.exercise.reference
-    seed = seed_played(shelved, reference)
-    trouble = attempted(shelved, reference, place, seed)
+    seed = seed_for(shelved, reference)
+    trouble = run_attempt(shelved, reference, place, seed)
     if trouble:
         raise Mistake(f"reference: expected it to come to its end: {trouble}")
-    return account_in(shelved, seed, place)
+    return load_record(shelved, seed, place)
 
 
 def _half_of(script: Script) -> Script:
@@ -141,20 +141,22 @@ def _half_of(script: Script) -> Script:
 def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
     reference = runs["reference"].grade(exercise)
     if not reference.passed:
-        told = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or counted(reference.points, "point")
+        told = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or pluralize(
+            reference.points, "point"
+        )
         yield f"reference: expected it to pass, got {told}"
     for i, faulty in enumerate(exercise.faulty, start=1):
         grade = runs[f"faulty {i}"].grade(exercise)
         called = faulty.script or f"faulty {i} ({faulty.procedure})"
         if grade.passed:
-            yield f"{called}: expected it to fail, got {counted(grade.points, 'point')}"
+            yield f"{called}: expected it to fail, got {pluralize(grade.points, 'point')}"
         if faulty.fails not in [each.id for each in grade.failed]:
             got = ", ".join(each.id for each in grade.failed) or "nothing"
             yield f"{called}: expected {faulty.fails} to fail, got {got}"
     if runs["nothing"].grade(exercise).passed:
         yield "expected who does nothing not to pass, got a pass"
     for step in exercise.steps:
-        measure = measure_of(step)
+        measure = make_metric(step)
         found = measure.of(runs["reference"].account)
         if not measure.reached(found.value, step.done):
             yield f"step {step.text!r}: expected the reference to tick it, got {found.reason}"
@@ -170,7 +172,7 @@ def _dead_criteria(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
     done = [run for name, run in runs.items() if name != "nothing"]
     verdicts = [_verdict(run, exercise) for run in done]
     for criterion in exercise.criteria:
-        sense = -1.0 if measure_of(criterion).more_is_better else 1.0
+        sense = -1.0 if make_metric(criterion).more_is_better else 1.0
         mutations = {
             "its tolerances are without limit": changed(criterion, excellent=sense * NEVER, passing=sense * NEVER),
             "its tolerances are impossible": changed(criterion, excellent=-sense * NEVER, passing=-sense * NEVER),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from a7sim.training.attempts import ANSWERS, HINTS, written_answers
 from a7sim.training.exercise import Exercise
-from a7sim.training.measures import measure_of
+from a7sim.training.measures import make_metric
 from a7sim.training.progress import EXAM, Attempt
 from a7sim.training.room import Room
 
@@ -30,7 +30,7 @@ class Checklist:
     def ticks(self) -> list[bool]:
         """Return which steps are done."""
         account = self.room.account(written_answers(self.attempt.folder))
-        measures = [measure_of(each) for each in self.exercise.steps]
+        measures = [make_metric(each) for each in self.exercise.steps]
         return [
             measure.reached(measure.of(account).value, step.done)
             for measure, step in zip(measures, self.exercise.steps, strict=True)

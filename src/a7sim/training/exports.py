@@ -6,8 +6,8 @@ from typing import Any
 
 import msgspec
 
-from a7sim.documents import Document, head
-from a7sim.files import csv_text
+from a7sim.documents import Document, document_header
+from a7sim.files import to_csv
 from a7sim.training.exercise import FULL_MARKS
 from a7sim.training.progress import Attempt, Graded
 
@@ -36,20 +36,20 @@ _STATEMENTS = uuid.UUID("5d9cfd3b-3a61-5c7e-9a53-7b6a7d1f0a07")
 _EXTENSIONS = "http://localhost/a7sim/xapi"
 
 
-def as_nbgrader(best: Mapping[tuple[str, str], Graded]) -> str:
+def to_nbgrader(best: Mapping[tuple[str, str], Graded]) -> str:
     """Return best grades as CSV in the columns of nbgrader. Hints are taken off; names and due dates are not known."""
     rows: list[list[str | float | None]] = []
     for (student, exercise), each in sorted(best.items()):
         points = each.grade.points
         rows.append([exercise, None, each.at, student, None, None, None, points, 0.0, points, FULL_MARKS])
-    return csv_text(NBGRADER_COLUMNS, rows)
+    return to_csv(NBGRADER_COLUMNS, rows)
 
 
-def as_class_document(
+def to_class_document(
     graded: Sequence[Graded], best: Mapping[tuple[str, str], Graded], attempts: Sequence[Attempt]
 ) -> Document:
     """Return all grades as a document, the best ones by student and exercise first."""
-    return head("train report") | {
+    return document_header("train report") | {
         "best": [_told(each) for _, each in sorted(best.items())],
         "grades": [_told(each) for each in graded],
         "attempts": [
@@ -73,7 +73,7 @@ def _told(each: Graded) -> Document:
     return where | {"at": each.at, "grade": grade}
 
 
-def as_xapi(graded: Sequence[Graded], home_page: str = HOME_PAGE) -> str:
+def to_xapi(graded: Sequence[Graded], home_page: str = HOME_PAGE) -> str:
     """Return grades as xAPI statements, a JSON object a line."""
     return "".join(msgspec.json.encode(_statement(each, home_page)).decode() + "\n" for each in graded)
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, near_vertical_parallax_coefficients
-from a7sim.reduction.least_squares import adjusted
+from a7sim.reduction.least_squares import solve_least_squares
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES, PLACES
 
@@ -21,11 +21,11 @@ def multipliers(scenario: Scenario, case: str) -> Array:
     x, y = np.array([PLACES[label] for label in CASES[case]]).T * np.array([plan.bx, width])[:, None]
     coefficients = near_vertical_parallax_coefficients(x, y, plan.projection_height, plan.bx)
     design = coefficients[[PARALLAX_ELEMENTS.index(name) for name in FIVE]].T
-    solved = [adjusted(design, -each).unknowns for each in np.eye(len(x))]
+    solved = [solve_least_squares(design, -each).unknowns for each in np.eye(len(x))]
     return np.asarray(solved).T / GON
 
 
-def form_of(scenario: Scenario, case: str) -> str:
+def computation_form(scenario: Scenario, case: str) -> str:
     """Return the form of a case as plain text: a line for every point, to be filled in."""
     heads = ("kappa'", 'kappa"', "phi'", 'phi"', "omega'")
     lines = [

@@ -12,9 +12,9 @@ from a7sim.session.lines import read_journal
 from a7sim.training.account import Account
 from a7sim.training.attempts import written_answers
 from a7sim.training.exercise import FULL_MARKS, Criterion, Exercise, Shelved
-from a7sim.training.handouts import handed_out
-from a7sim.training.measures import Found, measure_of
-from a7sim.training.room import Room, Unreliable, seen_again
+from a7sim.training.handouts import make_handout
+from a7sim.training.measures import Found, make_metric
+from a7sim.training.room import Room, Unreliable, replay_environment
 
 JUST_PASSED = 0.6
 """Share of its weight that a criterion earns at the limit of its pass band; from there it rises to all of it."""
@@ -79,14 +79,14 @@ class HintsTaken:
     cost: float = 0.0
 
 
-def grade_of(account: Account, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
+def grade_record(account: Account, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
     """Grade an account."""
-    return grade_by(account.exercise, found_in(account), account.seconds, hints, shelved_name)
+    return grade_by(account.exercise, evaluate_metrics(account), account.seconds, hints, shelved_name)
 
 
-def found_in(account: Account) -> list[Found]:
+def evaluate_metrics(account: Account) -> list[Found]:
     """Return what the measure of every criterion comes to, in their order."""
-    return [measure_of(each).of(account) for each in account.exercise.criteria]
+    return [make_metric(each).of(account) for each in account.exercise.criteria]
 
 
 def grade_by(
@@ -98,7 +98,7 @@ def grade_by(
 ) -> Grade:
     """Grade what the measures of an exercise's criteria came to in an attempt of so many simulated s."""
     hints = hints or HintsTaken()
-    marks = [marked(criterion, value) for criterion, value in zip(exercise.criteria, found, strict=True)]
+    marks = [grade_criterion(criterion, value) for criterion, value in zip(exercise.criteria, found, strict=True)]
     earned = round(max(0.0, sum(each.points for each in marks) - hints.cost), 1)
     missed = any(each.band == FAILED and each.required for each in marks)
     return Grade(
@@ -114,9 +114,9 @@ def grade_by(
     )
 
 
-def marked(criterion: Criterion, found: Found) -> Marked:
+def grade_criterion(criterion: Criterion, found: Found) -> Marked:
     """Return a criterion with its band and points by what its measure came to."""
-    measure = measure_of(criterion)
+    measure = make_metric(criterion)
     value = found.value
     if measure.reached(value, criterion.excellent):
         band, share = EXCELLENT, 1.0
@@ -142,30 +142,30 @@ def marked(criterion: Criterion, found: Found) -> Marked:
     )
 
 
-def graded(shelved: Shelved, seed: int, folder: Path, hints: HintsTaken | None = None) -> Grade:
+def grade_folder(shelved: Shelved, seed: int, folder: Path, hints: HintsTaken | None = None) -> Grade:
     """Grade the attempt in a folder. Raises Unreliable for a journal that cannot be relied on."""
-    return grade_of(account_in(shelved, seed, folder), hints, shelved.name)
+    return grade_record(load_record(shelved, seed, folder), hints, shelved.name)
 
 
-def account_in(shelved: Shelved, seed: int, folder: Path) -> Account:
+def load_record(shelved: Shelved, seed: int, folder: Path) -> Account:
     """Return the account of the attempt in a folder, by working it again. Raises Unreliable."""
     try:
-        room = seen_again(shelved, seed, read_journal(folder / JOURNAL))
+        room = replay_environment(shelved, seed, read_journal(folder / JOURNAL))
     except Unreliable:
         raise
     except Mistake as mistake:
         raise Unreliable(str(mistake)) from mistake
-    return account_of(room, written_answers(folder))
+    return make_record(room, written_answers(folder))
 
 
-def account_of(room: Room, written: dict[str, str] | None = None) -> Account:
+def make_record(room: Room, written: dict[str, str] | None = None) -> Account:
     """Return the account of an attempt with what was answered on paper, and what its maker of papers knows."""
     exercise = room.shelved.exercise
-    hidden = handed_out(exercise.handout, room.scenario, room.seed, exercise.handout_options).hidden
+    hidden = make_handout(exercise.handout, room.scenario, room.seed, exercise.handout_options).hidden
     return room.account(written, dict(hidden))
 
 
-def as_sentences(grade: Grade) -> Sequence[str]:
+def grade_lines(grade: Grade) -> Sequence[str]:
     """Return a grade for people, a line each: the verdict, then every criterion."""
     verdict = "passed" if grade.passed else "not passed"
     lines = [f"{grade.title}: {verdict}, {grade.points:g} of {FULL_MARKS:g} points"]

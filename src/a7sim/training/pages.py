@@ -9,7 +9,7 @@ from a7sim.report.page import Chapter, Paragraph, Part, Picture, Sheet, page
 from a7sim.training.exercise import FULL_MARKS, Shelved
 from a7sim.training.grading import EXCELLENT, Grade
 from a7sim.training.progress import Attempt, Graded
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ def student_sheet(student: str, shelf: Sequence[Shelved], best: Best, graded: Se
     """Return the sheet of a student: where they stand, and for every exercise what to do better."""
     mine = {exercise: each for (name, exercise), each in best.items() if name == student}
     passed = sum(each.grade.passed for each in mine.values())
-    lead: list[Part] = [Paragraph(f"{passed} of {counted(len(shelf), 'exercise')} passed, {len(mine)} tried.")]
+    lead: list[Part] = [Paragraph(f"{passed} of {pluralize(len(shelf), 'exercise')} passed, {len(mine)} tried.")]
     chapters = [Chapter("Where you stand", [_points(shelf, mine), _overview(shelf, mine, graded)])]
     for shelved in shelf:
         each = mine.get(shelved.name)
@@ -50,10 +50,10 @@ def _verdict(grade: Grade) -> str:
 
 def _of_exercise(each: Graded) -> Sequence[Part]:
     grade, attempt = each.grade, each.attempt
-    after = f", {counted(grade.hints, 'hint')} (-{grade.hint_points:g})" if grade.hints else ""
+    after = f", {pluralize(grade.hints, 'hint')} (-{grade.hint_points:g})" if grade.hints else ""
     first = Paragraph(
         f"{_verdict(grade).capitalize()} with {grade.points:g} of {FULL_MARKS:g} points{after}; "
-        f"attempt {attempt.number}, {attempt.mode}, {counted(grade.minutes, 'minute')} at the instrument's clock."
+        f"attempt {attempt.number}, {attempt.mode}, {pluralize(grade.minutes, 'minute')} at the instrument's clock."
     )
     rows = [[mark.title, mark.band, f"{mark.points:g} of {mark.weight:g}", mark.reason] for mark in grade.marks]
     table = Sheet("What was graded", ["criterion", "", "points", "why"], rows, frozenset({0, 1, 3}))
@@ -88,7 +88,7 @@ def _what_passes(axes: "Axes", shelf: Sequence[Shelved]) -> None:
 def class_sheet(shelf: Sequence[Shelved], best: Best, attempts: Sequence[Attempt]) -> str:
     """Return the sheet of a class: who stands where, and which mistakes are everybody's."""
     students = sorted({each.student for each in attempts})
-    lead: list[Part] = [Paragraph(f"{counted(len(students), 'student')}, {counted(len(attempts), 'attempt')}.")]
+    lead: list[Part] = [Paragraph(f"{pluralize(len(students), 'student')}, {pluralize(len(attempts), 'attempt')}.")]
     rows = [
         [student, str(_passed(best, [student], shelf)), *(_cell(best.get((student, each.name))) for each in shelf)]
         for student in students
@@ -120,7 +120,9 @@ def _spread(shelf: Sequence[Shelved], best: Best) -> Picture:
     by_exercise = [[each.grade.points for (_, name), each in best.items() if name == s.name] for s in shelf]
     numbers = [str(each.exercise.number) for each in shelf]
     said = "; ".join(
-        f"exercise {n}: median {median(some):g} of {counted(len(some), 'student')}" if some else f"exercise {n}: nobody"
+        f"exercise {n}: median {median(some):g} of {pluralize(len(some), 'student')}"
+        if some
+        else f"exercise {n}: nobody"
         for n, some in zip(numbers, by_exercise, strict=True)
     )
     with drawing("spread", "Points of the class by exercise", said, size=(8.0, 3.6), wide=True) as drawn:

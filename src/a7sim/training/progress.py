@@ -13,7 +13,7 @@ import msgspec
 from a7sim.mistakes import Mistake
 from a7sim.training.exercise import Exercise, Hint, Shelved
 from a7sim.training.grading import Grade, HintsTaken
-from a7sim.training.variation import seed_of
+from a7sim.training.variation import attempt_seed
 
 FILE = "progress.sqlite"
 
@@ -144,7 +144,7 @@ class Progress:
         with self._writing():
             self._close_open(student, name)
             number = 1 + self._one("SELECT count(*) FROM attempt WHERE student = ? AND exercise = ?", student, name)
-            drawn = seed_of(student, name, mode) if seed is None else seed
+            drawn = attempt_seed(student, name, mode) if seed is None else seed
             folder = Path("attempts") / quote(student, safe="") / name / str(number)
             self._database.execute(
                 "INSERT INTO attempt (student, exercise, mode, number, seed, folder, begun) "

@@ -10,12 +10,12 @@ from typing import Any
 from a7sim.instrument.language import Desk, LinkEvent, Listener
 from a7sim.link.clock import Clock
 from a7sim.mistakes import Mistake
-from a7sim.scenario import Scenario, hash_of
+from a7sim.scenario import Scenario, hash_scenario
 from a7sim.scene import Scene, build_scene
 from a7sim.session.folder import JOURNAL
-from a7sim.session.journal import Header, Journal, Keeping, header_of_unknown, software
+from a7sim.session.journal import Header, Journal, Keeping, make_header_without_scenario, software_version
 from a7sim.session.lines import Journalled, read_journal
-from a7sim.session.replaying import Difference, Replay, replayed
+from a7sim.session.replaying import Difference, Replay, replay_lines
 from a7sim.training.account import Account
 from a7sim.training.exercise import Shelved
 from a7sim.training.variation import scenario_for
@@ -67,8 +67,8 @@ class Room:
 
 def header_for(shelved: Shelved, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
     """Return what the journal of an attempt says first. It names the scenario by its hash alone: it holds the truth."""
-    first = header_of_unknown(JOURNAL_COMMAND, exercise=shelved.name, student=student, mode=mode).line
-    return Header(first | {"title": shelved.exercise.title, "scenario_hash": hash_of(scenario), "seed": seed})
+    first = make_header_without_scenario(JOURNAL_COMMAND, exercise=shelved.name, student=student, mode=mode).line
+    return Header(first | {"title": shelved.exercise.title, "scenario_hash": hash_scenario(scenario), "seed": seed})
 
 
 def _built(shelved: Shelved, seed: int, observer: dict[str, Any]) -> tuple[Scenario, Scene, WitnessedAutograph]:
@@ -77,14 +77,14 @@ def _built(shelved: Shelved, seed: int, observer: dict[str, Any]) -> tuple[Scena
     return scenario, scene, WitnessedAutograph.of(scenario.instrument, scene.drawer, seed)
 
 
-def rehearsal_room(shelved: Shelved, seed: int) -> Room:
+def dry_run_environment(shelved: Shelved, seed: int) -> Room:
     """Return the room of an attempt of which no journal is kept; the opening is still to be done."""
     scenario, scene, autograph = _built(shelved, seed, {})
     return Room(shelved, scenario, seed, scene, Desk(autograph, autograph.witness.heard), Clock(), autograph)
 
 
 @contextmanager
-def entered(
+def open_environment(
     shelved: Shelved, seed: int, folder: Path, student: str, mode: str, observer: dict[str, Any] | None = None
 ) -> Iterator[Room]:
     """Enter the room of a new attempt, journalled in a folder; the opening is still to be done.
@@ -93,24 +93,24 @@ def entered(
     """
     scenario, scene, autograph = _built(shelved, seed, observer or {})
     journal = Journal(Keeping(states=False))
-    desk = Desk(autograph, both(journal.heard, autograph.witness.heard))
+    desk = Desk(autograph, tee_listener(journal.heard, autograph.witness.heard))
     nominal = scenario_for(shelved, seed)
     with journal.opened(folder, header_for(shelved, nominal, seed, student, mode), desk):
         yield Room(shelved, scenario, seed, scene, desk, Clock(), autograph)
 
 
 @contextmanager
-def entered_again(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
+def resume_environment(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
     """Enter the room of an attempt that was left, as its journal leaves it. Raises Unreliable, Mistake."""
     there = read_journal(folder / JOURNAL)
-    if there.header.get("software") != software():
+    if there.header.get("software") != software_version():
         raise Mistake(
-            f"{there.where(1)}: expected an attempt of {software()} to go on with, got one of "
+            f"{there.where(1)}: expected an attempt of {software_version()} to go on with, got one of "
             f"{there.header.get('software')} (a7sim train reset begins anew)"
         )
     room, replay = _replayed(shelved, seed, there)
     journal = Journal(Keeping(resumes=True, states=False)).continued(there, room.desk, replay.checkpoints)
-    room.desk.listener = both(journal.heard, room.witness.heard)
+    room.desk.listener = tee_listener(journal.heard, room.witness.heard)
     with journal:
         for event in replay.unsaid():
             journal.heard(event)
@@ -119,7 +119,7 @@ def entered_again(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
         yield room
 
 
-def seen_again(shelved: Shelved, seed: int, there: Journalled) -> Room:
+def replay_environment(shelved: Shelved, seed: int, there: Journalled) -> Room:
     """Return the room of an attempt as its journal leaves it. Raises Unreliable."""
     return _replayed(shelved, seed, there)[0]
 
@@ -134,8 +134,8 @@ def _replayed(shelved: Shelved, seed: int, there: Journalled) -> tuple[Room, Rep
     replay = Replay(there, autograph=autograph)
     autograph.blind = True
     assert replay.desk.listener is not None
-    replay.desk.listener = both(replay.desk.listener, autograph.witness.heard)
-    for number, _, difference in replayed(replay):
+    replay.desk.listener = tee_listener(replay.desk.listener, autograph.witness.heard)
+    for number, _, difference in replay_lines(replay):
         if difference is not None and not _same_but_for_pictures(difference):
             expected_, got = difference.replayed or "nothing", difference.journalled or "nothing"
             raise Unreliable(
@@ -151,7 +151,7 @@ def _same_but_for_pictures(difference: Difference) -> bool:
     return journalled == again != difference.replayed
 
 
-def both(first: Listener, then: Listener) -> Listener:
+def tee_listener(first: Listener, then: Listener) -> Listener:
     """Return a listener that lets two hear."""
 
     def heard(event: LinkEvent) -> None:

@@ -8,14 +8,14 @@ import msgspec
 
 from a7sim.files import read_toml
 from a7sim.mistakes import Mistake
-from a7sim.scenario.validation import mistakes_of_form
-from a7sim.shelves import shelves_of
+from a7sim.scenario.validation import schema_errors
+from a7sim.shelves import bundled_dirs
 from a7sim.training.exercise import Exercise, Measured, Shelved
 from a7sim.training.handouts import HANDOUTS
-from a7sim.training.measures import MEASURES, measure_of
+from a7sim.training.measures import MEASURES, make_metric
 from a7sim.training.procedures import PROCEDURES
 
-SEARCH_PATH = shelves_of("exercises")
+SEARCH_PATH = bundled_dirs("exercises")
 """Where the exercises are that come with a7sim."""
 
 FILE = "exercise.toml"
@@ -55,7 +55,7 @@ def read_exercise(folder: Path) -> Shelved:
     """Return the exercise in a folder. Raises Mistake, which names every mistake at once."""
     path = folder / FILE
     raw = read_toml(path)
-    mistakes = list(mistakes_of_form(raw, _expected()))
+    mistakes = list(schema_errors(raw, _expected()))
     if not mistakes:
         exercise = msgspec.convert(raw, Exercise)
         mistakes = _mistakes_of_reference(exercise)
@@ -104,9 +104,9 @@ def _mistakes_of_measure(place: str, each: Measured) -> list[str]:
     kind = MEASURES.get(each.measure)
     if kind is None:
         return [f"{place}.measure: expected one of {', '.join(MEASURES)}, got {each.measure!r}"]
-    mistakes = list(mistakes_of_form(each.options, msgspec.inspect.type_info(kind), f"{place}.options"))
+    mistakes = list(schema_errors(each.options, msgspec.inspect.type_info(kind), f"{place}.options"))
     if not mistakes:
-        measure_of(each)
+        make_metric(each)
     return mistakes
 
 

@@ -93,7 +93,7 @@ REC "1011"
 """
 
 
-def begin_exercise(folder: Path, number: int) -> Path:
+def write_template(folder: Path, number: int) -> Path:
     """Write the skeleton of an exercise into a new folder and return it. Raises Mistake where that cannot be done."""
     title = folder.name.lstrip("0123456789-_").replace("-", " ").strip().capitalize() or "A new exercise"
     try:

@@ -17,7 +17,7 @@ TRAINING_STREAM = 7
 _DECIMALS = 4
 
 
-def seed_of(student: str, exercise: str, mode: str = "practice") -> int:
+def attempt_seed(student: str, exercise: str, mode: str = "practice") -> int:
     """Return the seed of a student's exercise: neighbours have different ones, and an exam has another again."""
     digest = hashlib.sha256("\0".join((student, exercise, mode)).encode("utf-8", "surrogatepass")).digest()
     return int.from_bytes(digest[:4])
@@ -31,16 +31,16 @@ def scenario_for(shelved: Shelved, seed: int, observer: Mapping[str, Any] | None
     exercise = shelved.exercise
     beside = shelved.folder / exercise.scenario
     name = beside if beside.is_file() else exercise.scenario
-    overrides = {path: as_toml(value) for path, value in exercise.settings.items()}
-    overrides |= {f"observer.{key}": as_toml(value) for key, value in (observer or {}).items()}
+    overrides = {path: to_toml(value) for path, value in exercise.settings.items()}
+    overrides |= {f"observer.{key}": to_toml(value) for key, value in (observer or {}).items()}
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(TRAINING_STREAM,)))
     if exercise.vary:
         nominal = msgspec.to_builtins(load_scenario(name, overrides))
         for path, within in exercise.vary.items():
-            overrides[path] = as_toml(_drawn(_at(nominal, path), within, rng))
+            overrides[path] = to_toml(_drawn(_at(nominal, path), within, rng))
     for alternatives in exercise.choose:
         chosen = alternatives[int(rng.integers(len(alternatives)))]
-        overrides |= {path: as_toml(value) for path, value in chosen.items()}
+        overrides |= {path: to_toml(value) for path, value in chosen.items()}
     return load_scenario(name, overrides)
 
 
@@ -61,10 +61,10 @@ def _at(data: Any, path: str) -> float:
     return data
 
 
-def as_toml(value: Any) -> str:
+def to_toml(value: Any) -> str:
     """Return a value as TOML writes it."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {as_toml(each)}" for key, each in value.items()) + "}"
+        return "{" + ", ".join(f"{key} = {to_toml(each)}" for key, each in value.items()) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(as_toml, value)) + "]"
+        return "[" + ", ".join(map(to_toml, value)) + "]"
     return msgspec.json.encode(value).decode()

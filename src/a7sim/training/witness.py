@@ -10,7 +10,7 @@ from msgspec import Struct
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import LinkEvent
 from a7sim.instrument.language.commands.recording import recorded_element
-from a7sim.instrument.language.program import Fault, Step, program_of
+from a7sim.instrument.language.program import Fault, Step, parse_program
 from a7sim.instrument.recorder import Recorder, Registration
 from a7sim.scenario import Condition
 from a7sim.training.exercise import OPENING
@@ -99,7 +99,7 @@ class Witness:
             return
         said = event.text.lower()
         if "note" in said or "fid" in said:
-            for unit in program_of(event.text.encode("latin-1", "replace")):
+            for unit in parse_program(event.text.encode("latin-1", "replace")):
                 self._take_note(unit)
 
     def _take_note(self, unit: Step | Fault) -> None:

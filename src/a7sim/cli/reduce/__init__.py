@@ -86,7 +86,7 @@ def interior(
         )
     flight = None if flying_height is None else Flight(flying_height, ground_height)
     outcome = computing.interior(counts, camera, method, count_mm, correct, flight)
-    _deliver(outcome, as_document, out, tables.of_interior)
+    _deliver(outcome, as_document, out, tables.interior_tables)
 
 
 @command.command("relative")
@@ -126,7 +126,7 @@ def relative(
 
     Example: a7sim reduce relative scenarios/dewitt-pair.csv --c 152.113
     """
-    _deliver(computing.relative(pair, c, (x0, y0), unknowns, bx, method), as_document, out, tables.of_relative)
+    _deliver(computing.relative(pair, c, (x0, y0), unknowns, bx, method), as_document, out, tables.relative_tables)
 
 
 @command.command("centres")
@@ -157,7 +157,7 @@ def centres(
 
     Example: a7sim reduce centres pointings.csv --z1 4900 --z2 5100
     """
-    _deliver(computing.centres(pointings, z1, z2, method, c), as_document, out, tables.of_centres)
+    _deliver(computing.centres(pointings, z1, z2, method, c), as_document, out, tables.centres_tables)
 
 
 @command.command("similarity")
@@ -175,7 +175,7 @@ def similarity(common: Path, method: computing.SimilarityMethod, out: Path | Non
 
     Example: a7sim reduce similarity common.csv --method both
     """
-    _deliver(computing.similarity(common, method), as_document, out, tables.of_similarity)
+    _deliver(computing.similarity(common, method), as_document, out, tables.similarity_tables)
 
 
 @command.command("connect")
@@ -189,7 +189,7 @@ def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_d
 
     Example: a7sim reduce connect models.csv --method centre
     """
-    _deliver(computing.connect(models, method), as_document, out, tables.of_connection)
+    _deliver(computing.connect(models, method), as_document, out, tables.connection_tables)
 
 
 @command.command("strip")
@@ -230,7 +230,7 @@ def strip(
     degree: Literal[2, 3] | None = None if polynomial is None else 2 if polynomial == "2" else 3
     camera = None if c is None else PairCamera(c, (x0, y0), bx)
     outcome = computing.strip(file, ground, camera, method, degree, against)
-    _deliver(outcome, as_document, out, tables.of_strip)
+    _deliver(outcome, as_document, out, tables.strip_tables)
 
 
 @command.command("absolute")
@@ -243,7 +243,7 @@ def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, 
 
     Example: a7sim reduce absolute model.csv --ground ground.csv
     """
-    _deliver(computing.absolute(model, ground, against), as_document, out, tables.of_absolute)
+    _deliver(computing.absolute(model, ground, against), as_document, out, tables.absolute_tables)
 
 
 @command.command("block")
@@ -272,16 +272,16 @@ def block(
 
     Example: a7sim reduce block strip1.csv strip2.csv --ground ground.csv
     """
-    _deliver(computing.block(models, ground, height_weight, against), as_document, out, tables.of_block)
+    _deliver(computing.block(models, ground, height_weight, against), as_document, out, tables.block_tables)
 
 
 def _deliver(outcome: Outcome, as_document: bool, out: Path | None, shown: Callable[[Document], list[Any]]) -> None:
     """Write an outcome where it is wanted and print it, as JSON or as the table a surveyor files."""
-    document = outcome.document if out is None else computing.written(outcome, out)
+    document = outcome.document if out is None else computing.write_result(outcome, out)
     if as_document:
         click.echo(as_json(document), nl=False)
         return
     console = Console(markup=False, highlight=False, emoji=False)
     console.width = max(console.width, MIN_WIDTH)
-    for each in [*shown(document), *tables.of_warnings(document)]:
+    for each in [*shown(document), *tables.warning_lines(document)]:
         console.print(each)

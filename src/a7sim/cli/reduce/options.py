@@ -4,11 +4,11 @@ from typing import Any
 
 import click
 
-from a7sim.cli.options import FILE, Number, Option, about, as_document, out_folder, together
+from a7sim.cli.options import FILE, Number, Option, as_document, combine_options, option_help, out_folder
 
-documented = together(out_folder("results.json and tables as CSV; may be there already"), as_document)
+documented = combine_options(out_folder("results.json and tables as CSV; may be there already"), as_document)
 
-principal_point = together(
+principal_point = combine_options(
     click.option("--x0", type=Number(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
     click.option("--y0", type=Number(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
 )
@@ -16,7 +16,9 @@ principal_point = together(
 
 def base(default: str, length: float | None = None) -> Option[Any]:
     """Return --bx, which is a length, or what `default` says, where it is left out."""
-    return click.option("--bx", type=Number(0.001, 1e6), default=length, help=about("Length of the base, mm", default))
+    return click.option(
+        "--bx", type=Number(0.001, 1e6), default=length, help=option_help("Length of the base, mm", default)
+    )
 
 
 def ground(required: bool) -> Option[Any]:

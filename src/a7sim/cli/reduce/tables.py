@@ -7,8 +7,8 @@ from typing import Any
 from rich.table import Table
 
 from a7sim.documents import Document
-from a7sim.sheets import sheet
-from a7sim.wording import counted
+from a7sim.sheets import text_table
+from a7sim.wording import pluralize
 
 ANGLES = ("omega", "phi", "kappa")
 SHIFTS = ("Tx", "Ty", "Tz")
@@ -16,7 +16,7 @@ SHIFTS = ("Tx", "Ty", "Tz")
 Shown = list[Any]
 
 
-def of_interior(document: Document) -> Shown:
+def interior_tables(document: Document) -> Shown:
     """Show fits, residuals, and what the film did, photograph by photograph."""
     camera = document["camera"]
     shown: Shown = [
@@ -28,7 +28,7 @@ def of_interior(document: Document) -> Shown:
         residuals = [(name, *(1e3 * v for v in each)) for name, each in picture["residuals_mm"].items()]
         shown += [
             "",
-            f"Photograph {picture['photo']}: {counted(len(picture['points']), 'point')}, "
+            f"Photograph {picture['photo']}: {pluralize(len(picture['points']), 'point')}, "
             f"s0 {1e3 * picture['s0_mm']:.1f} um, redundancy {picture['statistics']['redundancy']}",
             _table(("unknown", "value", "±"), unknowns),
             _table(("fiducial", "vx, um", "vy, um"), residuals, 1),
@@ -53,7 +53,7 @@ def _of_film(film: Document) -> list[str]:
     return said
 
 
-def of_relative(document: Document) -> Shown:
+def relative_tables(document: Document) -> Shown:
     """Show elements, parallaxes and model coordinates; the blunders found; and the methods side by side."""
     elements = [
         (name, "mm" if name.startswith("b") else "gon", each["value"], each["sigma"])
@@ -72,7 +72,7 @@ def of_relative(document: Document) -> Shown:
         _table(("point", "X, mm", "Y, mm", "Z, mm", "p, um"), points),
         "",
         f"s0 {1e3 * document['s0_mm']:.2f} um in the picture, "
-        f"redundancy {document['statistics']['redundancy']}, {counted(document['iterations'], 'iteration')}, "
+        f"redundancy {document['statistics']['redundancy']}, {pluralize(document['iterations'], 'iteration')}, "
         f"condition {document['condition']:.2g}",
     ]
     if document["method"] == "robust":
@@ -94,7 +94,7 @@ def _of_blunders(document: Document) -> list[str]:
     ] or ["no blunders found"]
 
 
-def of_centres(document: Document) -> Shown:
+def centres_tables(document: Document) -> Shown:
     """Show centres with their precision, and the residuals of the points."""
     method = document["method"]
     shown: Shown = [f"Perspective centres, {method}", ""]
@@ -113,13 +113,13 @@ def of_centres(document: Document) -> Shown:
     if method == "grid":
         return [
             *shown,
-            f"s0 {1e3 * document['s0_mm']:.2f} um on the plate, {counted(document['iterations'], 'iteration')}",
+            f"s0 {1e3 * document['s0_mm']:.2f} um on the plate, {pluralize(document['iterations'], 'iteration')}",
         ]
     of_pointing = f", a pointing {document['pointing_rms']:.4f}" if "pointing_rms" in document else ""
     return [*shown, f"rms {document['rms']:.4f}{of_pointing}, redundancy {document['redundancy']}"]
 
 
-def of_similarity(document: Document) -> Shown:
+def similarity_tables(document: Document) -> Shown:
     """Show the seven unknowns, the residuals, and the methods side by side."""
     sigma = document["sigma"]
     values = {"scale": document["scale"]} | {f"{name}, gon": value for name, value in document["angles"].items()}
@@ -139,7 +139,7 @@ def of_similarity(document: Document) -> Shown:
     return shown
 
 
-def of_connection(document: Document) -> Shown:
+def connection_tables(document: Document) -> Shown:
     """Show the joins with their closing differences, and the points of the whole."""
     points = [(point, *place) for point, place in document["points"].items()]
     return [
@@ -152,23 +152,23 @@ def of_connection(document: Document) -> Shown:
     ]
 
 
-def of_strip(document: Document) -> Shown:
+def strip_tables(document: Document) -> Shown:
     """Show joins, absolute orientation, residuals, and what the polynomials found the strip to be."""
     shown: Shown = [
-        f"Strip of {counted(len(document['models']), 'model')} from {document['input']}, "
+        f"Strip of {pluralize(len(document['models']), 'model')} from {document['input']}, "
         f"joined on {document['method']}",
         f"joins in the unit of model {document['models'][0]['model']}{', mm' if document['input'] == 'pairs' else ''}",
         "",
         *_of_joins(document["joins"]),
         "",
-        *of_absolute(document, "Absolute orientation of the strip"),
+        *absolute_tables(document, "Absolute orientation of the strip"),
     ]
     if "polynomial" in document:
         shown += ["", *_of_polynomial(document["polynomial"])]
     return shown
 
 
-def of_absolute(document: Document, title: str = "Absolute orientation") -> Shown:
+def absolute_tables(document: Document, title: str = "Absolute orientation") -> Shown:
     """Show the scale, the residuals at the ground points and the accuracies, and differences to given coordinates."""
     precision = f", s0 {document['s0_m']:.4f} m" if "s0_m" in document else ""
     return [
@@ -178,14 +178,15 @@ def of_absolute(document: Document, title: str = "Absolute orientation") -> Show
     ]
 
 
-def of_block(document: Document) -> Shown:
+def block_tables(document: Document) -> Shown:
     """Show the models' scales, the tie residuals, and the residuals and accuracies at the ground points."""
     models = [
         (each["model"], f"{each['scale']:.6f}", *_rms_of(each["residuals_m"].values()), len(each["residuals_m"]))
         for each in document["models"]
     ]
     return [
-        f"Block of {counted(len(models), 'model')}: s0 {document['s0_m']:.4f} m, in plan {document['s0_plan_m']:.4f}, "
+        f"Block of {pluralize(len(models), 'model')}: s0 {document['s0_m']:.4f} m, in plan "
+        f"{document['s0_plan_m']:.4f}, "
         f"in height {document['s0_height_m']:.4f}, redundancy {document['redundancy']}",
         "",
         _table(("model", "scale", "rms vX, m", "vY", "vZ", "points"), models, 3),
@@ -194,7 +195,7 @@ def of_block(document: Document) -> Shown:
     ]
 
 
-def of_warnings(document: Document) -> list[str]:
+def warning_lines(document: Document) -> list[str]:
     """Return what the surveyor should be told."""
     said = [f"warning: {warning}" for warning in document.get("warnings", [])]
     return said + [f"{name} is not written: {why}" for name, why in document.get("not_written", {}).items()]
@@ -224,7 +225,7 @@ def _of_ground(document: Document) -> Shown:
 
 def _of_accuracy(accuracy: Document) -> list[str]:
     return [
-        f"{which}, {counted(each['points'], 'point')}: rms X {_metres(each['rms']['X'])}, "
+        f"{which}, {pluralize(each['points'], 'point')}: rms X {_metres(each['rms']['X'])}, "
         f"Y {_metres(each['rms']['Y'])}, Z {_metres(each['rms']['Z'])} m; "
         f"plan {_metres(each['plan'])}, height {_metres(each['height'])} m"
         for which, each in accuracy.items()
@@ -250,7 +251,7 @@ def _of_comparison(document: Document) -> Shown:
     rows += [(name, *compared[key].values()) for name, key in (("mean square", "rms"), ("largest", "largest"))]
     return [
         "",
-        f"Computed minus given, {counted(compared['points'], 'point')}",
+        f"Computed minus given, {pluralize(compared['points'], 'point')}",
         _table(("point", "dX", "dY", "dZ"), rows, 3),
     ]
 
@@ -286,7 +287,7 @@ def _metres(value: float | None) -> str:
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[Any]], decimals: int = 4) -> Table:
     """Return a table, its first column to the left, numbers to the right, a dash where nothing is known."""
-    table = sheet(*header, fold=(0,))
+    table = text_table(*header, fold=(0,))
     for row in rows:
         table.add_row(*(_cell(value, decimals) for value in row))
     return table

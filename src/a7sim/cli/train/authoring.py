@@ -5,18 +5,18 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
-from a7sim.cli.names import an_exercise
-from a7sim.documents import as_json, head
-from a7sim.training.checking import checked
+from a7sim.cli.names import exercise_argument
+from a7sim.documents import as_json, document_header
+from a7sim.training.checking import check_exercise
 from a7sim.training.shelf import all_exercises, find_exercise
-from a7sim.training.skeleton import begin_exercise
-from a7sim.wording import counted
+from a7sim.training.skeleton import write_template
+from a7sim.wording import pluralize
 
 EXIT_FAULTY = 1
 
 
 @click.command("check")
-@click.argument("exercises", nargs=-1, metavar="[EXERCISE]...", shell_complete=an_exercise)
+@click.argument("exercises", nargs=-1, metavar="[EXERCISE]...", shell_complete=exercise_argument)
 @options.as_document
 def check_(exercises: tuple[str, ...], as_document: bool) -> None:
     """See that exercises hold: the reference passes, each faulty one fails for its reason, no criterion is dead.
@@ -25,13 +25,15 @@ def check_(exercises: tuple[str, ...], as_document: bool) -> None:
 
     Example: a7sim train check 4 my-exercises/20-clouds
     """
-    found = [checked(each) for each in (map(find_exercise, exercises) if exercises else all_exercises())]
+    found = [check_exercise(each) for each in (map(find_exercise, exercises) if exercises else all_exercises())]
     if as_document:
         told = [{"exercise": each.name, "faults": list(each.faults)} for each in found]
-        click.echo(as_json(head("train check") | {"exercises": told}), nl=False)
+        click.echo(as_json(document_header("train check") | {"exercises": told}), nl=False)
     else:
         for each in found:
-            points = "" if each.reference_points is None else f" (reference {counted(each.reference_points, 'point')})"
+            points = (
+                "" if each.reference_points is None else f" (reference {pluralize(each.reference_points, 'point')})"
+            )
             click.echo(f"{each.name}: {'holds' if not each.faults else f'{len(each.faults)} to mend'}{points}")
             for fault in each.faults:
                 click.echo(f"  {fault}")
@@ -49,4 +51,4 @@ def new_(folder: Path) -> None:
     digits = folder.name.partition("-")[0]
     taken = [each.exercise.number for each in all_exercises()]
     number = int(digits) if digits.isdecimal() and 1 <= int(digits) <= 999 else max(taken, default=0) + 1
-    click.echo(str(begin_exercise(folder, number)))
+    click.echo(str(write_template(folder, number)))

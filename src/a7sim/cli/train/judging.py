@@ -7,14 +7,14 @@ import click
 import msgspec
 
 from a7sim.cli import EXIT_DIFFERS, options
-from a7sim.cli.names import an_exercise
-from a7sim.cli.train.options import last_attempt, named, of_a_student, progress_in
-from a7sim.documents import as_json, head
+from a7sim.cli.names import exercise_argument
+from a7sim.cli.train.options import last_attempt, progress_in, student_name, student_options
+from a7sim.documents import as_json, document_header
 from a7sim.mistakes import Mistake
 from a7sim.session.folder import JOURNAL
 from a7sim.training.attempts import ANSWERS
-from a7sim.training.grading import Grade, as_sentences, graded
-from a7sim.training.handed_in import HandedIn, attempts_in, graded_folders
+from a7sim.training.grading import Grade, grade_folder, grade_lines
+from a7sim.training.handed_in import HandedIn, find_submissions, grade_submissions
 from a7sim.training.progress import EXAM, Attempt, Progress
 from a7sim.training.room import Unreliable
 from a7sim.training.shelf import find_exercise
@@ -23,7 +23,7 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
 
 
 @click.command("verify")
-@click.argument("exercise", required=False, shell_complete=an_exercise)
+@click.argument("exercise", required=False, shell_complete=exercise_argument)
 @click.option(
     "--journal",
     "folders",
@@ -34,7 +34,7 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
 )
 @options.seed("that of each attempt handed in")
 @options.as_document
-@of_a_student
+@student_options
 def verify_(
     exercise: str | None,
     folders: tuple[Path, ...],
@@ -48,9 +48,9 @@ def verify_(
     Example: a7sim train verify 4
     """
     if folders:
-        raise click.exceptions.Exit(_tell_of_many(graded_folders(attempts_in(folders), seed), as_document))
+        raise click.exceptions.Exit(_tell_of_many(grade_submissions(find_submissions(folders), seed), as_document))
     with progress_in(home) as progress:
-        attempt = last_attempt(progress, named(student), exercise)
+        attempt = last_attempt(progress, student_name(student), exercise)
         given = progress.given(attempt) if attempt.mode == EXAM else None
         try:
             grade = given or _graded(progress, attempt)
@@ -60,9 +60,9 @@ def verify_(
         if given is None:
             progress.give(attempt, grade)
     if as_document:
-        click.echo(as_json(head("train verify") | msgspec.to_builtins(grade)), nl=False)
+        click.echo(as_json(document_header("train verify") | msgspec.to_builtins(grade)), nl=False)
     else:
-        click.echo("\n".join(as_sentences(grade)))
+        click.echo("\n".join(grade_lines(grade)))
     raise click.exceptions.Exit(EXIT_PASSED if grade.passed else EXIT_NOT_PASSED)
 
 
@@ -70,24 +70,24 @@ def _tell_of_many(handed_in: list[HandedIn], as_document: bool) -> int:
     """Print what came of attempts that were handed in; return the exit code."""
     if as_document:
         documents = [msgspec.to_builtins(each) for each in handed_in]
-        click.echo(as_json(head("train verify") | {"handed_in": documents}), nl=False)
+        click.echo(as_json(document_header("train verify") | {"handed_in": documents}), nl=False)
     for each in handed_in:
         if each.grade is None:
             click.echo(f"a7sim: {each.trouble}", err=True)
         elif not as_document:
             click.echo(f"{each.folder}: {each.student}")
-            click.echo("\n".join(as_sentences(each.grade)))
+            click.echo("\n".join(grade_lines(each.grade)))
     if any(each.grade is None for each in handed_in):
         return EXIT_DIFFERS
     return EXIT_PASSED if all(each.grade and each.grade.passed for each in handed_in) else EXIT_NOT_PASSED
 
 
 def _graded(progress: Progress, attempt: Attempt) -> Grade:
-    return graded(find_exercise(attempt.exercise), attempt.seed, attempt.folder, progress.hints_taken(attempt))
+    return grade_folder(find_exercise(attempt.exercise), attempt.seed, attempt.folder, progress.hints_taken(attempt))
 
 
 @click.command("watch")
-@click.argument("exercise", required=False, shell_complete=an_exercise)
+@click.argument("exercise", required=False, shell_complete=exercise_argument)
 @click.option(
     "--every",
     type=options.Number(min=0.1, max=3600.0),
@@ -96,14 +96,14 @@ def _graded(progress: Progress, attempt: Attempt) -> Grade:
     metavar="SECONDS",
     help="How often it is looked whether the journal has grown.",
 )
-@of_a_student
+@student_options
 def watch_(exercise: str | None, every: float, home: Path | None, student: str | None) -> None:
     """Grade the attempt under way again whenever its journal has grown, until it passes or Ctrl-C. Not in an exam.
 
     Example: a7sim train watch 4
     """
     with progress_in(home) as progress:
-        attempt = last_attempt(progress, named(student), exercise)
+        attempt = last_attempt(progress, student_name(student), exercise)
         if attempt.mode == EXAM:
             raise Mistake(f"{attempt.exercise}: expected an attempt for practice, got an exam")
         seen: tuple[int, ...] = ()
@@ -113,7 +113,7 @@ def watch_(exercise: str | None, every: float, home: Path | None, student: str |
                 seen = now
                 grade = _graded(progress, attempt)
                 click.clear()
-                click.echo("\n".join(as_sentences(grade)))
+                click.echo("\n".join(grade_lines(grade)))
                 if grade.passed:
                     return
             time.sleep(every)

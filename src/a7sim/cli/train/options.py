@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli.options import FOLDER, together
+from a7sim.cli.options import FOLDER, combine_options
 from a7sim.cli.prompt import data_folder
 from a7sim.mistakes import Mistake
 from a7sim.training.progress import Attempt, Progress
@@ -30,7 +30,7 @@ _STUDENT = click.option(
     help=f"Whose progress; also {STUDENT_VARIABLE}  [default: who is logged in]",
 )
 
-of_a_student = together(_HOME, _STUDENT)
+student_options = combine_options(_HOME, _STUDENT)
 """--home, --student."""
 
 
@@ -39,7 +39,7 @@ def progress_in(home: Path | None) -> Progress:
     return Progress(home or data_folder() / "training")
 
 
-def named(student: str | None) -> str:
+def student_name(student: str | None) -> str:
     """Return the name of a student. Raises Mistake for one that is none."""
     if student is None:
         try:

@@ -6,22 +6,22 @@ import click
 from rich.console import Console
 
 from a7sim.cli import options
-from a7sim.cli.names import an_exercise
-from a7sim.cli.train.options import named, of_a_student, progress_in
-from a7sim.documents import Document, as_json, head
+from a7sim.cli.names import exercise_argument
+from a7sim.cli.train.options import progress_in, student_name, student_options
+from a7sim.documents import Document, as_json, document_header
 from a7sim.mistakes import Mistake
-from a7sim.session.folder import write_whole
-from a7sim.sheets import sheet
+from a7sim.session.folder import write_atomic
+from a7sim.sheets import text_table
 from a7sim.training.exercise import Shelved
-from a7sim.training.exports import HOME_PAGE, as_class_document, as_nbgrader, as_xapi
+from a7sim.training.exports import HOME_PAGE, to_class_document, to_nbgrader, to_xapi
 from a7sim.training.shelf import all_exercises, find_exercise
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 
 @click.command("list")
-@click.argument("exercise", required=False, shell_complete=an_exercise)
+@click.argument("exercise", required=False, shell_complete=exercise_argument)
 @options.as_document
-@of_a_student
+@student_options
 def list_(exercise: str | None, as_document: bool, home: Path | None, student: str | None) -> None:
     """List the exercises and how far they are done; or show what EXERCISE is about.
 
@@ -31,7 +31,7 @@ def list_(exercise: str | None, as_document: bool, home: Path | None, student: s
         shelved = find_exercise(exercise)
         click.echo(as_json(_of_exercise(shelved)) if as_document else f"{_shown(shelved)}\n", nl=False)
         return
-    name = named(student)
+    name = student_name(student)
     with progress_in(home) as progress:
         best = progress.best(name)
         attempts = progress.attempts(name)
@@ -45,9 +45,9 @@ def list_(exercise: str | None, as_document: bool, home: Path | None, student: s
     if as_document:
         keys = ("number", "title", "state", "points", "attempts")
         exercises = [dict(zip(keys, row, strict=True)) for row in rows]
-        click.echo(as_json(head("train list") | {"student": name, "exercises": exercises}), nl=False)
+        click.echo(as_json(document_header("train list") | {"student": name, "exercises": exercises}), nl=False)
         return
-    table = sheet("", "exercise", "state", "points", "attempts", left=(1, 2), fold=(1,))
+    table = text_table("", "exercise", "state", "points", "attempts", left=(1, 2), fold=(1,))
     for number, title, state, points, tries in rows:
         table.add_row(str(number), title, state, "" if points is None else f"{points:g}", str(tries or ""))
     Console().print(table)
@@ -55,7 +55,7 @@ def list_(exercise: str | None, as_document: bool, home: Path | None, student: s
 
 def _of_exercise(shelved: Shelved) -> Document:
     exercise = shelved.exercise
-    return head("train list") | {
+    return document_header("train list") | {
         "exercise": shelved.name,
         "number": exercise.number,
         "title": exercise.title,
@@ -72,7 +72,7 @@ def _shown(shelved: Shelved) -> str:
     exercise = shelved.exercise
     steps = [f"  - {each.text}" for each in exercise.steps]
     criteria = [f"  {each.weight:4g}  {each.title}" for each in exercise.criteria]
-    minutes, hints = counted(exercise.minutes, "minute"), counted(len(exercise.hints), "hint")
+    minutes, hints = pluralize(exercise.minutes, "minute"), pluralize(len(exercise.hints), "hint")
     facts = f"{minutes}, {exercise.pass_points:g} of 100 points pass, {hints}"
     return "\n".join([shelved.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
 
@@ -90,7 +90,7 @@ def _shown(shelved: Shelved) -> str:
 @click.option(
     "--home-page", metavar="URL", default=HOME_PAGE, show_default=True, help="Of the students' accounts, for xapi."
 )
-@of_a_student
+@student_options
 def report_(
     whole_class: bool, to: str, out: Path | None, home_page: str, home: Path | None, student: str | None
 ) -> None:
@@ -98,17 +98,17 @@ def report_(
 
     Example: a7sim train report --class --to html --out class.html
     """
-    whose = None if whole_class else named(student)
+    whose = None if whole_class else student_name(student)
     with progress_in(home) as progress:
         graded, best, attempts = progress.grades(whose), progress.best(whose), progress.attempts(whose)
     if not attempts:
         raise Mistake(f"{f'student {whose}' if whose else 'the class'}: expected attempts to report on, found none")
     if to == "csv":
-        text = as_nbgrader(best)
+        text = to_nbgrader(best)
     elif to == "json":
-        text = as_json(as_class_document(graded, best, attempts))
+        text = as_json(to_class_document(graded, best, attempts))
     elif to == "xapi":
-        text = as_xapi(graded, home_page)
+        text = to_xapi(graded, home_page)
     else:
         from a7sim.training.pages import class_sheet, student_sheet  # only pages need figures
 
@@ -117,5 +117,5 @@ def report_(
     if out is None:
         click.echo(text, nl=False)
     else:
-        write_whole(out, text)
+        write_atomic(out, text)
         click.echo(str(out))

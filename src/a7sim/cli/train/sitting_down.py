@@ -21,7 +21,7 @@ GOAL_WIDTH = 64
 """Columns, so that it has room on every terminal."""
 
 
-def sit_down(room: Room, checklist: Checklist, plain: bool) -> None:
+def open_console(room: Room, checklist: Checklist, plain: bool) -> None:
     """Open the console in the room of an attempt, until whoever sits there leaves. Raises Mistake without a terminal.
 
     The simulated clock goes with the wall's while somebody sits there.

@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
-from a7sim.cli.names import an_exercise
+from a7sim.cli.names import exercise_argument
 from a7sim.cli.serve import USUAL, Announcements, Served, serve
-from a7sim.cli.train.options import named, of_a_student, progress_in
-from a7sim.cli.train.sitting_down import sit_down
-from a7sim.documents import head
-from a7sim.link.addresses import Address, address_of
+from a7sim.cli.train.options import progress_in, student_name, student_options
+from a7sim.cli.train.sitting_down import open_console
+from a7sim.documents import document_header
+from a7sim.link.addresses import Address, parse_address
 from a7sim.link.conversation import Terms
 from a7sim.link.loops import run
 from a7sim.link.serving import Doors
@@ -20,7 +20,7 @@ from a7sim.mistakes import Mistake
 from a7sim.session.folder import JOURNAL
 from a7sim.session.journal import Journal
 from a7sim.session.scripts import read_script
-from a7sim.training.attempts import begun, gone_on, played_script
+from a7sim.training.attempts import play_script, resume_attempt, start_attempt
 from a7sim.training.checklist import Checklist
 from a7sim.training.exercise import Shelved
 from a7sim.training.progress import EXAM, PRACTICE, Attempt, Progress
@@ -32,7 +32,7 @@ EXAMINATION = "exam"
 
 
 @click.command("start")
-@click.argument("exercise", required=False, shell_complete=an_exercise)
+@click.argument("exercise", required=False, shell_complete=exercise_argument)
 @click.option(
     "--exam",
     is_flag=True,
@@ -44,7 +44,7 @@ EXAMINATION = "exam"
 @click.option("--link", metavar="tcp://HOST:PORT", help="Serve it there for any client instead of opening the console.")
 @click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp://{USUAL}.")
 @options.plain
-@of_a_student
+@student_options
 def start_(
     exercise: str | None,
     exam: bool,
@@ -71,13 +71,13 @@ def start_(
     played = read_script(script) if script is not None else None
     shelved = find_exercise(exercise or EXAMINATION)
     with progress_in(home) as progress:
-        attempt = _attempt(progress, shelved, named(student), EXAM if exam else PRACTICE, anew, seed)
+        attempt = _attempt(progress, shelved, student_name(student), EXAM if exam else PRACTICE, anew, seed)
     with _entered(shelved, attempt) as room:
         checklist = Checklist(room, attempt)
         if shelved.exercise.paper and played is None:
             _tell_of_papers(checklist)
         elif played is not None:
-            trouble = played_script(room, played)
+            trouble = play_script(room, played)
             click.echo("\n".join(checklist.lines()))
             if trouble:
                 raise Mistake(trouble)
@@ -85,7 +85,7 @@ def start_(
             click.echo("\n".join(checklist.lines()))
             _serve(room, address)
         else:
-            sit_down(room, checklist, plain)
+            open_console(room, checklist, plain)
     click.echo(f"a7sim train verify {shelved.exercise.number} grades it; a7sim train start goes on with it")
 
 
@@ -104,15 +104,15 @@ def _attempt(progress: Progress, shelved: Shelved, student: str, mode: str, anew
 def _entered(shelved: Shelved, attempt: Attempt) -> AbstractContextManager[Room]:
     journal = attempt.folder / JOURNAL
     if journal.exists() and b"\n" in journal.read_bytes():
-        return gone_on(shelved, attempt.seed, attempt.folder)
-    return begun(shelved, attempt.seed, attempt.folder, attempt.student, attempt.mode)
+        return resume_attempt(shelved, attempt.seed, attempt.folder)
+    return start_attempt(shelved, attempt.seed, attempt.folder, attempt.student, attempt.mode)
 
 
 def _address(text: str) -> Address:
     url = re.fullmatch("tcp:(//)?(?P<address>.+)", text)
     if not url:
         raise Mistake(f"--link: expected tcp://HOST:PORT, got {text!r}")
-    found = address_of(url["address"], "--link")
+    found = parse_address(url["address"], "--link")
     if not found.loopback:
         raise Mistake(f"--link {text}: expected an address of this machine alone")
     return found
@@ -125,6 +125,9 @@ def _tell_of_papers(checklist: Checklist) -> None:
 
 
 def _serve(room: Room, address: Address) -> None:
-    first = head("train start") | {"scenario": room.shelved.exercise.title, "variant": room.scenario.instrument.variant}
+    first = document_header("train start") | {
+        "scenario": room.shelved.exercise.title,
+        "variant": room.scenario.instrument.variant,
+    }
     served = Served(first, room.desk, room.clock, Journal())
     run(serve(served, Doors([address]), Terms(), Announcements(first, as_document=False, quiet=False)))

@@ -8,8 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
-from a7sim.instrument.language.logins import without_token
-from a7sim.instrument.language.program import Fault, Program, Question, Step, program_of, question_of, text_of
+from a7sim.instrument.language.logins import redact_token
+from a7sim.instrument.language.program import (
+    Fault,
+    Program,
+    Question,
+    Step,
+    cached_query,
+    parse_program,
+    strip_line_end,
+)
 from a7sim.instrument.language.status import OPERATION_COMPLETE, SETTLING, Status
 from a7sim.instrument.refusals import OutOfRange, Refusal, SettingsConflict, UnknownName
 
@@ -76,7 +84,7 @@ class Engine:
         """Take bytes that arrived at a simulated time in s; return the reply to each line that has one."""
         self._time = time
         if self.waits_until is None and not self._pending and self._admitted and self.desk.listener is None:
-            question = question_of(received, self._cr_ends_line)
+            question = cached_query(received, self._cr_ends_line)
             if question is not None:
                 return self._answer(question)
         replies: list[bytes] = []
@@ -146,19 +154,19 @@ class Engine:
         self._pending += part[: _MAX_PENDING_LENGTH - len(self._pending)]
 
     def _obey_line(self, line: bytes, replies: list[bytes]) -> None:
-        if len(line) > MAX_LINE_LENGTH and len(text_of(line)) > MAX_LINE_LENGTH:
+        if len(line) > MAX_LINE_LENGTH and len(strip_line_end(line)) > MAX_LINE_LENGTH:
             self._heard("!", f"(a line of more than {MAX_LINE_LENGTH} bytes, dropped)")
             self._status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {MAX_LINE_LENGTH} bytes a line")
             return
         if self.desk.listener is not None:
-            self._tell(text_of(line))
-        self._rest = program_of(line)
+            self._tell(strip_line_end(line))
+        self._rest = parse_program(line)
         self._obey_rest(replies)
 
     def _tell(self, text: str) -> None:
         if text.strip(" \t"):
             token = self.desk.token
-            self._heard(">", text if token is None else without_token(text, token))
+            self._heard(">", text if token is None else redact_token(text, token))
 
     def _heard(self, direction: str, text: str) -> None:
         self.desk.heard(self._time, self.client, direction, text)
@@ -180,7 +188,7 @@ class Engine:
                 return
         if self._replies:
             if self.desk.listener is not None:
-                self._heard("<", ";".join(map(as_heard, self._replies)))
+                self._heard("<", ";".join(map(loggable_reply, self._replies)))
             replies.append(b";".join(map(_as_bytes, self._replies)) + b"\n")
             self._replies.clear()
             self._reply_size = 0
@@ -302,7 +310,7 @@ def _as_bytes(reply: str | bytes) -> bytes:
     return reply if isinstance(reply, bytes) else reply.encode("ascii", "replace")
 
 
-def as_heard(reply: str | bytes) -> str:
+def loggable_reply(reply: str | bytes) -> str:
     """Return what is told to a listener of a reply: of a block its size and checksum only."""
     if isinstance(reply, str):
         return reply

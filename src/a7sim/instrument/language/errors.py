@@ -47,7 +47,7 @@ class LanguageError(Exception):
         self.detail = detail
 
 
-def entry(number: ErrorNumber, detail: str = "") -> str:
+def format_entry(number: ErrorNumber, detail: str = "") -> str:
     """Return an error as `SYSTem:ERRor?` answers it: number, then message and detail in quotes."""
     printable = "".join(c if " " <= c <= "~" else "?" for c in detail).replace('"', "'")
     text = f"{number.message};{printable[:MAX_DETAIL_LENGTH]}" if printable else number.message

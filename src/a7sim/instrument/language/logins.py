@@ -3,7 +3,7 @@
 import hmac
 import re
 
-from a7sim.instrument.language.syntax import units_of
+from a7sim.instrument.language.syntax import split_units
 
 TOKEN_PLACEHOLDER = "(the token)"
 """Stands for the token, so that a line can be said again to an instrument whose token is this."""
@@ -15,9 +15,9 @@ _HEADER = re.compile(r"[\s:A-Z0-9_]*LOG(?:IN)?\s+", re.IGNORECASE)
 _QUOTED = re.compile(r"\"((?:[^\"]|\"\")*)\"\s*|'((?:[^']|'')*)'\s*")
 
 
-def without_token(text: str, token: str | None) -> str:
+def redact_token(text: str, token: str | None) -> str:
     """Return a line with what it gives as a token left out; None where nobody knows the token and all may be it."""
-    return ";".join(_told(unit, token) for unit in units_of(text)) if _LOGIN.search(text) else text
+    return ";".join(_told(unit, token) for unit in split_units(text)) if _LOGIN.search(text) else text
 
 
 def _told(unit: str, token: str | None) -> str:

@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
-from a7sim.instrument.language.syntax import Mnemonic, Parameter, Unit, mnemonics_of, unit_of, units_of
+from a7sim.instrument.language.syntax import Mnemonic, Parameter, Unit, parse_mnemonics, parse_unit, split_units
 from a7sim.instrument.language.table import Call, Command, Handler
 
 MAX_CACHED_LINE = 100
@@ -37,7 +37,7 @@ class Fault(Struct, frozen=True):
     detail: str
 
 
-def text_of(line: bytes) -> str:
+def strip_line_end(line: bytes) -> str:
     """Return the text of a line without its line end."""
     return line.removesuffix(b"\n").removesuffix(b"\r").decode("latin-1")
 
@@ -46,7 +46,7 @@ Program = tuple[Step | Fault, ...]
 Path = tuple[Mnemonic, ...]
 
 
-def program_of(line: bytes) -> Program:
+def parse_program(line: bytes) -> Program:
     """Return the units of a line in order, with or without its line end. Every line begins at the root."""
     return _kept(line) if len(line) <= MAX_CACHED_LINE else _taken_apart(line)
 
@@ -59,7 +59,7 @@ class Question(Struct, frozen=True):
     call: Call
 
 
-def question_of(received: bytes, cr_ends_line: bool) -> Question | None:
+def cached_query(received: bytes, cr_ends_line: bool) -> Question | None:
     """Return the question that what was received is, None where it is anything else."""
     return _kept_question(received, cr_ends_line) if len(received) <= MAX_CACHED_LINE else None
 
@@ -68,7 +68,7 @@ def question_of(received: bytes, cr_ends_line: bool) -> Question | None:
 def _kept_question(received: bytes, cr_ends_line: bool) -> Question | None:
     if received.find(b"\n") != len(received) - 1 or (cr_ends_line and b"\r" in received):
         return None
-    program = program_of(received)
+    program = parse_program(received)
     step = program[0] if len(program) == 1 else None
     if not isinstance(step, Step) or step.bare is None or not step.command.query or step.command.holds:
         return None
@@ -78,9 +78,9 @@ def _kept_question(received: bytes, cr_ends_line: bool) -> Question | None:
 def _taken_apart(line: bytes) -> Program:
     program: list[Step | Fault] = []
     level: Path = ()
-    for text in units_of(text_of(line)):
+    for text in split_units(strip_line_end(line)):
         try:
-            unit = unit_of(text)
+            unit = parse_unit(text)
             command, suffix, level = _found(unit.header, unit.query, level)
             program.append(_step(text, unit, command, suffix))
         except LanguageError as error:
@@ -92,7 +92,7 @@ def _taken_apart(line: bytes) -> Program:
 def _found(header: str, query: bool, level: Path) -> tuple[Command, int, Path]:
     """Return the command that a header names below a level, its suffix, and the level of what follows."""
     common, rooted = header[0] == "*", header[0] == ":"
-    path = mnemonics_of(header) if common or rooted else level + mnemonics_of(header)
+    path = parse_mnemonics(header) if common or rooted else level + parse_mnemonics(header)
     command, suffix = COMMANDS.find(path, query)
     return command, suffix, level if common else path[:-1]
 

@@ -4,7 +4,7 @@ from collections import deque
 from dataclasses import astuple, dataclass, field
 from typing import Any
 
-from a7sim.instrument.language.errors import ErrorNumber, entry
+from a7sim.instrument.language.errors import ErrorNumber, format_entry
 
 QUEUE_LENGTH = 32
 
@@ -61,9 +61,9 @@ class Status:
     def report(self, number: ErrorNumber, detail: str = "") -> None:
         """Queue an error and raise its bit; a full queue makes its last entry an overflow."""
         if len(self.errors) < QUEUE_LENGTH:
-            self.errors.append(entry(number, detail))
+            self.errors.append(format_entry(number, detail))
         else:
-            self.errors[-1] = entry(ErrorNumber.QUEUE_OVERFLOW)
+            self.errors[-1] = format_entry(ErrorNumber.QUEUE_OVERFLOW)
             self.event |= DEVICE_ERROR
         if -200 < number <= -100:
             self.event |= COMMAND_ERROR
@@ -76,7 +76,7 @@ class Status:
 
     def next_error(self) -> str:
         """Return and take off the oldest error."""
-        return self.errors.popleft() if self.errors else entry(ErrorNumber.NO_ERROR)
+        return self.errors.popleft() if self.errors else format_entry(ErrorNumber.NO_ERROR)
 
     def read_event(self) -> int:
         """Return the standard event status and clear it."""

@@ -57,7 +57,7 @@ class Unit(Struct, frozen=True, gc=False):
         return tuple(_parameter(each.strip()) for each in _split(self.data, ",")) if self.data else ()
 
 
-def units_of(line: str) -> Iterator[str]:
+def split_units(line: str) -> Iterator[str]:
     """Yield the texts between the semicolons of a line, quotes protecting, blank ones left out."""
     for text in _split(line, ";"):
         unit = text.strip(" \t")
@@ -82,7 +82,7 @@ def _split_outside_quotes(text: str, separator: str) -> Iterator[str]:
     yield text[start:]
 
 
-def unit_of(text: str) -> Unit:
+def parse_unit(text: str) -> Unit:
     """Return a unit with its header taken apart. Raises LanguageError."""
     never = _NEVER.search(text)
     if never is not None:
@@ -96,7 +96,7 @@ def unit_of(text: str) -> Unit:
     return Unit(header[1], header[2] == "?", rest.strip())
 
 
-def mnemonics_of(header: str) -> tuple[Mnemonic, ...]:
+def parse_mnemonics(header: str) -> tuple[Mnemonic, ...]:
     """Return the mnemonics of a header in capitals with their suffixes, None where none came. Raises LanguageError."""
     if header[0] == "*":
         return ((header.upper(), None),)
@@ -133,6 +133,6 @@ def _text(text: str) -> Text:
     return Text(inner.replace(quote * 2, quote))
 
 
-def quoted(text: str) -> str:
+def quote_text(text: str) -> str:
     """Return a text in quotes, as string response data."""
     return '"' + text.replace('"', '""') + '"'

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from a7sim.report.drawing import INK, LEFT, RIGHT, SOFT, WIDTH_IN, arrows, drawing, nice, scale_arrow
+from a7sim.report.drawing import INK, LEFT, RIGHT, SOFT, WIDTH_IN, arrows, drawing, nice_number, scale_arrow
 from a7sim.report.page import Picture
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 _STYLES = ((LEFT, 0.009), (RIGHT, 0.005), (INK, 0.004), (SOFT, 0.009), (LEFT, 0.004))
 """Colour and width of the arrows of each level."""
@@ -20,9 +20,9 @@ def grid_residuals(rows: Sequence[Mapping[str, str]], projector: str, name: str)
     levels = list(dict.fromkeys(row["level_mm"] for row in found))
     largest = max(math.hypot(*each) for each in zip(vx, vy, strict=True))
     extent = max(x) - min(x) or 1.0
-    length, step = 0.14 * extent / (largest or 1.0), nice(largest or 1.0)
-    crosses = counted(len(set(zip(x, y, strict=True))), "cross", "crosses")
-    said = f"Arrows at {crosses} and {counted(len(levels), 'level')}; largest {largest:.1f} µm."
+    length, step = 0.14 * extent / (largest or 1.0), nice_number(largest or 1.0)
+    crosses = pluralize(len(set(zip(x, y, strict=True))), "cross", "crosses")
+    said = f"Arrows at {crosses} and {pluralize(len(levels), 'level')}; largest {largest:.1f} µm."
     with drawing(
         name, f"{projector.capitalize()} projector: residuals at the crosses", said, size=(WIDTH_IN, 5.4)
     ) as drawn:

@@ -18,12 +18,12 @@ from a7sim.report.drawing import (
     WIDTH_IN,
     arrows,
     drawing,
-    nice,
+    nice_number,
     scale_arrow,
 )
 from a7sim.report.page import Picture, Sheet
 from a7sim.standard_points import PLACES, POSITIONS
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,10 +44,10 @@ def residual_parallaxes(model: Document, name: str) -> Picture:
     places, unit = _places(model, residuals)
     across = max(y for _, y in places.values()) - min(y for _, y in places.values())
     largest = max((abs(value) for value in residuals.values()), default=0.0)
-    step = nice(largest or 1e-3)
+    step = nice_number(largest or 1e-3)
     length = 0.26 * across / max(largest, 1e-3)
     title = f"Model {model['model']}: residual y-parallaxes, rms {orientation['rms_parallax_mm']:.4f} mm"
-    said = f"Arrows along y at {counted(len(residuals), 'standard point')}; the largest parallax is {largest:.3f} mm."
+    said = f"Arrows along y at {pluralize(len(residuals), 'standard point')}; the largest parallax is {largest:.3f} mm."
     with drawing(name, title, said, size=(WIDTH_IN, 5.0)) as drawn:
         axes = drawn.axes[0]
         labels = list(residuals)
@@ -95,7 +95,7 @@ def iterations(model: Document, name: str) -> Picture:
     numbers = list(range(1, len(rounds) + 1))
     last = orientation["rms_parallax_mm"]
     title = f"Model {model['model']}: y-parallaxes round by round"
-    first = f"Rms {rounds[0]['rms_mm']:.4f} mm in the first of {counted(len(rounds), 'round')}"
+    first = f"Rms {rounds[0]['rms_mm']:.4f} mm in the first of {pluralize(len(rounds), 'round')}"
     said = f"{first}, {last:.4f} mm left at the end."
     with drawing(name, title, said, size=(WIDTH_IN, 5.0)) as drawn:
         axes = drawn.axes[0]

@@ -6,9 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 from a7sim.documents import Document
 from a7sim.reduction.strips import CENTRE, is_centre
-from a7sim.report.drawing import FAINT, INK, LEFT, PANEL, RIGHT, SOFT, WIDTH_IN, arrows, drawing, nice, scale_arrow
+from a7sim.report.drawing import (
+    FAINT,
+    INK,
+    LEFT,
+    PANEL,
+    RIGHT,
+    SOFT,
+    WIDTH_IN,
+    arrows,
+    drawing,
+    nice_number,
+    scale_arrow,
+)
 from a7sim.report.page import Picture
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,8 +51,10 @@ def residuals_in_plan(strip: Document, places: Places, name: str, of: str) -> Pi
     largest = max(math.hypot(each["X"], each["Y"]) for each in residuals.values())
     at = {point: (places[point][0] - origin[0], places[point][1] - origin[1]) for point in residuals}
     extent = _extent(at.values())
-    step, length = nice(largest or 1e-3), 0.13 * extent / (largest or 1e-3)
-    said = f"Arrows computed minus given at {counted(len(residuals), 'ground point')}; the longest is {largest:.3f} m."
+    step, length = nice_number(largest or 1e-3), 0.13 * extent / (largest or 1e-3)
+    said = (
+        f"Arrows computed minus given at {pluralize(len(residuals), 'ground point')}; the longest is {largest:.3f} m."
+    )
     long = len(residuals) > MANY
     size, width = ((8.0, 4.2), 0.004) if long else ((WIDTH_IN, 4.8), 0.008)
     with drawing(name, f"{of}: residuals in plan", said, size=size, wide=long) as drawn:
@@ -72,7 +86,7 @@ def residuals_in_height(strip: Document, name: str, of: str) -> Picture | None:
         return None
     points = list(residuals)
     largest = max(abs(each["Z"]) for each in residuals.values())
-    said = f"Heights computed minus given at {counted(len(points), 'ground point')}; the largest is {largest:.3f} m."
+    said = f"Heights computed minus given at {pluralize(len(points), 'ground point')}; the largest is {largest:.3f} m."
     long = len(points) > MANY
     size = (8.0, 4.2) if long else (WIDTH_IN, 4.8)
     with drawing(name, f"{of}: residuals in height", said, size=size, wide=long) as drawn:
@@ -101,7 +115,7 @@ def plan_and_profile(places: Places, strip: Document, name: str, of: str) -> Pic
     origin = _origin(places)
     roles = {point: each["role"] for point, each in _last(strip)["residuals_m"].items()}
     along = _along(centres)
-    drawn_of = f"{counted(len(points), 'point')} and {counted(len(centres), 'perspective centre')}"
+    drawn_of = f"{pluralize(len(points), 'point')} and {pluralize(len(centres), 'perspective centre')}"
     said = f"{drawn_of}, from above and from the side."
     with drawing(name, f"{of}: plan and profile", said, size=(8.0, 8.6), ratios=(1.9, 0.8, 1.0), wide=True) as drawn:
         plan, air, ground = drawn.axes

@@ -1,14 +1,14 @@
 """Papers that exercises put into students' hands."""
 
 from a7sim.training.handouts import control, job_sheet, model_sheets, orientation_forms, slipped_book
-from a7sim.training.handouts.base import HANDOUTS, Handout, handed_out
+from a7sim.training.handouts.base import HANDOUTS, Handout, make_handout
 
 __all__ = [
     "HANDOUTS",
     "Handout",
     "control",
-    "handed_out",
     "job_sheet",
+    "make_handout",
     "model_sheets",
     "orientation_forms",
     "slipped_book",

@@ -32,6 +32,6 @@ def handout(name: str) -> Callable[[Maker], Maker]:
     return registered
 
 
-def handed_out(name: str, scenario: Scenario, seed: int, options: Mapping[str, Any]) -> Handout:
+def make_handout(name: str, scenario: Scenario, seed: int, options: Mapping[str, Any]) -> Handout:
     """Return the papers of an exercise, the same for the same seed; none where it has no maker."""
     return HANDOUTS[name](scenario, seed, **options) if name else Handout()

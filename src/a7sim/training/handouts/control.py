@@ -2,7 +2,7 @@
 
 import math
 
-from a7sim.files import csv_text
+from a7sim.files import to_csv
 from a7sim.reduction import Ground
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
@@ -26,4 +26,4 @@ def control_csv(given: Ground, points: list[str] | None = None) -> str:
         for name, place, role in places
         if points is None or name in points
     ]
-    return csv_text(COLUMNS, rows)
+    return to_csv(COLUMNS, rows)

@@ -3,7 +3,7 @@
 from a7sim.operator import Job, ModelJob
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.running import job_of
+from a7sim.session.running import make_job
 from a7sim.training.handouts.base import Handout, handout
 
 JOB = "job.txt"
@@ -12,7 +12,7 @@ JOB = "job.txt"
 @handout("job sheet")
 def job_sheet(scenario: Scenario, seed: int, model: str = "1") -> Handout:
     """Make the job sheet of a model."""
-    job = job_of(scenario, build_scene(scenario, seed))
+    job = make_job(scenario, build_scene(scenario, seed))
     ordered = next(each for each in job.models if each.name == model)
     return Handout({JOB: "\n".join([*_of_model(job, ordered), *_of_camera(scenario), *_of_plan(job), ""])})
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from a7sim.files import csv_text
+from a7sim.files import to_csv
 from a7sim.geometry import Array, length_of
 from a7sim.mistakes import Mistake
 from a7sim.reduction import Ground, Model
@@ -14,7 +14,7 @@ from a7sim.reduction.strips import formed_strip, is_centre
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
 from a7sim.session.analytical import strip_by_comparator
-from a7sim.session.strips import given_control, grounded
+from a7sim.session.strips import given_control, orient_strip
 from a7sim.training.handouts.base import Handout, handout
 from a7sim.training.handouts.control import control_csv
 
@@ -59,12 +59,12 @@ def model_sheets(scenario: Scenario, seed: int, wanted: list[str]) -> Handout:
     scene = build_scene(scenario, seed)
     models = [_in_instrument(each, scenario) for each in strip_by_comparator(scenario, scene, seed).models]
     given = given_control(scenario, scene)
-    slip = misread(models, given, seed)
-    strip = grounded([model.without(slip.point) if model.name == slip.model else model for model in models], given)
+    slip = add_misreading(models, given, seed)
+    strip = orient_strip([model.without(slip.point) if model.name == slip.model else model for model in models], given)
     places = dict(zip(strip.points.points, strip.points.coordinates.T.tolist(), strict=True))
     hidden = {
         "bad": slip.point,
-        "ties": len(shared(models[0], models[1])),
+        "ties": len(common_points(models[0], models[1])),
         "scale": 1e3 * float(strip.oriented.similarity.scale),
     }
     hidden |= {f"{axis}{name}": places[name][k] for name in wanted for k, axis in enumerate("xyz")}
@@ -72,13 +72,13 @@ def model_sheets(scenario: Scenario, seed: int, wanted: list[str]) -> Handout:
     return Handout(papers, hidden)
 
 
-def misread(models: Sequence[Model], given: Ground, seed: int) -> Misread:
+def add_misreading(models: Sequence[Model], given: Ground, seed: int) -> Misread:
     """Return a slip that the joins show: its point has by far the largest closing difference. Raises Mistake."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=HANDOUT_STREAM))
     candidates: list[Misread] = [
         Misread(after.name, name, axis, float(sign * round(rng.uniform(*MISREAD_MM), 2)))
         for before, after in pairwise(models)
-        for name in shared(before, after)
+        for name in common_points(before, after)
         if not is_centre(name) and name not in given.points
         for axis in range(3)
         for sign in (-1.0, 1.0)
@@ -99,7 +99,7 @@ def _stands_out(slip: Misread, models: Sequence[Model]) -> bool:
     return join.points[worst] == slip.point and bool(np.sort(off)[-2] < 0.6 * off[worst])
 
 
-def shared(before: Model, after: Model) -> list[str]:
+def common_points(before: Model, after: Model) -> list[str]:
     """Return the names of what two models have in common, their centre among them."""
     return [name for name in before.points if name in after.points]
 
@@ -125,4 +125,4 @@ def _sheets_csv(models: Sequence[Model], scenario: Scenario) -> str:
         for model in models
         for name, place in zip(model.points, (model.coordinates * _units(scenario)).T.tolist(), strict=True)
     ]
-    return csv_text(COLUMNS, rows)
+    return to_csv(COLUMNS, rows)

@@ -1,11 +1,11 @@
 """Computation forms for who orients a model by sums on paper."""
 
 from a7sim.scenario import Scenario
-from a7sim.training.forms import form_of
+from a7sim.training.forms import computation_form
 from a7sim.training.handouts.base import Handout, handout
 
 
 @handout("orientation forms")
 def orientation_forms(scenario: Scenario, seed: int, cases: str = "AE") -> Handout:
     """Return a computation form for every case."""
-    return Handout({f"form-{case}.txt": form_of(scenario, case) for case in cases})
+    return Handout({f"form-{case}.txt": computation_form(scenario, case) for case in cases})

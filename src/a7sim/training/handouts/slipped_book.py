@@ -12,8 +12,8 @@ import numpy as np
 from a7sim.manual import POSITIONS_OF
 from a7sim.mistakes import Mistake
 from a7sim.operator.book import Entry
-from a7sim.operator.levers import right_fittings
-from a7sim.operator.relative import GROSS_MM, corrections_of, unknowns_of
+from a7sim.operator.levers import required_fittings
+from a7sim.operator.relative import GROSS_MM, compute_corrections, unknown_elements
 from a7sim.operator.slips import neighbours, transpositions
 from a7sim.scenario import Scenario
 from a7sim.scenario.schema import SlipKind
@@ -63,7 +63,7 @@ class Slipped:
 
 
 @handout("book with a slip")
-def book_with_a_slip(scenario: Scenario, seed: int, kind: str = "") -> Handout:
+def book_with_slip(scenario: Scenario, seed: int, kind: str = "") -> Handout:
     """Return the fair copy of an operator's book in which one slip was made, of a kind that the seed draws."""
     kinds: tuple[str, ...] = get_args(SlipKind)
     if kind and kind not in kinds:
@@ -94,7 +94,7 @@ def _worked(scenario: Scenario, seed: int) -> tuple[Seated, list[_Round]]:
     seated = Seated.at(session.person, session.job, session.job.models[0].name)
     seated.set_up()
     bench, model, plan = seated.bench, seated.model, session.job.plan
-    who, elements = bench.crew.everybody, unknowns_of(plan.method, model)
+    who, elements = bench.crew.everybody, unknown_elements(plan.method, model)
     labels = model.points_of_case(plan.case)
     rounds = []
     for _ in range(ROUNDS):
@@ -104,7 +104,7 @@ def _worked(scenario: Scenario, seed: int) -> tuple[Seated, list[_Round]]:
         entries = [each for each in session.person.book.entries[begun:] if each.item in MEASURING and not each.struck]
         mean = seen.p.mean(axis=0) if float(np.sqrt(np.mean(seen.p**2))) < GROSS_MM else 0.0
         base = np.full(who.size, plan.bx)
-        found, _ = corrections_of(bench, who, model, seen.places, seen.p - mean, elements, base, labels)
+        found, _ = compute_corrections(bench, who, model, seen.places, seen.p - mean, elements, base, labels)
         bench.seat.set_elements(who, {name: before[name] + found[name][who] for name in elements})
         after = bench.seat.elements(who, elements)
         counts = [{name: float(each[name][0]) for name in elements} for each in (before, after)]
@@ -119,7 +119,7 @@ def _copied(seated: Seated, rounds: Sequence[_Round]) -> list[Line]:
     def write(form: str, round_: int, point: str, item: str, reading: str) -> None:
         lines.append(Line(len(lines) + 1, form, round_, point, item, reading))
 
-    for name, position in right_fittings(seated.bench.seat.manual, model.polarity, model.base).items():
+    for name, position in required_fittings(seated.bench.seat.manual, model.polarity, model.base).items():
         write("fittings", 0, "", name, position)
     form = "relative orientation"
     for number, worked in enumerate(rounds, start=1):

@@ -1,7 +1,7 @@
 """The measures that exercises are graded by."""
 
 from a7sim.training.measures import answers, centres, clearing, deeds, grid, ground, numerical, readings, truth
-from a7sim.training.measures.base import MEASURES, Found, Measure, measure_of
+from a7sim.training.measures.base import MEASURES, Found, Measure, make_metric
 
 __all__ = [
     "MEASURES",
@@ -13,7 +13,7 @@ __all__ = [
     "deeds",
     "grid",
     "ground",
-    "measure_of",
+    "make_metric",
     "numerical",
     "readings",
     "truth",

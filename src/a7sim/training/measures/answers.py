@@ -7,12 +7,12 @@ from msgspec import field
 
 from a7sim.scenario import Scenario
 from a7sim.training.account import Account
-from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, listed, measure
-from a7sim.training.measures.truth import parallax_of
+from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, join_words, register_metric
+from a7sim.training.measures.truth import y_parallax_at
 from a7sim.training.witness import Reading
 
 
-@measure("not-answered")
+@register_metric("not-answered")
 class NotAnswered(Measure, frozen=True, kw_only=True):
     """How many answers are missing."""
 
@@ -23,10 +23,10 @@ class NotAnswered(Measure, frozen=True, kw_only=True):
     def of(self, account: Account) -> Found:
         """Return their number."""
         missing = [key for key in self.keys or account.exercise.answers if not account.answers.get(key)]
-        return Found(float(len(missing)), f"not answered: {listed(missing)}" if missing else "all is answered")
+        return Found(float(len(missing)), f"not answered: {join_words(missing)}" if missing else "all is answered")
 
 
-@measure("answer-off")
+@register_metric("answer-off")
 class AnswerOff(Measure, frozen=True, kw_only=True):
     """How far a number that was answered is from the truth.
 
@@ -56,7 +56,7 @@ class AnswerOff(Measure, frozen=True, kw_only=True):
         if what == "play":
             return account.autograph.play(name)
         if what == "parallax":
-            return parallax_of(account, account.name_of(name)) or math.nan
+            return y_parallax_at(account, account.name_of(name)) or math.nan
         return float(account.hidden.get(self.true, math.nan))
 
     def floor(self, scenario: Scenario) -> float:
@@ -64,7 +64,7 @@ class AnswerOff(Measure, frozen=True, kw_only=True):
         return self.least
 
 
-@measure("answers-off")
+@register_metric("answers-off")
 class AnswersOff(Measure, frozen=True, kw_only=True):
     """The largest difference of several answered numbers from what the maker of the papers kept back."""
 
@@ -93,7 +93,7 @@ class AnswersOff(Measure, frozen=True, kw_only=True):
         return self.least
 
 
-@measure("answer-wrong")
+@register_metric("answer-wrong")
 class AnswerWrong(Measure, frozen=True, kw_only=True):
     """How many answers are not the words that the maker of the papers kept back under the same keys."""
 
@@ -105,9 +105,9 @@ class AnswerWrong(Measure, frozen=True, kw_only=True):
         """Return their number."""
         missing = [key for key in self.keys if not account.answers.get(key)]
         wrong = [key for key in self.keys if key not in missing and not self._right(account, key)]
-        told = [f"not answered: {listed(missing)}"] if missing else []
+        told = [f"not answered: {join_words(missing)}"] if missing else []
         told += [f"{key} is not {account.answers[key]}" for key in wrong]
-        return Found(float(len(missing) + len(wrong)), "; ".join(told) or f"{listed(self.keys)}: right")
+        return Found(float(len(missing) + len(wrong)), "; ".join(told) or f"{join_words(self.keys)}: right")
 
     def _right(self, account: Account, key: str) -> bool:
         right = account.hidden.get(key, ())
@@ -115,7 +115,7 @@ class AnswerWrong(Measure, frozen=True, kw_only=True):
         return _plain(account.answers[key]) in {_plain(str(each)) for each in allowed}
 
 
-@measure("place-by-scales")
+@register_metric("place-by-scales")
 class PlaceByScales(Measure, frozen=True, kw_only=True):
     """How far answered coordinates of a point are from what its registered scales give (P 3.1), mm."""
 
@@ -129,7 +129,7 @@ class PlaceByScales(Measure, frozen=True, kw_only=True):
         try:
             answered = [float(account.answers.get(key, "")) for key in self.keys]
         except ValueError:
-            return Found(None, f"expected numbers for {listed(self.keys)}")
+            return Found(None, f"expected numbers for {join_words(self.keys)}")
         readings = [each for each in account.readings if each.point == account.name_of(self.point)]
         if not readings:
             return Found(None, f"nothing was registered at {self.point}")

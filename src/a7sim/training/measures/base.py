@@ -67,7 +67,7 @@ MEASURES: dict[str, type[Measure]] = {}
 Kind = TypeVar("Kind", bound=type[Measure])
 
 
-def measure(name: str) -> Callable[[Kind], Kind]:
+def register_metric(name: str) -> Callable[[Kind], Kind]:
     """Register a measure under a name."""
 
     def registered(kind: Kind) -> Kind:
@@ -77,12 +77,12 @@ def measure(name: str) -> Callable[[Kind], Kind]:
     return registered
 
 
-def measure_of(measured: Measured) -> Measure:
+def make_metric(measured: Measured) -> Measure:
     """Return the measure of a step or a criterion. Raises msgspec.ValidationError for options that are none."""
     return msgspec.convert(measured.options, MEASURES[measured.measure])
 
 
-def listed(words: Iterable[object], most: int = 6) -> str:
+def join_words(words: Iterable[object], most: int = 6) -> str:
     """Return words as people list them, the first few."""
     all_words = [str(each) for each in words]
     shown = all_words[:most]
@@ -91,7 +91,7 @@ def listed(words: Iterable[object], most: int = 6) -> str:
     return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}" if shown else "none"
 
 
-def title(handle: str) -> str:
+def handle_label(handle: str) -> str:
     """Return a handle as the field writes it: by', kappa\", X."""
     if handle[-1:] in "12" and handle[:-1] in ("c", "kappa", "phi", "omega", "by", "bz"):
         return handle[:-1] + ("'" if handle.endswith("1") else '"')
@@ -108,8 +108,8 @@ def readings_with(account: Account, element: str, points: Sequence[str] = ()) ->
     ]
 
 
-def where(readings: Iterable[Reading], account: Account) -> str:
+def describe_points(readings: Iterable[Reading], account: Account) -> str:
     """Return at which points readings were made, as positions of the model where they have one."""
     positions = {name: position for position, name in account.model.standard_points.items()}
     names = list(dict.fromkeys(positions.get(each.point, each.point) for each in readings))
-    return f"{'points' if len(names) > 1 else 'point'} {listed(names)}"
+    return f"{'points' if len(names) > 1 else 'point'} {join_words(names)}"

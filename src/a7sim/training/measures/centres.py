@@ -12,9 +12,18 @@ from a7sim.reduction import PerspectiveCentre, Undetermined, perspective_centre
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES, PLACES
 from a7sim.training.account import Account
-from a7sim.training.measures.base import BEST_POINTING_UM, HALF_A_COUNT, Found, Measure, listed, measure, title, where
+from a7sim.training.measures.base import (
+    BEST_POINTING_UM,
+    HALF_A_COUNT,
+    Found,
+    Measure,
+    describe_points,
+    handle_label,
+    join_words,
+    register_metric,
+)
 from a7sim.training.witness import Reading
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 MIN_POINTS = 3
 
@@ -64,10 +73,10 @@ class _Centres(Measure, frozen=True, kw_only=True):
         lacking = [
             f"the {'left' if each.endswith('1') else 'right'} one" for each in self.elements if each not in there
         ]
-        return Found(None, f"too few points were registered at both levels for a centre: {listed(lacking)}")
+        return Found(None, f"too few points were registered at both levels for a centre: {join_words(lacking)}")
 
 
-@measure("levels-missing")
+@register_metric("levels-missing")
 class LevelsMissing(_Centres, frozen=True, kw_only=True):
     """How many registrations are missing: of every point, with each eye, at each level."""
 
@@ -84,11 +93,11 @@ class LevelsMissing(_Centres, frozen=True, kw_only=True):
         wanted = len(self.elements) * len(self.levels) * len(self.points)
         if not short:
             return Found(0.0, "no registration is missing")
-        told = listed(f"{point} with {title(element)} at {level:.0f}" for element, level, point in short)
-        return Found(float(len(short)), f"{len(short)} of {counted(wanted, 'registration')} missing: {told}")
+        told = join_words(f"{point} with {handle_label(element)} at {level:.0f}" for element, level, point in short)
+        return Found(float(len(short)), f"{len(short)} of {pluralize(wanted, 'registration')} missing: {told}")
 
 
-@measure("pointing-rms")
+@register_metric("pointing-rms")
 class PointingRms(_Centres, frozen=True, kw_only=True):
     """How far the images stood from the mark where they were registered: rms of a coordinate, um at photo scale."""
 
@@ -106,15 +115,15 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
                 if seen is None:
                     side = "left" if eye == 1 else "right"
                     return Found(
-                        None, f"where {each.point} was registered with {title(element)} the {side} eye saw none"
+                        None, f"where {each.point} was registered with {handle_label(element)} the {side} eye saw none"
                     )
                 off += seen
-                place = f"{where([each], account)} with {title(element)} at {each.shown['Z']:.0f}"
+                place = f"{describe_points([each], account)} with {handle_label(element)} at {each.shown['Z']:.0f}"
                 worst = max(worst, (math.hypot(*seen), place))
         if not off:
             return Found(None, "nothing was registered at the levels")
         rms = math.sqrt(fmean(each**2 for each in off))
-        told = f"over {counted(len(off) // 2, 'pointing')} the images stood {rms:.1f} um (rms) beside the mark, "
+        told = f"over {pluralize(len(off) // 2, 'pointing')} the images stood {rms:.1f} um (rms) beside the mark, "
         told += f"most of all by {worst[0]:.0f} um at {worst[1]}"
         return Found(round(rms, 2), told)
 
@@ -123,7 +132,7 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
         return BEST_POINTING_UM
 
 
-@measure("pointings-apart")
+@register_metric("pointings-apart")
 class PointingsApart(_Centres, frozen=True, kw_only=True):
     """By how much one's pointings miss a common centre: the larger rms of both centres, mm at their height."""
 
@@ -188,7 +197,7 @@ class _Answered(_Centres, frozen=True, kw_only=True):
         return Found(round(value, 4) if math.isfinite(value) else None, told)
 
 
-@measure("centre-sums-off")
+@register_metric("centre-sums-off")
 class CentreSumsOff(_Answered, frozen=True, kw_only=True):
     """The largest difference of answered coordinates from those that follow from one's own registrations."""
 
@@ -207,7 +216,7 @@ class CentreSumsOff(_Answered, frozen=True, kw_only=True):
         return HALF_A_COUNT
 
 
-@measure("centre-off")
+@register_metric("centre-off")
 class CentreOff(_Answered, frozen=True, kw_only=True):
     """The largest difference of answered coordinates from where the centres truly are, in counter units."""
 

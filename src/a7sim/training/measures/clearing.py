@@ -10,11 +10,19 @@ from a7sim.reduction import Stand
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES
 from a7sim.training.account import Account
-from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, listed, measure, title, where
+from a7sim.training.measures.base import (
+    HALF_A_COUNT,
+    Found,
+    Measure,
+    describe_points,
+    handle_label,
+    join_words,
+    register_metric,
+)
 from a7sim.training.witness import Reading
 
 
-def stands_of(account: Account, reading: Reading) -> tuple[Stand, Stand]:
+def projector_poses(account: Account, reading: Reading) -> tuple[Stand, Stand]:
     """Return how the projectors of the left-hand and the right-hand photograph stood by their counters."""
     zero = {name: account.autograph.element_data(name).zero for name in account.autograph.variant.elements}
 
@@ -44,7 +52,7 @@ class _Clearing(Measure, frozen=True, kw_only=True):
         return {point: element for group in self.steps for point, element in group.items()}
 
 
-@measure("steps-missing")
+@register_metric("steps-missing")
 class StepsMissing(_Clearing, frozen=True, kw_only=True):
     """How many steps were not registered, were done before those they rest on, or with their element elsewhere."""
 
@@ -78,11 +86,14 @@ class StepsMissing(_Clearing, frozen=True, kw_only=True):
 
     def _told(self, points: list[str]) -> str:
         elements = self._elements()
-        return listed(f"{title(elements[point])} at {point}" for point in points)
+        return join_words(f"{handle_label(elements[point])} at {point}" for point in points)
 
     def _strayed(self, readings: list[Reading], account: Account) -> str:
-        return listed(
-            dict.fromkeys(f"{listed(map(title, each.named))} at {where([each], account)}" for each in readings)
+        return join_words(
+            dict.fromkeys(
+                f"{join_words(map(handle_label, each.named))} at {describe_points([each], account)}"
+                for each in readings
+            )
         )
 
 
@@ -108,7 +119,7 @@ class Turn:
         return abs(1.0 - self.times / self.needed)
 
 
-@measure("over-correction-off")
+@register_metric("over-correction-off")
 class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
     """What share of the last point's parallax is left after a round, since omega was turned too far or not enough.
 
@@ -127,12 +138,13 @@ class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
         last, omega = list(self._elements().items())[-1]
         if not turns:
             return Found(
-                None, f"{title(omega)} was never turned at {last} by {self.least:g} gon or more and registered"
+                None, f"{handle_label(omega)} was never turned at {last} by {self.least:g} gon or more and registered"
             )
         worst = max(turns, key=lambda each: each.remains)
         return Found(
             round(worst.remains, 3),
-            f"at point {last} {title(omega)} was turned {worst.times:.2f} times as far as cleared it, and it takes "
+            f"at point {last} {handle_label(omega)} was turned {worst.times:.2f} times as far as cleared it, "
+            "and it takes "
             f"{worst.needed:.2f} times: {worst.remains:.0%} of the parallax is left after the next round",
         )
 
@@ -171,14 +183,14 @@ class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
     def _coefficients(self, account: Account, marks: Array, reading: Reading) -> Array:
         hands = [f"{name[:-1]}{account.model.hand_of(int(name[-1]))}" for name in self._elements().values()]
         rows = [PARALLAX_ELEMENTS.index(name) for name in hands]
-        return clearing_coefficients(marks, *stands_of(account, reading))[rows]
+        return clearing_coefficients(marks, *projector_poses(account, reading))[rows]
 
     def floor(self, scenario: Scenario) -> float:
         """Return what half a count at either end of the shortest turn makes of it."""
         return 2.0 * HALF_A_COUNT / self.least
 
 
-@measure("missing-point-wrong")
+@register_metric("missing-point-wrong")
 class MissingPointWrong(Measure, frozen=True, kw_only=True):
     """How many of the positions 1 to 6 were wrongly answered to be missing, or not answered though they are."""
 
@@ -196,4 +208,4 @@ class MissingPointWrong(Measure, frozen=True, kw_only=True):
         wrong = sorted(said ^ gone)
         if not wrong:
             return Found(0.0, f"{self.key} was answered {answered}: right")
-        return Found(float(len(wrong)), f"{self.key} was answered {answered}: {listed(wrong)} is not so")
+        return Found(float(len(wrong)), f"{self.key} was answered {answered}: {join_words(wrong)} is not so")

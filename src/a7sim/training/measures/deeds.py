@@ -7,11 +7,20 @@ from a7sim.manual import REQUIRED_FITTINGS
 from a7sim.operator import ModelJob
 from a7sim.scenario import Scenario
 from a7sim.training.account import Account
-from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, listed, measure, readings_with, title, where
+from a7sim.training.measures.base import (
+    HALF_A_COUNT,
+    Found,
+    Measure,
+    describe_points,
+    handle_label,
+    join_words,
+    readings_with,
+    register_metric,
+)
 from a7sim.training.witness import AXES, PLAIN, Reading
 
 
-@measure("out-of-order")
+@register_metric("out-of-order")
 class OutOfOrder(Measure, frozen=True, kw_only=True):
     """How many deeds of a procedure are missing or came too early: in each of some chains, its own order.
 
@@ -37,8 +46,8 @@ class OutOfOrder(Measure, frozen=True, kw_only=True):
                     early.append(f"{_plainly(deed)} (before {_plainly(before)})")
                 elif place > last:
                     last, before = place, deed
-        told = [f"not done: {listed(dict.fromkeys(missing))}"] if missing else []
-        told += [f"done too early: {listed(dict.fromkeys(early))}"] if early else []
+        told = [f"not done: {join_words(dict.fromkeys(missing))}"] if missing else []
+        told += [f"done too early: {join_words(dict.fromkeys(early))}"] if early else []
         return Found(float(len(missing) + len(early)), "; ".join(told) or "everything was done, in its order")
 
     def _place(self, account: Account, deed: str) -> int | None:
@@ -54,10 +63,10 @@ class OutOfOrder(Measure, frozen=True, kw_only=True):
 
 def _plainly(deed: str) -> str:
     what, _, name = deed.removesuffix("!").partition(" ")
-    return f"{what} {title(name)}".strip()
+    return f"{what} {handle_label(name)}".strip()
 
 
-@measure("run-by-motor")
+@register_metric("run-by-motor")
 class RunByMotor(Measure, frozen=True, kw_only=True):
     """How many registrations were made with a carriage that was last run there, not turned there by hand."""
 
@@ -71,15 +80,15 @@ class RunByMotor(Measure, frozen=True, kw_only=True):
         if not readings:
             return Found(None, "nothing was registered")
         ran = [each for each in readings if any(self._ran(account, each, handle) for handle in self.handles)]
-        told = f"run there at {where(ran, account)}" if ran else "turned there by hand every time"
-        return Found(float(len(ran)), f"{listed(map(title, self.handles))}: {told}")
+        told = f"run there at {describe_points(ran, account)}" if ran else "turned there by hand every time"
+        return Found(float(len(ran)), f"{join_words(map(handle_label, self.handles))}: {told}")
 
     def _ran(self, account: Account, reading: Reading, handle: str) -> bool:
         before = [each for each in account.deeds if each.name == handle and each.place < reading.place]
         return bool(before) and before[-1].what in ("drive", "set")
 
 
-@measure("handles-moved")
+@register_metric("handles-moved")
 class HandlesMoved(Measure, frozen=True, kw_only=True):
     """How many elements do not stand in the end where the opening left them."""
 
@@ -90,7 +99,7 @@ class HandlesMoved(Measure, frozen=True, kw_only=True):
     def of(self, account: Account) -> Found:
         """Return their number."""
         moved = [handle for handle in self.handles if self._by_how_much(account, handle) > self.within + 1e-9]
-        told = f"{listed(map(title, moved))} moved" if moved else "all of it stands where it stood"
+        told = f"{join_words(map(handle_label, moved))} moved" if moved else "all of it stands where it stood"
         return Found(float(len(moved)), told)
 
     def _by_how_much(self, account: Account, handle: str) -> float:
@@ -101,7 +110,7 @@ class HandlesMoved(Measure, frozen=True, kw_only=True):
         return min(moved, abs(400.0 - moved)) if handle.startswith("kappa") else moved
 
 
-@measure("not-looked")
+@register_metric("not-looked")
 class NotLooked(Measure, frozen=True, kw_only=True):
     """How many points were registered without a look through an eyepiece since the last lever was put over."""
 
@@ -118,11 +127,11 @@ class NotLooked(Measure, frozen=True, kw_only=True):
             levers = [each.place for each in before if each.what in ("fit", "base", "load")]
             if not readings or max(looks, default=-1) < max(levers, default=0):
                 blind.append(point)
-        told = f"at {listed(blind)} nobody looked after the last lever" if blind else "looked every time"
+        told = f"at {join_words(blind)} nobody looked after the last lever" if blind else "looked every time"
         return Found(float(len(blind)), told)
 
 
-@measure("minutes")
+@register_metric("minutes")
 class Minutes(Measure, frozen=True, kw_only=True):
     """Minutes at the simulated clock since the student sat down."""
 
@@ -136,7 +145,7 @@ class Minutes(Measure, frozen=True, kw_only=True):
         )
 
 
-@measure("element-off")
+@register_metric("element-off")
 class ElementOff(Measure, frozen=True, kw_only=True):
     """The largest difference of elements, or counters, from what they should show in the end."""
 
@@ -152,7 +161,7 @@ class ElementOff(Measure, frozen=True, kw_only=True):
         name = max(self.wanted, key=lambda each: abs(shown[each] - self.wanted[each]))
         return Found(
             round(abs(shown[name] - self.wanted[name]), 4),
-            f"{title(name)} stands at {shown[name]:.2f} and belongs at {self.wanted[name]:.2f}",
+            f"{handle_label(name)} stands at {shown[name]:.2f} and belongs at {self.wanted[name]:.2f}",
         )
 
     def floor(self, scenario: Scenario) -> float:
@@ -160,7 +169,7 @@ class ElementOff(Measure, frozen=True, kw_only=True):
         return HALF_A_COUNT
 
 
-@measure("wrong-fittings")
+@register_metric("wrong-fittings")
 class WrongFittings(Measure, frozen=True, kw_only=True):
     """How many fittings do not belong to the pictures and the base: in the end, or at the registrations of a point.
 
@@ -199,7 +208,7 @@ class WrongFittings(Measure, frozen=True, kw_only=True):
             if there != wanted
         ]
         picture = f"{'at ' + self.point + ' ' if self.point else ''}for a {polarity} with base {self.base or base}"
-        return Found(float(len(wrong)), f"{picture}: {listed(wrong) if wrong else 'all is as it belongs'}")
+        return Found(float(len(wrong)), f"{picture}: {join_words(wrong) if wrong else 'all is as it belongs'}")
 
     def _as_ordered(self, model: ModelJob) -> "WrongFittings":
         """Return the measure with what the job sheet orders of a model."""

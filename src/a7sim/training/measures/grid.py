@@ -13,14 +13,14 @@ from a7sim.training.measures.base import (
     MAX_OF_SEVERAL,
     Found,
     Measure,
-    listed,
-    measure,
+    join_words,
+    register_metric,
 )
 from a7sim.training.measures.truth import AtReadings
 from a7sim.training.witness import Reading
 
 
-@measure("cross-missed")
+@register_metric("cross-missed")
 class CrossMissed(AtReadings, frozen=True, kw_only=True):
     """The largest distance of the mark from a point where it was registered, by the eye that saw it, um."""
 
@@ -37,7 +37,7 @@ class CrossMissed(AtReadings, frozen=True, kw_only=True):
         return math.hypot(MAX_OF_SEVERAL * BEST_POINTING_UM, count)
 
 
-@measure("levels-near")
+@register_metric("levels-near")
 class LevelsNear(Measure, frozen=True, kw_only=True):
     """The depth of the highest level of pointings below the centres as a share of that of the lowest."""
 
@@ -48,12 +48,12 @@ class LevelsNear(Measure, frozen=True, kw_only=True):
         names = [account.name_of(point) for point in self.points]
         depths = [-each.mark[2] for each in account.readings if each.point in names]
         if not depths:
-            return Found(None, f"nothing was registered at {listed(self.points)}")
+            return Found(None, f"nothing was registered at {join_words(self.points)}")
         high, low = min(depths), max(depths)
         return Found(round(high / low, 3), f"pointed at from {high:.0f} to {low:.0f} mm below the centre")
 
 
-@measure("errors-answered")
+@register_metric("errors-answered")
 class ErrorsAnswered(Measure, frozen=True, kw_only=True):
     """The largest difference of answered errors of elements, such as c1 or phi2, from what truly stands there."""
 

@@ -18,12 +18,12 @@ from a7sim.training.measures.base import (
     HALF_A_COUNT,
     Found,
     Measure,
-    listed,
-    measure,
-    title,
+    handle_label,
+    join_words,
+    register_metric,
 )
 from a7sim.training.witness import AXES, PLAIN, Deed, Reading
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 PLAN_AXES = ("X", "Y")
 
@@ -65,7 +65,7 @@ def _turned_there(deeds: Sequence[Deed], reading: Reading) -> bool:
     return False
 
 
-def mean_shown(readings: Sequence[Reading]) -> Array:
+def mean_display(readings: Sequence[Reading]) -> Array:
     """Return what the X, Y and Z counters showed in the mean ``(3,)``."""
     return np.asarray(np.mean([[each.shown[axis] for axis in AXES] for each in readings], axis=0))
 
@@ -82,7 +82,7 @@ def metres_per_um(scenario: Scenario, scale_number: float) -> float:
     return 1e-6 * scale_number * plan.projection_height / c * plan.projection_height / plan.bx
 
 
-@measure("missing-pointings")
+@register_metric("missing-pointings")
 class MissingPointings(Measure, frozen=True, kw_only=True):
     """How many pointings are missing: at every point so many, with each of some bases."""
 
@@ -103,10 +103,10 @@ class MissingPointings(Measure, frozen=True, kw_only=True):
         missing, wanted = sum(lacking.values()), len(self.points) * self.each * len(self.bases)
         if not missing:
             return Found(0.0, "no registration is missing")
-        return Found(float(missing), f"{missing} of {counted(wanted, 'registration')} missing: {listed(lacking)}")
+        return Found(float(missing), f"{missing} of {pluralize(wanted, 'registration')} missing: {join_words(lacking)}")
 
 
-@measure("heights-off")
+@register_metric("heights-off")
 class HeightsOff(Measure, frozen=True, kw_only=True):
     """By how much heights that the Z counter showed differ from the ground: rms or the largest, m."""
 
@@ -122,9 +122,9 @@ class HeightsOff(Measure, frozen=True, kw_only=True):
         readings = last_readings(account, self.points)
         missing = [point for point in self.points if account.name_of(point) not in readings]
         if missing:
-            return Found(None, f"nothing was registered at {listed(missing)}")
+            return Found(None, f"nothing was registered at {join_words(missing)}")
         truth = account.scene.ground_points
-        off = {name: float(mean_shown(some)[2] - truth[name][2]) for name, some in readings.items()}
+        off = {name: float(mean_display(some)[2] - truth[name][2]) for name, some in readings.items()}
         worst = max(off, key=lambda name: abs(off[name]))
         rms = math.sqrt(sum(each**2 for each in off.values()) / len(off))
         told = f"heights are off by {rms:.2f} m (rms), the largest {off[worst]:+.2f} m at {worst}"
@@ -135,7 +135,7 @@ class HeightsOff(Measure, frozen=True, kw_only=True):
         return height_floor_um(scenario) * metres_per_um(scenario, self.scale_number)
 
 
-@measure("distances-off")
+@register_metric("distances-off")
 class DistancesOff(Measure, frozen=True, kw_only=True):
     """The largest share by which distances in plan that the counters showed differ from the ground, in a thousand."""
 
@@ -155,10 +155,10 @@ class DistancesOff(Measure, frozen=True, kw_only=True):
         for one, other in combinations(readings, 2):
             true = float(length_of((truth[other] - truth[one])[:2]))
             if true >= self.shortest_m:
-                shown = mean_shown(readings[other]) - mean_shown(readings[one])
+                shown = mean_display(readings[other]) - mean_display(readings[one])
                 shares.append(metres * float(length_of(shown[:2])) / true - 1.0)
         if not shares:
-            return Found(None, f"no two of {listed(self.points)} were registered")
+            return Found(None, f"no two of {join_words(self.points)} were registered")
         share = 1e3 * sum(shares) / len(shares)
         told = f"the model is {abs(share):.2f} per mille too {'large' if share > 0 else 'small'}"
         return Found(round(abs(share), 4), told)
@@ -184,7 +184,7 @@ def change_of_base(account: Account, mode: str) -> Deed | None:
     return changes[-1] if changes else None
 
 
-@measure("moved-since")
+@register_metric("moved-since")
 class MovedSince(Measure, frozen=True, kw_only=True):
     """The largest difference of elements from how they stood when the base was changed over, mm or gon."""
 
@@ -203,15 +203,15 @@ class MovedSince(Measure, frozen=True, kw_only=True):
             off = account.autograph.element(name) - element_at(account, name, change.place)
             moved[name] = abs((off + 200.0) % 400.0 - 200.0) if name.startswith("kappa") else abs(off)
         worst = max(moved, key=lambda name: moved[name])
-        told = [f"{title(name)} by {amount:.2f}" for name, amount in moved.items() if amount > HALF_A_COUNT]
-        return Found(round(moved[worst], 4), f"moved since: {listed(told)}")
+        told = [f"{handle_label(name)} by {amount:.2f}" for name, amount in moved.items() if amount > HALF_A_COUNT]
+        return Found(round(moved[worst], 4), f"moved since: {join_words(told)}")
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
         return HALF_A_COUNT
 
 
-@measure("ties-apart")
+@register_metric("ties-apart")
 class TiesApart(Measure, frozen=True, kw_only=True):
     """The largest difference of a counter between the readings of common points in two models, mm.
 
@@ -227,11 +227,11 @@ class TiesApart(Measure, frozen=True, kw_only=True):
         inside, outside = (last_readings(account, self.points, base) for base in ("inside", "outside"))
         missing = [point for point in self.points if account.name_of(point) not in inside.keys() & outside.keys()]
         if missing:
-            return Found(None, f"not registered both with base in and with base out: {listed(missing)}")
+            return Found(None, f"not registered both with base in and with base out: {join_words(missing)}")
         units = {"Z": account.autograph.z_units_per_mm}
         apart = []
         for name, some in inside.items():
-            difference = mean_shown(outside[name]) - mean_shown(some)
+            difference = mean_display(outside[name]) - mean_display(some)
             for axis, by in zip(AXES, difference.tolist(), strict=True):
                 if axis in self.axes:
                     mm = by / units.get(axis, 1.0)
@@ -246,7 +246,7 @@ class TiesApart(Measure, frozen=True, kw_only=True):
         return 1e-3 * um * plan.projection_height / scenario.camera.c * plan.projection_height / plan.bx
 
 
-@measure("scale-not-carried")
+@register_metric("scale-not-carried")
 class ScaleNotCarried(Measure, frozen=True, kw_only=True):
     """By how much the second model's scale differs from the first's, per mille: by the bases, beside the flight."""
 

@@ -15,10 +15,18 @@ from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES
 from a7sim.training.account import Account
 from a7sim.training.forms import FIVE, multipliers
-from a7sim.training.measures.base import BEST_PARALLAX_UM, HALF_A_COUNT, Found, Measure, listed, measure, title
-from a7sim.training.measures.clearing import stands_of
+from a7sim.training.measures.base import (
+    BEST_PARALLAX_UM,
+    HALF_A_COUNT,
+    Found,
+    Measure,
+    handle_label,
+    join_words,
+    register_metric,
+)
+from a7sim.training.measures.clearing import projector_poses
 from a7sim.training.witness import Reading
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 BYS = ("by1", "by2")
 
@@ -72,7 +80,7 @@ class Round:
     def _rigorous(self, labels: Sequence[str], p: Array) -> Array:
         names = [self.account.name_of(label) for label in labels]
         marks = [np.mean([each.mark for each in self.readings if each.point == name], axis=0) for name in names]
-        left, right = stands_of(self.account, self.readings[0])
+        left, right = projector_poses(self.account, self.readings[0])
         solution = element_corrections(p[:, None], np.array(marks).T[..., None], left, right, FIVE)
         return solution.unknowns[:, 0] / GON
 
@@ -81,7 +89,7 @@ class Round:
         return self.readings[0].shown[element]
 
 
-def rounds_of(account: Account) -> list[Round]:
+def find_rounds(account: Account) -> list[Round]:
     """Return the rounds of measuring by' and by\"; turning one of the five elements begins a new one."""
     rounds: list[list[Reading]] = []
     for each in (each for each in account.readings if set(each.named) & set(BYS)):
@@ -102,9 +110,9 @@ class Worked:
     set: Mapping[str, float]
 
 
-def worked(account: Account, case: str) -> Worked | None:
+def answered_case(account: Account, case: str) -> Worked | None:
     """Return the first round that has all of a case, and what came of it; None where there is none."""
-    rounds = rounds_of(account)
+    rounds = find_rounds(account)
     place = next((i for i, each in enumerate(rounds) if each.has(case)), None)
     if place is None:
         return None
@@ -135,7 +143,7 @@ def _apart(given: Mapping[str, float], ways: Sequence[Mapping[str, float]]) -> t
     return min(worst)
 
 
-@measure("sums-off")
+@register_metric("sums-off")
 class SumsOff(Measure, frozen=True, kw_only=True):
     """The largest difference of corrections from those that follow from one's own readings, gon.
 
@@ -148,13 +156,13 @@ class SumsOff(Measure, frozen=True, kw_only=True):
 
     def of(self, account: Account) -> Found:
         """Return it."""
-        found = worked(account, self.case)
+        found = answered_case(account, self.case)
         if found is None:
             return Found(None, f"not all points of case {self.case} were read with by' and by\" at the same settings")
         off, name, right = _apart(found.answered or found.set, found.sums)
         given = (found.answered or found.set)[name]
         how = "answered" if found.answered else "set"
-        told = f"case {self.case}: {title(name)} was {how} as {given:+.2f} and your readings give {right:+.2f}"
+        told = f"case {self.case}: {handle_label(name)} was {how} as {given:+.2f} and your readings give {right:+.2f}"
         return Found(round(off, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
@@ -162,7 +170,7 @@ class SumsOff(Measure, frozen=True, kw_only=True):
         return HALF_A_COUNT
 
 
-@measure("set-otherwise")
+@register_metric("set-otherwise")
 class SetOtherwise(Measure, frozen=True, kw_only=True):
     """The largest difference of the corrections that were set from those worked out, gon, over some cases."""
 
@@ -172,14 +180,17 @@ class SetOtherwise(Measure, frozen=True, kw_only=True):
 
     def of(self, account: Account) -> Found:
         """Return it."""
-        there = {case: each for case in self.cases if (each := worked(account, case)) is not None}
+        there = {case: each for case in self.cases if (each := answered_case(account, case)) is not None}
         if len(there) < len(self.cases):
-            return Found(None, f"case {listed(set(self.cases) - set(there))} was not measured whole")
+            return Found(None, f"case {join_words(set(self.cases) - set(there))} was not measured whole")
         all_off = [
             (_apart(each.set, [each.answered] if each.answered else each.sums), case) for case, each in there.items()
         ]
         (off, name, right), case = max(all_off)
-        told = f"case {case}: {title(name)} was turned by {there[case].set[name]:+.2f} and should be by {right:+.2f}"
+        told = (
+            f"case {case}: {handle_label(name)} was turned by {there[case].set[name]:+.2f} and should be by "
+            f"{right:+.2f}"
+        )
         return Found(round(off, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
@@ -187,7 +198,7 @@ class SetOtherwise(Measure, frozen=True, kw_only=True):
         return 2.0 * HALF_A_COUNT
 
 
-@measure("parallax-rms")
+@register_metric("parallax-rms")
 class ParallaxRms(Measure, frozen=True, kw_only=True):
     """The rms of the y-parallaxes that were left where readings of elements were registered, um at photo scale."""
 
@@ -206,7 +217,7 @@ class ParallaxRms(Measure, frozen=True, kw_only=True):
             return Found(None, "nothing was registered with both images in view")
         rms = math.sqrt(fmean(each**2 for each in left))
         return Found(
-            round(rms, 2), f"over {counted(len(left), 'reading')} y-parallaxes of {rms:.1f} um (rms) were left"
+            round(rms, 2), f"over {pluralize(len(left), 'reading')} y-parallaxes of {rms:.1f} um (rms) were left"
         )
 
     def floor(self, scenario: Scenario) -> float:

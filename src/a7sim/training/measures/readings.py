@@ -7,12 +7,21 @@ from msgspec import field
 
 from a7sim.scenario import Scenario
 from a7sim.training.account import Account
-from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, listed, measure, readings_with, title, where
+from a7sim.training.measures.base import (
+    HALF_A_COUNT,
+    Found,
+    Measure,
+    describe_points,
+    handle_label,
+    join_words,
+    readings_with,
+    register_metric,
+)
 from a7sim.training.witness import AXES, PLAIN, Reading
-from a7sim.wording import counted
+from a7sim.wording import pluralize
 
 
-@measure("missing-readings")
+@register_metric("missing-readings")
 class MissingReadings(Measure, frozen=True, kw_only=True):
     """How many registrations are missing: of every point, and of each element there, so many."""
 
@@ -35,15 +44,19 @@ class MissingReadings(Measure, frozen=True, kw_only=True):
                 lacks = self.each - len(readings)
                 if lacks > 0:
                     missing += lacks
-                    short.setdefault(f"{title(element) + ' at ' if element else ''}{point}", []).append(str(lacks))
+                    short.setdefault(f"{handle_label(element) + ' at ' if element else ''}{point}", []).append(
+                        str(lacks)
+                    )
         wanted = len(self.points) * max(1, len(self.elements)) * self.each
         if not missing:
             return Found(0.0, "no registration is missing")
-        late = f" after the last turn of {listed(map(title, self.after))}" if self.after else ""
-        return Found(float(missing), f"{missing} of {counted(wanted, 'registration')} missing{late}: {listed(short)}")
+        late = f" after the last turn of {join_words(map(handle_label, self.after))}" if self.after else ""
+        return Found(
+            float(missing), f"{missing} of {pluralize(wanted, 'registration')} missing{late}: {join_words(short)}"
+        )
 
 
-@measure("wrong-approach")
+@register_metric("wrong-approach")
 class WrongApproach(Measure, frozen=True, kw_only=True):
     """How many registrations were made with a handle whose last movement came from the other side."""
 
@@ -67,16 +80,17 @@ class WrongApproach(Measure, frozen=True, kw_only=True):
         }
         bad = {each.number for some in wrong.values() for each in some}
         if not bad:
-            return Found(0.0, f"{listed(map(title, self.handles))} always came from the same side")
+            return Found(0.0, f"{join_words(map(handle_label, self.handles))} always came from the same side")
         from_where = "larger" if self.side > 0 else "smaller"
-        told = [f"{title(handle)} at {where(some, account)}" for handle, some in wrong.items() if some]
+        told = [f"{handle_label(handle)} at {describe_points(some, account)}" for handle, some in wrong.items() if some]
         return Found(
             float(len(bad)),
-            f"{len(bad)} of {counted(len(readings), 'registration')} came from {from_where} readings: {listed(told)}",
+            f"{len(bad)} of {pluralize(len(readings), 'registration')} came from {from_where} readings: "
+            f"{join_words(told)}",
         )
 
 
-@measure("one-side-only")
+@register_metric("one-side-only")
 class OneSideOnly(Measure, frozen=True, kw_only=True):
     """How many handles were not registered at a point both coming from smaller readings and from larger ones."""
 
@@ -91,14 +105,14 @@ class OneSideOnly(Measure, frozen=True, kw_only=True):
             return Found(None, f"nothing was registered at {self.point}")
         lacking = {handle: {each.sides.get(handle, 0) for each in readings} for handle in self.handles}
         told = [
-            f"{title(handle)} never came from {'smaller' if 1 not in sides else 'larger'} readings"
+            f"{handle_label(handle)} never came from {'smaller' if 1 not in sides else 'larger'} readings"
             for handle, sides in lacking.items()
             if not {1, -1} <= sides
         ]
-        return Found(float(len(told)), f"at {self.point}: {listed(told) if told else 'both sides were registered'}")
+        return Found(float(len(told)), f"at {self.point}: {join_words(told) if told else 'both sides were registered'}")
 
 
-@measure("not-left-between")
+@register_metric("not-left-between")
 class NotLeftBetween(Measure, frozen=True, kw_only=True):
     """How many points have no second registration for which a handle had gone away and come back."""
 
@@ -116,11 +130,11 @@ class NotLeftBetween(Measure, frozen=True, kw_only=True):
         }
         lazy = {point: handles for point, handles in lazy.items() if handles}
         if not lazy:
-            return Found(0.0, f"at {listed(self.points)} the second reading is one of its own")
-        handles = [title(each) for each in self.handles if any(each in some for some in lazy.values())]
+            return Found(0.0, f"at {join_words(self.points)} the second reading is one of its own")
+        handles = [handle_label(each) for each in self.handles if any(each in some for some in lazy.values())]
         return Found(
             float(len(lazy)),
-            f"at {listed(lazy)} there are no two readings of {listed(handles)} between which it went away "
+            f"at {join_words(lazy)} there are no two readings of {join_words(handles)} between which it went away "
             f"by {self.away:g} and came back",
         )
 
@@ -133,7 +147,7 @@ class NotLeftBetween(Measure, frozen=True, kw_only=True):
         return any(abs(at - first.shown[handle]) >= self.away - 1e-9 for at in stood)
 
 
-@measure("off-target")
+@register_metric("off-target")
 class OffTarget(Measure, frozen=True, kw_only=True):
     """The largest difference of a counter from what it should show where a point was registered."""
 
@@ -153,9 +167,11 @@ class OffTarget(Measure, frozen=True, kw_only=True):
             for handle, reading in wanted.items():
                 for each in readings:
                     shown = each.shown[handle]
-                    off.append((abs(shown - reading), f"{title(handle)} at {point} read {shown:.2f} for {reading:.2f}"))
+                    off.append(
+                        (abs(shown - reading), f"{handle_label(handle)} at {point} read {shown:.2f} for {reading:.2f}")
+                    )
         if missing:
-            return Found(None, f"nothing was registered at {listed(missing)}")
+            return Found(None, f"nothing was registered at {join_words(missing)}")
         worst, told = max(off)
         return Found(round(worst, 4), told)
 
@@ -164,7 +180,7 @@ class OffTarget(Measure, frozen=True, kw_only=True):
         return HALF_A_COUNT
 
 
-@measure("other-not-at-rest")
+@register_metric("other-not-at-rest")
 class OtherNotAtRest(Measure, frozen=True, kw_only=True):
     """How many readings of an element were made while another did not stand where it rests."""
 
@@ -184,17 +200,18 @@ class OtherNotAtRest(Measure, frozen=True, kw_only=True):
             count += len(wrong)
             if wrong:
                 told.append(
-                    f"{title(other)} was never returned to {self.at:g} before reading {title(read)} "
-                    f"at {where(wrong, account)}"
+                    f"{handle_label(other)} was never returned to {self.at:g} before reading {handle_label(read)} "
+                    f"at {describe_points(wrong, account)}"
                 )
         if not all_read:
-            return Found(None, f"no reading of {listed(map(title, self.pairs))} was registered")
+            return Found(None, f"no reading of {join_words(map(handle_label, self.pairs))} was registered")
         return Found(
-            float(count), listed(told) if told else f"the other one stood at rest at {counted(all_read, 'reading')}"
+            float(count),
+            join_words(told) if told else f"the other one stood at rest at {pluralize(all_read, 'reading')}",
         )
 
 
-@measure("spread")
+@register_metric("spread")
 class Spread(Measure, frozen=True, kw_only=True):
     """The largest difference between readings of the same element, or counter, at the same point."""
 
@@ -214,7 +231,10 @@ class Spread(Measure, frozen=True, kw_only=True):
                 read = [each.shown[handle] for each in group]
                 if len(read) > 1:
                     spread = max(read) - min(read)
-                    told = f"{title(handle)} at {where(group, account)} read from {min(read):.2f} to {max(read):.2f}"
+                    told = (
+                        f"{handle_label(handle)} at {describe_points(group, account)} read from {min(read):.2f} "
+                        f"to {max(read):.2f}"
+                    )
                     spreads.append((round(spread, 4), told))
         if not spreads:
             return Found(None, "nothing was read twice")
@@ -225,7 +245,7 @@ class Spread(Measure, frozen=True, kw_only=True):
         return 2.0 * HALF_A_COUNT
 
 
-@measure("not-opposed")
+@register_metric("not-opposed")
 class NotOpposed(Measure, frozen=True, kw_only=True):
     """By how much the mean readings of two elements at a point differ from being opposite: by' reads +p, by\" -p."""
 
@@ -242,11 +262,11 @@ class NotOpposed(Measure, frozen=True, kw_only=True):
             if others:
                 left = fmean(each.shown[self.one] for each in ones)
                 right = fmean(each.shown[self.other] for each in others)
-                read = f"{title(self.one)} reads {left:+.3f} and {title(self.other)} {right:+.3f}"
-                told = f"at {where(ones, account)} {read}"
+                read = f"{handle_label(self.one)} reads {left:+.3f} and {handle_label(self.other)} {right:+.3f}"
+                told = f"at {describe_points(ones, account)} {read}"
                 sums.append((round(abs(left + right), 4), told))
         if not sums:
-            return Found(None, f"no point was read with both {title(self.one)} and {title(self.other)}")
+            return Found(None, f"no point was read with both {handle_label(self.one)} and {handle_label(self.other)}")
         return Found(*max(sums))
 
     def floor(self, scenario: Scenario) -> float:

@@ -18,10 +18,10 @@ from a7sim.training.measures.base import (
     MAX_OF_SEVERAL,
     Found,
     Measure,
-    listed,
-    measure,
-    title,
-    where,
+    describe_points,
+    handle_label,
+    join_words,
+    register_metric,
 )
 from a7sim.training.witness import Reading, WitnessedAutograph
 
@@ -55,11 +55,11 @@ class AtReadings(Measure, frozen=True, kw_only=True):
             return Found(None, "nothing was registered")
         lost = [each for each in readings if self._um(each) is None]
         if lost:
-            return Found(None, f"at {where(lost, account)} the point was not in view")
+            return Found(None, f"at {describe_points(lost, account)} the point was not in view")
         worst = max(readings, key=lambda each: self._um(each) or 0.0)
         value = self._um(worst) or 0.0
-        named = listed(map(title, worst.named)) if worst.named else "the mark"
-        return Found(round(value, 1), f"{self._called(value)} at {where([worst], account)} with {named}")
+        named = join_words(map(handle_label, worst.named)) if worst.named else "the mark"
+        return Found(round(value, 1), f"{self._called(value)} at {describe_points([worst], account)} with {named}")
 
     def _um(self, reading: Reading) -> float | None:
         raise NotImplementedError
@@ -68,7 +68,7 @@ class AtReadings(Measure, frozen=True, kw_only=True):
         raise NotImplementedError
 
 
-@measure("parallax-left")
+@register_metric("parallax-left")
 class ParallaxLeft(AtReadings, frozen=True, kw_only=True):
     """The largest y-parallax that was left where a reading was registered, um at photo scale."""
 
@@ -83,7 +83,7 @@ class ParallaxLeft(AtReadings, frozen=True, kw_only=True):
         return math.hypot(MAX_OF_SEVERAL * BEST_PARALLAX_UM, half_a_count_um(scenario))
 
 
-@measure("off-the-ground")
+@register_metric("off-the-ground")
 class OffTheGround(AtReadings, frozen=True, kw_only=True):
     """The largest x-parallax where a reading was registered: the mark was above or below the ground, um."""
 
@@ -98,7 +98,7 @@ class OffTheGround(AtReadings, frozen=True, kw_only=True):
         return MAX_OF_SEVERAL * BEST_HEIGHT_UM
 
 
-@measure("beside-the-point")
+@register_metric("beside-the-point")
 class BesideThePoint(AtReadings, frozen=True, kw_only=True):
     """The largest distance of the mark from the point in plan where a reading was registered, um at photo scale."""
 
@@ -120,7 +120,7 @@ class BesideThePoint(AtReadings, frozen=True, kw_only=True):
         return MAX_OF_SEVERAL * BEST_POINTING_UM
 
 
-def parallax_of(account: Account, point: str) -> float | None:
+def y_parallax_at(account: Account, point: str) -> float | None:
     """Return the y-parallax in um at photo scale of a point as the projectors stand, None where it is on no picture.
 
     It is what both eyes would see with the mark on the ground there.
@@ -155,7 +155,7 @@ def _misses(autograph: WitnessedAutograph, images: list[tuple[int, Array]], mark
     return np.array([(x1 + x2) / 2.0, (y1 + y2) / 2.0, x1 - x2, y1 - y2])
 
 
-@measure("residual-parallax")
+@register_metric("residual-parallax")
 class ResidualParallax(Measure, frozen=True, kw_only=True):
     """The y-parallax that is left at the standard points in the end: rms, or the largest, um at photo scale."""
 
@@ -167,7 +167,7 @@ class ResidualParallax(Measure, frozen=True, kw_only=True):
     def of(self, account: Account) -> Found:
         """Return it."""
         names = {point: account.name_of(point) for point in self.points if point in account.model.standard_points}
-        found = {point: parallax_of(account, name) for point, name in names.items()}
+        found = {point: y_parallax_at(account, name) for point, name in names.items()}
         seen = {point: value for point, value in found.items() if value is not None}
         if len(seen) < len(found) or not seen:
             return Found(None, "the pictures of the model do not lie in their projectors")
@@ -183,7 +183,7 @@ class ResidualParallax(Measure, frozen=True, kw_only=True):
         return MAX_OF_SEVERAL * rms if self.largest else rms
 
 
-@measure("picture-off-centre")
+@register_metric("picture-off-centre")
 class PictureOffCentre(Measure, frozen=True, kw_only=True):
     """How far pictures lie from centred: the largest shift or, at the fiducials, turn that is left, mm."""
 
@@ -224,7 +224,7 @@ def _lie(account: Account, projector: int) -> tuple[float, float, float]:
     return float(np.hypot(*shift)), abs(turn) * float(np.abs(xy).max()), scale
 
 
-@measure("principal-distance-off")
+@register_metric("principal-distance-off")
 class PrincipalDistanceOff(Measure, frozen=True, kw_only=True):
     """The largest difference of a principal distance from that of the camera with the film as it has shrunk, mm."""
 
@@ -242,7 +242,8 @@ class PrincipalDistanceOff(Measure, frozen=True, kw_only=True):
             shown = account.autograph.element(f"c{projector}")
             side = "long" if shown > wanted else "short"
             told = (
-                f"{title(f'c{projector}')} stands at {shown:.2f}: {abs(shown - wanted):.3f} mm too {side} for the film"
+                f"{handle_label(f'c{projector}')} stands at {shown:.2f}: {abs(shown - wanted):.3f} mm too {side} "
+                "for the film"
             )
             off.append((abs(shown - wanted), told))
         value, told = max(off)

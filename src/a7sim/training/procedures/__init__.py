@@ -1,6 +1,6 @@
 """The procedures of the virtual operator that exercises name."""
 
 from a7sim.training.procedures import cards, models, orienting, testing
-from a7sim.training.procedures.base import PROCEDURES, Seated, play, procedure
+from a7sim.training.procedures.base import PROCEDURES, Seated, procedure, run_procedure
 
-__all__ = ["PROCEDURES", "Seated", "cards", "models", "orienting", "play", "procedure", "testing"]
+__all__ = ["PROCEDURES", "Seated", "cards", "models", "orienting", "procedure", "run_procedure", "testing"]

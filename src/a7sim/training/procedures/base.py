@@ -6,19 +6,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from a7sim.link.client import Client
-from a7sim.link.headers import quoted, recorded_as
+from a7sim.link.headers import quote_text, registration_word
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.manual import VARIANTS
 from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit, Job, ModelJob, Person, work
+from a7sim.operator import DoesNotFit, Job, ModelJob, Person, measure_models
 from a7sim.operator.bench import Bench
 from a7sim.operator.book import Entry
 from a7sim.operator.crew import Crew
 from a7sim.operator.interior import InteriorOrientations
 from a7sim.operator.line_hands import LineHands
-from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
+from a7sim.operator.work import load_prints, mount_photographs, orient_model, set_base_and_fittings
 from a7sim.reduction import Undetermined
-from a7sim.session.running import job_of
+from a7sim.session.running import make_job
 from a7sim.training.account import ANSWER
 from a7sim.training.exercise import Played
 from a7sim.training.room import Room
@@ -63,15 +63,15 @@ class Seated:
         self.begin("interior orientation")
         set_base_and_fittings(bench, self.model.base, self.model.polarity)
         found: dict[str, InteriorOrientations] = {}
-        mount(bench, self.model, found)
-        bench.begin(who, self.model, take_up_prints(bench, self.model))
+        mount_photographs(bench, self.model, found)
+        bench.begin(who, self.model, load_prints(bench, self.model))
 
     def take_over(self) -> None:
         """Sit down at an instrument that stands ready: base and pictures set, its counters as `*RST` leaves them."""
         who = self.bench.crew.everybody
         self.bench.seat.take_over(who)
         self.bench.seat.counters(who)
-        self.bench.begin(who, self.model, take_up_prints(self.bench, self.model))
+        self.bench.begin(who, self.model, load_prints(self.bench, self.model))
 
     def answer(self, answers: Mapping[str, float], decimals: int = 2) -> None:
         """Note answers down at the instrument."""
@@ -84,14 +84,14 @@ class Seated:
         self.person.note(f"{self.model.name}: {form}")
 
 
-def knock(seated: Seated, elements: Mapping[str, float]) -> None:
+def perturb_elements(seated: Seated, elements: Mapping[str, float]) -> None:
     """Turn elements by so much, by mistake."""
     who = seated.bench.crew.everybody
     standing = seated.bench.seat.elements(who, list(elements))
     seated.bench.seat.turn_elements(who, {name: standing[name] + amount for name, amount in elements.items()})
 
 
-def put_over(seated: Seated, fittings: Mapping[str, str]) -> None:
+def misplace_fittings(seated: Seated, fittings: Mapping[str, str]) -> None:
     """Put fittings into positions, by mistake."""
     for name, position in fittings.items():
         seated.bench.hands.set_fitting(np.asarray(seated.bench.crew.everybody), name, position)
@@ -114,7 +114,7 @@ def procedure(name: str) -> Callable[[Procedure], Procedure]:
     return registered
 
 
-def play(room: Room, played: Played, client: str, papers: Mapping[str, str] | None = None) -> str:
+def run_procedure(room: Room, played: Played, client: str, papers: Mapping[str, str] | None = None) -> str:
     """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake.
 
     `papers` are what was handed out, by file name.
@@ -122,7 +122,7 @@ def play(room: Room, played: Played, client: str, papers: Mapping[str, str] | No
     port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
     observer = scenario_for(room.shelved, room.seed, played.observer).observer
     person = Person(Client(port), room.clock, observer, room.seed)
-    seated = Seated.at(person, job_of(room.scenario, room.scene), room.shelved.exercise.model)
+    seated = Seated.at(person, make_job(room.scenario, room.scene), room.shelved.exercise.model)
     person.book.listener = _Button(person.client, seated.model).written
     try:
         PROCEDURES[played.procedure](replace(seated, papers=papers or {}), **played.options)
@@ -158,17 +158,17 @@ class _Button:
     def written(self, entry: Entry) -> None:
         if entry.struck:
             if entry.number in self._numbers:
-                self._client.send(f"REC:STR {self._numbers[entry.number]},{quoted(entry.struck[:60])}")
+                self._client.send(f"REC:STR {self._numbers[entry.number]},{quote_text(entry.struck[:60])}")
         elif entry.point and (entry.item in {REGISTERED_ALREADY, *ELEMENTS} or entry.item.startswith(_REGISTERED)):
             if entry.item != REGISTERED_ALREADY:
-                self._client.send(",".join([f"REC {quoted(entry.point)}", *self._words(entry.item)]))
+                self._client.send(",".join([f"REC {quote_text(entry.point)}", *self._words(entry.item)]))
             self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
 
     def _words(self, item: str) -> list[str]:
         """Return the elements that are registered with an item of the book."""
         if item in ELEMENTS:
-            return [recorded_as(item)]
-        return [recorded_as(by) for pointed, by in self._named.items() if item.startswith(pointed)]
+            return [registration_word(item)]
+        return [registration_word(by) for pointed, by in self._named.items() if item.startswith(pointed)]
 
 
 @procedure("interior orientation")
@@ -191,13 +191,13 @@ def relative_orientation(seated: Seated) -> None:
     """Relative orientation as the scenario's plan has it, of pictures that lie ready; then a look at every point."""
     seated.take_over()
     seated.begin("relative orientation")
-    oriented(seated.bench, seated.model)
+    orient_model(seated.bench, seated.model)
     seated.begin("last look")
     seated.bench.parallaxes_seen(seated.bench.crew.everybody, seated.points())
 
 
 @procedure("day's work")
-def days_work(seated: Seated) -> None:
+def full_day(seated: Seated) -> None:
     """All models of the scenario from the first picture to the last centre."""
-    for _ in work(seated.person, seated.bench.job):
+    for _ in measure_models(seated.person, seated.bench.job):
         pass

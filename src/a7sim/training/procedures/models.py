@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from a7sim.operator.absolute import absolute_orientation_at
-from a7sim.operator.bridging import carry_on, carry_scale_on, set_as_its_neighbour
+from a7sim.operator.bridging import copy_common_photo_orientation, extend_strip, transfer_scale
 from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import relative_orientation
-from a7sim.operator.work import mount, oriented, set_base_and_fittings, take_up_prints
+from a7sim.operator.work import load_prints, mount_photographs, orient_model, set_base_and_fittings
 from a7sim.training.account import ANSWER
-from a7sim.training.procedures.base import Seated, knock, procedure, put_over
+from a7sim.training.procedures.base import Seated, misplace_fittings, perturb_elements, procedure
 
 
 @procedure("prepared model")
@@ -20,10 +20,10 @@ def prepared_model(seated: Seated, model: str = "", orient: bool = True) -> None
 
     The Z counter is left so that it reads from the base line.
     """
-    bench, chosen = seated.bench, model_named(seated, model)
+    bench, chosen = seated.bench, find_model(seated, model)
     Seated(seated.person, bench, chosen).set_up()
     if orient:
-        oriented(bench, chosen)
+        orient_model(bench, chosen)
     who = bench.crew.everybody
     heights = bench.seat.from_zero(who, [f"bz{chosen.left_projector}"])[f"bz{chosen.left_projector}"]
     bench.seat.shift_counter(who, "Z", bench.seat.units_per_mm * heights - bench.seat.centre(who, 1)[2])
@@ -35,10 +35,10 @@ def take_over(seated: Seated, model: ModelJob) -> None:
     who = bench.crew.everybody
     bench.seat.take_over(who)
     bench.seat.counters(who)
-    bench.begin(who, model, take_up_prints(bench, model))
+    bench.begin(who, model, load_prints(bench, model))
 
 
-def model_named(seated: Seated, name: str) -> ModelJob:
+def find_model(seated: Seated, name: str) -> ModelJob:
     """Return a model of the job sheet, that of the exercise where none is named."""
     return next((each for each in seated.bench.job.models if each.name == name), seated.model)
 
@@ -58,8 +58,8 @@ def absolute_orientation(
     model = seated.model if points is None else replace(seated.model, other_points=tuple(points))
     take_over(seated, model)
     seated.begin("absolute orientation")
-    absolute_orientation_at(bench, model, changed_by(bench.job.control, misread or {}))
-    knock(seated, knocked or {})
+    absolute_orientation_at(bench, model, misread_control(bench.job.control, misread or {}))
+    perturb_elements(seated, knocked or {})
 
 
 @procedure("A8 model")
@@ -83,10 +83,10 @@ def a8_model(
     model = replace(seated.model, other_points=(*others, name))
     take_over(seated, model)
     seated.begin("relative orientation")
-    oriented(bench, model)
+    orient_model(bench, model)
     seated.begin("absolute orientation")
     if level:
-        control = changed_by(bench.job.control, misread or {})
+        control = misread_control(bench.job.control, misread or {})
         on_ground = absolute_orientation_at(bench, model, control)[0]
         reading, bx = np.array(on_ground.points[name]), on_ground.elements["bx"]
     else:
@@ -99,10 +99,10 @@ def a8_model(
     mm = 1.0 / scales[0].units_per_mm if doubled else 1.0
     left = bench.seat.manual.centres_on_base[0] * bx
     seated.person.note(f"{ANSWER}x{place}={mm * x - left:.2f} y{place}={mm * y:.2f}")
-    knock(seated, knocked or {})
+    perturb_elements(seated, knocked or {})
 
 
-def changed_by(
+def misread_control(
     control: Mapping[str, tuple[float, float, float]], misread: Mapping[str, Sequence[float]]
 ) -> dict[str, tuple[float, float, float]]:
     """Return control with some of it misread by so many m in X, Y, Z."""
@@ -140,20 +140,20 @@ def base_change(
     before = {name: readings[:, i] for i, name in enumerate(common)}
     seated.begin("interior orientation")
     if counters:
-        carry_on(bench, model)
+        extend_strip(bench, model)
     set_base_and_fittings(bench, model.base, model.polarity)
-    mount(bench, model, {})
-    bench.begin(crew.everybody, model, take_up_prints(bench, model))
-    set_as_its_neighbour(bench, model)
+    mount_photographs(bench, model, {})
+    bench.begin(crew.everybody, model, load_prints(bench, model))
+    copy_common_photo_orientation(bench, model)
     seated.begin("relative orientation")
     method = "dependent" if kept else "independent"
     tolerated = bench.job.tolerated_parallax_mm
     relative_orientation(bench, crew.everybody, model, method, plan.case, plan.parallax_readings, plan.bx, tolerated)
     seated.begin("scale")
     if scale:
-        carry_scale_on(bench, crew.everybody, model, before)
+        transfer_scale(bench, crew.everybody, model, before)
     seated.begin("model coordinates")
     if read_again:
         bench.measure(crew.everybody, common)
-    knock(seated, knocked or {})
-    put_over(seated, wrong_fittings or {})
+    perturb_elements(seated, knocked or {})
+    misplace_fittings(seated, wrong_fittings or {})

@@ -9,12 +9,12 @@ from a7sim.geometry import Array
 from a7sim.operator.bench import Parallaxes
 from a7sim.operator.centres import centre_of, observe_centre
 from a7sim.operator.empirical import empirical_orientation
-from a7sim.operator.relative import corrections_of, unknowns_of
-from a7sim.operator.seat import side
-from a7sim.operator.work import oriented
+from a7sim.operator.relative import compute_corrections, unknown_elements
+from a7sim.operator.seat import side_name
+from a7sim.operator.work import orient_model
 from a7sim.standard_points import CASES
 from a7sim.training.account import ANSWER
-from a7sim.training.procedures.base import Seated, knock, procedure, put_over
+from a7sim.training.procedures.base import Seated, misplace_fittings, perturb_elements, procedure
 
 INDEPENDENT = "independent"
 
@@ -65,7 +65,7 @@ def numerical_orientation(
     """
     seated.take_over()
     bench, model = seated.bench, seated.model
-    who, unknowns = bench.crew.everybody, unknowns_of(INDEPENDENT, model)
+    who, unknowns = bench.crew.everybody, unknown_elements(INDEPENDENT, model)
     for number, case in enumerate(cases, start=1):
         seated.begin(f"relative orientation, case {case}")
         bench.begin_round(who, number)
@@ -74,7 +74,7 @@ def numerical_orientation(
         seen = _parallaxes(seated, case, readings)
         mean = seen.p.mean(axis=0)
         base = np.full(who.size, bench.job.plan.bx)
-        found, _ = corrections_of(bench, who, model, seen.places, seen.p - mean, unknowns, base, labels)
+        found, _ = compute_corrections(bench, who, model, seen.places, seen.p - mean, unknowns, base, labels)
         found["phi1"] = found["phi1"] + slip_gon
         seated.answer({f"{case.lower()}-{name}": float(found[name][0]) for name in unknowns})
         noted = bench.crew.notes(who, settings, {})
@@ -129,10 +129,10 @@ def model_with_its_centres(
     """
     seated.set_up()
     seated.begin("relative orientation")
-    oriented(seated.bench, seated.model)
+    orient_model(seated.bench, seated.model)
     find_centres(seated, hands, swapped, height_in_mm)
-    knock(seated, knocked or {})
-    put_over(seated, wrong_fittings or {})
+    perturb_elements(seated, knocked or {})
+    misplace_fittings(seated, wrong_fittings or {})
 
 
 def find_centres(seated: Seated, hands: Sequence[int], swapped: bool, height_in_mm: bool) -> None:
@@ -142,7 +142,7 @@ def find_centres(seated: Seated, hands: Sequence[int], swapped: bool, height_in_
     bench.parallaxes_seen(bench.crew.everybody, [model.standard_points["1"]])
     bench.seat.preset(bench.crew.everybody, plan.preset)
     for hand in hands:
-        seated.begin(f"{side(hand)} perspective centre")
+        seated.begin(f"{side_name(hand)} perspective centre")
         centre = centre_of(observe_centre(bench, bench.crew.everybody, model, hand), 0)
         X, Y, Z = (float(each) for each in (centre.X0, centre.Y0, centre.Z0))
         if height_in_mm:

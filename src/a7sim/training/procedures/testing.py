@@ -2,7 +2,7 @@
 
 from a7sim.geometry import GON
 from a7sim.operator.bench import Bench
-from a7sim.operator.grid_test import GridTestOrder, calibrated
+from a7sim.operator.grid_test import GridTestOrder, measure_grid_batch
 from a7sim.training.account import ANSWER
 from a7sim.training.procedures.base import Seated, procedure
 
@@ -26,7 +26,7 @@ def grid_test(
     job = seated.bench.job
     order = GridTestOrder(job.certificate, job.grid_plate, crosses, levels, pointings, seated.model.polarity)
     bench = Bench(seated.bench.crew, seated.bench.hands, order.job)
-    for sheet in calibrated(bench, order):
+    for sheet in measure_grid_batch(bench, order):
         for name in ANSWERED:
             error = sense * float(sheet.test.errors[name][0])
             shown = error / GON if name != "c" and in_gon else error

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from a7sim.instrument.language.commands.parts import autograph_of
+from a7sim.instrument.language.commands.parts import autograph_for
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 from a7sim.instrument.language.table import (
     Call,
@@ -20,22 +20,22 @@ MAX_READING = 999999.99
 
 
 def _counters(engine: "Engine", call: Call) -> str:
-    return ",".join(autograph_of(engine).counter_text(axis) for axis in "XYZ")
+    return ",".join(autograph_for(engine).counter_text(axis) for axis in "XYZ")
 
 
 def _axis(axis: str) -> list[Command]:
     usual = "" if axis == "Z" else "mm"
 
     def unit(engine: "Engine") -> str:
-        return autograph_of(engine).variant.scales[axis].unit
+        return autograph_for(engine).variant.scales[axis].unit
 
     def limits(engine: "Engine", suffix: int) -> Limits:
-        autograph = autograph_of(engine)
+        autograph = autograph_for(engine)
         low, high = autograph.counter_limits(axis)
         return low, high, autograph.counter_at_rest(axis)
 
     def to_the_ends(engine: "Engine", suffix: int) -> Limits:
-        autograph = autograph_of(engine)
+        autograph = autograph_for(engine)
         low, high = autograph.counter_limits(axis)
         here = autograph.counter(axis)
         return low - here, high - here, 0.0
@@ -48,16 +48,16 @@ def _axis(axis: str) -> list[Command]:
             raise LanguageError(
                 ErrorNumber.DATA_OUT_OF_RANGE, f"expected at most {MAX_READING}, got {call.arguments[0]:.10g}"
             )
-        autograph_of(engine).preset(axis, call.arguments[0])
+        autograph_for(engine).preset(axis, call.arguments[0])
 
     def drive(engine: "Engine", call: Call) -> None:
-        autograph_of(engine).drive(axis, call.arguments[0])
+        autograph_for(engine).drive(axis, call.arguments[0])
 
     def wheel(engine: "Engine", call: Call) -> None:
-        autograph_of(engine).wheel(axis, call.arguments[0])
+        autograph_for(engine).wheel(axis, call.arguments[0])
 
     return [
-        Command(f"COUNter:{axis}?", lambda e, c: autograph_of(e).counter_text(axis), about=f"{axis} counter"),
+        Command(f"COUNter:{axis}?", lambda e, c: autograph_for(e).counter_text(axis), about=f"{axis} counter"),
         Command(
             f"COUNter:{axis}:PRESet",
             preset,

@@ -25,17 +25,17 @@ ELEMENT_NODES = (
 LIMIT = Choice(("MINimum", "MAXimum", "DEFault"), optional=True)
 
 
-def autograph_of(engine: "Engine") -> "Autograph":
+def autograph_for(engine: "Engine") -> "Autograph":
     """Return the instrument that an engine speaks for."""
     return engine.desk.autograph
 
 
-def fixed(value: float, decimals: int = 2) -> str:
+def format_fixed(value: float, decimals: int = 2) -> str:
     """Return a number with its decimals, never as minus zero."""
     return f"{value:z.{decimals}f}"
 
 
-def text_within(text: str) -> str:
+def text_argument(text: str) -> str:
     """Return a text. Raises LanguageError for an empty one and for one that is too long."""
     if not 1 <= len(text) <= MAX_TEXT_LENGTH:
         raise LanguageError(

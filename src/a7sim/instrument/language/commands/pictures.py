@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from a7sim.instrument.language.commands.parts import autograph_of, fixed
+from a7sim.instrument.language.commands.parts import autograph_for, format_fixed
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
-from a7sim.instrument.language.syntax import quoted
+from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
     Call,
     Command,
@@ -26,54 +26,57 @@ MAX_PICTURE = 1024
 
 
 def _load(engine: "Engine", call: Call) -> None:
-    autograph_of(engine).load(call.suffix, call.arguments[0])
+    autograph_for(engine).load(call.suffix, call.arguments[0])
 
 
 def _unload(engine: "Engine", call: Call) -> None:
-    autograph_of(engine).unload(call.suffix)
+    autograph_for(engine).unload(call.suffix)
 
 
 def _catalogue(engine: "Engine", call: Call) -> str:
-    return ",".join(quoted(name) for name in autograph_of(engine).catalogue) or '""'
+    return ",".join(quote_text(name) for name in autograph_for(engine).catalogue) or '""'
 
 
 def _centre(engine: "Engine", call: Call) -> None:
-    autograph_of(engine).centre_picture(call.suffix, *call.arguments)
+    autograph_for(engine).centre_picture(call.suffix, *call.arguments)
 
 
 def _centring_limits(name: str) -> Callable[["Engine", int], Limits]:
     def limits(engine: "Engine", suffix: int) -> Limits:
-        limit = getattr(autograph_of(engine).variant, name)
+        limit = getattr(autograph_for(engine).variant, name)
         return -limit, limit, 0.0
 
     return limits
 
 
 def _centring(engine: "Engine", call: Call) -> str:
-    return ",".join(fixed(value, 3) for value in autograph_of(engine).carrier(call.suffix).centring)
+    return ",".join(format_fixed(value, 3) for value in autograph_for(engine).carrier(call.suffix).centring)
 
 
 def _fiducials(engine: "Engine", call: Call) -> str:
-    displacements = autograph_of(engine).carrier(call.suffix).fiducial_displacements()
-    return ",".join(f"{quoted(name)},{fixed(dx, 3)},{fixed(dy, 3)}" for name, dx, dy in displacements)
+    displacements = autograph_for(engine).carrier(call.suffix).fiducial_displacements()
+    return ",".join(f"{quote_text(name)},{format_fixed(dx, 3)},{format_fixed(dy, 3)}" for name, dx, dy in displacements)
 
 
 def _sketch(engine: "Engine", call: Call) -> str:
-    sketch = autograph_of(engine).carrier(call.suffix).photograph.sketch
+    sketch = autograph_for(engine).carrier(call.suffix).photograph.sketch
     places = zip(sketch.names, sketch.xy[0], sketch.xy[1], strict=True)
-    return ",".join(f"{quoted(name)},{fixed(float(x), 1)},{fixed(float(y), 1)}" for name, x, y in places) or '""'
+    return (
+        ",".join(f"{quote_text(name)},{format_fixed(float(x), 1)},{format_fixed(float(y), 1)}" for name, x, y in places)
+        or '""'
+    )
 
 
 def _pair(seen: tuple[float, float] | None) -> str:
-    return f"{fixed(seen[0])},{fixed(seen[1])}" if seen else f"{NOT_VISIBLE},{NOT_VISIBLE}"
+    return f"{format_fixed(seen[0])},{format_fixed(seen[1])}" if seen else f"{NOT_VISIBLE},{NOT_VISIBLE}"
 
 
 def _eyepiece(engine: "Engine", call: Call) -> str:
-    return _pair(autograph_of(engine).eyepiece(call.suffix, call.arguments[0]))
+    return _pair(autograph_for(engine).eyepiece(call.suffix, call.arguments[0]))
 
 
 def _stereo(engine: "Engine", call: Call) -> str:
-    return _pair(autograph_of(engine).stereo(call.arguments[0]))
+    return _pair(autograph_for(engine).stereo(call.arguments[0]))
 
 
 def _picture(engine: "Engine", call: Call) -> bytes:
@@ -83,7 +86,7 @@ def _picture(engine: "Engine", call: Call) -> bytes:
             raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {largest} {name}, got {value:g}")
     if not 0.1 <= magnification <= 100.0:
         raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 0.1 to 100 times, got {magnification:g}")
-    grey = autograph_of(engine).picture(call.suffix, int(columns), int(rows), magnification)
+    grey = autograph_for(engine).picture(call.suffix, int(columns), int(rows), magnification)
     pixels = np.round(255.0 * grey).astype(np.uint8).tobytes()
     length = str(len(pixels))
     return f"#{len(length)}{length}".encode("ascii") + pixels
@@ -92,7 +95,7 @@ def _picture(engine: "Engine", call: Call) -> bytes:
 PICTURES = [
     Command("PHOTo<n>:LOAD", _load, (Quoted("picture"),), turns=True, about="lay a picture on the carrier"),
     Command("PHOTo<n>:UNLoad", _unload, turns=True, about="take it off"),
-    Command("PHOTo<n>?", lambda e, c: quoted(autograph_of(e).loaded(c.suffix) or ""), about="its name"),
+    Command("PHOTo<n>?", lambda e, c: quote_text(autograph_for(e).loaded(c.suffix) or ""), about="its name"),
     Command("PHOTo:CATalog?", _catalogue, about="the pictures at hand"),
     Command(
         "PHOTo<n>:CENTring",

@@ -3,9 +3,9 @@
 import re
 from typing import TYPE_CHECKING
 
-from a7sim.instrument.language.commands.parts import ELEMENT_NODES, autograph_of, fixed, text_within
+from a7sim.instrument.language.commands.parts import ELEMENT_NODES, autograph_for, format_fixed, text_argument
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
-from a7sim.instrument.language.syntax import quoted
+from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
     AnyWord,
     Call,
@@ -40,42 +40,42 @@ def recorded_element(word: str) -> str:
 
 
 def _record(engine: "Engine", call: Call) -> None:
-    autograph = autograph_of(engine)
+    autograph = autograph_for(engine)
     point, *words = call.arguments
-    elements = [(word, fixed(autograph.element(recorded_element(word)))) for word in words]
+    elements = [(word, format_fixed(autograph.element(recorded_element(word)))) for word in words]
     counters = [(axis, autograph.counter_text(axis)) for axis in "XYZ"]
-    autograph.recorder.register(text_within(point), counters + elements)
+    autograph.recorder.register(text_argument(point), counters + elements)
 
 
 def _last_record(engine: "Engine", call: Call) -> str:
-    registrations = autograph_of(engine).recorder.registrations
+    registrations = autograph_for(engine).recorder.registrations
     if not registrations:
         raise LanguageError(ErrorNumber.EXECUTION_ERROR, "nothing is registered yet")
     return _shown(registrations[-1])
 
 
 def _numbered_record(engine: "Engine", call: Call) -> str:
-    return _shown(autograph_of(engine).recorder.numbered(int(call.arguments[0])))
+    return _shown(autograph_for(engine).recorder.numbered(int(call.arguments[0])))
 
 
 def _shown(registration: Registration) -> str:
     counters = [reading for _, reading in registration.readings[:3]]
     elements = [f"{name},{reading}" for name, reading in registration.readings[3:]]
-    struck = [quoted(f"struck: {registration.struck}")] if registration.struck is not None else []
-    return ",".join([str(registration.number), quoted(registration.point), *counters, *elements, *struck])
+    struck = [quote_text(f"struck: {registration.struck}")] if registration.struck is not None else []
+    return ",".join([str(registration.number), quote_text(registration.point), *counters, *elements, *struck])
 
 
 def _struck_records(engine: "Engine", call: Call) -> str:
-    return str(sum(each.struck is not None for each in autograph_of(engine).recorder.registrations))
+    return str(sum(each.struck is not None for each in autograph_for(engine).recorder.registrations))
 
 
 def _strike(engine: "Engine", call: Call) -> None:
     number, why = call.arguments
-    autograph_of(engine).recorder.strike(int(number), text_within(why))
+    autograph_for(engine).recorder.strike(int(number), text_argument(why))
 
 
 def _note(engine: "Engine", call: Call) -> None:
-    text_within(call.arguments[0])
+    text_argument(call.arguments[0])
 
 
 RECORDING = [
@@ -93,7 +93,7 @@ RECORDING = [
         about="a registration as it stands: number, point, X, Y, Z and element,reading ...",
     ),
     Command("RECord:LAST?", _last_record, about="number, point, X, Y, Z and element,reading ..."),
-    Command("RECord:COUNt?", lambda e, c: str(len(autograph_of(e).recorder.registrations)), about="registrations"),
+    Command("RECord:COUNt?", lambda e, c: str(len(autograph_for(e).recorder.registrations)), about="registrations"),
     Command(
         "RECord:STRike",
         _strike,

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from a7sim.instrument.language.commands.parts import autograph_of
+from a7sim.instrument.language.commands.parts import autograph_for
 from a7sim.instrument.language.errors import ErrorNumber, LanguageError
 from a7sim.instrument.language.status import Register
-from a7sim.instrument.language.syntax import quoted
+from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
     Call,
     Command,
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _identity(engine: "Engine", call: Call) -> str:
-    autograph = autograph_of(engine)
+    autograph = autograph_for(engine)
     return f"WILD HEERBRUGG,{autograph.variant.name},{autograph.serial},{engine.desk.version}"
 
 
@@ -34,7 +34,7 @@ def _complete(engine: "Engine", call: Call) -> None:
 
 def _reset(engine: "Engine", call: Call) -> None:
     engine.forget_completion()
-    autograph_of(engine).reset()
+    autograph_for(engine).reset()
 
 
 def _mask(call: Call, largest: int) -> int:
@@ -108,7 +108,7 @@ SYSTEM = [
     Command("SYSTem:ERRor[:NEXT]?", lambda e, c: e.status.next_error(), about="oldest error, taken off the queue"),
     Command("SYSTem:ERRor:COUNt?", lambda e, c: str(len(e.status.errors)), about="errors in the queue"),
     Command("SYSTem:VERSion?", lambda e, c: SCPI_VERSION, about="version of SCPI"),
-    Command("SYSTem:HELP:HEADers?", lambda e, c: ",".join(map(quoted, e.headers)), about="all headers, in quotes"),
+    Command("SYSTem:HELP:HEADers?", lambda e, c: ",".join(map(quote_text, e.headers)), about="all headers, in quotes"),
     Command(
         "SYSTem:LOCK:REQuest?",
         lambda e, c: "1" if e.desk.request_lock(e.client) else "0",
