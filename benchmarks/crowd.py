@@ -28,14 +28,14 @@ def main():
     over_the_line = time.process_time() - began
     print(f"one session over the line: {over_the_line:.2f} s CPU")
     with recording() as calls:
-        list(open_batch(scenario, range(RECORDED)).worked())
+        list(open_batch(scenario, range(RECORDED)).measure_models())
     print("sessions  open s  work s  ms a session  drawing s  ratio  same readings")
     figures = []
     for sessions in counts:
         began = time.process_time()
         crowd = open_batch(scenario, range(sessions))
         opened = time.process_time()
-        records = list(crowd.worked())
+        records = list(crowd.measure_models())
         worked = time.process_time()
         drawing = cpu_seconds_to_draw(calls) * sessions / RECORDED
         same = all(one.points == many.of(0).points for one, many in zip(alone, records, strict=True))

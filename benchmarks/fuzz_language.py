@@ -178,7 +178,7 @@ class Author:
         header = re.sub(r"\[[^\]]*\]", "", command.header).replace("<n>", self._dice.choice(("", "1", "2", "2", "3")))
         written = self._dice.choice((short_form, str.lower, str))(header)
         root = "" if header.startswith("*") or self._dice.random() < 0.3 else ":"
-        return f"{root}{written} {','.join(map(self._parameter, command.takes))}".rstrip()
+        return f"{root}{written} {','.join(map(self._parameter, command.parameters))}".rstrip()
 
     def _parameter(self, kind):
         dice = self._dice
@@ -199,7 +199,7 @@ class Author:
 def instruments(seed):
     """Yield one new instrument after the other, each with a model mounted; every fourth asks for a token."""
     scenario = load_scenario("akwanga")
-    drawer = build_scene(scenario, seed).drawer
+    drawer = build_scene(scenario, seed).mountable
     number = 0
     while True:
         number += 1

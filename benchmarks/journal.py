@@ -63,11 +63,11 @@ def cost(home, repeats):
 def long_session(folder, events):
     """Leave the journal of a session of so many events: turning, looking, reading, registering."""
     scenario = load_scenario("akwanga")
-    desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, SEED).drawer, SEED))
+    desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, SEED).mountable, SEED))
     folder.mkdir()
     dice = random.Random(SEED)
-    with Journal(Keeping("none")).opened(folder, make_header("serve", scenario, SEED), desk) as journal:
-        desk.listener = journal.heard
+    with Journal(Keeping("none")).recording(folder, make_header("serve", scenario, SEED), desk) as journal:
+        desk.listener = journal.on_link_event
         engine = desk.open()
         engine.feed(b'PHOT1:LOAD "101";:PHOT2:LOAD "102";:BASE:BX 194.99\n', 0.0)
         for step in range(events // 4):
@@ -117,7 +117,7 @@ def main():
     parser.add_argument("--events", type=int, default=ASKED_OF)
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
-        return cost(Path(temporary), chosen.repeats) + seeking(Path(temporary), chosen.events)
+        return cost(Path(temporary), chosen.repeated_parameter) + seeking(Path(temporary), chosen.events)
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ def cpu_seconds(work):
 
 def sessions(scenario, seeds):
     """Documents of sessions without their own strips."""
-    return open_batch(scenario, seeds).documents(strips=False)
+    return open_batch(scenario, seeds).run(strips=False)
 
 
 class Thesis:
@@ -82,7 +82,7 @@ def study_work():
         tasks = load_study("thesis-1985", replicates=1).tasks
     except StudyError:
         return Thesis().replicates, "the same work as studies/thesis-1985.toml, which is not there"
-    return lambda seeds: [task.together(seeds) for task in tasks], "studies/thesis-1985.toml"
+    return lambda seeds: [task.run_batch(seeds) for task in tasks], "studies/thesis-1985.toml"
 
 
 def cpu_seconds_to_draw_often(calls, times):

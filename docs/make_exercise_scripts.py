@@ -170,7 +170,7 @@ def parallax(driver, otherwise):
             driver.client.send("DRIV:X {:.2f};Y {:.2f}".format(*ROUGH[position]))
             driver.fuse(name, "XY")
         else:
-            driver.come_to(position, ROUGH[position])
+            driver.select_point(position, ROUGH[position])
         for element in ("by1", "by2"):
             if otherwise == "half" and element == "by2" and position in "456":
                 continue
@@ -302,7 +302,7 @@ def one_projector(driver, otherwise):
         driver.remark(f"Round {number}")
         driver.wait(600, "five points to go to, to look at and to turn at")
         for position, element in steps:
-            driver.come_to(position, ROUGH[position])
+            driver.select_point(position, ROUGH[position])
             amount = driver.turn_to_clear(element, position)
             if element == "omega2" and otherwise not in ("one round", "omega first"):
                 _, y, z = driver.client.numbers("COUN?")
@@ -320,7 +320,7 @@ def one_projector(driver, otherwise):
         driver.remark("All six points once more, hands off the elements")
         driver.wait(300)
         for position in "123456":
-            driver.come_to(position, ROUGH[position])
+            driver.select_point(position, ROUGH[position])
             driver.record(driver.name(position))
 
 

@@ -183,7 +183,7 @@ LONGEST_SHOWN = 56
 @cache
 def _equipment(variant):
     scenario = load_scenario(SCENARIOS[variant])
-    return scenario, build_scene(scenario, 7).drawer
+    return scenario, build_scene(scenario, 7).mountable
 
 
 class Instrument:
@@ -237,7 +237,7 @@ def ranges_of(command, variant):
         return f"{', '.join(VARIANTS[variant].height_gears)}; {BOUNDS[command.header]}"
     if command.header in BOUNDS:
         return BOUNDS[command.header]
-    limited = [each for each in command.takes if isinstance(each, Quantity) and each.limits]
+    limited = [each for each in command.parameters if isinstance(each, Quantity) and each.limits]
     texts = [_of_both(each, Instrument(variant).engine, command) for each in limited]
     return "; ".join(dict.fromkeys(texts))
 
@@ -264,8 +264,8 @@ def _limits(quantity, engine, number):
 def errors_of(command):
     """Return the errors that a command alone can meet; -101, -102, -108 and -113 are everybody's."""
     errors = set(ALSO.get(command.header, ()))
-    kinds = [*command.takes, *([command.repeats] if command.repeats else [])]
-    if any(not kind.optional for kind in command.takes):
+    kinds = [*command.parameters, *([command.repeated_parameter] if command.repeated_parameter else [])]
+    if any(not kind.optional for kind in command.parameters):
         errors.add(-109)
     if kinds:
         errors.add(-104)
@@ -276,7 +276,7 @@ def errors_of(command):
             errors |= {-222} | _unit_errors(kind)
     if "<n>" in command.header:
         errors.add(-114)
-    if command.turns:
+    if command.moves:
         errors.add(-203)
     if any("not on it" in ranges_of(command, variant) for variant in SCENARIOS) or command.header == "BASE:MODE":
         errors.add(-221)
@@ -318,7 +318,7 @@ def _row(command: Command):
     shown = reply if len(reply) <= LONGEST_SHOWN else reply[:LONGEST_SHOWN] + " ..."
     example = f"`{line}`" + (f" gives `{shown}`" if reply else "")
     cells = (
-        _code(command.written()),
+        _code(command.syntax()),
         _about(command),
         *(ranges_of(command, variant) for variant in SCENARIOS),
         example,
@@ -335,7 +335,7 @@ def _code(text):
 def _about(command):
     if command.about:
         return command.about
-    setter = next((each.about for each in COMMANDS.commands if f"{each.header}?" == command.header), "")
+    setter = next((each.help for each in COMMANDS.commands if f"{each.header}?" == command.header), "")
     return f"asks for it: {setter}" if setter else ""
 
 

@@ -55,7 +55,7 @@ class Person:
 
     async def settle(self) -> None:
         """Wait until all that was ordered is said and shown."""
-        await self.until(lambda: self.console.dials is not None and self._quiet() and self.console.station.at_rest)
+        await self.until(lambda: self.console.dials is not None and self._quiet() and self.console.station.is_idle)
         for _ in range(5):
             await asyncio.sleep(0.0)
         await self.until(self._quiet)
@@ -115,7 +115,7 @@ class Person:
 
     async def step_of(self, step: float) -> None:
         """Take a step of the ladder."""
-        away = STEP_SIZES.index(step) - self.console.hands.rung
+        away = STEP_SIZES.index(step) - self.console.hands.step_index
         await self.press(*["]" if away > 0 else "["] * abs(away))
 
     def message(self) -> str:

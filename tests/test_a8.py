@@ -95,7 +95,7 @@ def test_a_reading_of_its_scales_is_no_length():
 @given(st.sampled_from("XY"), st.floats(-50.0, 50.0))
 def test_a_unit_of_its_scales_is_2_mm_of_the_model(axis, amount):
     a8 = Autograph(A8)
-    a8.wheel(axis, amount)
+    a8.turn_handwheel(axis, amount)
     moved = a8.mark_in_model()["XY".index(axis)]
     assert moved == pytest.approx(2.0 * amount)
     assert a8.counter(axis) == pytest.approx(200.0 + moved / 2.0, abs=0.005 + 1e-9)
@@ -210,7 +210,7 @@ def test_a_negative_is_seen_as_it_is_with_the_fittings_that_it_has():
     a8.set_fitting("diapositive", "right")
     a8.set_fitting("ycollar", "in")
     assert a8.eyepiece(1, "P") == pytest.approx((1000.0, 2000.0))
-    a8.wheel("Y", 0.5)
+    a8.turn_handwheel("Y", 0.5)
     assert a8.counter("Y") == 200.5
     assert a8.eyepiece(1, "P")[1] == pytest.approx(1500.0)
 

@@ -39,7 +39,7 @@ def worked(scenario, seeds=(1,)):
 
 def misclosures(crowd, models, session=0):
     """How far a strip ``(3, n)`` in mm lies from the true ground, carried onto it by a similarity."""
-    strip = strip_points([model.places_of(session) for model in models])
+    strip = strip_points([model.coordinates_of(session) for model in models])
     ground = np.array([crowd.scenes[session].ground_points[name] for name in strip.points]).T
     return similarity_by_quaternion(ground, strip.coordinates).residuals
 
@@ -83,7 +83,7 @@ def test_three_models_close_within_what_is_asked_of_ten(three):
 
 def test_the_scale_is_carried_by_the_heights_of_common_points(monkeypatch):
     """The comparison can fail: without the carrying of scale the flying height's changes break the strip."""
-    monkeypatch.setattr(bridging, "carry_scale_on", lambda bench, who, model, before: np.ones(bench.crew.sessions))
+    monkeypatch.setattr(bridging, "carry_scale_on", lambda bench, who, model, before: np.ones(bench.crew.size))
     crowd, models = worked(scenario_of(2))
     assert len(models) == 2
     assert np.abs(misclosures(crowd, models)).max() > 10.0 * CLOSES_MM
@@ -162,8 +162,8 @@ def test_what_cannot_be_looked_at_again_stays_as_it_was_oriented(monkeypatch):
     """Where no image can be fused at the last look nothing is corrected and nothing set to zero."""
 
     def all_apart(bench, who, points):
-        nothing = np.zeros((len(points), bench.crew.sessions))
-        apart = np.full(bench.crew.sessions, points[0], dtype=object)
+        nothing = np.zeros((len(points), bench.crew.size))
+        apart = np.full(bench.crew.size, points[0], dtype=object)
         return Parallaxes(nothing, np.zeros((3, *nothing.shape)), apart)
 
     monkeypatch.setattr(Bench, "parallaxes_seen", all_apart)
@@ -186,7 +186,7 @@ def test_of_two_readings_that_contradict_each_other_either_may_be_the_wrong_one(
     settings = {"plan.parallax_readings": 1, "plan.centre_method": "scales", "observer.blunder_rate": 0.02}
     scenario = load_scenario("akwanga", settings=settings)
     crowd = open_batch(msgspec.structs.replace(scenario, models=scenario.models[:1]), range(12))
-    assert len(list(crowd.worked())) == 1
+    assert len(list(crowd.measure_models())) == 1
     assert not any("do not agree" in why for why in crowd.bench.crew.reasons.values()), crowd.bench.crew.reasons
 
 

@@ -49,7 +49,7 @@ def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(shipped):
     scenario, document, out = shipped
     models = list(islice(bridge_strip_batch(open_batch(scenario, (2,)).bench), 2))
     rows = [row.split(",")[:2] for row in (out / "models.csv").read_text().splitlines()[2:]]
-    points = [[model.model.name, point] for model in models for point in model.places_of(0)]
+    points = [[model.model.name, point] for model in models for point in model.coordinates_of(0)]
     assert rows[: len(points)] == points
     for said, model in zip(document["bridged"]["models"], models, strict=False):
         assert said["elements"] == {name: each[0] for name, each in model.orientation.elements.items()}

@@ -40,8 +40,8 @@ class Worker:
         self.session = open_session(scenario, 1, self.lines.append)
         job = replace(self.session.job, models=self.session.job.models[:1])
         person = self.session.person
-        person.book.head("", "preparation")
-        self.bench = Bench(Crew.of_one(person), LineHands(person), job)
+        person.book.set_heading("", "preparation")
+        self.bench = Bench(Crew.single(person), LineHands(person), job)
         self.record = next(measure_models_batch(self.bench)).of(0)
         self.view = StereoView(self.bench, person)
         control = ground_control(scenario, self.session.scene)

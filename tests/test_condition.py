@@ -166,7 +166,7 @@ def test_a_worn_instrument_has_its_pictures_laid_as_a_faultless_one():
         stated = Instrument(condition=condition)
         autograph = build_autograph(stated, {"L": photograph("L", {"P": (1.0, 2.0)})}, 8)
         autograph.load(1, "L")
-        return autograph.carrier(1).laid
+        return autograph.carrier(1).placement
 
     assert laid("worn") == laid(Condition())
 
@@ -251,8 +251,8 @@ def test_the_error_of_a_screw_repeats_with_every_turn():
 
 @given(st.floats(-250.0, 250.0), st.floats(0.0, 0.05), st.floats(0.0, 6.3))
 def test_the_truth_about_a_place_undoes_the_screws(place, amplitude, phase):
-    spindle = Spindle(-280.0, 280.0, 0.0, runout=Runout(amplitude, 5.0, phase))
-    spindle.turn_to(spindle.position_free_of_runout(place), np.random.default_rng(0))
+    spindle = Spindle(-280.0, 280.0, 0.0, periodic_error=Runout(amplitude, 5.0, phase))
+    spindle.turn_to(spindle.position_without_periodic_error(place), np.random.default_rng(0))
     assert spindle.position == pytest.approx(place, abs=1e-9)
 
 
@@ -273,7 +273,7 @@ def test_a_counter_slips_by_whole_units_and_never_by_more_than_it_passed(turns, 
     counter, rng, at = Counter(2.0, slip_share=share), np.random.default_rng(seed), 0.0
     for to in turns:
         before = counter.offset
-        counter.passed(at, to, rng)
+        counter.advance(at, to, rng)
         slipped, passed = before - counter.offset, np.floor(before + 2.0 * to) - np.floor(before + 2.0 * at)
         assert slipped == round(slipped)
         assert 0.0 <= slipped * np.sign(passed) <= abs(passed)
@@ -283,7 +283,7 @@ def test_a_counter_slips_by_whole_units_and_never_by_more_than_it_passed(turns, 
 def test_counters_slip_at_their_share_of_the_passes():
     counter, rng = Counter(slip_share=0.01), np.random.default_rng(5)
     for _ in range(100):
-        counter.passed(0.5, 200.5, rng)
+        counter.advance(0.5, 200.5, rng)
     assert -counter.offset == pytest.approx(200, abs=5 * np.sqrt(200))
 
 

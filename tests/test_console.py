@@ -157,7 +157,7 @@ def test_free_hand_is_a_state_of_its_own_that_goes_past_the_collars() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
-            console.station.say("FITT:XCOL OUT")
+            console.station.send("FITT:XCOL OUT")
             await person.press("right")
             assert console.dials.counters["X"] == "-1.00"
             await person.press("h", "right", "right")
@@ -484,7 +484,7 @@ def test_every_deed_is_in_the_palette_under_its_group_and_keys() -> None:
             await person.settle()
             listed = {each.title: each for each in console.get_system_commands(console.screen)}
             for deed in actions_for(watching=False):
-                assert listed[deed.about].help.startswith(f"{deed.group}, ")
+                assert listed[deed.description].help.startswith(f"{deed.group}, ")
             listed["a smaller step"].callback()
             finer = console.hands.step
             listed["a larger step"].callback()

@@ -131,7 +131,7 @@ def test_hands_say_lines_of_the_language() -> None:
     assert hands.turned(-1) == "PROJ2:OMEG:TURN -0.1"
     assert hands.moved("X", 1, 12.0) == "WHE:X 0.1"
     assert Hands(free=True).moved("Y", -1, 12.0) == "DRIV:Y 11.0000"
-    assert Hands().on(VARIANTS["A8"]).element == "kappa1"
+    assert Hands().valid_for(VARIANTS["A8"]).element == "kappa1"
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def place(out: Path | None = None, go_on: bool | None = None, seed: int = SEED) 
 
 def sat_at(here: InProcess, sitting: Callable[[Person], Coroutine[Any, Any, None]]) -> Path:
     """Let a person sit at a place, and leave by the key; return the folder of the session."""
-    console = Console(replace(here.seat, drawing=Drawing.HALVES))
+    console = Console(replace(here.config, drawing=Drawing.HALVES))
 
     async def sit_down() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
@@ -54,7 +54,7 @@ def sat_at(here: InProcess, sitting: Callable[[Person], Coroutine[Any, Any, None
             await pilot.press("q")
 
     asyncio.run(sit_down())
-    kept = here.stand_up()
+    kept = here.close()
     assert kept is not None
     return kept
 
@@ -176,10 +176,10 @@ def test_where_somebody_sits_nobody_else_goes_on() -> None:
         await person.settle()
         await person.press("right")
         elsewhere = place()
-        assert elsewhere.seat.resumable() is None
-        assert "somebody sits there" in elsewhere.seat.greeting()
-        elsewhere.seat.connect().close()
-        taken.append(elsewhere.stand_up())
+        assert elsewhere.config.resumable() is None
+        assert "somebody sits there" in elsewhere.config.greeting()
+        elsewhere.config.connect().close()
+        taken.append(elsewhere.close())
 
     folder = sat_at(place(), first)
     assert taken == [folder.with_name("akwanga-2")]
@@ -189,7 +189,7 @@ def test_escape_from_the_question_leaves_and_begins_nothing(data: Path) -> None:
     folder = sat_at(place(), a_beginning)
     before = (folder / JOURNAL).read_bytes()
     here = place()
-    console = Console(here.seat)
+    console = Console(here.config)
 
     async def sit_down() -> None:
         async with console.run_test(size=(80, 24)) as pilot:
@@ -198,7 +198,7 @@ def test_escape_from_the_question_leaves_and_begins_nothing(data: Path) -> None:
             await pilot.press("escape")
 
     asyncio.run(sit_down())
-    assert here.stand_up() is None
+    assert here.close() is None
     assert (folder / JOURNAL).read_bytes() == before
     assert [each.name for each in (data / "sessions").iterdir()] == ["akwanga"]
 

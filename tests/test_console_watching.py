@@ -52,11 +52,11 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setattr(journal_module, "EVERY", 10)
         journal = Journal()
-        desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, 7).drawer, 7), journal.heard)
-        with journal.opened(folder, make_header("serve", scenario, 7), desk):
+        desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, 7).mountable, 7), journal.on_link_event)
+        with journal.recording(folder, make_header("serve", scenario, 7), desk):
             port = InProcessSerial(desk=desk, timeout=1.0)
             for line in WORK:
-                port.clock.spend(10.0)
+                port.clock.advance(10.0)
                 port.write(line.encode() + b"\n")
             port.close()
     return folder
@@ -67,7 +67,7 @@ def film(session: Path) -> Film:
 
 
 def dials_of(a_film: Film) -> Any:
-    with a_film.opened() as client:
+    with a_film.open_client() as client:
         client.send(readouts_query(VARIANTS["A7"]))
         return parse_readouts(VARIANTS["A7"], client.reply())
 
@@ -100,13 +100,13 @@ def test_a_film_stands_the_same_whichever_way_it_came_there(session: Path, monke
     assert straight.steps == len(WORK)
     there = []
     for step in range(straight.steps + 1):
-        frame = straight.run_to(step)
+        frame = straight.seek(step)
         there.append((frame, dials_of(straight)))
-    assert straight.journalled.header["command"] == "serve" and frame.trouble == ""
+    assert straight.journalled.header["command"] == "serve" and frame.error == ""
     jumping = film(session)
     monkeypatch.setattr(film_module, "LEAP", 5)
     for step in (17, 3, 9, 8, 0, 15, 1, 17):
-        assert (jumping.run_to(step), dials_of(jumping)) == there[step]
+        assert (jumping.seek(step), dials_of(jumping)) == there[step]
     assert there[11][1].struck == 0 and there[12][1].struck == 1
     assert [each.records for _, each in there] == [0] * 4 + [*range(1, 9), 8, 8, *range(9, 13)]
 
@@ -115,14 +115,14 @@ def test_checkpoints_make_a_jump_say_few_lines_again(session: Path, monkeypatch:
     monkeypatch.setattr(film_module, "LEAP", 5)
     jumping = film(session)
     said: list[int] = []
-    say = jumping._replay.__class__.say
+    say = jumping._replay.__class__.apply
     monkeypatch.setattr(
         jumping._replay.__class__,
         "say",
         lambda replay, number, event: said.append(number) or say(replay, number, event),
     )
-    jumping.run_to(jumping.steps)
-    jumping.run_to(jumping.steps - 1)
+    jumping.seek(jumping.steps)
+    jumping.seek(jumping.steps - 1)
     assert len(said) <= 2 * 14 < len(jumping.journalled)
 
 
@@ -130,13 +130,13 @@ def test_a_film_knows_what_was_done_where(session: Path) -> None:
     a_film = film(session)
     assert [a_film.next_record(step, 1) for step in (0, 4, 11, 17)] == [4, 5, 12, None]
     assert [a_film.next_record(step, -1) for step in (17, 5, 4)] == [16, 4, None]
-    assert a_film.run_to(6).point == "P3" and a_film.run_to(2).point is None
-    assert (a_film.frame.said, a_film.frame.time) == (f"client1: {WORK[1]}", 20.0)
-    assert a_film.run_to(4).origins["X"] == 5000.0
-    assert [a_film.sought(words) for words in ("7", "70s", "0:01:10", "after the slip", "@2")] == [7, 7, 7, 13, 1]
+    assert a_film.seek(6).point == "P3" and a_film.seek(2).point is None
+    assert (a_film.frame.line, a_film.frame.time) == (f"client1: {WORK[1]}", 20.0)
+    assert a_film.seek(4).origins["X"] == 5000.0
+    assert [a_film.find_step(words) for words in ("7", "70s", "0:01:10", "after the slip", "@2")] == [7, 7, 7, 13, 1]
     for words in ("18", "never noted", "@999", "1:00:00"):
         with pytest.raises(Mistake, match=f"jump to {words}: expected a step up to 17, a time up to 170s"):
-            a_film.sought(words)
+            a_film.find_step(words)
 
 
 def test_what_does_not_happen_again_is_said(session: Path) -> None:
@@ -144,8 +144,8 @@ def test_what_does_not_happen_again_is_said(session: Path) -> None:
     answers = next(number for number in range(2, len(there)) if there.event(number).dir == "<")
     there.lines[answers - 1] = there.lines[answers - 1].replace(b'"text":"', b'"text":"9')
     a_film = Film(there)
-    assert a_film.run_to(3).trouble == ""
-    assert f"line {answers}: expected again client1 < 9" in a_film.run_to(4).trouble
+    assert a_film.seek(3).error == ""
+    assert f"line {answers}: expected again client1 < 9" in a_film.seek(4).error
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_an_address_is_known_from_a_session(watched: str, so: bool) -> None:
 
 def test_a_session_in_which_nothing_was_said_is_one_sentence(tmp_path: Path) -> None:
     scenario = load_scenario("akwanga")
-    with Journal().opened(tmp_path, make_header("serve", scenario, 7), None):
+    with Journal().recording(tmp_path, make_header("serve", scenario, 7), None):
         pass
     with pytest.raises(Mistake, match="expected a session in which something was said, got none"):
         open_recording(str(tmp_path))

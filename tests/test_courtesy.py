@@ -28,16 +28,16 @@ def machine(monkeypatch):
 
 def test_the_processor_is_given_up_as_long_as_it_comes_back_soon(machine):
     server = courtesy.Courtesy()
-    assert all(server.yielded() for _ in range(100))
+    assert all(server.yield_cpu() for _ in range(100))
     assert machine.given_up == 100
 
 
 def test_where_others_want_it_it_is_kept_for_a_second(machine):
     server = courtesy.Courtesy()
     machine.away = 3e-3
-    assert [server.yielded() for _ in range(100)] == [True] * 2 + [False] * 98
+    assert [server.yield_cpu() for _ in range(100)] == [True] * 2 + [False] * 98
     machine.now += courtesy.UNTIL_ALONE
-    assert server.yielded()
+    assert server.yield_cpu()
 
 
 def test_being_away_once_says_nothing(machine):
@@ -45,4 +45,4 @@ def test_being_away_once_says_nothing(machine):
     server = courtesy.Courtesy()
     for away in [3e-3, 1e-5] * 50:
         machine.away = away
-        assert server.yielded()
+        assert server.yield_cpu()

@@ -34,7 +34,7 @@ def same_to_the_digit(scenario, seeds=SEEDS, all_finish=False, looked_at=None):
 def same_as_alone(scenario, seeds, looked_at):
     """A crowd that has worked, and whether those of it that are looked at read and set what each does alone."""
     crowd = open_batch(scenario, seeds)
-    records = list(crowd.worked())
+    records = list(crowd.measure_models())
     if not crowd.bench.crew.reasons:
         assert [each.model.name for each in records] == [each.name for each in scenario.models]
     return crowd, all(_same(crowd, records, seeds.index(seed), seed) for seed in looked_at)
@@ -145,7 +145,7 @@ def test_a_bench_that_is_off_by_a_count_is_found_out(monkeypatch):
 @pytest.fixture(scope="module")
 def by_itself():
     """The document of a crowd of one, with seed 3."""
-    (document,) = open_batch(read_once(SCENARIOS["as it stands"]), [3]).documents()
+    (document,) = open_batch(read_once(SCENARIOS["as it stands"]), [3]).run()
     return document
 
 
@@ -174,6 +174,6 @@ def test_sessions_do_not_disturb_each_other(by_itself):
     strict = msgspec.structs.replace(
         scenario, plotting=msgspec.structs.replace(scenario.plan, tolerated_centre_rms=0.19)
     )
-    given_up, among_others, *_ = open_batch(strict, [14, 3, 11]).documents()
+    given_up, among_others, *_ = open_batch(strict, [14, 3, 11]).run()
     assert given_up["status"] == "does not fit"
     assert by_itself == among_others

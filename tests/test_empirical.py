@@ -59,14 +59,14 @@ def ready(scenario, seed, model=0, change=lambda job: job):
     """A bench with one model of a scenario mounted, and its session."""
     session = open_session(scenario, seed)
     job = dataclasses.replace(session.job, models=(change(session.job.models[model]),))
-    return session, made_ready(Crew.of_one(session.person), LineHands(session.person), job)
+    return session, made_ready(Crew.single(session.person), LineHands(session.person), job)
 
 
 def made_ready(crew, hands, job):
     bench = Bench(crew, hands, job)
     with suppress(_IsReady):
         next(measure_models_batch(bench, _stop_at_relative_orientation))
-    crew.begin(crew.everybody, job.models[0].name, "relative orientation")
+    crew.begin(crew.active, job.models[0].name, "relative orientation")
     return bench
 
 

@@ -93,7 +93,7 @@ def sheets_of_crowd(scenario, seeds, **order):
     order = GridTestOrder(scenario.camera, scenario.grid_plate, **order)
     bench = open_batch(scenario, seeds).bench
     sheets = list(measure_grid_batch(Bench(bench.crew, bench.hands, order.job), order))
-    assert all(len(sheet.who) == len(seeds) for sheet in sheets)
+    assert all(len(sheet.sessions) == len(seeds) for sheet in sheets)
     return sheets
 
 
@@ -199,7 +199,7 @@ def test_a_plate_is_ruled_to_its_accuracy_and_is_the_same_whatever_is_flown():
 
 def test_a_plate_is_loaded_over_the_link_like_a_picture():
     scenario = load_scenario("akwanga")
-    door = Door(Desk(build_autograph(scenario.instrument, build_scene(scenario, 1).drawer, 1)))
+    door = Door(Desk(build_autograph(scenario.instrument, build_scene(scenario, 1).mountable, 1)))
     assert door.say("PHOT:CAT?") == '"101","102","103","grid"'
     assert door.say('PHOT1:LOAD "grid";:PROJ1:PDIS 152.68;:DRIV:X 0;Y 0;:PHOT1?') == '"grid"'
     assert all(abs(each) < 2000.0 for each in door.numbers('EYEP1? "G55"'))
@@ -377,7 +377,7 @@ def centres_by(method, seed):
 def sessions_by(method):
     plan = {"plan.centre_method": f'"{method}"', "plan.parallax_readings": "2"}
     crowd = open_batch(load_scenario("akwanga", plan | METHODS[method]), SEEDS)
-    documents = crowd.documents()
+    documents = crowd.run()
     assert crowd.bench.crew.reasons == {}
     return documents, crowd.bench.crew.seconds / 3600.0
 

@@ -413,7 +413,7 @@ def test_rods_that_a_reset_left_too_steep_can_be_brought_back_but_not_taken_furt
         a7.drive("Y", -251.0)
     a7.drive("Y", -240.0)
     a7.drive("Y", 0.0)
-    a7.wheel("X", 1.0)
+    a7.turn_handwheel("X", 1.0)
 
 
 def test_a_registration_is_struck_once_and_keeps_its_reason():

@@ -146,7 +146,7 @@ def test_a_journal_cut_at_any_of_its_last_300_bytes_is_read_to_its_last_whole_li
         path.write_bytes(left)
         journalled = read_journal(path)
         end = left.rfind(b"\n") + 1
-        assert (len(journalled), journalled.size, journalled.torn) == (left.count(b"\n"), end, left[end:])
+        assert (len(journalled), journalled.size, journalled.truncated_tail) == (left.count(b"\n"), end, left[end:])
 
 
 @pytest.mark.parametrize("flipped", [0x0B, ord("}")])
@@ -302,7 +302,7 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        combinations.run_combinations(light, 1985, cut, Watcher(begins=interrupt))
+        combinations.run_combinations(light, 1985, cut, Watcher(on_activity=interrupt))
     assert not (cut / "results.json").exists()
     session = find_resumable(cut, "run")
     assert session.setting("strips") == "all"
@@ -387,7 +387,7 @@ def test_a_run_on_a_full_disk_stops_in_a_sentence_and_goes_on_when_there_is_room
         f"a7sim: {out}/session.jsonl: it can no longer be written, so the session stops here: File too large\n"
     )
     journalled = read_journal(out / "session.jsonl")
-    assert (journalled.size > 99_000, journalled.torn) == (True, b"")
+    assert (journalled.size > 99_000, journalled.truncated_tail) == (True, b"")
     resumed(out)
     assert files_of(out) == files_of(whole)
 
@@ -493,8 +493,8 @@ def test_always_and_none_are_what_they_say(tmp_path, monkeypatch):
 def test_what_registers_is_known_by_its_line(tmp_path, monkeypatch, line, registers):
     at_once = []
     monkeypatch.setattr(DurableFile, "add", lambda self, line, now=False: at_once.append(now))
-    journal = Journal().opened(tmp_path, Header({"schema_version": 3}), None)
-    journal.heard(LinkEvent(0.0, "client1", ">", line))
+    journal = Journal().recording(tmp_path, Header({"schema_version": 3}), None)
+    journal.on_link_event(LinkEvent(0.0, "client1", ">", line))
     assert at_once == [False, registers]
 
 
@@ -508,7 +508,7 @@ def test_a_replay_from_a_checkpoint_ends_where_one_from_the_beginning_ends(whole
         replay = Replay(journalled)
         first = replay.seek(line)
         assert all(difference is None for _, _, difference in replay_lines(replay, first))
-        assert replay.ended() is None
+        assert replay.final_difference() is None
         states.append(replay.desk.state())
         assert (first > len(journalled) // 2) == (line > 2)
     assert states[0]["clients"] == states[1]["clients"]
@@ -639,7 +639,7 @@ def test_a_replay_goes_at_the_speed_that_is_asked_for(monkeypatch):
     slept = []
     clock = Clock()
     monkeypatch.setattr(time, "monotonic", lambda: clock.now)
-    monkeypatch.setattr(time, "sleep", lambda s: (slept.append(round(s, 6)), clock.spend(s)))
+    monkeypatch.setattr(time, "sleep", lambda s: (slept.append(round(s, 6)), clock.advance(s)))
     pace = Pace(10.0)
     for now in (100.0, 100.0, 105.0, 106.0):
         pace.until(now)
@@ -684,8 +684,8 @@ def test_what_a_client_and_an_instrument_say_is_recorded_and_replays(tmp_path, c
 
 
 def test_a_record_of_an_unknown_instrument_is_told_and_not_verified(tmp_path, capsys):
-    with Journal().opened(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
-        journal.heard(LinkEvent(1.0, "client1", ">", "*IDN?"))
+    with Journal().recording(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
+        journal.on_link_event(LinkEvent(1.0, "client1", ">", "*IDN?"))
     done = said_here(capsys, "replay", tmp_path)
     assert done.stdout.splitlines()[0] == "      1.00 client1   > *IDN?"
     done = said_here(capsys, "replay", tmp_path, "--verify")
@@ -695,19 +695,19 @@ def test_a_record_of_an_unknown_instrument_is_told_and_not_verified(tmp_path, ca
 
 def test_a_client_that_goes_needs_no_journal_that_can_be_written_and_any_other_word_does(tmp_path, monkeypatch):
     """Who goes is not held up by a full disk; nothing else is acknowledged that is not written."""
-    with Journal().opened(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
+    with Journal().recording(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
 
         def full(*_, **__):
             raise JournalStopped("the disk is full")
 
         monkeypatch.setattr(journal, "_write", full)
-        journal.heard(LinkEvent(1.0, "client1", "-", ""))
+        journal.on_link_event(LinkEvent(1.0, "client1", "-", ""))
         with pytest.raises(JournalStopped, match="the disk is full"):
-            journal.heard(LinkEvent(2.0, "client1", ">", "*IDN?"))
+            journal.on_link_event(LinkEvent(2.0, "client1", ">", "*IDN?"))
 
 
 def test_what_a_replay_only_tells_is_not_told_where_it_is_to_be_quiet(tmp_path, capsys):
-    with Journal().opened(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
-        journal.heard(LinkEvent(1.0, "client1", ">", "*IDN?"))
+    with Journal().recording(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
+        journal.on_link_event(LinkEvent(1.0, "client1", ">", "*IDN?"))
     told = said_here(capsys, "replay", tmp_path, "--quiet")
     assert (told.returncode, told.stdout) == (0, "")

@@ -29,7 +29,7 @@ def scenario_of(**overrides):
 
 def levelled(scenario, seed=1):
     crowd = open_batch(scenario, [seed])
-    (record,) = crowd.worked()
+    (record,) = crowd.measure_models()
     return crowd, record.of(0)
 
 
@@ -70,7 +70,7 @@ def test_the_relative_orientation_is_untouched_but_for_rounding(without_any_erro
     """What the counters describe, before and while level: rotation and base the same within two counts."""
     record = without_any_error[1]
     before, meanwhile = (
-        Relative.of_counters(each, record.model, A7) for each in (record.on_ground.before, record.on_ground.elements)
+        Relative.from_counters(each, record.model, A7) for each in (record.on_ground.before, record.on_ground.elements)
     )
     assert max(before.differences_gon(meanwhile)) < 0.02
     assert record.on_ground.elements["phi1"] != record.on_ground.before["phi1"]
@@ -79,7 +79,7 @@ def test_the_relative_orientation_is_untouched_but_for_rounding(without_any_erro
 def test_afterwards_everything_stands_as_it_did(without_any_error):
     """Elements, gear and counters: the instrument reads a point as it read it before."""
     crowd, record = without_any_error
-    bench, who = crowd.bench, crowd.bench.crew.everybody
+    bench, who = crowd.bench, crowd.bench.crew.active
     shown = bench.seat.elements(who, list(record.on_ground.before))
     assert {name: each[0] for name, each in shown.items()} == record.on_ground.before
     assert bench.seat.units_per_mm == record.z_units_per_mm == 8.0
@@ -88,7 +88,7 @@ def test_afterwards_everything_stands_as_it_did(without_any_error):
 
 
 def test_a_person_with_errors_comes_within_what_is_tolerated_too():
-    (document,) = open_batch(scenario_of(), [7]).documents()
+    (document,) = open_batch(scenario_of(), [7]).run()
     found = document["models"][0]["absolute_orientation"]
     assert found["agrees"]
     assert 2 <= len(found["rounds"]) <= MAX_ROUNDS + 1
@@ -100,7 +100,7 @@ def test_an_a8_is_levelled_by_what_it_has():
     """Common Phi, equal changes of omega as far as counters show, and the base; everything else stays."""
     a8 = {"instrument.variant": '"A8"', "models.1.base": '"inside"', "plan.procedure": '"empirical"'}
     found = levelled(without_errors(scenario_of(**a8)))[1].on_ground
-    assert found.agrees
+    assert found.within_tolerance
     changes = {name: value - found.before[name] for name, value in found.elements.items()}
     assert {name for name, change in changes.items() if abs(change) > 1e-9} == {"common_phi", "omega1", "omega2", "bx"}
     assert changes["omega1"] == pytest.approx(changes["omega2"], abs=0.0101)
@@ -133,7 +133,9 @@ def test_both_projectors_and_the_base_turn_together(base, lean):
         {name: np.array([v]) for name, v in SETTINGS.items()}, model, A7, up, np.array([1.01])
     )
     after = SETTINGS | {name: float(each[0]) for name, each in turned.items()}
-    rotations, bases = Relative.of_counters(SETTINGS, model, A7).differences_gon(Relative.of_counters(after, model, A7))
+    rotations, bases = Relative.from_counters(SETTINGS, model, A7).differences_gon(
+        Relative.from_counters(after, model, A7)
+    )
     assert rotations < 1e-9
     assert bases < 0.002
     n = model.left_projector

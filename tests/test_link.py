@@ -289,7 +289,7 @@ def test_lines_cross_at_the_time_of_the_clock():
     heard = []
     clock = Clock()
     port = InProcessSerial(desk=Desk(Autograph(VARIANTS["A7"]), heard.append), clock=clock, timeout=SHORT)
-    clock.spend(12.5)
+    clock.advance(12.5)
     answers(port, "*OPC?")
     assert [(event.time, event.direction, event.text) for event in heard] == [
         (0.0, "+", ""),

@@ -25,7 +25,7 @@ SEEDS = range(10)
 
 
 def _run_case(case):
-    return open_batch(load_scenario("akwanga", {"plan.case": f'"{case}"'}), SEEDS).documents()
+    return open_batch(load_scenario("akwanga", {"plan.case": f'"{case}"'}), SEEDS).run()
 
 
 @cache

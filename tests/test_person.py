@@ -101,7 +101,7 @@ def crowd_of(skill):
     """Twelve persons of a skill on film without errors, none of whom slips."""
     scenario = read_once(one_model(observer_of_skill(skill, **WITHOUT_SLIPS), film=Film()))
     crowd = open_batch(scenario, range(12))
-    (records,) = crowd.worked()
+    (records,) = crowd.measure_models()
     return crowd, records
 
 
@@ -122,7 +122,7 @@ def test_the_profiles_differ_in_residuals_in_centres_and_in_time():
 def test_a_novice_in_a_crowd_is_the_novice_at_the_line():
     scenario, seeds = one_model(observer_of_skill("novice")), (4, 5)
     crowd = open_batch(scenario, seeds)
-    (records,) = crowd.worked()
+    (records,) = crowd.measure_models()
     assert all(crowd.bench.crew.slip_log[i] for i in range(len(seeds)))
     for i, seed in enumerate(seeds):
         session = open_session(scenario, seed)
@@ -150,19 +150,19 @@ def test_a_tired_persons_settings_scatter_more_and_a_break_restores_them():
     """The same draws, larger by the factor of the hour; after a break as at the start."""
     tired = open_batch(one_model(Observer(fresh_hours=0.0, fatigue_per_hour=1.0, takes_breaks=True)), (1,)).bench.crew
     fresh = open_batch(one_model(Observer()), (1,)).bench.crew
-    who = tired.everybody
+    who = tired.active
     for crew in (tired, fresh):
         crew.spend(who, 3.0 * HOUR)
-    assert tired.errors(who, 1.0, (50,)) == pytest.approx(4.0 * fresh.errors(who, 1.0, (50,)))
+    assert tired.draw_setting_errors(who, 1.0, (50,)) == pytest.approx(4.0 * fresh.draw_setting_errors(who, 1.0, (50,)))
     tired.begin_round(who, 2)
-    assert tired.errors(who, 1.0, (50,)) == pytest.approx(fresh.errors(who, 1.0, (50,)))
+    assert tired.draw_setting_errors(who, 1.0, (50,)) == pytest.approx(fresh.draw_setting_errors(who, 1.0, (50,)))
     assert tired.timesheet.activities_of(0)["breaks"] == 900.0
 
 
 def test_breaks_are_taken_by_those_who_are_due_only():
     crew = open_batch(one_model(Observer(takes_breaks=True)), (1, 2)).bench.crew
-    crew.spend(crew.everybody[:1], 2.5 * HOUR)
-    crew.begin(crew.everybody, "1", "relative orientation")
+    crew.spend(crew.active[:1], 2.5 * HOUR)
+    crew.begin(crew.active, "1", "relative orientation")
     assert crew.seconds.tolist() == [2.75 * HOUR, 0.0]
 
 
@@ -184,7 +184,7 @@ def test_the_time_adds_up(skill):
 def test_pace_makes_everything_slower_but_breaks():
     slow, usual = (open_batch(one_model(Observer(pace=pace)), (1,)).bench.crew for pace in (1.5, 1.0))
     for crew in (slow, usual):
-        crew.spend(crew.everybody, 10.0, "looking")
+        crew.spend(crew.active, 10.0, "looking")
     assert (slow.seconds[0], usual.seconds[0]) == (15.0, 10.0)
 
 
@@ -343,9 +343,9 @@ def test_drawn_slips_come_as_often_as_their_rates_say():
     """Of four persons who write a thousand readings of by each, with a rate of 5 % of either kind."""
     slipping = Observer(**WITHOUT_SLIPS | {"wrong_sign_rate": 0.05, "transposed_rate": 0.05})
     crew = open_batch(one_model(slipping), range(4)).bench.crew
-    who, nothing = crew.everybody, np.zeros(4)
+    who, nothing = crew.active, np.zeros(4)
     for _ in range(1000):
-        crew.write(who, "1", "by1", np.full(4, 3.12), nothing)
+        crew.transcribe(who, "1", "by1", np.full(4, 3.12), nothing)
     for kind in ("wrong sign", "transposed digits"):
         assert sum(slip.kind == kind for log in crew.slip_log for slip in log) == pytest.approx(200, abs=45)
     written = {slip.written for log in crew.slip_log for slip in log}

@@ -74,7 +74,7 @@ def test_what_excludes_the_largest_model_is_named(flying_height, photo_base, sai
     """At 1:3000 and 470 mm: a base of 91 mm becomes 280.1 mm, the corners of the picture lie 354 mm off the base."""
     flight = Flight.of_heights(152.676, photo_base, (100.0, 110.0), flying_height=flying_height)
     largest = choose_settings(flight, A7).scales[0]
-    assert any(each.startswith(said) for each in largest.against)
+    assert any(each.startswith(said) for each in largest.reason_rejected)
 
 
 def test_a_map_without_a_horizontal_gear_is_refused():

@@ -115,7 +115,7 @@ def test_what_a_folder_had_of_another_strip_is_not_gone_on_with(bridged, tmp_pat
     shutil.copy(bridged / JOURNAL, cut / INDEPENDENT)
     Keeping().prepare(cut, force=True, parts=(INDEPENDENT,))
     assert files_of(cut) == {}
-    assert Keeping(resumes=True).of_part(cut / INDEPENDENT) == Keeping(resumes=False)
+    assert Keeping(resumes=True).for_part(cut / INDEPENDENT) == Keeping(resumes=False)
 
 
 @pytest.mark.parametrize(("left", "begun"), [(None, False), (b"", False), (b'{"schema', False), (b'{}\n{"t"', True)])
@@ -123,4 +123,4 @@ def test_a_part_is_gone_on_with_where_the_header_of_its_journal_is_whole(tmp_pat
     """Cut off sooner, nothing was observed in it, and it is begun anew."""
     if left is not None:
         (tmp_path / JOURNAL).write_bytes(left)
-    assert Keeping(resumes=True).of_part(tmp_path) == Keeping(resumes=begun)
+    assert Keeping(resumes=True).for_part(tmp_path) == Keeping(resumes=begun)

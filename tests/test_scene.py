@@ -34,7 +34,7 @@ def test_a_ray_meets_the_ground_on_the_ground():
     ground = Ground.of(Terrain(mean_height=459.08, relief=28.84, wavelength=700.0, seed=6))
     centre = np.array([440000.0, 985000.0, 1680.0])
     direction = np.array([[30.0, -60.0, 0.0], [80.0, 10.0, 0.0], [-152.0, -152.0, -152.0]])
-    met = ground.met_by(centre, direction)
+    met = ground.intersect(centre, direction)
     np.testing.assert_allclose(met[2], ground.height(met[0], met[1]), atol=0.02)
 
 

@@ -25,7 +25,7 @@ def played(tmp_path, text):
     (tmp_path / "s.a7s").write_text(FIRST + text)
     heard = []
     player = Player(read_script(tmp_path / "s.a7s"), heard.append)
-    return player.play(), [event.text for event in heard if event.direction == ">"], player
+    return player.run(), [event.text for event in heard if event.direction == ">"], player
 
 
 @pytest.mark.parametrize("name", ["interior", "clearing", "centres"])
@@ -33,7 +33,7 @@ def test_the_scripts_of_the_thesis_find_all_that_they_expect(name):
     script = read_script(find_script(name))
     assert sum(isinstance(each, Expect) for each in script.statements) >= 11
     player = Player(script)
-    assert player.play() is None
+    assert player.run() is None
     assert len(player.desk.autograph.recorder.registrations) == {"interior": 0, "clearing": 12, "centres": 24}[name]
 
 

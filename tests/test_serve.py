@@ -234,7 +234,7 @@ def test_the_replies_to_a_line_are_bounded(served):
 
 
 def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
-    with Served(terms=Terms(most_clients=3)) as served:
+    with Served(terms=Terms(max_clients=3)) as served:
         lines = [served.line() for _ in range(3)]
         assert [line.ask("*TST?") for line in lines] == ["0"] * 3
         for _ in range(2 * MAX_REJECTION_NOTICES):
@@ -246,7 +246,7 @@ def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
 
 
 def test_why_a_client_is_turned_away():
-    with Served(terms=Terms(most_clients=1)) as served:
+    with Served(terms=Terms(max_clients=1)) as served:
         assert served.line().ask("*TST?") == "0"
         late = served.line()
         assert late.ask("*IDN?") == '-200,"Execution error;expected at most 1 client at a time"'
@@ -260,7 +260,7 @@ def test_64_clients_are_let_in_unless_said_otherwise(served):
 
 
 def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
-    with Served(terms=Terms(patience=0.5)) as served:
+    with Served(terms=Terms(write_timeout=0.5)) as served:
         other = served.line()
         assert other.ask("*TST?") == "0"
         slow = served.line()
@@ -301,7 +301,7 @@ def test_a_client_that_reads_late_gets_every_reply_in_order(served):
 
 
 def test_who_says_nothing_is_told_and_let_go_and_who_speaks_stays():
-    with Served(terms=Terms(idle=0.4)) as served:
+    with Served(terms=Terms(idle_timeout=0.4)) as served:
         silent, speaking = served.line(), served.line()
         assert silent.ask("SYST:LOCK:REQ?") == "1"
         until = time.monotonic() + 0.8
@@ -357,7 +357,7 @@ def test_a_burst_starves_nobody(served):
 
 
 def test_a_hundred_clients_polling_at_once_are_all_served_alike():
-    with Served(terms=Terms(most_clients=100)) as served:
+    with Served(terms=Terms(max_clients=100)) as served:
         lines = [served.line() for _ in range(100)]
         for n, line in enumerate(lines):
             assert line.ask(f"*ESE {n};*ESE?") == str(n)

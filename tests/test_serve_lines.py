@@ -103,7 +103,7 @@ def test_a_folder_that_is_not_there_is_said_and_every_other_door_is_closed_again
 
 
 def test_a_terminal_whose_client_does_not_read_begins_anew(link):
-    with Served(terms=Terms(patience=0.2), doors=Doors(pty=[link], tcp=[ANYWHERE])) as served:
+    with Served(terms=Terms(write_timeout=0.2), doors=Doors(pty=[link], tcp=[ANYWHERE])) as served:
         first = served.server._terminals[0]._conversation
         far = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(far)
@@ -129,7 +129,7 @@ def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
 
 
 def test_a_terminal_long_silent_frees_its_lock_and_stays(link):
-    with Served(terms=Terms(idle=0.2), doors=Doors(pty=[link])) as served:
+    with Served(terms=Terms(idle_timeout=0.2), doors=Doors(pty=[link])) as served:
         with at(served) as port:
             assert Client(port).ask("SYST:LOCK:REQ?") == "1"
         assert served.until(lambda: served.desk.lock_holder is None)
@@ -203,7 +203,7 @@ def test_a_paced_client_that_hangs_up_its_half_is_answered_to_the_end():
 
 def faulty(spec, seed=1, baud=None):
     return Served(
-        Desk(Autograph(VARIANTS["A7"])), Terms(faults=parse_faults(spec), fault_seed=seed, baud=baud, most_clients=200)
+        Desk(Autograph(VARIANTS["A7"])), Terms(faults=parse_faults(spec), fault_seed=seed, baud=baud, max_clients=200)
     )
 
 
@@ -238,7 +238,7 @@ def test_replies_are_late_by_the_delay_and_in_order():
 def test_bytes_are_garbled_as_often_as_asked_and_line_ends_spared():
     reply = bytes(range(32, 127)) * 100 + b"\n"
     noise = Noise(Faults(garble=0.02), np.random.default_rng(3))
-    came = [noise.carried(reply) for _ in range(10)]
+    came = [noise.apply(reply) for _ in range(10)]
     wrong = sum(a != b for each in came for a, b in zip(each, reply, strict=True))
     assert 0.015 < wrong / (10 * len(reply)) < 0.025
     assert all(each[-1:] == b"\n" for each in came)
@@ -257,7 +257,7 @@ def test_a_line_that_is_cut_takes_its_client_and_nobody_else():
 
 def test_a_cut_is_an_end_not_a_reply():
     with pytest.raises(Cut):
-        Noise(Faults(disconnect=1.0), np.random.default_rng(0)).carried(b"0\n")
+        Noise(Faults(disconnect=1.0), np.random.default_rng(0)).apply(b"0\n")
 
 
 def test_faults_read_as_they_are_written():

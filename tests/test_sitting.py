@@ -41,7 +41,7 @@ def test_who_is_interrupted_leaves_whole_files(what, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        work(load_scenario(name), 1, out, Watcher(begins=interrupt))
+        work(load_scenario(name), 1, out, Watcher(on_activity=interrupt))
     document = results_of(out)
     assert (document["status"], document["message"].split()[-2:]) == ("interrupted", ["was", "interrupted"])
     assert document["operator"]["book_entries"] == len((out / "book.csv").read_text().splitlines()) - 1
@@ -66,7 +66,7 @@ def test_what_fails_for_another_reason_says_so_in_the_file_and_goes_on_up(tmp_pa
         raise Mistake("the lamp has burnt out")
 
     with pytest.raises(Mistake, match="burnt out"):
-        run(load_scenario("akwanga"), 1, tmp_path / "out", Watcher(begins=fail))
+        run(load_scenario("akwanga"), 1, tmp_path / "out", Watcher(on_activity=fail))
     document = results_of(tmp_path / "out")
     assert (document["status"], document["message"]) == ("failed", "the lamp has burnt out")
 

@@ -45,7 +45,7 @@ def line(dice, name):
 
 def worn(name, token=None):
     scenario = load_scenario(name, {"instrument.condition": '"worn"', "instrument.laying_sigma_mm": "0.3"})
-    return Desk(build_autograph(scenario.instrument, build_scene(scenario, 3).drawer, 3), token=token)
+    return Desk(build_autograph(scenario.instrument, build_scene(scenario, 3).mountable, 3), token=token)
 
 
 @pytest.mark.parametrize("name", list(LINES))
@@ -90,7 +90,7 @@ def test_states_that_are_not_what_their_hash_says_are_not_believed(tmp_path):
 
 def test_differences_are_named_by_their_place():
     was, is_now = {"x": {"at": 1.0, "of": [1]}, "y": 2}, {"x": {"at": 1.5, "of": [1]}, "z": 3}
-    assert [(each.part, each.was, each.is_now) for each in differences(was, is_now)] == [
+    assert [(each.part, each.before, each.after) for each in differences(was, is_now)] == [
         ("x.at", 1.0, 1.5),
         ("y", 2, None),
         ("z", None, 3),

@@ -29,7 +29,7 @@ def worked(tmp_path_factory):
     laid = build_study(AT_THE_PLOTTER, tmp_path_factory.mktemp("study"))
     tally = Tally.empty(1, 1)
     run_study(laid, tally, InProcess())
-    linked = laid.tasks[0].linked(0, replicate_seed(laid.study.seed, 0))
+    linked = laid.tasks[0].link_document(0, replicate_seed(laid.study.seed, 0))
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(Task, "linked", lambda task, cell, seed: linked)
         yield laid, tally
@@ -106,4 +106,4 @@ def test_a_response_that_the_study_did_not_keep_as_it_was_is_found_out(worked):
     other = Tally.empty(1, 1)
     other.add(0, np.array([[1.0]]))
     (found,) = audit_study(laid, other, 1)
-    assert (found.place, found.on_the_bench, found.others) == ("hours", 1.0, 0)
+    assert (found.place, found.batch_value, found.others) == ("hours", 1.0, 0)

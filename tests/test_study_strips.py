@@ -77,7 +77,7 @@ def asked(tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("a7sim.study.simulating.documents_of_all_ways", kept)
-        return task.together(SEEDS), by_case
+        return task.run_batch(SEEDS), by_case
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +152,7 @@ def test_cells_are_the_strips_and_a_model_does_not_know_with_which_it_is_combine
     monkeypatch.setattr(
         "a7sim.study.simulating.documents_of_all_ways", lambda scenario, *_, **__: by_case[scenario.plan.case]
     )
-    values = task.together([1, 2, 3])
+    values = task.run_batch([1, 2, 3])
     assert [cell.label for cell in study.cells][:2] == ["model 1 A, model 2 A", "model 1 A, model 2 B"]
     rotation = values[:, 1, 0].reshape(5, 5)
     assert (rotation == rotation[:, :1]).all()
@@ -173,7 +173,7 @@ def test_one_cell_needs_no_session_but_those_of_its_own_cases(tmp_path, monkeypa
     monkeypatch.setattr("a7sim.study.simulating.documents_of_all_ways", worked_already)
     whole = list(combine_strips([replicates[0], replicates[2]], 2, ground, scenario.strip))
     for cell, cases in ((8, ["B", "D"]), (15, ["D", "A"]), (12, ["C"])):
-        assert task.crowded(cell, SEEDS[::2]) == [each[cell] for each in whole]
+        assert task.batch_documents(cell, SEEDS[::2]) == [each[cell] for each in whole]
         assert worked_cases == cases
         worked_cases.clear()
 

@@ -102,7 +102,7 @@ def test_centres_from_two_levels_spread_as_drawn_pointings_do():
 def test_sessions_spread_as_theory_says_and_not_as_least_squares_alone(method):
     """Within what 150 sessions can tell (a quarter); least squares of free parallaxes falls short by more."""
     scenario = quiet(plan__method=method, plan__centre_method="scales")
-    documents = open_batch(scenario, range(150)).documents()
+    documents = open_batch(scenario, range(150)).run()
     predicted = element_errors(scenario, 0)
     ratios = {}
     for name in predicted.names:

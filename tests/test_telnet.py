@@ -15,7 +15,7 @@ def com_port(option, value=b""):
 
 @given(st.binary(max_size=200), st.integers(1, 7))
 def test_binary_data_comes_through_escaping_in_any_pieces(data, size):
-    line = WILL_BINARY + Telnet.escaped(data)
+    line = WILL_BINARY + Telnet.escape(data)
     telnet = Telnet()
     assert b"".join(telnet.received(line[i : i + size])[0] for i in range(0, len(line), size)) == data
 

@@ -102,9 +102,9 @@ def test_an_attempt_that_was_cut_off_goes_on_where_it_was(parallax, tmp_path):
     journal.write_bytes(b"".join(lines[:cut]) + b'{"t":3.0,"cl')
     with resume_attempt(parallax, 4, tmp_path) as room:
         assert room.autograph.element("by1") == 0.3
-        assert [each.point for each in room.account().readings] == ["1011"]
+        assert [each.point for each in room.record().readings] == ["1011"]
         room.desk.open(time=room.clock.now).feed(b'REC "1012",BY1\n', 9.0)
-    assert grade_folder(parallax, 4, tmp_path).minutes == pytest.approx((9.0 - room.witness.began) / 60.0, abs=0.1)
+    assert grade_folder(parallax, 4, tmp_path).minutes == pytest.approx((9.0 - room.action_log.began) / 60.0, abs=0.1)
 
 
 def test_neighbours_have_different_photographs_and_the_same_student_the_same(parallax):
@@ -175,10 +175,10 @@ def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
         )
         for line in lines:
             engine.feed(line, 6.0)
-        account = room.account({"play": "0.08"})
+        account = room.record({"play": "0.08"})
 
         def found(name, **options):
-            return make_metric(Measured(measure=name, options=options)).of(account)
+            return make_metric(Measured(measure=name, options=options)).evaluate(account)
 
         assert found("spread", handles=["by1"]) == Found(0.04, "by' at point 1 read from 0.26 to 0.30")
         assert found("missing-readings", points=["2"]) == Found(1.0, "1 of 1 registration missing: 2")
@@ -198,7 +198,7 @@ def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parall
             for line in lines:
                 engine.feed(line + b"\n", 6.0)
             options = {"points": ["1"], "each": 4}
-            return make_metric(Measured(measure="missing-pointings", options=options)).of(room.account()).value
+            return make_metric(Measured(measure="missing-pointings", options=options)).evaluate(room.record()).value
 
         assert missing_after(b"DRIV:X 50", b"PROJ1:BY 0.3", b"DRIV:X 1", b'REC "1011",BY1') == 3.0
         assert missing_after(b"PROJ1:BY 0.4;:WHE:Y 0.4", b'REC "1011",BY1') == 3.0
@@ -210,12 +210,12 @@ def test_an_answer_that_is_missing_or_no_number_is_told_and_measures_nothing(par
     """What is answered is measured against what was kept back; blanks and capitals of words do not matter."""
     with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
         room.desk.open("client2", time=5.0).feed(b'DRIV:X 20;:REC "1011"\n', 6.0)
-        blank = room.account({})
+        blank = room.record({})
         hidden = {"base": 92.5, "height": 300.0, "sign": ["minus", "-"]}
 
     def found(name, answers, **options):
         account = replace(blank, written=answers, hidden=hidden)
-        return make_metric(Measured(measure=name, options=options)).of(account)
+        return make_metric(Measured(measure=name, options=options)).evaluate(account)
 
     both = {"keys": ["base", "height"]}
     assert found("answers-off", {"base": "92", "height": "301"}, **both) == Found(

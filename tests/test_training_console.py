@@ -38,7 +38,7 @@ def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: 
         port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
         tasks = Checklist(room, attempt).lines
         asyncio.run(sit_down(Console(Seat(lambda: Client(port), lambda: 0.0, drawing=Drawing.HALVES, tasks=tasks))))
-        readings = room.account().readings
+        readings = room.record().readings
         assert [(each.point, each.named) for each in readings] == [("1011", ("by1",))] * 2 + [("A", ("by1",))]
 
 

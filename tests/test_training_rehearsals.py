@@ -22,12 +22,12 @@ def test_a_rehearsal_comes_to_what_the_journal_of_the_same_attempt_gives(number,
     shelved = find_exercise(number)
     played = shelved.exercise.faulty[0]
     rehearsals = Rehearsals(shelved)
-    rehearsals.attempted(shelved.exercise.reference)
-    rehearsed, trouble = rehearsals.attempted(played)
+    rehearsals.run_attempt(shelved.exercise.reference)
+    rehearsed, trouble = rehearsals.run_attempt(played)
     seed = seed_for(shelved, played)
     assert run_attempt(shelved, played, tmp_path, seed) == trouble
     journalled = load_record(shelved, seed, tmp_path)
-    assert len(journalled.deeds) > 0
+    assert len(journalled.actions) > 0
     assert seen(rehearsed) == seen(journalled)
     assert evaluate_metrics(rehearsed) == evaluate_metrics(journalled)
 
@@ -35,6 +35,6 @@ def test_a_rehearsal_comes_to_what_the_journal_of_the_same_attempt_gives(number,
 def test_what_is_rehearsed_leaves_the_opening_as_it_was():
     rehearsals = Rehearsals(find_exercise("9"))
     seed = seed_for(rehearsals.shelved, rehearsals.shelved.exercise.reference)
-    before = rehearsals.left(seed, None)
-    rehearsals.attempted(rehearsals.shelved.exercise.reference)
-    assert seen(rehearsals.left(seed, None)) == seen(before)
+    before = rehearsals.run_and_leave(seed, None)
+    rehearsals.run_attempt(rehearsals.shelved.exercise.reference)
+    assert seen(rehearsals.run_and_leave(seed, None)) == seen(before)

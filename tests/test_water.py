@@ -250,8 +250,8 @@ def test_on_water_no_spot_is_set_and_no_contour_followed():
     scenario = without_errors(load_scenario(LAKE))
     session = open_session(scenario, 1)
     person = session.person
-    person.book.head("", "preparation")
-    bench = Bench(Crew.of_one(person), LineHands(person), replace(session.job, models=session.job.models[:1]))
+    person.book.set_heading("", "preparation")
+    bench = Bench(Crew.single(person), LineHands(person), replace(session.job, models=session.job.models[:1]))
     record = next(measure_models_batch(bench)).of(0)
     view = StereoView(bench, person)
     model = level_model(bench, view, record.points, ground_control(scenario, session.scene), 3750.0)

@@ -14,7 +14,7 @@ from tests.served import ANYWHERE, Served
 
 def new_desk(scenario="akwanga", seed=7):
     loaded = load_scenario(scenario) if isinstance(scenario, str) else scenario
-    return Desk(build_autograph(loaded.instrument, build_scene(loaded, seed).drawer, seed))
+    return Desk(build_autograph(loaded.instrument, build_scene(loaded, seed).mountable, seed))
 
 
 @contextmanager

@@ -40,7 +40,7 @@ def seen_at_six(n_and_seed):
     n, seed = n_and_seed
     plan = {"plan.procedure": '"empirical"', "plan.start_off_gon": "2", "plan.over_correction": n}
     session = open_session(load_scenario("akwanga", plan | {"plan.tolerated_parallax_um": "1000"}), seed)
-    bench = Bench(Crew.of_one(session.person), LineHands(session.person), session.job)
+    bench = Bench(Crew.single(session.person), LineHands(session.person), session.job)
     with suppress(_IsReady):
         next(measure_models_batch(bench, _stop))
     found = orient_model(bench, session.job.models[0]).of(0)

@@ -47,7 +47,7 @@ class Row:
     """What `line` counts: lines of CSV, rows of TOML."""
 
     @property
-    def place(self) -> str:
+    def location(self) -> str:
         """Where the row stands, in words."""
         return f"{self.unit} {self.line}"
 
@@ -239,8 +239,8 @@ def rows_by_key(path: str | Path, rows: Sequence[Row], *columns: str) -> dict[tu
         if key in found:
             shown = " ".join(key)
             raise Mistake(
-                f"{path}, {row.place}, column {columns[-1]}: expected a point of its own, "
-                f"got {shown} as in {found[key].place}"
+                f"{path}, {row.location}, column {columns[-1]}: expected a point of its own, "
+                f"got {shown} as in {found[key].location}"
             )
         found[key] = row
     return found

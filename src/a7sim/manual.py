@@ -118,7 +118,7 @@ class Variant:
     """How far a picture can be shifted and turned on its carrier [assumption; no source at hand]."""
     rates: Rates = Rates()
 
-    def lacks(self, *elements: str) -> list[str]:
+    def missing_elements(self, *elements: str) -> list[str]:
         """Return those of the elements that the plotter does not have."""
         return [name for name in elements if name not in self.elements]
 

@@ -47,7 +47,7 @@ def connect(
         return Client.open(to, timeout, token)
     if token is not None:
         raise Mistake("connect: expected no token beside a scenario, since an instrument in this process asks for none")
-    desk = Desk(Autograph.of_scenario(*_chosen(to, seed)))
+    desk = Desk(Autograph.from_scenario(*_chosen(to, seed)))
     return Client(InProcessSerial(desk=desk, timeout=timeout))
 
 
@@ -66,7 +66,7 @@ class Operator:
     def __init__(self, scenario: Name | Scenario, seed: int | None = None) -> None:
         self.scenario, self.seed = _chosen(scenario, seed)
 
-    def work(
+    def run(
         self,
         link: str | None = None,
         out: Name | None = None,
@@ -104,26 +104,26 @@ class Study:
     ('full', 7)
     """
 
-    laid: Laid
+    loaded: Laid
 
     @classmethod
     def load(cls, name: Name, replicates: int | None = None) -> Self:
         """Return a study of a file, or of one that comes with a7sim. Raises Mistake, which names every mistake."""
         return cls(load_study(Path(name), replicates))
 
-    def work(self, out: Name | None = None, workers: int = 1, *, force: bool = False) -> Document:
+    def run(self, out: Name | None = None, workers: int = 1, *, force: bool = False) -> Document:
         """Work all cells and return the document of findings, as `a7sim study --json` prints it.
 
         Several `workers` are processes: a script that asks for them does so below `if __name__ == "__main__":`. With
         `out` the tables are left there, and a study that was cut off there goes on. Raises Mistake.
         """
         folder = None if out is None else Path(out)
-        tally = open_tally(self.laid, folder, force)
+        tally = open_tally(self.loaded, folder, force)
         with open_executor("process") if workers == 1 else open_executor("pool", workers) as (executor, at_once):
-            run_study(self.laid, tally, executor, at_once, checkpoint_path(folder) if folder is not None else None)
-        document = findings_document(self.laid, tally)
+            run_study(self.loaded, tally, executor, at_once, checkpoint_path(folder) if folder is not None else None)
+        document = findings_document(self.loaded, tally)
         if folder is not None:
-            write_results(folder, self.laid, tally, document)
+            write_results(folder, self.loaded, tally, document)
         return document
 
 

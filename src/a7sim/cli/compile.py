@@ -57,7 +57,7 @@ def command(
     order = resolve_request(scenario, asked, kept)
     wanted = Wanted(name, contours, interval, lines, map_scale, tremor)
     if order.begun_with is not None:
-        wanted = Wanted.of(order.begun_with)
+        wanted = Wanted.from_settings(order.begun_with)
     with progress_bar(_POINTS, told) as watcher:
         document = compile_model(order.scenario, order.seed, wanted, kept.folder, watcher, kept.force, kept.keeping)
     show_results(document, told, map_tables)

@@ -111,7 +111,7 @@ def command(
         name = scenario or USUAL
         overrides = {"instrument.variant": f'"{variant.upper()}"'} if variant else {}
         here = InProcess(name, load_scenario(name, overrides), seed, out, go_on)
-        seat = here.seat
+        seat = here.config
     if serve_in_browser(context):
         return
     if not (is_browser_child() or (sys.stdin.isatty() and sys.stderr.isatty())):
@@ -126,7 +126,7 @@ def command(
             welcome=watch is None and _first_visit(),
         )
     ).run()
-    kept = here.stand_up() if here else None
+    kept = here.close() if here else None
     if kept is not None:
         click.echo(f"the session is kept in {kept}")
 

@@ -55,5 +55,5 @@ def command(
     token = token_from(token_file)
     with progress_bar(POINTS_A_MODEL * len(loaded.models), told) as watcher:
         operator = Operator(loaded, seed)
-        document = operator.work(url, out, force=force, timeout=timeout, token=token, watcher=watcher)
+        document = operator.run(url, out, force=force, timeout=timeout, token=token, watcher=watcher)
     show_results(document, told, session_tables)

@@ -71,7 +71,7 @@ def _document(found: Preparation, variant: str) -> dict[str, Any]:
 
 def _of_scale(scale: ModelScale) -> dict[str, Any]:
     rounded = {name: round(value, 3) if isinstance(value, float) else value for name, value in vars(scale).items()}
-    return rounded | {"against": list(scale.against)}
+    return rounded | {"against": list(scale.reason_rejected)}
 
 
 def _sheet(found: Preparation, variant: str, map_scale: float | None) -> RenderableType:
@@ -85,7 +85,7 @@ def _sheet(found: Preparation, variant: str, map_scale: float | None) -> Rendera
             scale.plan_gear,
             f"{scale.lowest:.1f}-{scale.highest:.1f}",
             f"{scale.bx:.2f}",
-            "chosen" if scale == chosen else "; ".join(scale.against),
+            "chosen" if scale == chosen else "; ".join(scale.reason_rejected),
         )
     to_map = f", {chosen.plan_gear} to the map 1:{map_scale:.0f}" if map_scale is not None else ""
     return Group(

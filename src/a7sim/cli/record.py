@@ -57,7 +57,7 @@ def command(
         signal.signal(getattr(signal, name), lambda *_: stop.set())
     with _door(address) as door:
         prepare_folder(out, force)
-        with Journal(Keeping(durability)).opened(out, header, None) as journal:
+        with Journal(Keeping(durability)).recording(out, header, None) as journal:
             host, port = door.getsockname()[:2]
             where = f"tcp://{Address(host, port)}"
             click.echo(
@@ -65,7 +65,7 @@ def command(
                 nl=False,
             )
             click.echo("" if as_document else "\nready")
-            Between(url, journal.heard, WallClock(), stop).serve(door)
+            Between(url, journal.on_link_event, WallClock(), stop).serve(door)
 
 
 def _header(url: str, scenario: str | None, seed: int | None) -> Header:

@@ -138,9 +138,9 @@ def _replayed(replay: Replay, first: int, verify: bool, pace: Pace, silent: bool
             if not silent:
                 click.echo(f"{'differs':>10} {differs.replayed or 'nothing'}")
     if difference is None:
-        difference = replay.ended()
+        difference = replay.final_difference()
         differing += difference is not None
-    parts = () if difference is None else difference.parts or replay.parts_that_differ(difference.line)
+    parts = () if difference is None else difference.parts or replay.state_differences(difference.line)
     if difference is not None and (verify or not silent):
         _tell(journalled, difference, parts)
     _ended(journalled, differing, difference, len(replay.checkpoints) - known, as_document, silent and not verify)
@@ -149,11 +149,11 @@ def _replayed(replay: Replay, first: int, verify: bool, pace: Pace, silent: bool
 
 
 def _tell(journalled: Journalled, difference: Difference, parts: tuple[Differing, ...]) -> None:
-    click.echo(f"a7sim: {journalled.where(difference.line)}: the first difference", err=True)
+    click.echo(f"a7sim: {journalled.location(difference.line)}: the first difference", err=True)
     click.echo(f"a7sim: the journal has      {difference.journalled or 'nothing'}", err=True)
     click.echo(f"a7sim: the instrument says  {difference.replayed or 'nothing'}", err=True)
     for part in parts[:_MAX_PARTS]:
-        click.echo(f"a7sim: state, {part.part}: {part.was} in the journal, {part.is_now} now", err=True)
+        click.echo(f"a7sim: state, {part.part}: {part.before} in the journal, {part.after} now", err=True)
 
 
 def _ended(
@@ -165,7 +165,7 @@ def _ended(
     silent: bool,
 ) -> None:
     lines = len(journalled) - 1
-    torn = len(journalled.torn)
+    torn = len(journalled.truncated_tail)
     if as_document:
         found = None
         if difference is not None:
@@ -189,13 +189,13 @@ def play_script(session: str, pace: Pace, out: Path | None, force: bool, silent:
     """Play a script, and end with exit code 3 where it and the instrument part."""
     script = read_script(find_script(session))
     journal = Journal()
-    told = Told(lambda text: None if silent else click.echo(text), pace.until, journal.heard)
-    player = Player(script, told.heard)
+    told = Told(lambda text: None if silent else click.echo(text), pace.until, journal.on_link_event)
+    player = Player(script, told.on_link_event)
     if out is not None:
         prepare_folder(out, force)
     header = make_header("replay", script.scenario, script.seed, script=script.file.name)
-    with journal.opened(out, header, player.desk) if out else nullcontext():
-        failed = player.play()
+    with journal.recording(out, header, player.desk) if out else nullcontext():
+        failed = player.run()
     if as_document:
         document = document_header("replay") | {
             "session": str(script.file),

@@ -54,7 +54,7 @@ class InProcess:
             )
 
     @property
-    def seat(self) -> Seat:
+    def config(self) -> Seat:
         """The seat, as it is before anybody has sat down."""
         return Seat(
             self._opened,
@@ -63,7 +63,7 @@ class InProcess:
             sheet=JobSheet(self._scenario.title, self._scenario.camera),
             resumable=self._resumable,
             greeting=lambda: self._greeting,
-            past=self._past,
+            history=self._past,
         )
 
     def _last(self) -> "Left | None":
@@ -82,19 +82,19 @@ class InProcess:
         if last.begun is None:
             self._greeting = f"begun anew, since the last session cannot be gone on with: {last.trouble}"
             return None
-        if not last.worked:
+        if not last.has_changes:
             self._decide(last, True)
             self._greeting = ""
             return None
-        when = datetime.fromtimestamp(last.when).strftime("%Y-%m-%d %H:%M")  # as the person's clock shows it
-        about = f"{format_elapsed(last.lasted)} at the instrument, left {when}, kept in {last.folder}"
+        when = datetime.fromtimestamp(last.last_activity).strftime("%Y-%m-%d %H:%M")  # as the person's clock shows it
+        about = f"{format_elapsed(last.ended_at_s)} at the instrument, left {when}, kept in {last.folder}"
         return Resumable(about, lambda goes_on: self._decide(last, goes_on))
 
     def _decide(self, last: "Left", goes_on: bool) -> None:
         if goes_on:
             self._left = last
-            self._wall = WallClock(now=last.lasted)
-            self._greeting = f"where it stood, {format_elapsed(last.lasted)} at the instrument; ? is help"
+            self._wall = WallClock(now=last.ended_at_s)
+            self._greeting = f"where it stood, {format_elapsed(last.ended_at_s)} at the instrument; ? is help"
 
     def _opened(self) -> Client:
         """Sit down in the chair, which is built when the instrument is first spoken to."""
@@ -103,20 +103,20 @@ class InProcess:
 
             begun = self._left.begun if self._left else None
             self._chair = Chair(self._scenario, self._seed, self._folder, self._clock, begun)
-        return self._chair.sit_down()
+        return self._chair.open()
 
     def _past(self) -> Iterable[Said]:
-        return (Said(each.text, each.dir == "<") for each in self._chair.past()) if self._chair else ()
+        return (Said(each.text, each.dir == "<") for each in self._chair.history()) if self._chair else ()
 
     def _time(self) -> float:
-        self._clock.pass_to(self._wall.now)
+        self._clock.advance_to(self._wall.now)
         return self._clock.now
 
-    def stand_up(self) -> Path | None:
+    def close(self) -> Path | None:
         """End the journal; return the folder where it is, None where nothing was begun."""
         if self._chair is None:
             return None
-        self._chair.stand_up()
+        self._chair.close()
         return self._chair.folder
 
 
@@ -147,7 +147,7 @@ def playback_console(session: str) -> Seat:
     film = open_recording(session)
     title = str(film.journalled.header.get("title", ""))
     return Seat(
-        film.opened,
+        film.open_client,
         lambda: film.frame.time,
         where=session,
         sheet=JobSheet(title),

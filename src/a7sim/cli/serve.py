@@ -93,7 +93,7 @@ def command(
     doors = _doors(tcp, rfc2217, pty)
     token = token_from(token_file)
     _refuse_open_doors(doors, listen_anyway, token)
-    terms = Terms(baud, parse_faults(fault) if fault is not None else None, fault_seed, idle, most_clients=clients)
+    terms = Terms(baud, parse_faults(fault) if fault is not None else None, fault_seed, idle, max_clients=clients)
     if kept.resume is not None:
         served = _served_again(resolve_resume(kept.resume, *_OF_THE_DOOR), token, kept.keeping)
     else:
@@ -115,18 +115,18 @@ class Served:
 
 
 def _served_anew(scenario: Scenario, seed: int, token: str | None, realtime: bool, kept: Kept) -> Served:
-    autograph = Autograph.of_scenario(scenario, seed)
+    autograph = Autograph.from_scenario(scenario, seed)
     journal = Journal(kept.keeping)
-    desk = Desk(autograph, journal.heard if kept.out else None, token, 0.0 if realtime else POLL_SECONDS)
+    desk = Desk(autograph, journal.on_link_event if kept.out else None, token, 0.0 if realtime else POLL_SECONDS)
     header = make_header("serve", scenario, seed, realtime=realtime, login=token is not None)
-    return Served(_head(scenario, seed), desk, _clock(realtime), journal.opened(kept.out, header, desk))
+    return Served(_head(scenario, seed), desk, _clock(realtime), journal.recording(kept.out, header, desk))
 
 
 def _served_again(begun: Begun, token: str | None, keeping: Keeping) -> Served:
     if begun.setting("login") != (token is not None):
         asked, given = ("a", "none") if token is None else ("no", "one")
         raise Mistake(
-            f"{begun.journalled.where(1)}: expected {asked} token, as the session was begun with, got {given}"
+            f"{begun.journalled.location(1)}: expected {asked} token, as the session was begun with, got {given}"
         )
     journal = Journal(keeping)
     desk, now, _ = restore_instrument(begun, journal)

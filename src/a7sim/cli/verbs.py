@@ -11,8 +11,8 @@ from click.shell_completion import CompletionItem
 class Verb(NamedTuple):
     """Where a command stands, as `module:name`, and what a list of commands says of it."""
 
-    where: str
-    about: str
+    import_path: str
+    short_help: str
 
 
 class Verbs(click.Group):
@@ -30,17 +30,17 @@ class Verbs(click.Group):
         """Import and return a verb's command."""
         if cmd_name not in self._verbs:
             return None
-        module, _, name = self._verbs[cmd_name].where.partition(":")
+        module, _, name = self._verbs[cmd_name].import_path.partition(":")
         command = getattr(importlib.import_module(module), name)
         return command if isinstance(command, click.Command) else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write what the verbs are about."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, verb.about) for name, verb in self._verbs.items()])
+            formatter.write_dl([(name, verb.short_help) for name, verb in self._verbs.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the verbs that begin so, and the group's own options."""
         named = ((name, verb) for name, verb in self._verbs.items() if name.startswith(incomplete))
         own = click.Command.shell_complete(self, ctx, incomplete)
-        return [*(CompletionItem(name, help=verb.about) for name, verb in named), *own]
+        return [*(CompletionItem(name, help=verb.short_help) for name, verb in named), *own]

@@ -65,7 +65,7 @@ def _of_levels(path: Path) -> Outcome:
         key = row.texts["point"], row.numbers["level"]
         if key in by_level:
             raise Mistake(
-                f"{path}, {row.place}, column level: expected point {key[0]} once at every level, "
+                f"{path}, {row.location}, column level: expected point {key[0]} once at every level, "
                 f"got it twice at {key[1]:g}"
             )
         by_level[key] = np.array([row.numbers["X"], row.numbers["Y"]])
@@ -125,7 +125,7 @@ def _of_base_scale(path: Path) -> Outcome:
     base, column, height = point_columns([rows[name,] for name in names], ("base", "column", "height"))
     if not (base > 0.0).all():
         row = next(row for row in rows.values() if not row.numbers["base"] > 0.0)
-        raise Mistake(f"{path}, {row.place}, column base: expected a base above 0 mm, got {row.numbers['base']:g}")
+        raise Mistake(f"{path}, {row.location}, column base: expected a base above 0 mm, got {row.numbers['base']:g}")
     left, right = a8_centres(base, column, height)
     document = document_header("reduce centres") | {
         "method": "a8",

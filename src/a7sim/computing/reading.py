@@ -118,12 +118,14 @@ def read_ground(path: Path) -> Ground:
         role = row.texts["role"]
         if role not in ROLES:
             raise Mistake(
-                f"{path}, {row.place}, column role: expected control, plan, height or check, got {role[:40]!r}"
+                f"{path}, {row.location}, column role: expected control, plan, height or check, got {role[:40]!r}"
             )
         empty = [axis for axis in "XYZ" if np.isnan(row.numbers[axis])]
         missing = [axis for axis in _NEEDED[role] if axis in empty] or (empty if len(empty) == 3 else [])
         if missing:
-            raise Mistake(f"{path}, {row.place}, column {missing[0]}: expected a number at a {role} point, got nothing")
+            raise Mistake(
+                f"{path}, {row.location}, column {missing[0]}: expected a number at a {role} point, got nothing"
+            )
     ordered = sorted(rows, key=lambda row: natural_sort_key(row.texts["point"]))
     return Ground(point_names(ordered), point_columns(ordered, "XYZ"), tuple(row.texts["role"] for row in ordered))
 

@@ -65,7 +65,9 @@ class Console(Hearing, Deeds, App[None]):
         self.playback = Playback(seat.film, self.ask, self.show_frame) if seat.film else None
         self._by_key = actions_by_key(seat.keymap, seat.watching)
         self._early: deque[events.Key] | None = deque()
-        self.main = Front(self.binocular, self.key_pressed, self.utf8, seat.goal or WELCOME * seat.welcome, seat.tasks)
+        self.main = Front(
+            self.binocular, self.key_pressed, self.utf8, seat.exercise_goal or WELCOME * seat.welcome, seat.tasks
+        )
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = seat.theme
@@ -106,7 +108,7 @@ class Console(Hearing, Deeds, App[None]):
 
     def on_unmount(self) -> None:
         """End the conversation."""
-        self.station.leave()
+        self.station.stop()
 
     def say(self, words: str, refused: bool = False) -> None:
         """Show a message."""
@@ -115,7 +117,7 @@ class Console(Hearing, Deeds, App[None]):
     def _masthead(self) -> None:
         if self.met is not None and self.main.is_there:
             job = self.seat.sheet.title or self.seat.where
-            self.main.head(header_text(self.met.identity, self.dials, job, self.seat.time(), self.size.width))
+            self.main.show_header(header_text(self.met.identity, self.dials, job, self.seat.time(), self.size.width))
 
     def next_panel(self) -> None:
         """Show the next panel at the right of a narrow screen."""
@@ -132,7 +134,7 @@ class Console(Hearing, Deeds, App[None]):
         elif name is None:
             return False
         else:
-            self.do(name)
+            self.run_by_name(name)
         return True
 
     def press_early_keys(self) -> None:
@@ -149,8 +151,8 @@ class Console(Hearing, Deeds, App[None]):
                 self.set_timer(SETTLING_S, self.press_early_keys)
             else:
                 if name is not None:
-                    self.do(name)
-                self.afterwards(self.press_early_keys)
+                    self.run_by_name(name)
+                self.call_after_orders(self.press_early_keys)
 
     @property
     def _settled(self) -> bool:
@@ -169,7 +171,7 @@ class Console(Hearing, Deeds, App[None]):
         """Return what the palette lists: every deed by its name, and the library's own."""
         for deed in actions_for(self.seat.watching, self.seat.film is not None):
             keys = " ".join(key_display(key, not self.utf8) for key in self.seat.keymap[deed.name])
-            yield SystemCommand(deed.about, f"{deed.group}, {keys}", partial(self.do, deed.name))
+            yield SystemCommand(deed.description, f"{deed.group}, {keys}", partial(self.run_by_name, deed.name))
         yield from super().get_system_commands(screen)
 
     # --- panels ---------------------------------------------------------------------------------------
@@ -187,11 +189,11 @@ class Console(Hearing, Deeds, App[None]):
         unstruck = any(not entry.struck for entry in self.entries)
         keys, magnification = key_labels(self.seat.keymap, not self.utf8), self.view.magnification
         if self.seat.watching:
-            self.main.hint(
+            self.main.show_hints(
                 hints_to_watch(keys, magnification, None if self.playback is None else self.playback.playing)
             )
         else:
-            self.main.hint(hints(keys, self.hands, magnification, self.point, pricked, unstruck))
+            self.main.show_hints(hints(keys, self.hands, magnification, self.point, pricked, unstruck))
         self._masthead()
 
     # --- what widgets tell ---------------------------------------------------------------------------
@@ -203,15 +205,15 @@ class Console(Hearing, Deeds, App[None]):
 
     @on(Wheeled)
     def _wheeled(self, event: Wheeled) -> None:
-        if not self.hands_off():
+        if not self.reject_if_watching():
             self.wheel(event.drum, event.way)
 
     @on(Pointed)
     def _pointed(self, event: Pointed) -> None:
-        if not self.hands_off():
-            self.drive_near(event.projector, event.point)
+        if not self.reject_if_watching():
+            self.approach_point(event.projector, event.point)
 
     @on(Eyepiece.Clicked)
     def _clicked(self, event: Eyepiece.Clicked) -> None:
-        if not self.hands_off():
+        if not self.reject_if_watching():
             self.clicked(event.across, event.up)

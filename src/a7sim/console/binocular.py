@@ -26,7 +26,7 @@ class View:
     merged: str = "side by side"
 
     @property
-    def in_one(self) -> bool:
+    def is_merged(self) -> bool:
         """Whether both pictures are shown in one eyepiece."""
         return self.merged != "side by side" and self.drawing is Drawing.HALVES
 
@@ -65,9 +65,9 @@ class Binocular(Horizontal):
         """Open and close the eyepieces as the view has them."""
         view = self.view
         for eye, eyepiece in self._eyes.items():
-            closed = eye == 2 if view.in_one else eye not in view.eyes
+            closed = eye == 2 if view.is_merged else eye not in view.eyes
             eyepiece.set_class(closed, "-closed")
-            eyepiece.border_title = view.merged if view.in_one else NAMES[eye]
+            eyepiece.border_title = view.merged if view.is_merged else NAMES[eye]
             eyepiece.border_subtitle = f"x{view.magnification:g}"
 
     def look(self, point: str | None) -> Look:
@@ -76,7 +76,7 @@ class Binocular(Horizontal):
         open_ones = [each for each in self._eyes.values() if not each.has_class("-closed")]
         cells = min((each.cells for each in open_ones), default=(0, 0))
         columns, rows = picture_size(view.drawing, *cells)
-        eyes = (1, 2) if view.in_one else view.eyes
+        eyes = (1, 2) if view.is_merged else view.eyes
         return Look(columns, rows, view.magnification, eyes, point if view.drawing is Drawing.WORDS else None)
 
     def draw(self, sight: Sight) -> None:
@@ -85,7 +85,7 @@ class Binocular(Horizontal):
         view = self.view
         fitting = {eye: greys for eye, greys in sight.pictures.items() if is_drawn_as(view.drawing, greys)}
         pictures = {eye: apply_vignette(greys) for eye, greys in fitting.items()}
-        both = view.in_one and len(pictures) == 2
+        both = view.is_merged and len(pictures) == 2
         if both and view.merged == "anaglyph":
             self._eyes[1].show(overlay_mark(anaglyph(pictures[1], pictures[2]), self._mark), in_colours=True)
             return

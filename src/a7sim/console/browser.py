@@ -49,7 +49,7 @@ class Visitors:
         self._alarm = asyncio.get_running_loop().call_later(self.idle_s, self.left_alone)
 
     @contextmanager
-    def looking_on(self, page: web.WebSocketResponse) -> Iterator[None]:
+    def page_open(self, page: web.WebSocketResponse) -> Iterator[None]:
         """Take a page for open."""
         if self._alarm is not None:
             self._alarm.cancel()
@@ -91,7 +91,7 @@ class BrowserServer(Server):
         return {"title": TITLE, "websocket": f"ws://{request.host}/ws", "font_size": size}
 
     async def _process_messages(self, websocket: web.WebSocketResponse, app_service: AppService) -> None:
-        with self._visitors.looking_on(websocket):
+        with self._visitors.page_open(websocket):
             await super()._process_messages(websocket, app_service)
 
 

@@ -28,9 +28,9 @@ ACTIONS_WHILE_DISCONNECTED = ("quit", "help")
 class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeeds):
     """The deeds of a console."""
 
-    def do(self, name: str) -> None:
+    def run_by_name(self, name: str) -> None:
         """Do what a key or the palette asks for."""
-        if (self._console.dials is None and name not in ACTIONS_WHILE_DISCONNECTED) or self.hands_off(name):
+        if (self._console.dials is None and name not in ACTIONS_WHILE_DISCONNECTED) or self.reject_if_watching(name):
             return
         if name in _TURNS:
             self.move(*_TURNS[name])
@@ -54,11 +54,11 @@ class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeed
 
         def chosen(name: str | None) -> None:
             if name is not None:
-                self.drive_near(projector, name)
+                self.approach_point(projector, name)
 
         console.push_screen(Choose("drive near a point", choices), chosen)
 
-    def drive_near(self, projector: int, point: str) -> None:
+    def approach_point(self, projector: int, point: str) -> None:
         """Drive near a point of the sketch of what lies in a projector."""
         console = self._console
         variant, dials = self._at()
@@ -74,9 +74,9 @@ class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeed
             console.refresh_panels()
 
         console.say(f"driving to point {point} ...")
-        console.ask(partial(reach.near, point=point), arrived)
+        console.ask(partial(reach.drive_near, point=point), arrived)
 
-    def do_say(self) -> None:
+    def action_send_line(self) -> None:
         """Say a line of the command language."""
         self._console.push_screen(Ask("say", note="a line of the command language"), self._said)
 

@@ -123,6 +123,6 @@ def help_text(keymap: Keymap, plain: bool, watching: bool = False, film: bool = 
         for deed in deeds:
             if deed.group == group:
                 keys = " ".join(key_display(key, plain) for key in keymap[deed.name])
-                lines.append(f"  {keys:<10} {deed.about}")
+                lines.append(f"  {keys:<10} {deed.description}")
         lines.append("")
     return "\n".join(lines)

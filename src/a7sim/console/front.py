@@ -127,13 +127,13 @@ class Front(Screen[None]):
         progress.update(words)
         progress.set_class(True, "-shown")
 
-    def head(self, words: str) -> None:
+    def show_header(self, words: str) -> None:
         """Show the masthead."""
         masthead = self.query_one("#masthead", Static)
         if str(masthead.content) != words:
             masthead.update(words)
 
-    def hint(self, hints: Hints) -> None:
+    def show_hints(self, hints: Hints) -> None:
         """Show which keys do something now."""
         if hints != self._hinted:
             self._hinted = hints

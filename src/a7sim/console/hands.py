@@ -21,26 +21,26 @@ class Hands:
 
     name: str = "by"
     side: int = 1
-    rung: int = STEP_SIZES.index(1.0)
+    step_index: int = STEP_SIZES.index(1.0)
     free: bool = False
 
     @property
     def step(self) -> float:
         """The present step, mm or gon or units of a counter."""
-        return STEP_SIZES[self.rung]
+        return STEP_SIZES[self.step_index]
 
     @property
     def element(self) -> str:
         """The element in hand, such as by1 or bx."""
         return self.name if self.name in SIDELESS_ELEMENTS else f"{self.name}{self.side}"
 
-    def on(self, variant: Variant) -> "Hands":
+    def valid_for(self, variant: Variant) -> "Hands":
         """Return the hands at a plotter that may not have what they held."""
         return self if self.element in variant.elements else replace(self, name="kappa")
 
     def stepping(self, rungs: int) -> "Hands":
         """Return the hands with a larger or smaller step."""
-        return replace(self, rung=min(max(self.rung + rungs, 0), len(STEP_SIZES) - 1))
+        return replace(self, step_index=min(max(self.step_index + rungs, 0), len(STEP_SIZES) - 1))
 
     def turned(self, way: int) -> str:
         """Return the line that turns the element in hand by a step, forward or back."""

@@ -45,9 +45,9 @@ class Hearing(Sitting):
             answer = work(client)
             console.post_message(Done(partial(then, answer)))
 
-        console.station.order(order)
+        console.station.submit(order)
 
-    def afterwards(self, then: Callable[[], None]) -> None:
+    def call_after_orders(self, then: Callable[[], None]) -> None:
         """Go on when all that was ordered so far is said, and what came of it is known."""
         self.ask(lambda _: None, lambda _: then())
 
@@ -81,7 +81,7 @@ class Hearing(Sitting):
         console = self._console
         first = console.met is None
         console.met = met
-        console.hands = console.hands.on(met.variant)
+        console.hands = console.hands.valid_for(met.variant)
         if console.silent is not None:
             console.silent = None
             console.say("the instrument answers again")
@@ -95,7 +95,7 @@ class Hearing(Sitting):
     def _begin(self, met: Met) -> None:
         """Take up what was there before anybody sat down here."""
         console = self._console
-        past = console.seat.past
+        past = console.seat.history
         watching = console.seat.watching
         self.ask(
             lambda client: recover_presets(met.variant, past(), "" if watching else unquote(client.ask("GEAR:HEIG?"))),

@@ -21,7 +21,7 @@ class Deed:
 
     name: str
     keys: tuple[str, ...]
-    about: str
+    description: str
     group: str
 
 
@@ -103,7 +103,7 @@ def sample() -> str:
     width = max(len(deed.name) for deed in ACTIONS)
     for deed in ACTIONS:
         keys = ", ".join(f"'{key}'" if '"' in key else f'"{key}"' for key in deed.keys)
-        lines.append(f"{deed.name:<{width}} = [{keys}]  # {deed.about}")
+        lines.append(f"{deed.name:<{width}} = [{keys}]  # {deed.description}")
     return "\n".join(lines) + "\n"
 
 

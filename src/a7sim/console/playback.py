@@ -60,7 +60,7 @@ class Playback:
         """Run to a step, as far as there is one."""
         self._since = None
         aim = self._aim = min(max(step, 0), self.film.steps)
-        self._run(lambda _: self.film.run_to(aim))
+        self._run(lambda _: self.film.seek(aim))
 
     def go_by(self, steps: int) -> None:
         """Pause, and run on or back by so many steps."""
@@ -77,7 +77,7 @@ class Playback:
 
     def jump(self, words: str) -> None:
         """Run to the step that a number, a time or the text of a note names. Raises Mistake where there is none."""
-        self.go_to(self.film.sought(words))
+        self.go_to(self.film.find_step(words))
 
     def tick(self) -> None:
         """Run on by what is due."""
@@ -91,11 +91,11 @@ class Playback:
         else:
             step = self.film.step_at(self._due())
             if step > self.frame.step:
-                self._run(lambda _: self.film.run_to(step))
+                self._run(lambda _: self.film.seek(step))
 
     def _run_on(self, _: Client) -> "Frame":
         until = monotonic() + RUN_S
-        return self.film.run_on(lambda: monotonic() >= until)
+        return self.film.advance_until(lambda: monotonic() >= until)
 
     def _due(self) -> float:
         """Return how late it is in the film by the wall's clock, counted from when it was last set going."""
@@ -125,7 +125,7 @@ class Playback:
         frame = self.frame
         pace = "max" if math.isinf(self.speed) else f"{self.speed:g}x"
         state = f"playing {pace}" if self.playing else f"paused ({pace})"
-        return f"{state}  step {frame.step} of {self.film.steps}  {format_elapsed(frame.time)}  {frame.said}".rstrip()
+        return f"{state}  step {frame.step} of {self.film.steps}  {format_elapsed(frame.time)}  {frame.line}".rstrip()
 
 
 def jump_with_message(playback: Playback, words: str) -> str | None:

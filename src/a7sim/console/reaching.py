@@ -99,7 +99,7 @@ class Reach:
     projector: int
     sketch: Mapping[str, Place]
 
-    def near(self, client: Client, point: str) -> bool:
+    def drive_near(self, client: Client, point: str) -> bool:
         """Drive until the eye sees the point near the mark; return whether it does."""
         for dx, dy in _outward():
             x, y = self.sketch[point]

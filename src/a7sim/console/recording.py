@@ -39,7 +39,7 @@ class RecordingDeeds(Sitting):
 
     def do_strike(self) -> None:
         """Strike the last reading out that is not struck yet, once all that was ordered before is in the book."""
-        self._console.afterwards(self._strike_last)
+        self._console.call_after_orders(self._strike_last)
 
     def _strike_last(self) -> None:
         console = self._console
@@ -47,7 +47,7 @@ class RecordingDeeds(Sitting):
         if last is None:
             console.say("there is nothing in the book to strike out")
             return
-        console.station.say(f"REC:STR {last.number},{quote_text(STRIKE_REASON)}")
+        console.station.send(f"REC:STR {last.number},{quote_text(STRIKE_REASON)}")
         console.entries = tuple(entry.struck_out() if entry is last else entry for entry in console.entries)
         console.say(f"struck out {last.number}: {last.point}")
         console.refresh_panels()
@@ -58,7 +58,7 @@ class RecordingDeeds(Sitting):
 
         def noted(text: str | None) -> None:
             if text is not None:
-                console.station.say(f"NOTE {quote_text(text)}")
+                console.station.send(f"NOTE {quote_text(text)}")
                 console.say(f"noted: {text}")
 
         console.push_screen(Ask("note"), noted)

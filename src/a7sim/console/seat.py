@@ -43,7 +43,7 @@ class Seat:
     theme: str = "enamel"
     tasks: Callable[[], Sequence[str]] | None = None
     """What there is to do, a line each, asked again every second; None where nobody has set any tasks."""
-    goal: str = ""
+    exercise_goal: str = ""
     """What is to be reached, told over the eyepieces until the first key."""
     welcome: bool = False
     """Whether to tell a first-time visitor what there is."""
@@ -51,7 +51,7 @@ class Seat:
     """Looks for a session to go on with, once the screen is there."""
     greeting: Callable[[], str] = lambda: ""
     """What is to be said when the instrument first answers."""
-    past: Callable[[], Iterable[Said]] = tuple
+    history: Callable[[], Iterable[Said]] = tuple
     """What was said in the session that is gone on with."""
     watching: bool = False
     """Whether somebody else turns and this console only shows it."""

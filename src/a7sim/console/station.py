@@ -56,41 +56,41 @@ class Station:
         """Begin the conversation."""
         self._thread.start()
 
-    def leave(self) -> None:
+    def stop(self) -> None:
         """End the conversation once what was ordered is said."""
         self._leaving.set()
         self._orders.put(None)
         if self._thread.is_alive():
             self._thread.join(timeout=2.0)
 
-    def order(self, order: Order) -> None:
+    def submit(self, order: Order) -> None:
         """Have something said; the dials are read afterwards."""
         with self._counting:
             self._waiting += 1
             self._at_rest.clear()
         self._orders.put(order)
 
-    def say(self, *lines: str) -> None:
+    def send(self, *lines: str) -> None:
         """Have lines said that ask nothing."""
 
         def said(client: Client) -> None:
             for line in lines:
                 client.send(line)
 
-        self.order(said)
+        self.submit(said)
 
     def look(self, look: Look) -> None:
         """Change what the eyepieces are to show."""
         if look != self._look:
             self._look = look
-            self.order(lambda _: None)
+            self.submit(lambda _: None)
 
-    def settled(self, timeout: float) -> bool:
+    def wait_idle(self, timeout: float) -> bool:
         """Wait until all that was ordered is said and shown; return whether it came to that."""
         return self._at_rest.wait(timeout)
 
     @property
-    def at_rest(self) -> bool:
+    def is_idle(self) -> bool:
         """Whether all that was ordered is said and shown."""
         return self._at_rest.is_set()
 

@@ -20,7 +20,7 @@ class TurningDeeds(Sitting):
             reading = float(client.ask(f"COUN:{axis}?")) if hands.free and axis != "Z" else 0.0
             client.send(hands.moved(axis, way, reading))
 
-        console.station.order(order)
+        console.station.submit(order)
 
     def take_up(self, name: str) -> None:
         """Take up an element, if the plotter has it."""
@@ -50,11 +50,11 @@ class TurningDeeds(Sitting):
 
     def do_turn_up(self) -> None:
         """Turn the element in hand forward."""
-        self._console.station.say(self._console.hands.turned(1))
+        self._console.station.send(self._console.hands.turned(1))
 
     def do_turn_down(self) -> None:
         """Turn the element in hand back."""
-        self._console.station.say(self._console.hands.turned(-1))
+        self._console.station.send(self._console.hands.turned(-1))
 
     def wheel(self, drum: str, way: int) -> None:
         """Turn the drum under the mouse; an element is taken up by it."""
@@ -69,7 +69,7 @@ class TurningDeeds(Sitting):
             replace(console.hands, name=drum if bare else drum[:-1], side=console.hands.side if bare else int(drum[-1]))
         )
         if way:
-            console.station.say(console.hands.turned(way))
+            console.station.send(console.hands.turned(way))
 
     def do_free_hand(self) -> None:
         """Let X and Y go free of the wheels, or take the wheels again."""
@@ -95,7 +95,7 @@ class TurningDeeds(Sitting):
         scale = pitch * height / dials.element("c1")
         dx, dy = across * scale, 2 * up * scale
         x, y = (console.presets.unit(variant, axis) * each for axis, each in (("X", dx), ("Y", dy)))
-        console.station.say(f"DRIV:X {dials.counter('X') + x:.2f};Y {dials.counter('Y') + y:.2f}")
+        console.station.send(f"DRIV:X {dials.counter('X') + x:.2f};Y {dials.counter('Y') + y:.2f}")
 
     def do_set(self) -> None:
         """Set the element in hand to a reading."""
@@ -105,7 +105,7 @@ class TurningDeeds(Sitting):
         data = variant.elements[element]
         note = f"{data.low:g} to {data.high:g} {unit(variant, element)}; it stands at {dials.elements[element]}"
         self._ask_number(
-            f"set {element_label(element)} to", note, lambda value: console.station.say(f"{header(element)} {value:g}")
+            f"set {element_label(element)} to", note, lambda value: console.station.send(f"{header(element)} {value:g}")
         )
 
     def do_drive(self) -> None:
@@ -113,4 +113,4 @@ class TurningDeeds(Sitting):
         self._ask_axes("run to readings", "such as: X 97.5 Y -12 Z -325.71", self._drive)
 
     def _drive(self, readings: list[tuple[str, str]]) -> None:
-        self._console.station.say(*(f"DRIV:{axis} {reading}" for axis, reading in readings))
+        self._console.station.send(*(f"DRIV:{axis} {reading}" for axis, reading in readings))

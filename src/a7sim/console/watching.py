@@ -19,7 +19,7 @@ _LOOKED = {deed.name for deed in actions_for(watching=True) if deed.group in VIE
 class WatchingDeeds(Sitting):
     """The deeds of who watches."""
 
-    def hands_off(self, deed: str = "") -> bool:
+    def reject_if_watching(self, deed: str = "") -> bool:
         """Return whether a deed is not for who watches, and say so."""
         console = self._console
         if not console.seat.watching or deed in _LOOKED or (console.playback is not None and deed in _PLAYED):
@@ -40,8 +40,8 @@ class WatchingDeeds(Sitting):
         if frame.point != console.point:
             console.point = frame.point
             console.look()
-        if frame.trouble:
-            console.say(frame.trouble, refused=True)
+        if frame.error:
+            console.say(frame.error, refused=True)
         elif frame.step == playback.film.steps:
             console.say("the end of the session")
         self._progress()

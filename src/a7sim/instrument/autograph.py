@@ -76,7 +76,7 @@ class Autograph:
                 high,
                 variant.carriages_at_rest[axis],
                 play=self._condition.carriage_backlash_mm,
-                runout=_runout_of(self._condition, axis, variant.carriage_lead_mm),
+                periodic_error=_runout_of(self._condition, axis, variant.carriage_lead_mm),
             )
             for axis, (low, high) in variant.carriages.items()
         }
@@ -98,7 +98,7 @@ class Autograph:
         self._rods = {n: 1e-3 * np.array(each.rod_um) if any(each.rod_um) else None for n, each in projectors.items()}
 
     @classmethod
-    def of(cls, instrument: Instrument, photographs: Mapping[str, Photograph], seed: int) -> Self:
+    def from_parts(cls, instrument: Instrument, photographs: Mapping[str, Photograph], seed: int) -> Self:
         """Return the instrument of a scenario with its photographs in the drawer."""
         return cls(
             VARIANTS[instrument.variant],
@@ -110,9 +110,9 @@ class Autograph:
         )
 
     @classmethod
-    def of_scenario(cls, scenario: Scenario, seed: int) -> Self:
+    def from_scenario(cls, scenario: Scenario, seed: int) -> Self:
         """Return the instrument of a scenario, with the photographs and faults that a seed draws. Raises Mistake."""
-        return cls.of(scenario.instrument, build_scene(scenario, seed).drawer, seed)
+        return cls.from_parts(scenario.instrument, build_scene(scenario, seed).mountable, seed)
 
     def _element_spindle(self, name: str, element: Element) -> Spindle:
         condition = self._condition
@@ -139,11 +139,11 @@ class Autograph:
 
     def turn_element(self, name: str, amount: float) -> None:
         """Turn the drum of an element by so much of its counter, to wherever between two counts that is."""
-        self._run_element(name, self._spindle(name).after(amount))
+        self._run_element(name, self._spindle(name).value_after_turn(amount))
 
     def _run_element(self, name: str, target: float, rng: np.random.Generator | None = None) -> None:
         spindle = self._spindle(name)
-        if name in MOVE_CENTRES and spindle.allows(target):
+        if name in MOVE_CENTRES and spindle.within_range(target):
             self._refuse_if_rods_cannot(elements={name: target})
         self._turn(name, target, rng)
         self._forget_poses(*(projector for projector in (1, 2) if name.endswith(str(projector))))
@@ -211,7 +211,7 @@ class Autograph:
         if seconds > 0.0:
             self._taken[part] = self._taken.get(part, 0.0) + seconds
 
-    def time_taken(self) -> dict[str, float]:
+    def pop_travel_times(self) -> dict[str, float]:
         """Return how many seconds each part has moved since this was last asked, those that did not left out.
 
         State changes at once: what is read meanwhile is what stands at the end of the movement.
@@ -235,7 +235,7 @@ class Autograph:
             "base_mode": self.base_mode,
             "fittings": dict(self.fittings.as_words()),
             "carriers": {
-                str(n): [each.photograph.name, list(each.laid), list(each.centring)]
+                str(n): [each.photograph.name, list(each.placement), list(each.centring)]
                 for n, each in sorted(self._carriers.items())
             },
             "dice": [str(dice["state"]["state"]), str(dice["state"]["inc"]), dice["has_uint32"], dice["uinteger"]],
@@ -264,12 +264,12 @@ class Autograph:
             "has_uint32": has_uint32,
             "uinteger": uinteger,
         }
-        self.register_again(state)
+        self.restore_registrations(state)
         self._taken.clear()
         self._mark = None
         self._forget_poses()
 
-    def register_again(self, state: State) -> None:
+    def restore_registrations(self, state: State) -> None:
         """Register what a state holds on top of what is registered."""
         for number, point, readings, struck in state["registered"]:
             self.recorder.apply(Registration(number, point, tuple((name, text) for name, text in readings), struck))
@@ -311,11 +311,11 @@ class Autograph:
         """Run a carriage until its counter shows a reading, and on if the counter slipped on the way."""
         counter = self._counters[axis]
         self._move(axis, counter.position(reading))
-        if counter.slip_share and abs(counter.position(reading) - self._carriages[axis].at) > counter.half_a_count:
+        if counter.slip_share and abs(counter.position(reading) - self._carriages[axis].at) > counter.half_count:
             with suppress(OutOfRange):
                 self._move(axis, counter.position(reading))
 
-    def wheel(self, axis: str, amount: float) -> None:
+    def turn_handwheel(self, axis: str, amount: float) -> None:
         """Turn a handwheel by so many counter units; its collar decides which way the carriage goes."""
         polarity = self._polarity()
         sense = handwheel_senses(self._acting_fittings(polarity), polarity)[axis]
@@ -325,9 +325,9 @@ class Autograph:
     def _move(self, axis: str, position: float) -> None:
         spindle = self._carriages[axis]
         at_end = min(max(position, spindle.low), spindle.high)
-        if abs(at_end - position) <= self._counters[axis].half_a_count:
+        if abs(at_end - position) <= self._counters[axis].half_count:
             position = at_end
-        if not spindle.allows(position):
+        if not spindle.within_range(position):
             low, high = self.counter_limits(axis)
             got = self._counters[axis].reading(position)
             raise OutOfRange(f"{axis} expected {low:.2f} to {high:.2f} on its counter, got {got:.10g}")
@@ -336,7 +336,7 @@ class Autograph:
         spindle.turn_to(position)
         self._mark = None
         self._takes(axis, abs(position - before) / self.variant.rates.carriage)
-        self._counters[axis].passed(before, position, self._rng)
+        self._counters[axis].advance(before, position, self._rng)
 
     def set_height_gear(self, gear: str | float) -> None:
         """Engage a height gear by its combination or by its counter units a mm."""
@@ -425,7 +425,7 @@ class Autograph:
         photograph = self._photographs[name]
         shift, turn = self._laying_sigmas
         dx, dy, dkappa = self._rng.standard_normal(3) * (shift, shift, turn)
-        upside_down = 200.0 if photograph.laid == "upside down" else 0.0
+        upside_down = 200.0 if photograph.placement == "upside down" else 0.0
         self._carriers[projector] = Carrier(photograph, (float(dx), float(dy), float(dkappa) + upside_down))
         self._takes(f"carrier {projector}", self.variant.rates.laying)
 
@@ -504,7 +504,7 @@ class Autograph:
         on_the_guides = dict(zip("XYZ", np.linalg.solve(self._guides, place).tolist(), strict=True))
         return {
             axis: counter.offset
-            + counter.units_per_mm * self._carriages[axis].position_free_of_runout(on_the_guides[axis])
+            + counter.units_per_mm * self._carriages[axis].position_without_periodic_error(on_the_guides[axis])
             for axis, counter in self._counters.items()
         }
 
@@ -614,4 +614,4 @@ def guide_matrix(condition: Condition) -> Array:
 
 def build_autograph(instrument: Instrument, photographs: Mapping[str, Photograph], seed: int) -> Autograph:
     """Return the instrument of a scenario with its photographs in the drawer."""
-    return Autograph.of(instrument, photographs, seed)
+    return Autograph.from_parts(instrument, photographs, seed)

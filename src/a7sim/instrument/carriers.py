@@ -14,7 +14,7 @@ class Carrier:
     """A photograph on its carrier: laid by hand, then shifted and turned until it is centred."""
 
     photograph: Photograph
-    laid: tuple[float, float, float]
+    placement: tuple[float, float, float]
     """dx, dy in mm and dkappa in gon, as it came to lie."""
     centring: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -27,8 +27,8 @@ class Carrier:
         self._set()
 
     def _set(self) -> None:
-        self._turn = plane_rotation((self.laid[2] + self.centring[2]) * GON)
-        self._shift = np.array([self.laid[0] + self.centring[0], self.laid[1] + self.centring[1]])
+        self._turn = plane_rotation((self.placement[2] + self.centring[2]) * GON)
+        self._shift = np.array([self.placement[0] + self.centring[0], self.placement[1] + self.centring[1]])
         self._points: dict[str, Array] = {}
 
     def on_carrier(self, film: Array) -> Array:

@@ -38,7 +38,7 @@ _RIGHT = {
 class Levers:
     """What base, levers, prisms and collars of every instrument come to."""
 
-    straight: Truths
+    uncrossed: Truths
     """Where the left eye sees the left picture ``(instruments,)``."""
     signs: Mapping[int, Array]
     """Of what is seen of the picture in a projector ``(2, instruments)``, in um for a mm."""
@@ -63,7 +63,7 @@ class Bundles:
         self.principal_point = rows[16:18]
         self.c = rows[18]
 
-    def among(self, who: Who) -> "Bundles":
+    def take(self, who: Who) -> "Bundles":
         """Return those of some, to be read at once and not written to."""
         return self if who.size == self.c.size else Bundles(take(self._rows, who))
 
@@ -149,7 +149,7 @@ class Fleet:
 
     # --- refusals -------------------------------------------------------------------------------------
 
-    def refused(self, who: Who) -> dict[int, list[str]]:
+    def pop_errors(self, who: Who) -> dict[int, list[str]]:
         """Return what was refused since the last asking, by instrument."""
         return {int(each): self._refusals.pop(int(each)) for each in who if int(each) in self._refusals}
 
@@ -169,14 +169,16 @@ class Fleet:
 
     def turn_element(self, who: Who, name: str, amounts: Array) -> None:
         """Turn the drums of an element by so much ``(m,)``, to wherever between two counts that is."""
-        self._run_element(who, name, self._drums[name].after(who, amounts) if name in self._drums else amounts)
+        self._run_element(
+            who, name, self._drums[name].value_after_turn(who, amounts) if name in self._drums else amounts
+        )
 
     def _run_element(self, who: Who, name: str, targets: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
         if name not in self._drums:
             self._refuse(who, f"an {self.variant.name} has no {name}", -221)
             return
         drums = self._drums[name]
-        allowed = drums.allows(targets)
+        allowed = drums.within_range(targets)
         moved = [n for n in (1, 2) if name in ("bx", "common_phi") or name.endswith(str(n))]
         told: dict[int, Array] = {}
         if name in MOVE_CENTRES:
@@ -284,7 +286,7 @@ class Fleet:
     def _half_a_count(self, row: int) -> float:
         return float(0.5000001 * 10.0 ** -self._decimals[row] / self._units[row])
 
-    def wheels(self, who: Who, amounts: Array) -> None:
+    def turn_handwheels(self, who: Who, amounts: Array) -> None:
         """Turn the handwheels X, Y and, where there is a third, Z by so many counter units ``(k, m)``, in that order.
 
         Their collars decide which way the carriages go.
@@ -295,23 +297,23 @@ class Fleet:
         after = before[:k] + steps
         if self._no_slips and who.size:
             low, high = after.min(axis=1), after.max(axis=1)
-            if self._carriages.surely_allow(low, high) and self._rods_surely_can(who, before, low, high):
-                self._carriages.run_to(who, 0, after)
+            if self._carriages.range_contains(low, high) and self._rods_surely_can(who, before, low, high):
+                self._carriages.move_to(who, 0, after)
                 return
         for row, each in enumerate(after):
             self._move(who, row, each)
 
     def _move(self, who: Who, row: int, positions: Array, silently: bool = False) -> Truths:
-        positions = self._carriages.put_at_end(row, positions, self._half_a_count(row))
+        positions = self._carriages.snap_to_end(row, positions, self._half_a_count(row))
         before = self._carriages.at[row, who]
         mark = take(self._carriages.at, who).copy()
         mark[row] = positions
-        allowed = self._carriages.allow(row, positions) & self._rods_can(who, mark=mark)
+        allowed = self._carriages.within_range(row, positions) & self._rods_can(who, mark=mark)
         if not silently:
             self._refuse(who[~allowed], f"Data out of range;{AXES[row]}: beyond its range or that of the rods")
         who, positions = who[allowed], positions[allowed]
         self._slip(who, row, before[allowed], positions)
-        self._carriages.run_to(who, row, positions[None])
+        self._carriages.move_to(who, row, positions[None])
         return np.asarray(allowed)
 
     def _slip(self, who: Who, row: int, before: Array, after: Array) -> None:
@@ -398,7 +400,7 @@ class Fleet:
         laid = np.zeros((3, self.instruments))
         shift, turn = self._laying_sigmas
         for each in who:
-            upside_down = 200.0 if photographs[each].laid == "upside down" else 0.0
+            upside_down = 200.0 if photographs[each].placement == "upside down" else 0.0
             laid[:, each] = self._rngs[each].standard_normal(3) * (shift, shift, turn) + (0.0, 0.0, upside_down)
         self._carriers[projector] = Carriers(photographs, laid)
         self._levers = None
@@ -452,14 +454,14 @@ class Fleet:
 
     def pose(self, who: Who, projector: int) -> tuple[Array, Array]:
         """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
-        bundles = self._bundles[projector].among(who)
+        bundles = self._bundles[projector].take(who)
         return bundles.centre, bundles.turned
 
     def readings_at(self, who: Who, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
         guides = np.moveaxis(self._guides[:, :, who], -1, 0)
         carriage = np.asarray(np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T, dtype=float)
-        free = self._carriages.position_free_of_runout(who, carriage)
+        free = self._carriages.position_without_periodic_error(who, carriage)
         return {axis: self._unrounded(who, row, free[row]) for row, axis in enumerate(AXES)}
 
     def mark(self, who: Who) -> Array:
@@ -489,7 +491,7 @@ class Fleet:
         return np.concatenate([self._in_eyepiece(who, eye, name, mark) for eye in (1, 2)])
 
     def _in_eyepiece(self, who: Who, eye: int, name: str, mark: Array) -> Array:
-        straight = take(self._levers_stand.straight, who)
+        straight = take(self._levers_stand.uncrossed, who)
         ways = ((eye, straight), (3 - eye, ~straight))
         for projector, looking in ways:
             if projector in self._carriers and looking.all():
@@ -501,7 +503,7 @@ class Fleet:
         return seen
 
     def _seen_in(self, who: Who, projector: int, name: str, mark: Array) -> Array:
-        bundles = self._bundles[projector].among(who)
+        bundles = self._bundles[projector].take(who)
         displacement = self._carriers[projector].point(who, name) - self._mark_on_carrier(who, projector, bundles, mark)
         turned = mxv(bundles.swung, displacement)
         shown = take(self._levers_stand.signs[projector], who) * turned

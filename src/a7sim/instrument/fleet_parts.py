@@ -69,7 +69,7 @@ class Carriages:
         position = take(self._shaft, who)
         return position if self._runouts is None else position + self._runouts.at(who, position)
 
-    def position_free_of_runout(self, who: Who, place: Array) -> Array:
+    def position_without_periodic_error(self, who: Who, place: Array) -> Array:
         """Return where they would stand ``(3, m)`` without the errors that the turns of their screws repeat."""
         position = place
         if self._runouts is not None:
@@ -77,21 +77,21 @@ class Carriages:
                 position = place - self._runouts.at(who, position)
         return position
 
-    def put_at_end(self, axis: int, places: Array, within: float) -> Array:
+    def snap_to_end(self, axis: int, places: Array, within: float) -> Array:
         """Return places ``(m,)`` of a carriage, the end of its range where they are so near it."""
         at_end = np.clip(places, self._low[axis], self._high[axis])
         return np.where(np.abs(at_end - places) <= within, at_end, places)
 
-    def allow(self, axis: int, places: Array) -> Truths:
+    def within_range(self, axis: int, places: Array) -> Truths:
         """Return to which places ``(m,)`` a carriage can be run."""
         return np.asarray((places >= self._low[axis] - 1e-9) & (places <= self._high[axis] + 1e-9))
 
-    def surely_allow(self, low: Array, high: Array) -> bool:
+    def range_contains(self, low: Array, high: Array) -> bool:
         """Return whether the ranges of the first k carriages hold all from the low to the high places ``(k,)``."""
         k = len(low)
         return bool(((low >= self._low[:k]) & (high <= self._high[:k])).all())
 
-    def run_to(self, who: Who, first: int, places: Array) -> None:
+    def move_to(self, who: Who, first: int, places: Array) -> None:
         """Run carriages, from a first one on, to places ``(k, m)`` that they allow."""
         rows = slice(first, first + len(places))
         half = take(self._half_play, who)
@@ -127,11 +127,11 @@ class Drums:
         shown = round_like_counter(take(self.at, who), COUNTER_DECIMALS)
         return round_like_counter(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
 
-    def allows(self, values: Array) -> Truths:
+    def within_range(self, values: Array) -> Truths:
         """Return which values the drum can be turned to."""
         return np.asarray((values >= self.low - 1e-9) & (values <= self.high + 1e-9))
 
-    def after(self, who: Who, amounts: Array) -> Array:
+    def value_after_turn(self, who: Who, amounts: Array) -> Array:
         """Return to what values ``(m,)`` the drums come when they are turned by so much."""
         values = take(self.at, who) + amounts
         return np.asarray(values % self.high if self.endless else values)

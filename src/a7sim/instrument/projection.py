@@ -31,9 +31,9 @@ class Turned(NamedTuple):
 
     rotation: Array
     """``(3, 3, ...)``."""
-    missed: Array
+    axis_offset: Array
     """By how much the axes miss the projection centre, in the camera's axes ``(3, ...)``, mm."""
-    gone_round: Array
+    rotated_offset: Array
     """The same in the frame's axes: it goes round with the camera."""
 
 
@@ -49,7 +49,7 @@ def pose(camera: Turned, place: Array, common_phi: npt.ArrayLike | None = None) 
     The common Phi turns the frame with all that stands on it, `Ry(Phi) R`.
     """
     turned = camera.rotation
-    centre = place + camera.gone_round - camera.missed
+    centre = place + camera.rotated_offset - camera.axis_offset
     if common_phi is None:
         return centre, turned
     return apply_common_tilt(centre, common_phi), mxm(rotation(0.0, common_phi, 0.0), turned)

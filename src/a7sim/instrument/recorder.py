@@ -40,12 +40,12 @@ class Recorder:
 
         Raises OutOfRange for a number that is not there, SettingsConflict for one that is struck already.
         """
-        registration = self.numbered(number)
+        registration = self.by_number(number)
         if registration.struck is not None:
             raise SettingsConflict(f"registration {number} is struck out already")
         self.apply(replace(registration, struck=why))
 
-    def numbered(self, number: int) -> Registration:
+    def by_number(self, number: int) -> Registration:
         """Return a registration as it stands. Raises OutOfRange for a number that is not there."""
         if not 1 <= number <= len(self.registrations):
             raise OutOfRange(f"expected a registration 1 to {len(self.registrations)}, got {number}")

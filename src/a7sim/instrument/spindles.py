@@ -42,9 +42,9 @@ class Spindle:
     endless: bool = False
     play: float = 0.0
     setting_sigma: float = 0.0
-    fault: float = 0.0
+    zero_error: float = 0.0
     """Zero error: the shaft stands that much further than the drum says."""
-    runout: Runout | None = None
+    periodic_error: Runout | None = None
 
     def __post_init__(self) -> None:
         self._shaft = self.at
@@ -66,15 +66,15 @@ class Spindle:
     @property
     def position(self) -> float:
         """Where the shaft really stands, in mm or gon."""
-        position = self._shaft + self._error + self.fault
-        return position if self.runout is None else position + self.runout.at(position)
+        position = self._shaft + self._error + self.zero_error
+        return position if self.periodic_error is None else position + self.periodic_error.at(position)
 
-    def position_free_of_runout(self, place: float) -> float:
+    def position_without_periodic_error(self, place: float) -> float:
         """Return where the shaft would stand without the error that its turns repeat, the inverse of it."""
         position = place
-        if self.runout is not None:
+        if self.periodic_error is not None:
             for _ in range(APPROXIMATIONS):
-                position = place - self.runout.at(position)
+                position = place - self.periodic_error.at(position)
         return position
 
     @property
@@ -83,11 +83,11 @@ class Spindle:
         shown = round(self.at, COUNTER_DECIMALS)
         return round(shown % self.high, COUNTER_DECIMALS) if self.endless else shown + 0.0
 
-    def allows(self, value: float) -> bool:
+    def within_range(self, value: float) -> bool:
         """Whether the drum can be turned to a value."""
         return self.low - 1e-9 <= value <= self.high + 1e-9
 
-    def after(self, amount: float) -> float:
+    def value_after_turn(self, amount: float) -> float:
         """Return to what value the drum comes when it is turned by so much."""
         return (self.at + amount) % self.high if self.endless else self.at + amount
 
@@ -96,7 +96,7 @@ class Spindle:
 
         Raises OutOfRange; then nothing has moved.
         """
-        if not self.allows(value):
+        if not self.within_range(value):
             raise OutOfRange(f"expected {self.low:.2f} to {self.high:.2f}, got {value:.10g}")
         if self.endless:
             value += self.high * round((self.at - value) / self.high)
@@ -132,7 +132,7 @@ class Counter:
         """Count as when the state was taken."""
         self.units_per_mm, self.decimals, self.offset = state
 
-    def passed(self, before: float, after: float, rng: np.random.Generator) -> None:
+    def advance(self, before: float, after: float, rng: np.random.Generator) -> None:
         """Follow the carriage from one position to another, and slip where a carry fails.
 
         What is missed once is missing until the counter is preset or cleared.
@@ -157,7 +157,7 @@ class Counter:
         return (round(reading, self.decimals) - self.offset) / self.units_per_mm
 
     @property
-    def half_a_count(self) -> float:
+    def half_count(self) -> float:
         """Half the last digit, in mm of the carriage: nearer than this the counter shows no difference."""
         return 0.5000001 * 10.0**-self.decimals / self.units_per_mm
 

@@ -11,11 +11,11 @@ class Clock:
 
     now: float = 0.0
 
-    def spend(self, seconds: float) -> None:
+    def advance(self, seconds: float) -> None:
         """Let time pass."""
         self.now += seconds
 
-    def pass_to(self, time: float) -> bool:
+    def advance_to(self, time: float) -> bool:
         """Let time pass until it is so late, if it is not yet; return whether it is."""
         self.now = max(self.now, time)
         return True
@@ -33,6 +33,6 @@ class WallClock:
         """Seconds since the session began."""
         return self._wall() - self._began
 
-    def pass_to(self, time: float) -> bool:
+    def advance_to(self, time: float) -> bool:
         """Return whether it is so late; it does not hurry."""
         return self.now >= time

@@ -26,11 +26,11 @@ class Terms:
     """Bits/s of every line, None where bytes need no time."""
     faults: Faults | None = None
     fault_seed: int = 0
-    idle: float = 3600.0
+    idle_timeout: float = 3600.0
     """s without a byte after which a client is dropped."""
-    patience: float = 10.0
+    write_timeout: float = 10.0
     """s that replies wait for a client that does not read them, before it is dropped."""
-    most_clients: int = 64
+    max_clients: int = 64
 
 
 class Wire(Protocol):
@@ -77,15 +77,15 @@ class Conversation:
         self._next: asyncio.Handle | None = None
         self._impatient: asyncio.Handle | None = None
         self._heard_at = loop.time()
-        self._sleeper = loop.call_later(terms.idle, self._asleep)
+        self._sleeper = loop.call_later(terms.idle_timeout, self._asleep)
 
     # --- what the wire tells --------------------------------------------------------------------------
 
-    def received(self, data: bytes) -> None:
+    def data_received(self, data: bytes) -> None:
         """Take bytes that the client sent."""
         self._heard_at = self._loop.time()
         if self._plain and self._reading and len(data) <= CHUNK_BYTES:
-            replies = self._engine.replies_to(data, self._clock.now)
+            replies = self._engine.feed_with_replies(data, self._clock.now)
             if replies:
                 self._wire.write(b"".join(replies))
             if self._engine.waits_until is not None:
@@ -96,25 +96,25 @@ class Conversation:
         else:
             self._arrived(data)
 
-    def clogged(self) -> None:
+    def pause_writing(self) -> None:
         """Obey nothing more: the client does not read its replies. It is dropped if it goes on like that."""
         self._clogged = True
         self._pause()
-        self._impatient = self._loop.call_later(self._terms.patience, self._wire.abort)
+        self._impatient = self._loop.call_later(self._terms.write_timeout, self._wire.abort)
 
-    def unclogged(self) -> None:
+    def resume_writing(self) -> None:
         """Go on: the client has read."""
         self._clogged = False
         if self._impatient is not None:
             self._impatient.cancel()
         self._go_on_soon()
 
-    def ended(self) -> None:
+    def eof_received(self) -> None:
         """Hang up as soon as all is answered: the client sends nothing more."""
         self._ended = True
         self._go_on_soon()
 
-    def cut(self) -> None:
+    def connection_lost(self) -> None:
         """Forget the client: it is gone, and a lock that it holds is free again."""
         self._open = False
         self._desk.close(self._engine.client, self._clock.now)
@@ -141,7 +141,7 @@ class Conversation:
         return self._clogged or on_the_way or self._engine.waits_until is not None
 
     def _feed(self, data: bytes) -> None:
-        for reply in self._engine.replies_to(data, self._clock.now):
+        for reply in self._engine.feed_with_replies(data, self._clock.now):
             self._send(reply)
 
     def _go_on_soon(self) -> None:
@@ -151,7 +151,7 @@ class Conversation:
         waits_until = self._engine.waits_until
         if waits_until is not None and not self._clogged:
             self._pause()
-            if self._clock.pass_to(waits_until):
+            if self._clock.advance_to(waits_until):
                 self._next = self._loop.call_soon(self._go_on)
             else:
                 self._next = self._loop.call_later(waits_until - self._clock.now, self._go_on)
@@ -195,7 +195,7 @@ class Conversation:
             return
         if self._noise is not None:
             try:
-                reply = self._noise.carried(reply)
+                reply = self._noise.apply(reply)
             except Cut:
                 self._wire.abort()
                 return
@@ -211,7 +211,7 @@ class Conversation:
     # --- who says nothing -----------------------------------------------------------------------------
 
     def _asleep(self) -> None:
-        idle = self._terms.idle
+        idle = self._terms.idle_timeout
         left = self._heard_at + idle - self._loop.time()
         if left > 0.0:
             self._sleeper = self._loop.call_later(left, self._asleep)

@@ -17,7 +17,7 @@ class Courtesy:
         self._alone_from = 0.0
         self._was_brief = True
 
-    def yielded(self) -> bool:
+    def yield_cpu(self) -> bool:
         """Give up the processor, unless others want it; return whether that was done."""
         left_at = monotonic()
         if left_at < self._alone_from:

@@ -73,7 +73,7 @@ class Noise:
         self._faults = faults
         self._rng = rng
 
-    def carried(self, reply: bytes) -> bytes:
+    def apply(self, reply: bytes) -> bytes:
         """Return what arrives of a reply, nothing where it is lost. Raises Cut."""
         cut, dropped = self._rng.random(2)
         if cut < self._faults.disconnect:

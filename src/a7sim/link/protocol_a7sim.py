@@ -38,7 +38,7 @@ def _described_by(url: str) -> Desk:
     try:
         scenario = load_scenario(scenario_name)
         chosen = scenario.seed if seed is None else seed
-        autograph = Autograph.of_scenario(scenario, chosen)
+        autograph = Autograph.from_scenario(scenario, chosen)
     except (Mistake, OSError) as mistake:
         raise SerialException("; ".join(str(mistake).splitlines())) from mistake
     return Desk(autograph)

@@ -52,14 +52,14 @@ class PtyWire:
         self.resume_reading()
 
     def _welcomed(self) -> Conversation:
-        welcomed = self._host.welcome(self, serial=True)
+        welcomed = self._host.accept(self, serial=True)
         if isinstance(welcomed, bytes):
             raise Mistake(f"--pty: expected fewer lines than clients are allowed: {welcomed.decode('ascii').strip()}")
         return welcomed
 
     def remove(self) -> None:
         """Take link and terminal away."""
-        self._conversation.cut()
+        self._conversation.connection_lost()
         self.pause_reading()
         self._loop.remove_writer(self._near)
         if self._link.is_symlink() and str(self._link.readlink()) == self.device:
@@ -71,12 +71,12 @@ class PtyWire:
         os.close(self._far)
 
     def _readable(self) -> None:
-        near, received = self._near, self._conversation.received
+        near, received = self._near, self._conversation.data_received
         for _ in range(POLLS_BEFORE_SLEEP):
             try:
                 data = os.read(near, MAX_READ)
             except (BlockingIOError, InterruptedError):
-                if not self._courtesy.yielded():
+                if not self._courtesy.yield_cpu():
                     return
             else:
                 received(data)
@@ -89,7 +89,7 @@ class PtyWire:
             self._loop.remove_writer(self._near)
         if self._clogged and len(self._unsent) <= MAX_UNREAD // 4:
             self._clogged = False
-            self._conversation.unclogged()
+            self._conversation.resume_writing()
 
     def _sent(self, data: bytes | bytearray) -> int:
         try:
@@ -110,7 +110,7 @@ class PtyWire:
         self._unsent += data
         if not self._clogged and len(self._unsent) > MAX_UNREAD:
             self._clogged = True
-            self._conversation.clogged()
+            self._conversation.pause_writing()
 
     def pause_reading(self) -> None:
         """Receive nothing more for the time being."""
@@ -129,8 +129,8 @@ class PtyWire:
 
     def abort(self) -> None:
         """Forget the client with all that is on the line, and begin anew."""
-        self._conversation.cut()
-        self._host.left(self)
+        self._conversation.connection_lost()
+        self._host.release(self)
         self._loop.remove_writer(self._near)
         self._unsent.clear()
         self._clogged = False

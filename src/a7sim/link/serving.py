@@ -90,9 +90,9 @@ class Server:
         """How many there are, each terminal counted as one."""
         return len(self._wires)
 
-    def welcome(self, wire: Wire, serial: bool) -> Conversation | bytes:
+    def accept(self, wire: Wire, serial: bool) -> Conversation | bytes:
         """Return a conversation for a wire, or why there is none, as a line."""
-        most = self._terms.most_clients
+        most = self._terms.max_clients
         if len(self._wires) >= most:
             if len(self._turned_away) >= MAX_REJECTION_NOTICES:
                 wire.abort()
@@ -100,9 +100,9 @@ class Server:
             text = format_entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {pluralize(most, 'client')} at a time")
             return f"{text}\n".encode("ascii")
         self._wires.add(wire)
-        return Conversation(self.desk, self._clock, self._terms, wire, self.desk.opened + 1, serial)
+        return Conversation(self.desk, self._clock, self._terms, wire, self.desk.client_count + 1, serial)
 
-    def left(self, wire: Wire) -> None:
+    def release(self, wire: Wire) -> None:
         """Take note that a wire is no more."""
         self._wires.discard(wire)
         self._turned_away.discard(wire)

@@ -53,7 +53,7 @@ class Telnet:
         return bytes([IAC, WILL, BINARY, IAC, DO, BINARY, IAC, WILL, NO_GO_AHEAD, IAC, DO, NO_GO_AHEAD])
 
     @staticmethod
-    def escaped(data: bytes) -> bytes:
+    def escape(data: bytes) -> bytes:
         """Return data as it goes over the line."""
         return data.replace(b"\xff", b"\xff\xff")
 
@@ -144,5 +144,5 @@ class Telnet:
         return code
 
     def _tell(self, option: int, value: bytes) -> None:
-        told = self.escaped(bytes([option + TO_THE_CLIENT]) + value)
+        told = self.escape(bytes([option + TO_THE_CLIENT]) + value)
         self._answer += bytes([IAC, SB, COM_PORT]) + told + bytes([IAC, SE])

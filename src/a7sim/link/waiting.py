@@ -8,6 +8,6 @@ def feed_until_idle(engine: Engine, received: bytes, clock: Clock) -> bytes:
     """Feed an engine and let the clock run to where each wait ends; return the bytes of all replies."""
     replies = engine.feed(received, clock.now)
     while engine.waits_until is not None:
-        clock.pass_to(engine.waits_until)
+        clock.advance_to(engine.waits_until)
         replies += engine.feed(b"", clock.now)
     return replies

@@ -24,10 +24,10 @@ FAREWELL = 1.0
 class Host(Protocol):
     """Who opens a conversation for every wire."""
 
-    def welcome(self, wire: Wire, serial: bool) -> Conversation | bytes:
+    def accept(self, wire: Wire, serial: bool) -> Conversation | bytes:
         """Return a conversation, or why there is none, as a line."""
 
-    def left(self, wire: Wire) -> None:
+    def release(self, wire: Wire) -> None:
         """Take note that a wire is no more."""
 
 
@@ -50,7 +50,7 @@ class TcpWire(asyncio.BufferedProtocol):
         self._transport = cast(asyncio.Transport, transport)
         self._socket = self._transport.get_extra_info("socket")
         self._transport.set_write_buffer_limits(high=MAX_UNREAD)
-        welcomed = self._host.welcome(self, self.serial)
+        welcomed = self._host.accept(self, self.serial)
         if isinstance(welcomed, Conversation):
             self._conversation = welcomed
         else:
@@ -73,7 +73,7 @@ class TcpWire(asyncio.BufferedProtocol):
     def _take(self, data: bytes) -> None:
         if self._conversation is not None:
             self._answered = False
-            self._conversation.received(data)
+            self._conversation.data_received(data)
             if not self._answered:
                 self._acknowledge()
 
@@ -89,25 +89,25 @@ class TcpWire(asyncio.BufferedProtocol):
         """Keep the line until all is answered."""
         if self._conversation is None:
             return False
-        self._conversation.ended()
+        self._conversation.eof_received()
         return True
 
     def connection_lost(self, exc: Exception | None) -> None:
         """End the conversation."""
         if self._conversation is not None:
-            self._conversation.cut()
+            self._conversation.connection_lost()
             self._conversation = None
-        self._host.left(self)
+        self._host.release(self)
 
     def pause_writing(self) -> None:
         """Tell that the client does not read."""
         if self._conversation is not None:
-            self._conversation.clogged()
+            self._conversation.pause_writing()
 
     def resume_writing(self) -> None:
         """Tell that it has read."""
         if self._conversation is not None:
-            self._conversation.unclogged()
+            self._conversation.resume_writing()
 
     # --- what the conversation asks -------------------------------------------------------------------
 
@@ -160,4 +160,4 @@ class TelnetWire(TcpWire):
 
     def write(self, data: bytes) -> None:
         """Send bytes as telnet sends them."""
-        super().write(self._telnet.escaped(data))
+        super().write(self._telnet.escape(data))

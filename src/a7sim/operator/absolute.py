@@ -38,7 +38,7 @@ class OnGround:
     """X and Y in mm at the model scale, Z in m."""
 
     @property
-    def agrees(self) -> bool:
+    def within_tolerance(self) -> bool:
         """Whether all heights at control agree."""
         return max(map(abs, self.heights.values())) <= self.tolerated
 
@@ -53,20 +53,20 @@ def absolute_orientation_at(
     """
     found: dict[int, OnGround] = {}
     crew = bench.crew
-    for who, names in bench.alike(crew.everybody, [*control]):
+    for who, names in bench.group_by_points(crew.active, [*control]):
         known = Control(tuple(names), np.array([control[name] for name in names]).reshape(-1, 3).T)
         if not known.is_enough:
             crew.remark(who, f"{model.name}: too little control to level and scale it ({', '.join(names) or 'none'})")
             continue
         levelling = Levelling(bench, model, known)
         before = levelling.settings(who)
-        start = np.zeros(crew.sessions)
+        start = np.zeros(crew.size)
         bench.seat.drive(who, {"Z": np.round(bench.seat.counters(who)[2])})
         start[who] = bench.seat.counters(who)[2]
         fit = levelling.compared(who, levelling.measured(who, 1))
         gears = np.array([_gear(bench, float(metres)) for metres in fit.metres])
         for gear in dict.fromkeys(gears.tolist()):
-            same = crew.goes_on(who) & (gears == gear)
+            same = crew.is_active(who) & (gears == gear)
             found |= _InMetres(levelling, gear).done(who[same], fit.of(same), before, start)
     return found
 
@@ -91,13 +91,13 @@ class _InMetres:
     def done(self, who: Who, fit: Fit, before: Settings, start: Array) -> dict[int, OnGround]:
         """Level, read and set back to settings and readings of Z ``(sessions,)``."""
         self.seat.drive(who, {"Z": start[who]})
-        self.seat.engage(who, self.gear)
-        rounds = self.levelling.turned_until_level(self.crew.still(who), fit.of(self.crew.goes_on(who)), self.number)
-        who = self.crew.still(who)
-        shift = np.zeros(self.crew.sessions)
+        self.seat.set_height_gear(who, self.gear)
+        rounds = self.levelling.level(self.crew.remaining(who), fit.of(self.crew.is_active(who)), self.number)
+        who = self.crew.remaining(who)
+        shift = np.zeros(self.crew.size)
         shift[who] = self._index_set(who)
         readings = self._read(who)
-        who = self.crew.still(who)
+        who = self.crew.remaining(who)
         found = self._concluded(who, rounds, before, self.levelling.settings(who), readings)
         self._set_back(who, before, start, shift)
         return found
@@ -106,7 +106,7 @@ class _InMetres:
         """Make the Z counter read heights, on the mean of the control; return how much more it reads ``(m,)``."""
         names = [self.control.names[i] for i in self.control.with_height]
         self.bench.begin_round(who, MAX_ROUNDS + 1)
-        readings = self.bench.measure(who, names)[2][:, who]
+        readings = self.bench.measure_points(who, names)[2][:, who]
         more = np.mean(self.control.ground[2, self.control.with_height][:, None] - readings, axis=0)
         return self.seat.shift_counter(who, "Z", more)
 
@@ -114,8 +114,8 @@ class _InMetres:
         """Measure control and all other points that are shown; X, Y in mm and Z in m ``(3, sessions)``."""
         self.bench.begin_round(who, MAX_ROUNDS + 2)
         wanted = dict.fromkeys([*self.control.names, *self.seat.model.other_points])
-        names = [name for name in wanted if self.bench.pricked(who, name).all()]
-        return dict(zip(names, np.moveaxis(self.bench.measure(who, names), 1, 0), strict=True))
+        names = [name for name in wanted if self.bench.has_point(who, name).all()]
+        return dict(zip(names, np.moveaxis(self.bench.measure_points(who, names), 1, 0), strict=True))
 
     def _concluded(
         self,
@@ -152,5 +152,5 @@ class _InMetres:
         if who.size:
             self.seat.shift_counter(who, "Z", -shift[who])
             self.seat.drive(who, {"Z": start[who]})
-            self.seat.engage(who, self.bench.job.plan.height_gear)
-            self.seat.turn_changed(who, {name: values[who] for name, values in before.items()})
+            self.seat.set_height_gear(who, self.bench.job.plan.height_gear)
+            self.seat.turn_if_changed(who, {name: values[who] for name, values in before.items()})

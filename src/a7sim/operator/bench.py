@@ -38,13 +38,13 @@ class Parallaxes:
     point whose images could not be brought together, where there was one; nothing else holds there.
     """
 
-    p: Array
+    parallax_mm: Array
     places: Array
-    apart: npt.NDArray[np.object_]
+    disagreement: npt.NDArray[np.object_]
 
-    def parted(self, who: Who) -> Who:
+    def disagrees(self, who: Who) -> Who:
         """Return those for whom the images of a point could not be brought together."""
-        parted = np.array([self.apart[session] is not None for session in who], dtype=bool)
+        parted = np.array([self.disagreement[session] is not None for session in who], dtype=bool)
         return np.asarray(who[parted])
 
 
@@ -52,15 +52,15 @@ class Parallaxes:
 class Cleared:
     """What clearing a y-parallax with an element came to; arrays ``(sessions,)``, zero for those not in `who`."""
 
-    who: Who
+    sessions: Who
     """Those who found it clear, or cleared it."""
-    apart: Who
+    disagreement: Who
     """Those to whom the two images did not come together."""
-    found: Array
+    arrival_parallax_mm: Array
     """The y-parallax in mm as it seemed on arriving."""
-    place: Array
+    model_position_mm: Array
     """Where ``(3, sessions)``: x from the left-hand centre, y from the base line, z below the centres, mm."""
-    turn: Array
+    element_change: Array
     """The turn that cleared the point, gon or mm, as it is written down."""
 
 
@@ -82,7 +82,7 @@ class Bench:
 
     def begin(self, who: Who, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> None:
         """Take up a model whose pictures are mounted; `prints` by hand (1 left, 2 right), places ``(2, sessions)``."""
-        self.eyes.take_prints(prints)
+        self.eyes.set_prints(prints)
         self._prints = prints
         self._entries.clear()
         self.seat.begin(who, model)
@@ -91,10 +91,10 @@ class Bench:
         """Point at a point in the left-hand photograph and make the counters show the plan's numbers there."""
         plan = self.job.plan
         self.seat.drive_z_to(who, np.full(who.size, -plan.projection_height))
-        errors = self.crew.errors(who, self.crew.observer.monocular_um, (2,))
+        errors = self.crew.draw_setting_errors(who, self.crew.observer.monocular_um, (2,))
         self.eyes.bring_into_view(who, 1, point)
-        self.eyes.bisect(self.crew.still(who), 1, point, errors)
-        self.seat.preset(self.crew.still(who), plan.preset)
+        self.eyes.bisect(self.crew.remaining(who), 1, point, errors)
+        self.seat.preset(self.crew.remaining(who), plan.preset)
 
     def begin_round(self, who: Who, number: int) -> None:
         """Begin a round of a procedure: what is read now is entered under its number."""
@@ -106,14 +106,16 @@ class Bench:
         """Spend the time of one computation."""
         self.crew.spend(who, self.crew.observer.seconds_to_compute, "computing")
 
-    def pricked(self, who: Who, point: str, hands: Sequence[int] = (1, 2)) -> Truths:
+    def has_point(self, who: Who, point: str, hands: Sequence[int] = (1, 2)) -> Truths:
         """Return which of those who act find a point pricked on both prints, or on that of one photograph."""
         prints = [self._prints[hand].get(point) for hand in hands]
         if any(each is None for each in prints):
             return np.zeros(who.size, dtype=bool)
         return np.asarray(~np.isnan([each[0, who] for each in prints if each is not None]).any(axis=0))
 
-    def alike(self, who: Who, points: Sequence[str], hands: Sequence[int] = (1, 2)) -> Iterator[tuple[Who, list[str]]]:
+    def group_by_points(
+        self, who: Who, points: Sequence[str], hands: Sequence[int] = (1, 2)
+    ) -> Iterator[tuple[Who, list[str]]]:
         """Yield those who find the same of some points pricked, on the prints of these photographs, and what they find.
 
         Everybody who acts comes once, the list in the order of `points` and perhaps empty.
@@ -121,59 +123,59 @@ class Bench:
         if not points:
             yield who, []
             return
-        shown = np.array([self.pricked(who, point, hands) for point in points])
+        shown = np.array([self.has_point(who, point, hands) for point in points])
         for pattern in np.unique(shown, axis=1).T:
             them = who[(shown == pattern[:, None]).all(axis=0)]
             yield them, [point for point, there in zip(points, pattern, strict=True) if there]
 
     def _come_to(self, who: Who, point: str) -> None:
         """Go to a point, or by mistake to a standard point near it."""
-        near = neighbours(self.seat.model.standard_points, point) if self.crew.mistakes_points else []
-        self.crew.come_to(who, point, {name: self.pricked(who, name) for name in near})
+        near = neighbours(self.seat.model.standard_points, point) if self.crew.may_mistake_points else []
+        self.crew.select_point(who, point, {name: self.has_point(who, name) for name in near})
 
     # --- monocular pointing ---------------------------------------------------------------------------
 
-    def point_with(self, who: Who, hand: int, points: Sequence[str], level: float) -> Array:
+    def point_monocularly(self, who: Who, hand: int, points: Sequence[str], level: float) -> Array:
         """Point with the eye of photograph 1 (left-hand) or 2 at a Z reading; X, Y readings ``(2, n, sessions)``."""
         crew = self.crew
-        errors = crew.errors(who, crew.observer.monocular_um, (2, len(points)))
-        slips = crew.slips(who, (2, len(points)))
+        errors = crew.draw_setting_errors(who, crew.observer.monocular_um, (2, len(points)))
+        slips = crew.draw_misreadings(who, (2, len(points)))
         self._drive_to_level(who, level)
-        readings = np.zeros((2, len(points), crew.sessions))
+        readings = np.zeros((2, len(points), crew.size))
         for i, point in enumerate(points):
-            who = crew.still(who)
+            who = crew.remaining(who)
             self._come_to(who, point)
             self._point_once(who, hand, point, level, errors[:, i], slips[:, i], readings[:, i])
         return readings
 
-    def point_again(self, who: Who, hand: int, point: str, level: float, why: str) -> Array:
+    def repeat_pointing(self, who: Who, hand: int, point: str, level: float, why: str) -> Array:
         """Strike out a pointing and make it once more; X, Y ``(2, sessions)``."""
         crew = self.crew
         for numbers in self._entries[hand, point, level]:
             crew.strike(who, numbers, why)
-        crew.come_back(who)
+        crew.recheck_points(who)
         self._drive_to_level(who, level)
-        errors = crew.errors_again(who, crew.observer.monocular_um, 2)
-        slips = crew.slips_again(who, 2)
-        readings = np.zeros((2, crew.sessions))
+        errors = crew.redraw_setting_errors(who, crew.observer.monocular_um, 2)
+        slips = crew.redraw_misreadings(who, 2)
+        readings = np.zeros((2, crew.size))
         self._point_once(who, hand, point, level, errors, slips, readings)
         return readings
 
     def _drive_to_level(self, who: Who, level: float) -> None:
         self.seat.drive(who, {"Z": np.full(who.size, level)})
-        self.seat.see_that_it_obeyed(who, f"driving Z to {level:.2f}")
+        self.seat.give_up_on_errors(who, f"driving Z to {level:.2f}")
 
     def _point_once(
         self, who: Who, hand: int, point: str, level: float, errors: Array, slips: Array, readings: Array
     ) -> None:
         crew = self.crew
         self.eyes.bring_into_view(who, hand, point)
-        self.eyes.bisect(crew.still(who), hand, point, errors)
-        who = crew.still(who)
+        self.eyes.bisect(crew.remaining(who), hand, point, errors)
+        who = crew.remaining(who)
         items = [f"{name} {side_name(hand)} at Z {level:.2f}" for name in "XY"]
         for axis, item in enumerate(items):
             readings[axis, who] = self._read(who, point, item, slips[axis])
-        self.eyes.learn_straying(who, hand, point, readings[:, who])
+        self.eyes.measure_drift(who, hand, point, readings[:, who])
         numbers = [crew.enter(who, point, item, readings[axis, who]) for axis, item in enumerate(items)]
         self._entries[hand, point, level] = (numbers[0], numbers[1])
         self._tick()
@@ -181,7 +183,7 @@ class Bench:
     def _read(self, who: Who, point: str, item: str, slips: Array) -> Array:
         """Read the counter ``(m,)`` that an item begins with, with what is misread ``(sessions,)``."""
         self.crew.spend(who, self.crew.observer.seconds_to_read, "reading")
-        return self.crew.write(who, point, item, self.hands.counter(who, item[0]), slips)
+        return self.crew.transcribe(who, point, item, self.hands.counter(who, item[0]), slips)
 
     # --- y-parallaxes ---------------------------------------------------------------------------------
 
@@ -190,23 +192,23 @@ class Bench:
     ) -> Parallaxes:
         """Measure y-parallaxes with by' or by" or both, so many readings of each."""
         crew, observer, n = self.crew, self.crew.observer, len(points)
-        plan_errors = crew.errors(who, observer.stereo_um, (2, n))
-        height_errors = crew.errors(who, observer.height_um, (n,))
-        errors = crew.errors(who, observer.parallax_um, (n, len(projectors), readings))
-        slips = crew.slips(who, (n, len(projectors), readings))
+        plan_errors = crew.draw_setting_errors(who, observer.stereo_um, (2, n))
+        height_errors = crew.draw_setting_errors(who, observer.height_um, (n,))
+        errors = crew.draw_setting_errors(who, observer.parallax_um, (n, len(projectors), readings))
+        slips = crew.draw_misreadings(who, (n, len(projectors), readings))
         rest = self._at_rest(who)
-        p, places = np.zeros((n, crew.sessions)), np.zeros((3, n, crew.sessions))
-        apart = np.full(crew.sessions, None, dtype=object)
+        p, places = np.zeros((n, crew.size)), np.zeros((3, n, crew.size))
+        apart = np.full(crew.size, None, dtype=object)
         measuring = who
         for i, point in enumerate(points):
             self._come_to(measuring, point)
             judgement = Judgement(plan_errors[:, i], height_errors[i])
             fused = self.mark.fuse(measuring, point, judgement)
             readings_there = self.seat.counters(fused) if fused.size else np.zeros((3, 0))
-            places[:, i, fused] = self.seat.place(fused, readings_there)
-            self.eyes.learn_straying(fused, 1, point, readings_there) if fused.size else None
+            places[:, i, fused] = self.seat.model_position(fused, readings_there)
+            self.eyes.measure_drift(fused, 1, point, readings_there) if fused.size else None
             cleared = self._parallax(fused, point, judgement, projectors, rest, errors[i], slips[i], p[i])
-            lost = exclude(crew.still(measuring), cleared)
+            lost = exclude(crew.remaining(measuring), cleared)
             apart[lost] = point
             if lost.size:
                 self._turn_back(lost, ("by1", "by2"), rest)
@@ -215,11 +217,11 @@ class Bench:
                 break
             self._tick()
         if measuring.size:
-            self.seat.see_that_it_obeyed(measuring, f"{self.seat.model.name}: measuring y-parallaxes")
+            self.seat.give_up_on_errors(measuring, f"{self.seat.model.name}: measuring y-parallaxes")
         return Parallaxes(p, places, apart)
 
     def _at_rest(self, who: Who) -> dict[str, Array]:
-        rest = {name: np.zeros(self.crew.sessions) for name in ("by1", "by2")}
+        rest = {name: np.zeros(self.crew.size) for name in ("by1", "by2")}
         for name, counts in self.seat.elements(who, ["by1", "by2"]).items():
             rest[name][who] = counts
         return rest
@@ -269,16 +271,16 @@ class Bench:
         if not who.size:
             return who
         by, sense = f"by{projector}", self._sense_of_by(projector)
-        who = self.mark.settle(who, point, judgement, Clearing(by, np.full(self.crew.sessions, -sense), errors))
+        who = self.mark.settle(who, point, judgement, Clearing(by, np.full(self.crew.size, -sense), errors))
         if who.size:
             self.crew.spend(who, self.crew.observer.seconds_to_read, "reading")
-            counts = self.crew.write(who, point, by, self.hands.elements(who, [by])[by], slips)
+            counts = self.crew.transcribe(who, point, by, self.hands.elements(who, [by])[by], slips)
             numbers[who] = self.crew.enter(who, point, by, counts)[who]
             values[who] = sense * (counts - rest[by][who])
         return who
 
     def _sense_of_by(self, projector: int) -> float:
-        return 1.0 if self.seat.model.hand_of(projector) == 1 else -1.0
+        return 1.0 if self.seat.model.side_of(projector) == 1 else -1.0
 
     def _without_slips(
         self,
@@ -300,22 +302,22 @@ class Bench:
         readings = values.shape[1]
         bys = " and ".join("by'" if projector == 1 else 'by"' for projector in projectors)
         for number in range(MAX_POINTINGS):
-            flat = values.reshape(-1, crew.sessions)[:, doubtful]
+            flat = values.reshape(-1, crew.size)[:, doubtful]
             deviations = np.abs(flat - np.median(flat, axis=0))
             worst = deviations.argmax(axis=0) if len(flat) > 2 else np.full(doubtful.size, number % len(flat))
             off = deviations.max(axis=0) > tolerance[doubtful]
             doubtful, worst = doubtful[off], worst[off]
             if not doubtful.size:
-                return exclude(crew.still(who), lost)
+                return exclude(crew.remaining(who), lost)
             for i in np.unique(worst // readings):
                 of_this = worst // readings == i
-                again, k = doubtful[of_this], np.zeros(crew.sessions, dtype=np.intp)
+                again, k = doubtful[of_this], np.zeros(crew.size, dtype=np.intp)
                 k[again] = worst[of_this] % readings
                 value, entry = (np.take_along_axis(each[i], k[None], axis=0)[0] for each in (values, numbers))
                 by = f"by{projectors[i]}"
                 crew.strike(again, entry, f"does not agree with the other readings of {bys} at {point}")
-                errors = crew.errors_again(again, observer.parallax_um, 1)[0]
-                slips = crew.slips_again(again, 1)[0]
+                errors = crew.redraw_setting_errors(again, observer.parallax_um, 1)[0]
+                slips = crew.redraw_misreadings(again, 1)[0]
                 found = self._clear_with_by(again, projectors[i], point, judgement, errors, slips, rest, value, entry)
                 values[i, k[found], found], numbers[i, k[found], found] = value[found], entry[found]
                 lost = np.concatenate([lost, exclude(again, found)])
@@ -323,11 +325,11 @@ class Bench:
                     self._turn_back(found, (by,), rest)
             doubtful = exclude(doubtful, lost)
         crew.give_up(doubtful, f"{self.seat.model.name}: the readings of {bys} at {point} do not agree")
-        return exclude(crew.still(who), lost)
+        return exclude(crew.remaining(who), lost)
 
     # --- clearing -------------------------------------------------------------------------------------
 
-    def clear(
+    def clear_parallax(
         self,
         who: Who,
         point: str,
@@ -342,10 +344,10 @@ class Bench:
         """
         crew = self.crew
         judgement, error = self._judgement(who)
-        found, turn, gain = np.zeros((3, crew.sessions))
-        place = np.zeros((3, crew.sessions))
+        found, turn, gain = np.zeros((3, crew.size))
+        place = np.zeros((3, crew.size))
         fused = self._arrive(who, point, judgement, error, place, found)
-        apart = exclude(crew.still(who), fused)
+        apart = exclude(crew.remaining(who), fused)
         if not fused.size:
             return Cleared(fused, apart, found, place, turn)
         gain[fused] = gain_at(fused, place[:, fused])
@@ -354,15 +356,15 @@ class Bench:
         self._tick()
         return Cleared(exclude(fused, exclude(turning, turned)), apart, found, place, turn)
 
-    def parallaxes_seen(self, who: Who, points: Sequence[str]) -> Parallaxes:
+    def look_at_parallaxes(self, who: Who, points: Sequence[str]) -> Parallaxes:
         """Look at what y-parallax is left at points, without turning anything but the handwheels."""
         crew = self.crew
-        p, places = np.zeros((len(points), crew.sessions)), np.zeros((3, len(points), crew.sessions))
-        apart = np.full(crew.sessions, None, dtype=object)
+        p, places = np.zeros((len(points), crew.size)), np.zeros((3, len(points), crew.size))
+        apart = np.full(crew.size, None, dtype=object)
         for i, point in enumerate(points):
             judgement, error = self._judgement(who)
             fused = self._arrive(who, point, judgement, error, places[:, i], p[i])
-            apart[exclude(crew.still(who), fused)] = point
+            apart[exclude(crew.remaining(who), fused)] = point
             who = fused
             if not who.size:
                 break
@@ -372,7 +374,7 @@ class Bench:
     def _judgement(self, who: Who) -> tuple[Judgement, Array]:
         """Draw by how much one arrival at a point is misjudged, and its y-parallax ``(sessions,)`` in um."""
         observer = self.crew.observer
-        x, y, height, parallax = self.crew.errors(who, 1.0, (4,))
+        x, y, height, parallax = self.crew.draw_setting_errors(who, 1.0, (4,))
         plan = observer.stereo_um * np.array([x, y])
         return Judgement(plan, observer.height_um * height), observer.parallax_um * parallax
 
@@ -383,54 +385,54 @@ class Bench:
         fused = self.mark.fuse(who, point, judgement)
         if fused.size:
             readings = seat.counters(fused)
-            place[:, fused] = seat.place(fused, readings)
-            self.eyes.learn_straying(fused, 1, point, readings)
+            place[:, fused] = seat.model_position(fused, readings)
+            self.eyes.measure_drift(fused, 1, point, readings)
             found[fused] = self._seen_parallax(fused, point, error)
             self.crew.enter(fused, point, "parallax seen", found[fused])
         return fused
 
     def _seen_parallax(self, who: Who, point: str, error: Array) -> Array:
         """Return the y-parallax ``(m,)`` in mm as it seems."""
-        seen = self.mark.looked(who, point)[3] + error[who]
+        seen = self.mark.view(who, point)[3] + error[who]
         return np.asarray(1e-3 * seen * self.seat.z[who] / self.seat.c)
 
     def _turn_until_clear(self, who: Who, point: str, judgement: Judgement, clearing: Clearing, turn: Array) -> Who:
         """Turn an element until a point is clear, enter what it shows, and put the turn into place."""
         crew, seat, element = self.crew, self.seat, clearing.element
-        slips = crew.slips(who, (1,))[0]
-        before = np.zeros(crew.sessions)
-        before[who] = seat.standing(who, [element])[element] if who.size else 0.0
+        slips = crew.draw_misreadings(who, (1,))[0]
+        before = np.zeros(crew.size)
+        before[who] = seat.exact_values(who, [element])[element] if who.size else 0.0
         who = self.mark.settle(who, point, judgement, clearing) if who.size else who
         if not who.size:
             return who
         crew.spend(who, crew.observer.seconds_to_read, "reading")
         shown = seat.elements(who, [element])[element]
-        written = crew.write(who, point, element, shown, slips)
+        written = crew.transcribe(who, point, element, shown, slips)
         crew.enter(who, point, element, written)
-        turned = seat.in_hand(who, element) - before[who]
+        turned = seat.held_position(who, element) - before[who]
         turn[who] = (wrap_gon(turned) if seat.manual.elements[element].endless else turned) + written - shown
-        seat.learn_settings(who)
-        seat.see_that_it_obeyed(who, f"{seat.model.name}: clearing {point} with {element}")
-        return crew.still(who)
+        seat.read_settings(who)
+        seat.give_up_on_errors(who, f"{seat.model.name}: clearing {point} with {element}")
+        return crew.remaining(who)
 
     # --- model coordinates ----------------------------------------------------------------------------
 
-    def measure(self, who: Who, points: Sequence[str]) -> Array:
+    def measure_points(self, who: Who, points: Sequence[str]) -> Array:
         """Measure model points stereoscopically, two pointings that agree; X, Y, Z readings ``(3, n, sessions)``.
 
         A point whose images cannot be fused is remarked upon and comes out as nan.
         """
         crew, observer, n = self.crew, self.crew.observer, len(points)
-        at_point = crew.errors(who, 1.0, (3, n)) * np.sqrt(1.0 - observer.repeat_share**2)
-        anew = crew.errors(who, 1.0, (3, n, 2)) * observer.repeat_share
-        slips = crew.slips(who, (3, n, 2))
-        measured = np.full((3, n, crew.sessions), np.nan)
+        at_point = crew.draw_setting_errors(who, 1.0, (3, n)) * np.sqrt(1.0 - observer.repeat_share**2)
+        anew = crew.draw_setting_errors(who, 1.0, (3, n, 2)) * observer.repeat_share
+        slips = crew.draw_misreadings(who, (3, n, 2))
+        measured = np.full((3, n, crew.size), np.nan)
         for i, point in enumerate(points):
-            who = crew.still(who)
+            who = crew.remaining(who)
             self._come_to(who, point)
             self._measure(who, point, at_point[:, i], anew[:, i], slips[:, i], measured[:, i])
             self._tick()
-        self.seat.see_that_it_obeyed(who, f"{self.seat.model.name}: measuring model coordinates")
+        self.seat.give_up_on_errors(who, f"{self.seat.model.name}: measuring model coordinates")
         return measured
 
     def _measure(self, who: Who, point: str, at_point: Array, anew: Array, slips: Array, into: Array) -> None:
@@ -446,11 +448,11 @@ class Bench:
                 error, slip = anew[:, k], slips[:, k]
             else:
                 self._strike(repeating, entries[-2])
-                error = crew.errors_again(repeating, observer.repeat_share, 3)
-                slip = crew.slips_again(repeating, 3)
-            readings = np.full((3, crew.sessions), np.nan)
+                error = crew.redraw_setting_errors(repeating, observer.repeat_share, 3)
+                slip = crew.redraw_misreadings(repeating, 3)
+            readings = np.full((3, crew.size), np.nan)
             found, numbers = self._pointing(repeating, point, sigmas * (at_point + error), slip, readings)
-            apart = exclude(crew.still(repeating), found)
+            apart = exclude(crew.remaining(repeating), found)
             crew.remark(apart, f"point {point}: its two images cannot be fused, not measured")
             pointings.append(readings)
             entries.append(numbers)
@@ -466,7 +468,7 @@ class Bench:
     def _pointing(self, who: Who, point: str, error: Array, slips: Array, readings: Array) -> tuple[Who, Numbers]:
         crew = self.crew
         who = self.mark.fuse(who, point, Judgement(error[:2], error[2]))
-        numbers = np.zeros((3, crew.sessions), dtype=np.intp)
+        numbers = np.zeros((3, crew.size), dtype=np.intp)
         if who.size:
             for axis, name in enumerate("XYZ"):
                 readings[axis, who] = self._read(who, point, name, slips[axis])
@@ -476,7 +478,7 @@ class Bench:
         return who, numbers
 
     def _agree(self, first: Array, second: Array) -> npt.NDArray[np.bool_]:
-        difference = np.abs(first - second) / self.seat.units[:, None]
+        difference = np.abs(first - second) / self.seat.counter_units_per_mm[:, None]
         return np.asarray((difference <= AGREEMENT_MM + 1e-9).all(axis=0))
 
     def _strike(self, who: Who, numbers: Numbers) -> None:

@@ -35,11 +35,11 @@ class Book:
     listener: Callable[[Entry], None] | None = None
     """Is told of every entry as it is written, and again as it is struck out."""
 
-    def head(self, model: str, form: str, round: int = 0) -> None:
+    def set_heading(self, model: str, form: str, round: int = 0) -> None:
         """Begin a form; what follows is entered under it."""
         self.model, self.form, self.round = model, form, round
 
-    def enter(self, time: float, point: str, item: str, reading: str, remark: str = "") -> int:
+    def add(self, time: float, point: str, item: str, reading: str, remark: str = "") -> int:
         """Enter a reading and return its number."""
         number = len(self.entries) + 1
         entry = Entry(number, time, self.model, self.form, self.round, point, item, reading, remark)
@@ -47,7 +47,7 @@ class Book:
         self._tell(entry)
         return number
 
-    def strike(self, number: int, why: str) -> None:
+    def strike_out(self, number: int, why: str) -> None:
         """Strike an entry out; it stays, marked."""
         struck = replace(self.entries[number - 1], struck=why)
         self.entries[number - 1] = struck
@@ -59,7 +59,7 @@ class Book:
 
     def remark(self, time: float, text: str) -> None:
         """Enter a remark."""
-        self.enter(time, "", "remark", "", text)
+        self.add(time, "", "remark", "", text)
 
     @property
     def remarks(self) -> list[str]:

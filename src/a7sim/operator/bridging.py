@@ -50,7 +50,7 @@ class BridgedModels:
     """A model in a crew's strips; arrays have all sessions as their last axis."""
 
     model: ModelJob
-    who: Who
+    sessions: Who
     orientation: RelativeOrientations
     points: Mapping[str, Array]
     """Readings X, Y, Z ``(3, sessions)`` that go on from the first model, nan where a point was not measured."""
@@ -60,7 +60,7 @@ class BridgedModels:
     """Factor ``(sessions,)`` that bx took on to carry the scale."""
     z_units_per_mm: float
 
-    def places_of(self, session: int) -> dict[str, tuple[float, float, float]]:
+    def coordinates_of(self, session: int) -> dict[str, tuple[float, float, float]]:
         """Return one session's points in mm, Z upward."""
         each = {
             name: (place[:, session] / [1.0, 1.0, self.z_units_per_mm]).tolist() for name, place in self.points.items()
@@ -75,8 +75,8 @@ def bridge_strip(
     begins: Callable[[str], None] = lambda _: None,
 ) -> Iterator[BridgedModels]:
     """Yield the models of a strip as a person bridges it. Raises DoesNotFit when one cannot be set up."""
-    person.book.head("", "preparation")
-    yield from bridge_strip_batch(Bench(Crew.of_one(person), LineHands(person), job, tick), begins)
+    person.book.set_heading("", "preparation")
+    yield from bridge_strip_batch(Bench(Crew.single(person), LineHands(person), job, tick), begins)
 
 
 def bridge_strip_batch(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[BridgedModels]:
@@ -93,7 +93,7 @@ def bridge_strip_batch(bench: Bench, begins: Callable[[str], None] = lambda _: N
 def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedModels]:
     crew, seat, job = bench.crew, bench.seat, bench.job
     interior: dict[str, InteriorOrientations] = {}
-    seat.prepare(crew.everybody)
+    seat.prepare(crew.active)
     before: dict[str, Array] = {}
     last: ModelJob | None = None
     for model in job.models:
@@ -105,32 +105,32 @@ def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedMod
         mount_photographs(bench, model, interior)
         prints = load_prints(bench, model)
         require_active(bench)
-        bench.begin(crew.everybody, model, prints)
+        bench.begin(crew.active, model, prints)
         if last is None:
             preset_counters(bench, model)
         else:
             copy_common_photo_orientation(bench, model)
         begin_form(bench, model, "relative orientation", begins)
         orientation = _oriented(bench, model)
-        scale = np.ones(crew.sessions)
+        scale = np.ones(crew.size)
         if last is not None:
             begin_form(bench, model, "scale", begins)
-            scale = transfer_scale(bench, crew.everybody, model, before)
+            scale = transfer_scale(bench, crew.active, model, before)
         orientation = _refined(bench, model, orientation)
         if last is not None:
-            scale *= transfer_scale(bench, crew.everybody, model, before)
+            scale *= transfer_scale(bench, crew.active, model, before)
         begin_form(bench, model, "model coordinates", begins)
         points = model_coordinates(bench, model)
         require_active(bench)
         common = {name: points[name] - before[name] for name in points if name in before}
-        yield BridgedModels(model, crew.everybody, orientation, points, common, scale, seat.units_per_mm)
+        yield BridgedModels(model, crew.active, orientation, points, common, scale, seat.units_per_mm)
         before, last = points, model
 
 
 def _see_that_it_follows(bench: Bench, last: ModelJob, model: ModelJob) -> None:
     if model.left != last.right or model.left_projector != last.right_projector:
         bench.crew.give_up(
-            bench.crew.everybody,
+            bench.crew.active,
             f"model {model.name} does not go on from model {last.name}: expected {last.right} on the left and base "
             f"{'outside' if last.base == 'inside' else 'inside'}, got {model.left} and base {model.base}",
         )
@@ -145,7 +145,7 @@ def extend_strip(bench: Bench, model: ModelJob) -> None:
 
     With the base changed over, its centre comes from X = bx to X = 0: what stands in X = 0 has to read bx more.
     """
-    seat, who, n = bench.seat, bench.crew.everybody, model.left_projector
+    seat, who, n = bench.seat, bench.crew.active, model.left_projector
     seat.shift_counter(who, "X", seat.elements(who, ["bx"])["bx"])
     for name, axis, units in ((f"by{n}", "Y", -1.0), (f"bz{n}", "Z", seat.units_per_mm)):
         element = seat.manual.elements[name]
@@ -158,7 +158,7 @@ def extend_strip(bench: Bench, model: ModelJob) -> None:
 
 def copy_common_photo_orientation(bench: Bench, model: ModelJob) -> None:
     """Start the new photograph from the tilts and the by and bz of the oriented one, and bx from the plan."""
-    seat, who = bench.seat, bench.crew.everybody
+    seat, who = bench.seat, bench.crew.active
     left, right = model.left_projector, model.right_projector
     names = ("phi", "omega", "by", "bz")
     shown = seat.elements(who, [f"{name}{left}" for name in names])
@@ -170,7 +170,7 @@ def copy_common_photo_orientation(bench: Bench, model: ModelJob) -> None:
 
 
 def _oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
-    plan, who, tolerated = bench.job.plan, bench.crew.everybody, bench.job.tolerated_parallax_mm
+    plan, who, tolerated = bench.job.plan, bench.crew.active, bench.job.tolerated_parallax_mm
     return relative_orientation(bench, who, model, "dependent", plan.case, plan.parallax_readings, plan.bx, tolerated)
 
 
@@ -184,19 +184,19 @@ def transfer_scale(bench: Bench, who: Who, model: ModelJob, before: Mapping[str,
     """
     crew, seat = bench.crew, bench.seat
     left, right = model.left_projector, model.right_projector
-    factor, least = np.ones(crew.sessions), np.full(crew.sessions, np.inf)
+    factor, least = np.ones(crew.size), np.full(crew.size, np.inf)
     names = [name for name in map(model.standard_points.get, "135") if name is not None and name in before]
     if not names:
         crew.give_up(who, f"{model.name}: none of its points 1, 3 and 5 was measured before, to carry the scale on")
         require_active(bench)
     for number in range(1, MAX_SCALINGS + 1):
         bench.begin_round(who, number)
-        readings = bench.measure(who, names)[:, :, who]
+        readings = bench.measure_points(who, names)[:, :, who]
         wanted = np.stack([before[name][:, who] for name in names], axis=1)
         bench.compute(who)
-        settings = seat.standing(who, ["bx", *(f"{name}{n}" for name in ("by", "bz") for n in (left, right))])
+        settings = seat.exact_values(who, ["bx", *(f"{name}{n}" for name in ("by", "bz") for n in (left, right))])
         depths = [
-            settings[f"bz{left}"] + np.stack([seat.place(who, each[:, i])[2] for i in range(len(names))])
+            settings[f"bz{left}"] + np.stack([seat.model_position(who, each[:, i])[2] for i in range(len(names))])
             for each in (readings, wanted)
         ]
         larger = np.nanmean(depths[1] / depths[0], axis=0)
@@ -204,7 +204,7 @@ def transfer_scale(bench: Bench, who: Who, model: ModelJob, before: Mapping[str,
         turning = (change > bench.eyes.finest_mm) & (change < STILL_FALLING * least[who])
         least[who] = change
         crew.give_up(who[~np.isfinite(larger)], f"{model.name}: no common point carries the scale on")
-        turning &= crew.goes_on(who)
+        turning &= crew.is_active(who)
         if not turning.any():
             break
         new = {"bx": larger * settings["bx"]}
@@ -229,16 +229,16 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
     crew, seat = bench.crew, bench.seat
     unknowns = unknown_elements("dependent", model)
     points = [model.standard_points[label] for label in model.all_positions()]
-    everybody = who = crew.everybody
-    best = expand_to_batch(seat.standing(who, unknowns), who, crew.sessions)
-    least = np.full(crew.sessions, np.inf)
+    everybody = who = crew.active
+    best = expand_to_batch(seat.exact_values(who, unknowns), who, crew.size)
+    least = np.full(crew.size, np.inf)
     for number in range(1, MAX_REFINEMENTS + 1):
         bench.begin_round(who, number)
-        seen = bench.parallaxes_seen(who, points)
-        who = crew.still(who)
-        who = exclude(who, seen.parted(who))
-        rms = np.sqrt((seen.p**2).mean(axis=0))
-        now = expand_to_batch(seat.standing(who, unknowns), who, crew.sessions)
+        seen = bench.look_at_parallaxes(who, points)
+        who = crew.remaining(who)
+        who = exclude(who, seen.disagrees(who))
+        rms = np.sqrt((seen.parallax_mm**2).mean(axis=0))
+        now = expand_to_batch(seat.exact_values(who, unknowns), who, crew.size)
         better = who[rms[who] < least[who]]
         falling = who[rms[who] < STILL_FALLING * least[who]]
         least[better] = rms[better]
@@ -247,11 +247,11 @@ def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> Rela
         who = falling
         if not who.size or number == MAX_REFINEMENTS:
             break
-        corrections, _ = compute_corrections(bench, who, model, seen.places, seen.p, unknowns, seat.bx(who))
-        who = crew.still(who)
+        corrections, _ = compute_corrections(bench, who, model, seen.places, seen.parallax_mm, unknowns, seat.bx(who))
+        who = crew.remaining(who)
         seat.turn_elements(who, {name: (now[name] + corrections[name])[who] for name in unknowns})
-    everybody = crew.still(everybody)
-    seat.turn_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
+    everybody = crew.remaining(everybody)
+    seat.turn_if_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
     bench.begin_round(everybody, MAX_REFINEMENTS + 1)
     job = bench.job
     return assess_residuals(

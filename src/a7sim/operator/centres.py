@@ -54,8 +54,8 @@ def observe_centre(bench: Bench, who: Who, model: ModelJob, hand: int) -> Perspe
     give up.
     """
     plan, crew = bench.job.plan, bench.crew
-    shown = bench.seat.levels_shown(who, plan.centre_levels)
-    who = crew.still(who)
+    shown = bench.seat.displayed_levels(who, plan.centre_levels)
+    who = crew.remaining(who)
     levels = shown[:, 0]
     if plan.centre_method == "scales":
         return _by_scales(bench, who, hand, plan.centre_levels)
@@ -63,7 +63,7 @@ def observe_centre(bench: Bench, who: Who, model: ModelJob, hand: int) -> Perspe
         centres = _by_grid_plate(bench, who, model, hand, levels)
     else:
         centres = _by_levels(bench, who, model, hand, levels)
-    who = crew.still(who)
+    who = crew.remaining(who)
     rms = centres.rms[who]
     for session, bad in zip(who[rms > plan.tolerated_centre_rms], rms[rms > plan.tolerated_centre_rms], strict=True):
         crew.give_up(
@@ -105,7 +105,7 @@ def _by_scales(bench: Bench, who: Who, hand: int, levels: Sequence[float]) -> Pe
 
     Their standard deviations are those of the rounding to the last digit.
     """
-    sessions = bench.crew.sessions
+    sessions = bench.crew.size
     X0, Y0, Z0 = np.full((3, sessions), np.nan)
     X0[who], Y0[who], Z0[who] = bench.seat.centre(who, hand)
     rounding = np.full(sessions, LEAST_COUNT / np.sqrt(12.0))
@@ -137,19 +137,19 @@ def _by_levels(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Level
     points = [model.standard_points[label] for label in model.all_positions()]
     corners_and_nadirs = {model.standard_points[label] for label in model.points_of_case("A")}
     groups = []
-    for them, there in bench.alike(who, points, (hand,)):
+    for them, there in bench.group_by_points(who, points, (hand,)):
         usual = [name for name in there if name in corners_and_nadirs]
         chosen = usual if len(usual) >= MIN_POINTS else there
         if len(chosen) >= MIN_POINTS:
             found = _of_points(bench, them, model, hand, chosen, levels)
-            groups.append((crew.still(them), chosen, found))
+            groups.append((crew.remaining(them), chosen, found))
         else:
             crew.give_up(
                 them,
                 f"{model.name}: {len(chosen)} of the standard points are pricked on the print of the {side_name(hand)} "
                 f"photograph: there must be {MIN_POINTS} for its perspective centre",
             )
-    return _gathered(groups, crew.sessions)
+    return _gathered(groups, crew.size)
 
 
 def _gathered(groups: Sequence[tuple[Who, Sequence[str], PerspectiveCentre]], sessions: int) -> PerspectiveCentre:
@@ -177,13 +177,13 @@ def _of_points(
     """
     crew = bench.crew
     pointings = _one_set(bench, who, hand, points, levels)
-    who = crew.still(who)
+    who = crew.remaining(who)
     doubtful = who[_rms(pointings[..., who], levels) > SUSPICIOUS_RMS]
     if doubtful.size:
         crew.remark(doubtful, f"{model.name}: the points of the centre fit badly, a second set is observed")
         again = _one_set(bench, doubtful, hand, points, levels)
         pointings[..., doubtful] = (pointings[..., doubtful] + again[..., doubtful]) / 2.0
-        who = crew.still(who)
+        who = crew.remaining(who)
     return _centre(pointings[..., who], levels)
 
 
@@ -201,8 +201,10 @@ def _rms(pointings: Array, levels: Levels) -> Array:
 def _one_set(bench: Bench, who: Who, hand: int, points: Sequence[str], levels: Levels) -> Array:
     """Return pointings ``(2, k, n, sessions)`` at k levels."""
     crew = bench.crew
-    pointings = np.stack([bench.point_with(crew.still(who), hand, points, level) for level in levels.tolist()], axis=1)
-    looking = crew.still(who)
+    pointings = np.stack(
+        [bench.point_monocularly(crew.remaining(who), hand, points, level) for level in levels.tolist()], axis=1
+    )
+    looking = crew.remaining(who)
     bench.compute(looking)
     for _ in range(MAX_REPETITIONS):
         misread = _misread_points(pointings[..., looking], levels)
@@ -213,9 +215,9 @@ def _one_set(bench: Bench, who: Who, hand: int, points: Sequence[str], levels: L
         for place in np.unique(misread):
             again = looking[misread == place]
             for i, level in enumerate(levels.tolist()):
-                pointed = bench.point_again(again, hand, points[place], level, why)
+                pointed = bench.repeat_pointing(again, hand, points[place], level, why)
                 pointings[:, i, place, again] = pointed[:, again]
-        looking = crew.still(looking)
+        looking = crew.remaining(looking)
         bench.compute(looking)
     return pointings
 
@@ -242,24 +244,24 @@ def _by_grid_plate(bench: Bench, who: Who, model: ModelJob, hand: int, levels: L
     projector = bench.seat.projector(hand)
     picture = model.left if hand == 1 else model.right
     centre_picture(bench, who, projector, plate.name, certificate)
-    lie = locate_plate(bench, crew.still(who), projector, certificate, times=1)
-    bench.eyes.take_prints({hand: sketch_positions(bench, crew.still(who), projector)})
-    crosses = _crosses_in_model(bench, crew.still(who), hand, levels)
+    lie = locate_plate(bench, crew.remaining(who), projector, certificate, times=1)
+    bench.eyes.set_prints({hand: sketch_positions(bench, crew.remaining(who), projector)})
+    crosses = _crosses_in_model(bench, crew.remaining(who), hand, levels)
     if len(crosses) < MIN_CROSSES:
         crew.give_up(who, f"{model.name}: too few crosses of plate {plate.name} lie within the model for a centre")
-        return _nowhere(crew.sessions)
+        return _nowhere(crew.size)
     pointings = np.stack(
-        [point_at_crosses(bench, crew.still(who), hand, crosses, level) for level in levels.tolist()], axis=1
+        [point_at_crosses(bench, crew.remaining(who), hand, crosses, level) for level in levels.tolist()], axis=1
     )
-    who = crew.still(who)
+    who = crew.remaining(who)
     bench.compute(who)
     c = bench.seat.elements(who, [f"c{projector}"])[f"c{projector}"]
     its_lie = PlateLie(*_each(lie, lambda values: values[who]))
     found = _resected(bench, crosses, pointings[..., who], levels, c, its_lie)
-    centres = _among_all(found, who, crew.sessions)
+    centres = _among_all(found, who, crew.size)
     centre_picture(bench, who, projector, picture, job.certificate)
-    who = crew.still(who)
-    bench.eyes.take_prints({side: sketch_positions(bench, who, bench.seat.projector(side)) for side in (1, 2)})
+    who = crew.remaining(who)
+    bench.eyes.set_prints({side: sketch_positions(bench, who, bench.seat.projector(side)) for side in (1, 2)})
     return centres
 
 
@@ -271,9 +273,9 @@ def _crosses_in_model(bench: Bench, who: Who, hand: int, levels: Levels) -> Cros
 
     def in_model(crosses: Crosses) -> Crosses:
         swung = np.array(
-            [seat.on_carrier(who, hand, np.repeat([place], who.size, axis=0).T) for place in crosses.values()]
+            [seat.rotate_by_swing(who, hand, np.repeat([place], who.size, axis=0).T) for place in crosses.values()]
         )
-        depth = seat.in_frame(who, np.zeros((2, levels.size, who.size)), levels[:, None])[2]
+        depth = seat.frame_positions(who, np.zeros((2, levels.size, who.size)), levels[:, None])[2]
         x = swung[:, 0] * depth.max(axis=0) / seat.c + (0.0 if hand == 1 else bx)
         inside = ((x >= -beyond) & (x <= bx + beyond)).all(axis=1)
         return {name: place for (name, place), keep in zip(crosses.items(), inside, strict=True) if keep}

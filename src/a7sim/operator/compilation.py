@@ -95,7 +95,7 @@ class Compilation:
         self.model = model
         self.area = area
         self._tracing = tracing
-        self._who = bench.crew.everybody
+        self._who = bench.crew.active
         self._light = 1.0 if bench.seat.model.polarity == "positive" else -1.0
 
     # --- the mark -------------------------------------------------------------------------------------
@@ -103,7 +103,7 @@ class Compilation:
     def _drive(self, place: Array, z: float) -> None:
         targets = dict(zip("XYZ", [np.array([value]) for value in (*place, z)], strict=True))
         self._bench.seat.drive(self._who, targets)
-        self._bench.seat.see_that_it_obeyed(self._who, "driving over the model")
+        self._bench.seat.give_up_on_errors(self._who, "driving over the model")
 
     def _turn(self, plan: Array, rise: float = 0.0) -> None:
         wheels = np.array([*plan, rise * self.model.units_per_mm])
@@ -133,7 +133,7 @@ class Compilation:
 
     def _tremor(self, look: Look) -> tuple[Array, float]:
         """Draw tremor along and across ``(2,)``, and how much too high the ground seems to be, in mm."""
-        along, across, height = self._bench.crew.errors(self._who, 1.0, (3,))[:, 0]
+        along, across, height = self._bench.crew.draw_setting_errors(self._who, 1.0, (3,))[:, 0]
         tremor = 1e-3 * self._tracing.tremor_um * look.enlargement * np.array([along, across])
         return tremor, float(1e-3 * self._bench.crew.observer.height_um * height / look.parallax_by_height)
 
@@ -211,7 +211,7 @@ class Compilation:
         at, step, bend = start, FIRST_STEP_MM, 0.0
         while len(vertices) < _MAX_VERTICES:
             wanted = step * _turned(at.heading, bend / 2.0)
-            cut = self.area.shortened(at.place, wanted)
+            cut = self.area.clip_step(at.place, wanted)
             if length_of(cut) < 1e-2:
                 return vertices, "edge"
             self._turn(at.place + cut - self._place())
@@ -308,7 +308,7 @@ class Compilation:
             if length_of(left) < _END_REACHED_MM and left @ road.heading < step:
                 return vertices, "end"
             forward = step * _turned(road.heading, bend / 2.0)
-            cut = self.area.shortened(start + road.offset, forward)
+            cut = self.area.clip_step(start + road.offset, forward)
             if length_of(cut) < length_of(forward) - 1e-9:
                 return vertices, "edge"
             going = road.offset + cut

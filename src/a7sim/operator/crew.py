@@ -42,25 +42,25 @@ class Crew:
         self._model, self._form, self._round = "", "", 0
 
     @classmethod
-    def of_one(cls, person: Person) -> "Crew":
+    def single(cls, person: Person) -> "Crew":
         """Return the crew that is one person at a line."""
         return cls(person.observer, [person.dice], person)
 
     @property
-    def sessions(self) -> int:
+    def size(self) -> int:
         """How many they are."""
         return len(self._dice)
 
     @property
-    def everybody(self) -> Who:
+    def active(self) -> Who:
         """Indices of all sessions that go on."""
         return np.flatnonzero(~self._given_up)
 
-    def goes_on(self, who: Who) -> npt.NDArray[np.bool_]:
+    def is_active(self, who: Who) -> npt.NDArray[np.bool_]:
         """Return which have not given up."""
         return np.asarray(~self._given_up[who])
 
-    def still(self, who: Who) -> Who:
+    def remaining(self, who: Who) -> Who:
         """Return those who have not given up."""
         return who[~self._given_up[who]]
 
@@ -69,15 +69,15 @@ class Crew:
     def begin(self, who: Who, model: str, form: str) -> None:
         """Begin a form of a model, after a break where one is due."""
         self._rest(who)
-        self._slips.come_back(who.tolist())
+        self._slips.recheck_points(who.tolist())
         self._model, self._form, self._round = model, form, 0
         if self.person is not None:
-            self.person.book.head(model, form)
+            self.person.book.set_heading(model, form)
 
     def begin_round(self, who: Who, number: int) -> None:
         """Begin a round of the form, after a break where one is due."""
         self._rest(who)
-        self._slips.come_back(who.tolist())
+        self._slips.recheck_points(who.tolist())
         self._round = number
         if self.person is not None:
             self.person.book.round = number
@@ -93,23 +93,25 @@ class Crew:
 
     # --- chance ---------------------------------------------------------------------------------------
 
-    def errors(self, who: Who, sigma: float, shape: tuple[int, ...]) -> Array:
+    def draw_setting_errors(self, who: Who, sigma: float, shape: tuple[int, ...]) -> Array:
         """Return the errors of planned settings ``(*shape, sessions)``, zero for those who do not act."""
-        return self._among_all(who, self._acuity_factors(who, sigma) * self._drawn(who, shape, Dice.errors))
+        return self._among_all(
+            who, self._acuity_factors(who, sigma) * self._drawn(who, shape, Dice.fill_setting_errors)
+        )
 
-    def slips(self, who: Who, shape: tuple[int, ...]) -> Array:
+    def draw_misreadings(self, who: Who, shape: tuple[int, ...]) -> Array:
         """Return what is misread at planned readings ``(*shape, sessions)``, in counter units."""
-        luck = self._drawn(who, (3, *shape), Dice.luck)
+        luck = self._drawn(who, (3, *shape), Dice.fill_reading_draws)
         return self._among_all(who, misreading(self.observer, luck, self._slip_factors(who)))
 
-    def errors_again(self, who: Who, sigma: float, count: int) -> Array:
+    def redraw_setting_errors(self, who: Who, sigma: float, count: int) -> Array:
         """Return the errors ``(count, sessions)`` of settings made once more."""
-        drawn = self._drawn(who, (count,), Dice.errors_again)
+        drawn = self._drawn(who, (count,), Dice.refill_setting_errors)
         return self._among_all(who, self._acuity_factors(who, sigma) * drawn)
 
-    def slips_again(self, who: Who, count: int) -> Array:
+    def redraw_misreadings(self, who: Who, count: int) -> Array:
         """Return what is misread ``(count, sessions)`` at readings made once more."""
-        luck = self._drawn(who, (3, count), Dice.luck_again)
+        luck = self._drawn(who, (3, count), Dice.refill_reading_draws)
         return self._among_all(who, misreading(self.observer, luck, self._slip_factors(who)))
 
     def _drawn(self, who: Who, shape: tuple[int, ...], draw: Callable[[Dice, Array], None]) -> Array:
@@ -120,9 +122,9 @@ class Crew:
         return np.ascontiguousarray(np.moveaxis(drawn, 0, -1))
 
     def _among_all(self, who: Who, values: Array) -> Array:
-        if who.size == self.sessions:
+        if who.size == self.size:
             return values
-        every = np.zeros((*values.shape[:-1], self.sessions))
+        every = np.zeros((*values.shape[:-1], self.size))
         every[..., who] = values
         return every
 
@@ -135,54 +137,54 @@ class Crew:
     # --- slips ----------------------------------------------------------------------------------------
 
     @property
-    def mistakes_points(self) -> bool:
+    def may_mistake_points(self) -> bool:
         """Whether anybody may go to another point than the one that is meant."""
         return self._slips.possible("wrong point")
 
-    def come_to(self, who: Who, point: str, near: Mapping[str, npt.NDArray[np.bool_]]) -> None:
+    def select_point(self, who: Who, point: str, near: Mapping[str, npt.NDArray[np.bool_]]) -> None:
         """Go to a point, or by mistake to one near it; who can find which of these ``(m,)`` on their prints."""
-        self.come_back(who)
-        if not self.mistakes_points:
+        self.recheck_points(who)
+        if not self.may_mistake_points:
             return
         factors = self._slip_factors(who)
         for i, session in enumerate(who):
             candidates = [name for name, found in near.items() if found[i]]
-            self._slips.come_to(self._occasion(session, point), candidates, factors[i])
+            self._slips.select_point(self._occasion(session, point), candidates, factors[i])
 
-    def come_back(self, who: Who) -> None:
+    def recheck_points(self, who: Who) -> None:
         """Look once more which point it is."""
-        self._slips.come_back(who.tolist())
+        self._slips.recheck_points(who.tolist())
 
-    def pointing_at(self, who: Who, point: str) -> Iterator[tuple[Who, str]]:
+    def pointing_groups(self, who: Who, point: str) -> Iterator[tuple[Who, str]]:
         """Yield who of those at a point really looks at which, as groups."""
-        if self._slips.all_points_right:
+        if self._slips.no_point_mistaken:
             yield who, point
             return
-        names = np.array([self._slips.taken_for(int(session), point) for session in who], dtype=object)
+        names = np.array([self._slips.mistaken_point(int(session), point) for session in who], dtype=object)
         for name in dict.fromkeys(names.tolist()):
             yield who[names == name], name
 
-    def looked_at(self, who: Who, point: str, look: Callable[[Who, str], Array]) -> Array:
+    def view_points(self, who: Who, point: str, look: Callable[[Who, str], Array]) -> Array:
         """Return what `look` gives ``(..., m)`` of the points that those at a point really look at."""
-        if self._slips.all_points_right:
+        if self._slips.no_point_mistaken:
             return look(who, point)
-        groups = [(them, look(them, name)) for them, name in self.pointing_at(who, point)]
+        groups = [(them, look(them, name)) for them, name in self.pointing_groups(who, point)]
         if len(groups) <= 1:
             return groups[0][1] if groups else look(who, point)
-        seen = np.zeros((*groups[0][1].shape[:-1], self.sessions))
+        seen = np.zeros((*groups[0][1].shape[:-1], self.size))
         for them, each in groups:
             seen[..., them] = each
         return np.asarray(seen[..., who])
 
-    def printed(self, prints: Mapping[str, Array], point: str) -> Array:
+    def print_position(self, prints: Mapping[str, Array], point: str) -> Array:
         """Return the place ``(2, sessions)`` on the prints of what everybody takes for a point, nan where it is not."""
-        nowhere = np.full((2, self.sessions), np.nan)
-        if self._slips.all_points_right:
+        nowhere = np.full((2, self.size), np.nan)
+        if self._slips.no_point_mistaken:
             return prints.get(point, nowhere)
-        taken = [prints.get(self._slips.taken_for(session, point), nowhere) for session in range(self.sessions)]
+        taken = [prints.get(self._slips.mistaken_point(session, point), nowhere) for session in range(self.size)]
         return np.stack([each[:, session] for session, each in enumerate(taken)], axis=-1)
 
-    def write(self, who: Who, point: str, item: str, shown: Array, misread: Array) -> Array:
+    def transcribe(self, who: Who, point: str, item: str, shown: Array, misread: Array) -> Array:
         """Return what is written ``(m,)`` of what counters show; `misread` ``(sessions,)`` is what chance adds."""
         wrongly = take(misread, who)
         written = np.asarray(shown + wrongly).round(4)
@@ -190,10 +192,10 @@ class Crew:
         factors = self._slip_factors(who[tempted])
         for i, factor in zip(tempted.tolist(), factors, strict=True):
             occasion = self._occasion(who[i], point, item)
-            written[i] = self._slips.write(occasion, float(shown[i]), float(written[i]), factor)
+            written[i] = self._slips.transcribe(occasion, float(shown[i]), float(written[i]), factor)
         return written
 
-    def puts(self, who: Who, fitting: str, position: str) -> Iterator[tuple[Who, str]]:
+    def fitting_positions(self, who: Who, fitting: str, position: str) -> Iterator[tuple[Who, str]]:
         """Yield who puts a fitting into which position: the right one, but where it is forgotten the other."""
         if not self._slips.possible("forgotten lever"):
             yield who, position
@@ -201,7 +203,7 @@ class Crew:
         (other,) = set(POSITIONS_OF[fitting]) - {position}
         factors = self._slip_factors(who)
         forgotten = [
-            self._slips.forgets(self._occasion(session, fitting, "fitting"), position, other, factor)
+            self._slips.forgets_fitting(self._occasion(session, fitting, "fitting"), position, other, factor)
             for session, factor in zip(who, factors, strict=True)
         ]
         left = np.array(forgotten, dtype=bool)
@@ -209,7 +211,7 @@ class Crew:
             if them.size:
                 yield them, put
 
-    def notes(self, who: Who, now: Mapping[str, Array], before: Mapping[str, Array]) -> Mapping[str, Array]:
+    def noted_elements(self, who: Who, now: Mapping[str, Array], before: Mapping[str, Array]) -> Mapping[str, Array]:
         """Return the elements ``(sessions,)`` as they are noted: where one is not re-read, what it was before."""
         if not self._slips.possible("element not re-read"):
             return now
@@ -218,7 +220,7 @@ class Crew:
         for name, old in before.items():
             for session, factor in zip(who, factors, strict=True):
                 occasion = self._occasion(session, name, "element")
-                if self._slips.uses_old(occasion, float(old[session]), float(now[name][session]), factor):
+                if self._slips.uses_stale_reading(occasion, float(old[session]), float(now[name][session]), factor):
                     noted[name][session] = old[session]
         return noted
 
@@ -234,24 +236,24 @@ class Crew:
 
     def _let_go_by(self, who: Who, seconds: float, act: Act) -> None:
         add_at(seconds, who, self.seconds)
-        self.timesheet.spend(who, seconds, self._form, act)
+        self.timesheet.add(who, seconds, self._form, act)
         if self.person is not None:
-            self.person.clock.spend(seconds)
+            self.person.clock.advance(seconds)
 
     def enter(self, who: Who, point: str, item: str, readings: Array) -> npt.NDArray[np.intp]:
         """Enter readings ``(m,)`` in the book and return the numbers ``(sessions,)`` of the entries."""
-        numbers = np.zeros(self.sessions, dtype=np.intp)
+        numbers = np.zeros(self.size, dtype=np.intp)
         if self.person is not None:
             for session, reading in zip(who, readings, strict=True):
-                numbers[session] = self.person.book.enter(self.person.clock.now, point, item, f"{reading:.2f}")
-                self._slips.entered(int(session), point, item, int(numbers[session]))
+                numbers[session] = self.person.book.add(self.person.clock.now, point, item, f"{reading:.2f}")
+                self._slips.note_entry(int(session), point, item, int(numbers[session]))
         return numbers
 
     def strike(self, who: Who, numbers: npt.NDArray[np.intp], why: str) -> None:
         """Strike entries out; they stay, marked."""
         if self.person is not None:
             for session in who:
-                self.person.book.strike(int(numbers[session]), why)
+                self.person.book.strike_out(int(numbers[session]), why)
 
     def remark(self, who: Who, text: str) -> None:
         """Write a remark into the book and the journal."""

@@ -28,24 +28,24 @@ class Dice:
         self._again = np.random.default_rng(again)
         self._lapses = np.random.default_rng(lapses)
 
-    def errors(self, into: Array) -> None:
+    def fill_setting_errors(self, into: Array) -> None:
         """Draw the errors of planned settings, in units of their standard deviation."""
         into[...] = self._planned.standard_normal(into.shape)
 
-    def errors_again(self, into: Array) -> None:
+    def refill_setting_errors(self, into: Array) -> None:
         """Draw the errors ``(count,)`` of settings that have to be made once more, in the same unit."""
         into[:] = self._again.standard_normal(into.size)
 
-    def luck(self, into: Array) -> None:
+    def fill_reading_draws(self, into: Array) -> None:
         """Draw the luck ``(3, ...)`` with which planned readings are read, for `misread`."""
         _luck(self._planned, into)
 
-    def luck_again(self, into: Array) -> None:
+    def refill_reading_draws(self, into: Array) -> None:
         """Draw the luck ``(3, count)`` with which readings are made once more."""
         for i in range(into.shape[1]):
             _luck(self._again, into[:, i : i + 1])
 
-    def lapses(self, rate: float) -> bool:
+    def slip_draws(self, rate: float) -> bool:
         """Return whether something happens that does so with this rate."""
         return rate > 0.0 and bool(self._lapses.random() < rate)
 

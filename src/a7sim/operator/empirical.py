@@ -146,7 +146,7 @@ def perturb_elements(bench: Bench, who: Who, model: ModelJob, method: str, most:
     A component of the base by as much as tilts the base by that angle.
     """
     unknowns = unknown_elements(method, model)
-    shares = np.vectorize(math.erf)(bench.crew.errors(who, 0.5**0.5, (len(unknowns),)))
+    shares = np.vectorize(math.erf)(bench.crew.draw_setting_errors(who, 0.5**0.5, (len(unknowns),)))
     now = bench.seat.elements(who, unknowns)
     base = np.abs(bench.seat.bx(who)) * GON
     bench.crew.remark(who, f"{model.name}: elements set off by up to {most:g} gon, for practice")
@@ -194,7 +194,7 @@ def empirical_orientation(
             waiting[missing | {label}] = np.union1d(waiting.get(missing | {label}, lost), lost)
         found = RelativeOrientations(method, case, clearing.rounds, clearing.rough, {}, {}, {}, "empirical")
         done.append((ended, _assessed(bench, ended, model, found, missing, readings, tolerated_rms)))
-    return merge_groups(done, method, case, crew.sessions, "empirical")
+    return merge_groups(done, method, case, crew.size, "empirical")
 
 
 def _checks(usable: Sequence[str], steps: Sequence[Step]) -> list[str]:
@@ -215,14 +215,14 @@ def _assessed(
         return found
     bench.begin_round(who, len(found.rounds) + 1)
     there = [label for label in model.all_positions() if label not in missing]
-    there = [label for label in there if bench.pricked(who, model.standard_points[label]).all()]
+    there = [label for label in there if bench.has_point(who, model.standard_points[label]).all()]
     return assess_residuals(bench, who, model, found, there, readings, tolerated_rms)
 
 
 def _with_pricked(bench: Bench, who: Who, model: ModelJob, labels: Sequence[str]) -> dict[frozenset[str], Who]:
     """Return the sessions by what positions are not in their model, or not pricked on both their prints."""
     absent = frozenset(CASES["A"]) - frozenset(labels)
-    pricked = {label: bench.pricked(who, model.standard_points[label]) for label in labels}
+    pricked = {label: bench.has_point(who, model.standard_points[label]) for label in labels}
     groups: dict[frozenset[str], list[int]] = {}
     for i, session in enumerate(who):
         missing = absent | {label for label, there in pricked.items() if not there[i]}
@@ -249,12 +249,12 @@ class _Clearing:
         self.steps = steps
         self.checks = checks
         self.rounds: list[Rounds] = []
-        self.rough = np.zeros(self.crew.sessions, dtype=np.intp)
+        self.rough = np.zeros(self.crew.size, dtype=np.intp)
         self.lost: list[tuple[Who, str]] = []
         """Who could not bring the images together, and at which position."""
         self._over_corrected = over_corrected
-        self._found = {label: np.full(self.crew.sessions, np.nan) for label in self._labels()}
-        self._places = np.zeros((3, len(steps), self.crew.sessions))
+        self._found = {label: np.full(self.crew.size, np.nan) for label in self._labels()}
+        self._places = np.zeros((3, len(steps), self.crew.size))
         acuity = 1e-3 * self.crew.observer.parallax_um * bench.job.plan.projection_height / bench.seat.c
         self._visible = max(acuity, bench.eyes.finest_mm)
 
@@ -263,7 +263,7 @@ class _Clearing:
         ended = who[:0]
         while who.size:
             self.bench.begin_round(who, len(self.rounds) + 1)
-            settings = expand_to_batch(self.bench.seat.elements(who, self._elements()), who, self.crew.sessions)
+            settings = expand_to_batch(self.bench.seat.elements(who, self._elements()), who, self.crew.size)
             who = self._clear_first_four(who)
             if not who.size:
                 break
@@ -285,7 +285,7 @@ class _Clearing:
         return [step.element for step in self.steps]
 
     def _going(self, who: Who) -> Who:
-        who = self.crew.still(np.asarray(who, dtype=np.intp))
+        who = self.crew.remaining(np.asarray(who, dtype=np.intp))
         for lost, _ in self.lost:
             who = exclude(who, lost)
         return who
@@ -309,13 +309,13 @@ class _Clearing:
     def _over_correct(self, who: Who) -> tuple[Who, Who, Array]:
         """Turn omega n times as far as clears the last point; return who is there, who had to turn, and n."""
         seat, step, threshold = self.bench.seat, self.steps[-1], VISIBLE_SIGMAS_AT_LAST * self._visible
-        turn, n = np.zeros((2, self.crew.sessions))
+        turn, n = np.zeros((2, self.crew.size))
         who = self._clear(who, len(self.steps) - 1, step, threshold, turn)
         turning = who[turn[who] != 0.0]
         if turning.size:
             n[turning] = self._times(turning)
             turning = self._going(turning)
-            stands = seat.standing(turning, [step.element])[step.element]
+            stands = seat.exact_values(turning, [step.element])[step.element]
             seat.turn_elements(turning, {step.element: stands + ((n - 1.0) * turn)[turning]})
         return self._going(who), self._going(turning), n
 
@@ -334,17 +334,17 @@ class _Clearing:
 
     def _look_at_checks(self, who: Who) -> None:
         for label in self.checks:
-            seen = self.bench.parallaxes_seen(who, [self.model.standard_points[label]])
-            together = self.crew.still(who)
-            apart = seen.parted(together)
-            self._found[label][together] = seen.p[0, together]
+            seen = self.bench.look_at_parallaxes(who, [self.model.standard_points[label]])
+            together = self.crew.remaining(who)
+            apart = seen.disagrees(together)
+            self._found[label][together] = seen.parallax_mm[0, together]
             self._found[label][apart] = np.nan
 
     def _close_round(self, who: Who, turning: Who, settings: Mapping[str, Array], n: Array) -> None:
         parallaxes = {label: p.copy() for label, p in self._found.items()}
         squares = np.square(list(parallaxes.values()))
         rms = np.sqrt(np.nansum(squares, axis=0) / np.maximum(1, (~np.isnan(squares)).sum(axis=0)))
-        nothing = np.zeros(self.crew.sessions)
+        nothing = np.zeros(self.crew.size)
         self.rounds.append(Rounds(who, settings, parallaxes, nothing, rms, turning, {}, n))
 
     # --- a point --------------------------------------------------------------------------------------
@@ -358,27 +358,27 @@ class _Clearing:
         for tries_left in reversed(range(TRIES)):
             if not who.size:
                 break
-            done = self.bench.clear(who, point, step.element, partial(self._gain, step.element), unless_within)
-            self._found[step.position][done.who] = done.found[done.who]
-            self._places[:, place, done.who] = done.place[:, done.who]
+            done = self.bench.clear_parallax(who, point, step.element, partial(self._gain, step.element), unless_within)
+            self._found[step.position][done.sessions] = done.arrival_parallax_mm[done.sessions]
+            self._places[:, place, done.sessions] = done.model_position_mm[:, done.sessions]
             if turn is not None:
-                turn[done.who] = done.turn[done.who]
-            cleared = np.union1d(cleared, done.who)
-            who = exclude(self.crew.still(who), done.who)
-            parted = exclude(who, done.apart)
+                turn[done.sessions] = done.element_change[done.sessions]
+            cleared = np.union1d(cleared, done.sessions)
+            who = exclude(self.crew.remaining(who), done.sessions)
+            parted = exclude(who, done.disagreement)
             if tries_left:
-                for session in np.intersect1d(who, done.apart):
+                for session in np.intersect1d(who, done.disagreement):
                     self._bring_together(np.array([session]), point, step)
-                who = self.crew.still(who)
+                who = self.crew.remaining(who)
         self.crew.give_up(
-            self.crew.still(parted),
+            self.crew.remaining(parted),
             f"{self.model.name}: {point} cannot be cleared with {step.element}: that comes to its end, or images part",
         )
-        who = self.crew.still(who)
+        who = self.crew.remaining(who)
         if who.size:
             self.crew.remark(who, f"{self.model.name}: the images of {point} cannot be fused: done without it")
             self.lost.append((who, step.position))
-        return self.crew.still(np.asarray(cleared, dtype=np.intp))
+        return self.crew.remaining(np.asarray(cleared, dtype=np.intp))
 
     def _bring_together(self, one: Who, point: str, step: Step) -> None:
         """Turn an element by what the Y readings of each eye alone differ by."""
@@ -388,10 +388,10 @@ class _Clearing:
             one, f"{self.model.name}: the images of {point} are too far apart: {element} by each eye alone"
         )
         level = float(seat.counters(one)[2, 0])
-        readings = [bench.point_with(one, hand, [point], level) for hand in (1, 2)]
-        if not self.crew.still(one).size:
+        readings = [bench.point_monocularly(one, hand, [point], level) for hand in (1, 2)]
+        if not self.crew.remaining(one).size:
             return
-        left, right = (seat.in_frame(one, each[:, :, one], np.array([level]))[:, 0] for each in readings)
+        left, right = (seat.frame_positions(one, each[:, :, one], np.array([level]))[:, 0] for each in readings)
         base = seat.bx(one)
         place = left * base / (left[0] - right[0] + base)
         parallax = (left[1] - right[1]) * base / (left[0] - right[0] + base)
@@ -402,7 +402,7 @@ class _Clearing:
     # --- coefficients ---------------------------------------------------------------------------------
 
     def _by_hand(self, element: str) -> str:
-        return f"{element[:-1]}{self.model.hand_of(int(element[-1]))}"
+        return f"{element[:-1]}{self.model.side_of(int(element[-1]))}"
 
     def _gain(self, element: str, who: Who, place: Array) -> Array:
         """Return what one unit of an element's counter adds to the parallax ``(m,)`` at places ``(3, m)``, mm.

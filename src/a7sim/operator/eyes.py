@@ -39,10 +39,10 @@ class Eyes:
         self.finest_mm = max(FINEST_MM, FINEST_SHARE * 1e-3 * eye * seat.job.plan.projection_height / seat.c)
         """What handwheels and drums are not turned by any more."""
         self._prints: Mapping[int, Mapping[str, Array]] = {}
-        self._strayed = np.zeros((3, 2, seat.crew.sessions))
-        self._seen_from = np.zeros((2, seat.crew.sessions))
+        self._strayed = np.zeros((3, 2, seat.crew.size))
+        self._seen_from = np.zeros((2, seat.crew.size))
 
-    def take_prints(self, prints: Mapping[int, Mapping[str, Array]]) -> None:
+    def set_prints(self, prints: Mapping[int, Mapping[str, Array]]) -> None:
         """Take up the paper prints by hand (1 left, 2 right): places ``(2, sessions)`` of points in mm."""
         self._prints = prints
         self._strayed[:] = 0.0
@@ -50,7 +50,7 @@ class Eyes:
     def bring_into_view(self, who: Who, hand: int, point: str) -> None:
         """Drive to where the print shows a point and look around until it is in the field of view."""
         seat = self.seat
-        printed = self.crew.printed(self._prints[hand], point)
+        printed = self.crew.print_position(self._prints[hand], point)
         nowhere = np.isnan(printed[0, who])
         self.crew.give_up(
             who[nowhere], f"point {point} is not pricked on the print of the {side_name(hand)} photograph"
@@ -59,14 +59,14 @@ class Eyes:
         if not who.size:
             return
         seat.counters(who)
-        from_below = seat.on_carrier(who, hand, printed[:, who]) + self._strayed[hand][:, who]
-        origin = seat.below(who, hand)
+        from_below = seat.rotate_by_swing(who, hand, printed[:, who]) + self._strayed[hand][:, who]
+        origin = seat.under_centre(who, hand)
         looking = np.arange(who.size)
         for around in _outward():
-            places = origin + seat.in_units((from_below + around[:, None]) * seat.z[who] / seat.c)
+            places = origin + seat.to_counter_units((from_below + around[:, None]) * seat.z[who] / seat.c)
             x, y = places[:, looking]
             went = looking[seat.drive(who[looking], {"X": x, "Y": y})]
-            found = went[~np.isnan(self.seen(who[went], hand, point)[0])] if went.size else went
+            found = went[~np.isnan(self.view_point(who[went], hand, point)[0])] if went.size else went
             self._seen_from[:, who[found]] = places[:, found]
             looking = exclude(looking, found)
             if not looking.size:
@@ -76,9 +76,9 @@ class Eyes:
         if again.any():
             self.bring_into_view(looking_on[again], hand, point)
             looking = looking[~again]
-        seat.see_that_it_obeyed(who[looking], f"{seat.model.name}: looking for point {point}")
+        seat.give_up_on_errors(who[looking], f"{seat.model.name}: looking for point {point}")
         self.crew.give_up(
-            self.crew.still(who[looking]),
+            self.crew.remaining(who[looking]),
             f"{seat.model.name}: point {point} is nowhere near where the print shows it in the {side_name(hand)} eye, "
             f"not within {SEARCH_RINGS * SEARCH_STEP_MM:.0f} mm: wrong picture in the projector, or the base "
             "setting does not belong to this model",
@@ -88,26 +88,26 @@ class Eyes:
         """Return what is not turned any more after so many looks, mm."""
         return self.finest_mm if looks < PATIENT_LOOKS else max(self.finest_mm, IMPATIENT_MM)
 
-    def learn_straying(self, who: Who, hand: int, point: str, readings: Array) -> None:
+    def measure_drift(self, who: Who, hand: int, point: str, readings: Array) -> None:
         """Bear in mind how far from where the print showed it a point was found, by its readings ``(2 or 3, m)``."""
         seat = self.seat
-        expected = seat.on_carrier(who, hand, self.crew.printed(self._prints[hand], point)[:, who])
-        away = seat.in_mm(readings[:2] - seat.below(who, hand))
+        expected = seat.rotate_by_swing(who, hand, self.crew.print_position(self._prints[hand], point)[:, who])
+        away = seat.to_mm(readings[:2] - seat.under_centre(who, hand))
         self._strayed[hand][:, who] = away * seat.c / seat.z[who] - expected
 
-    def seen(self, who: Who, hand: int, point: str) -> Array:
+    def view_point(self, who: Who, hand: int, point: str) -> Array:
         """Look: where the image stands from the mark ``(2, m)`` in um, nan where it is not in the field of view."""
         self.crew.spend(who, self.crew.observer.seconds_to_look, "looking")
-        return self.crew.looked_at(who, point, lambda them, name: self.seat.hands.seen(them, hand, name))
+        return self.crew.view_points(who, point, lambda them, name: self.seat.hands.view_point(them, hand, name))
 
     def bisect(self, who: Who, hand: int, point: str, errors: Array) -> None:
         """Turn X and Y until the image seems to lie at the mark; errors ``(2, sessions)`` in um."""
         seat = self.seat
-        watch = Watch(2, self.crew.sessions)
+        watch = Watch(2, self.crew.size)
         for looks in range(MAX_LOOKS):
-            seen = self.seen(who, hand, point)
-            if not watch.all_well(who, seen):
-                lost = np.isnan(seen[0]) | watch.running_away(who, seen).any(axis=0)
+            seen = self.view_point(who, hand, point)
+            if not watch.is_converging(who, seen):
+                lost = np.isnan(seen[0]) | watch.is_diverging(who, seen).any(axis=0)
                 if lost.any():
                     self._look_again_with_levers_right(who, hand, point, seen, lost)
                     self._ran_away(who[lost], hand, point)
@@ -117,10 +117,11 @@ class Eyes:
             who = who[moving]
             if not who.size:
                 return
-            seat.turn(who, seat.in_units(steps[:, moving]))
-        seat.see_that_it_obeyed(who, f"{seat.model.name}: pointing at {point}")
+            seat.turn(who, seat.to_counter_units(steps[:, moving]))
+        seat.give_up_on_errors(who, f"{seat.model.name}: pointing at {point}")
         self.crew.give_up(
-            self.crew.still(who), f"{seat.model.name}: point {point}: the mark cannot be brought to rest on the image"
+            self.crew.remaining(who),
+            f"{seat.model.name}: point {point}: the mark cannot be brought to rest on the image",
         )
 
     def _look_again_with_levers_right(self, who: Who, hand: int, point: str, seen: Array, lost: Truths) -> None:
@@ -129,7 +130,7 @@ class Eyes:
         mended = away[correct_fittings(self.seat, who[away])]
         if mended.size:
             self._go_back(who[mended])
-            seen[:, mended] = self.seen(who[mended], hand, point)
+            seen[:, mended] = self.view_point(who[mended], hand, point)
             lost[mended] = np.isnan(seen[0, mended])
 
     def _go_back(self, who: Who) -> None:
@@ -153,9 +154,9 @@ class Eyes:
             (1, "top to bottom", "Dove prisms"),
         ):
             self._go_back(one)
-            counters, seen = seat.counters(one), self.seen(one, hand, point)
+            counters, seen = seat.counters(one), self.view_point(one, hand, point)
             seat.turn(one, np.eye(2)[:, [axis]])
-            counters_then, seen_then = seat.counters(one), self.seen(one, hand, point)
+            counters_then, seen_then = seat.counters(one), self.view_point(one, hand, point)
             if counters_then[axis, 0] < counters[axis, 0]:
                 reasons.append(f"the {'XY'[axis]} wheel turns the wrong way (its collar)")
             elif seen_then[axis, 0] > seen[axis, 0]:
@@ -171,7 +172,7 @@ class Watch:
         self._times = np.zeros((displacements, sessions), dtype=int)
         self._any_grew = False
 
-    def all_well(self, who: Who, seen: Array) -> bool:
+    def is_converging(self, who: Who, seen: Array) -> bool:
         """Whether all displacements ``(k, m)`` in um are seen and small, and none ever grew; if not, ask on."""
         now = np.abs(seen)
         well = not self._any_grew and bool(now.max(initial=0.0) <= DIVERGENCE_UM)
@@ -179,11 +180,11 @@ class Watch:
             put(now, who, self._before)
         return well
 
-    def growing(self, who: Who) -> Truths:
+    def has_grown(self, who: Who) -> Truths:
         """Return which of the displacements ``(k, m)`` had grown when they were last seen."""
         return take(self._times, who) > 0
 
-    def running_away(self, who: Who, seen: Array) -> Truths:
+    def is_diverging(self, who: Who, seen: Array) -> Truths:
         """Return which of the displacements ``(k, m)`` in um have grown in look after look."""
         now = np.abs(seen)
         grown = (now > 1.4 * take(self._before, who)) & (now > DIVERGENCE_UM)

@@ -50,26 +50,26 @@ class FloatingMark:
         """Set the mark on a point, first with the left eye, then with both; return those who could fuse it."""
         seat, eyes, crew = self.seat, self.eyes, self.crew
         eyes.bring_into_view(who, 1, point)
-        who = crew.still(who)
-        height = np.zeros(crew.sessions)
+        who = crew.remaining(who)
+        height = np.zeros(crew.size)
         height[who] = -seat.z[who]
-        exactly = np.zeros((2, crew.sessions))
+        exactly = np.zeros((2, crew.size))
         fused: list[Who] = []
         for rise in RISES_TO_FUSE_MM:
             there = who
             if rise:
                 there = who[seat.drive_z_to(who, height[who] + rise)]
-                seat.hands.refused(who)
+                seat.hands.pop_errors(who)
                 if not there.size:
                     continue
                 eyes.bring_into_view(there, 1, point)
-                there = crew.still(there)
+                there = crew.remaining(there)
             eyes.bisect(there, 1, point, exactly)
-            there = crew.still(there)
-            seen = there[~np.isnan(eyes.seen(there, 2, point)[0])]
+            there = crew.remaining(there)
+            seen = there[~np.isnan(eyes.view_point(there, 2, point)[0])]
             if seen.size:
                 fused.append(self.settle(seen, point, judgement))
-            who = exclude(crew.still(who), seen)
+            who = exclude(crew.remaining(who), seen)
             if not who.size:
                 return _together(fused)
         seat.drive_z_to(who, height[who])
@@ -82,23 +82,23 @@ class FloatingMark:
         """
         seat, eyes, crew = self.seat, self.eyes, self.crew
         drum = _Drum(self, who, clearing) if clearing is not None else None
-        watch = Watch(4, crew.sessions)
+        watch = Watch(4, crew.size)
         settled: list[Who] = []
-        begun = np.full((3, crew.sessions), np.nan)
+        begun = np.full((3, crew.size), np.nan)
         for looks in range(MAX_LOOKS):
-            seen = self.looked(who, point)
-            well = watch.all_well(who, seen)
+            seen = self.view(who, point)
+            well = watch.is_converging(who, seen)
             if not well:
                 self._see_what_runs_away(who, point, seen, watch, begun, clearing)
             if crew.reasons or not well:
-                keep = crew.goes_on(who) & ~np.isnan(seen).any(axis=0)
+                keep = crew.is_active(who) & ~np.isnan(seen).any(axis=0)
                 who, seen = who[keep], seen.compress(keep, axis=-1)
             if not who.size:
                 return _together(settled)
             readings = seat.counters(who)
             if looks == 0:
                 put(readings, who, begun)
-            x, y, _ = seat.place(who, readings)
+            x, y, _ = seat.model_position(who, readings)
             z, bx = take(seat.z, who), seat.bx(who)
             scale = 1e-3 * z / seat.c
             rise = (seen[2] + take(judgement.height, who)) * scale * z / np.abs(bx)
@@ -107,7 +107,7 @@ class FloatingMark:
             steps = (seen[:2] + take(judgement.plan, who)) * scale + along_the_rays
             at_rest = eyes.at_rest_mm(looks)
             moving = np.maximum(np.abs(steps).max(axis=0), np.abs(rise)) >= at_rest
-            wheels = np.concatenate([seat.in_units(steps), [rise * seat.units_per_mm]])
+            wheels = np.concatenate([seat.to_counter_units(steps), [rise * seat.units_per_mm]])
             amounts: Array | None = None
             if drum is not None:
                 amounts, at_end = drum.to_turn(who, seen[3] * scale, scale, at_rest)
@@ -125,17 +125,17 @@ class FloatingMark:
                 clearing.element if clearing else None,
                 amounts[moving] if amounts is not None else None,
             )
-        seat.see_that_it_obeyed(who, f"{seat.model.name}: setting the mark on {point}")
+        seat.give_up_on_errors(who, f"{seat.model.name}: setting the mark on {point}")
         crew.give_up(
-            crew.still(who),
+            crew.remaining(who),
             f"{seat.model.name}: point {point} cannot be brought to rest under the mark stereoscopically",
         )
         return _together(settled)
 
-    def looked(self, who: Who, point: str) -> Array:
+    def view(self, who: Who, point: str) -> Array:
         """Return what both eyes see ``(4, m)``: x and y from the mark (mean of both), px, py, um; nan if lost."""
         self.crew.spend(who, self.crew.observer.seconds_to_look, "looking")
-        lx, ly, rx, ry = self.crew.looked_at(who, point, self.seat.hands.seen_by_both)
+        lx, ly, rx, ry = self.crew.view_points(who, point, self.seat.hands.view_point_stereo)
         return np.array([(lx + rx) / 2.0, (ly + ry) / 2.0, lx - rx, ly - ry])
 
     def _see_what_runs_away(
@@ -143,8 +143,8 @@ class FloatingMark:
     ) -> None:
         """Put right the levers of those whose parallaxes grow, as far as these are wrong, else let them give up."""
         unseen = np.isnan(seen)
-        vanished = watch.growing(who) & unseen.any(axis=0)
-        running_away = watch.running_away(who, np.where(unseen, 0.0, seen))
+        vanished = watch.has_grown(who) & unseen.any(axis=0)
+        running_away = watch.is_diverging(who, np.where(unseen, 0.0, seen))
         running_away[3] &= clearing is not None
         away = (vanished | running_away)[2:]
         if away.any():
@@ -163,7 +163,7 @@ class FloatingMark:
         mended = away[correct_fittings(self.seat, who[away])]
         if mended.size:
             self.seat.drive(who[mended], dict(zip("XYZ", begun[:, who[mended]], strict=True)))
-            seen[:, mended] = self.looked(who[mended], point)
+            seen[:, mended] = self.view(who[mended], point)
         return mended
 
     def _see_that_it_fuses(self, who: Who, point: str, running_away: Truths, clearing: Clearing | None) -> None:
@@ -175,7 +175,7 @@ class FloatingMark:
         )
         if clearing is not None:
             self.crew.give_up(
-                self.crew.still(who[running_away[3]]),
+                self.crew.remaining(who[running_away[3]]),
                 f"{model}: point {point}: the y-parallax grows when {clearing.element} is turned to clear "
                 "it: the picture is mirrored or the base is set for the other arrangement",
             )
@@ -192,7 +192,7 @@ class _Drum:
         self._seat = mark.seat
         self._clearing = clearing
         self._element = mark.seat.manual.elements[clearing.element]
-        mark.seat.take_hold(who, clearing.element)
+        mark.seat.grab_drum(who, clearing.element)
 
     def to_turn(self, who: Who, parallax: Array, scale: Array, at_rest: float) -> tuple[Array, Truths]:
         """Return by how much to turn, nothing where it is clear, and where that is out of range ``(m,)``."""
@@ -200,5 +200,5 @@ class _Drum:
         amounts = np.where(np.abs(left) < at_rest, 0.0, -left / take(self._clearing.gain, who))
         if self._element.endless:
             return amounts, np.zeros(who.size, dtype=bool)
-        wanted = self._seat.in_hand(who, self._clearing.element) + amounts
+        wanted = self._seat.held_position(who, self._clearing.element) + amounts
         return amounts, (wanted < self._element.low) | (wanted > self._element.high)

@@ -82,7 +82,7 @@ class ProjectorSheet:
     """A projector's grid test; arrays ``(..., m)`` have those who came to the end of it as their last axis."""
 
     projector: int
-    who: Who
+    sessions: Who
     counters: Mapping[str, Array]
     """What the counters of its elements and of bx show, gon and mm."""
     heights: tuple[float, ...]
@@ -101,7 +101,7 @@ def measure_grid(
     begins: Callable[[str], None] = lambda _: None,
 ) -> Iterator[ProjectorSheet]:
     """Yield both projectors as one person tests them. Raises DoesNotFit when one cannot be tested."""
-    yield from measure_grid_batch(Bench(Crew.of_one(person), LineHands(person), order.job, tick), order, begins)
+    yield from measure_grid_batch(Bench(Crew.single(person), LineHands(person), order.job, tick), order, begins)
 
 
 def measure_grid_batch(
@@ -109,16 +109,16 @@ def measure_grid_batch(
 ) -> Iterator[ProjectorSheet]:
     """Yield the left and the right projector as a crew tests them, each session at its own instrument."""
     crew = bench.crew
-    crew.begin(crew.everybody, "", "preparation")
-    bench.seat.prepare(crew.everybody)
+    crew.begin(crew.active, "", "preparation")
+    bench.seat.prepare(crew.active)
     set_base_and_fittings(bench, "inside", order.polarity)
     for hand in (1, 2):
         form = f"grid test, {side_name(hand)} projector"
         begins(form)
-        crew.begin(crew.everybody, order.plate.name, form)
-        bench.hands.note(crew.everybody, form)
+        crew.begin(crew.active, order.plate.name, form)
+        bench.hands.note(crew.active, form)
         yield _tested(bench, order, hand)
-        bench.hands.unload(crew.everybody, hand)
+        bench.hands.unload(crew.active, hand)
 
 
 def _tested(bench: Bench, order: GridTestOrder, hand: int) -> ProjectorSheet:
@@ -126,12 +126,12 @@ def _tested(bench: Bench, order: GridTestOrder, hand: int) -> ProjectorSheet:
     model = ModelJob(f"{plate.name} in projector {hand}", plate.name, plate.name, "inside", order.polarity, {})
     certificate = bench.job.certificate
     _set_to_zeros(bench, hand)
-    centre_picture(bench, crew.everybody, hand, plate.name, certificate)
-    lie = locate_plate(bench, crew.everybody, hand, certificate, TIMES_REGISTERED)
-    bench.begin(crew.everybody, model, {hand: sketch_positions(bench, crew.everybody, hand)})
+    centre_picture(bench, crew.active, hand, plate.name, certificate)
+    lie = locate_plate(bench, crew.active, hand, certificate, TIMES_REGISTERED)
+    bench.begin(crew.active, model, {hand: sketch_positions(bench, crew.active, hand)})
     heights = order.heights(seat.manual)
     sets = np.stack([_pointings(bench, order, hand, height) for height in heights], axis=2)
-    who = crew.everybody
+    who = crew.active
     bench.compute(who)
     counters = _counters(bench, who, hand)
     means = sets.mean(axis=0)[..., who]
@@ -144,7 +144,7 @@ def _tested(bench: Bench, order: GridTestOrder, hand: int) -> ProjectorSheet:
 
 def _set_to_zeros(bench: Bench, projector: int) -> None:
     """Set a projector's elements and bx to their counter zeros, and the camera's principal distance."""
-    seat, who = bench.seat, bench.crew.everybody
+    seat, who = bench.seat, bench.crew.active
     elements = seat.manual.elements
     zeros = {
         name: np.full(who.size, element.zero)
@@ -157,12 +157,12 @@ def _set_to_zeros(bench: Bench, projector: int) -> None:
 def _pointings(bench: Bench, order: GridTestOrder, hand: int, height: float) -> Array:
     """Return places of the mark ``(p, 2, n, sessions)`` in mm of the frame, pointed at all crosses p times."""
     crew, seat = bench.crew, bench.seat
-    places = np.zeros((order.pointings, 2, len(order.chosen), crew.sessions))
+    places = np.zeros((order.pointings, 2, len(order.chosen), crew.size))
     level = seat.units_per_mm * height
     for i in range(order.pointings):
-        readings = point_at_crosses(bench, crew.everybody, hand, order.chosen, level)
-        who = crew.everybody
-        places[i][:, :, who] = seat.in_frame(who, readings[:, :, who], np.full(who.size, level))[:2]
+        readings = point_at_crosses(bench, crew.active, hand, order.chosen, level)
+        who = crew.active
+        places[i][:, :, who] = seat.frame_positions(who, readings[:, :, who], np.full(who.size, level))[:2]
     return places
 
 

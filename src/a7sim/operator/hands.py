@@ -24,7 +24,7 @@ class Hands(Protocol):
     def reset(self, who: Who) -> None:
         """Run all elements to their zeros, base inside, fittings for a positive, presets off."""
 
-    def engage(self, who: Who, height_gear: str | float, plan_gear: str) -> None:
+    def set_height_gear(self, who: Who, height_gear: str | float, plan_gear: str) -> None:
         """Engage the gears."""
 
     def set_base_mode(self, who: Who, mode: str) -> None:
@@ -87,10 +87,10 @@ class Hands(Protocol):
         The drum of the element is turned by amounts ``(m,)``, five decimals.
         """
 
-    def seen(self, who: Who, eye: int, point: str) -> Array:
+    def view_point(self, who: Who, eye: int, point: str) -> Array:
         """Return where an eye sees a point from the mark ``(2, m)``, um at photo scale, nan where it does not."""
 
-    def seen_by_both(self, who: Who, point: str) -> Array:
+    def view_point_stereo(self, who: Who, point: str) -> Array:
         """Return the same for the left and the right eye together ``(4, m)``."""
 
     def record(self, who: Who, point: str) -> None:
@@ -99,5 +99,5 @@ class Hands(Protocol):
     def note(self, who: Who, text: str) -> None:
         """Write a note into the journals of the instruments."""
 
-    def refused(self, who: Who) -> dict[int, list[str]]:
+    def pop_errors(self, who: Who) -> dict[int, list[str]]:
         """Return what was refused since the last asking, by session."""

@@ -62,7 +62,7 @@ def interior_orientation(
     cannot centre the picture give up.
     """
     found = centre_picture(bench, who, projector, photograph, certificate)
-    _set_principal_distance(bench, bench.crew.still(who), projector, photograph, certificate, found)
+    _set_principal_distance(bench, bench.crew.remaining(who), projector, photograph, certificate, found)
     return found
 
 
@@ -77,8 +77,8 @@ def centre_picture(
     _mount(bench, who, projector, photograph)
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
     wanted = -np.array(certificate.principal_point)[:, None]
-    found = InteriorOrientations(photograph, np.zeros(crew.sessions, dtype=np.intp), *np.zeros((3, crew.sessions)))
-    centring = crew.still(who)
+    found = InteriorOrientations(photograph, np.zeros(crew.size, dtype=np.intp), *np.zeros((3, crew.size)))
+    centring = crew.remaining(who)
     for round_ in range(1, MAX_ROUNDS + 1):
         names, displacements = view_fiducials(bench, centring, projector)
         places = np.array([marks[name] for name in names]).T
@@ -101,8 +101,8 @@ def centre_picture(
         now = hands.centring(centring, projector)
         bench.seat.spend_setting(centring)
         hands.centre(centring, projector, np.round(now - [*off, turn], 3))
-        bench.seat.see_that_it_obeyed(centring, f"centring {photograph}")
-        centring = crew.still(centring)
+        bench.seat.give_up_on_errors(centring, f"centring {photograph}")
+        centring = crew.remaining(centring)
     crew.give_up(centring, f"picture {photograph} cannot be centred in projector {projector}")
     return found
 
@@ -112,7 +112,7 @@ def _mount(bench: Bench, who: Who, projector: int, photograph: str) -> None:
     crew.spend(who, crew.observer.seconds_to_mount, "mounting")
     bench.seat.spend_setting(who)
     bench.hands.load(who, projector, photograph)
-    bench.seat.see_that_it_obeyed(who, f"mounting {photograph}")
+    bench.seat.give_up_on_errors(who, f"mounting {photograph}")
     lies_there = bench.hands.loaded(who, projector)
     if lies_there != photograph:
         crew.give_up(who, f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it")
@@ -123,7 +123,7 @@ def view_fiducials(bench: Bench, who: Who, projector: int) -> tuple[list[str], A
     names, exact = bench.hands.fiducials(who, projector)
     crew = bench.crew
     crew.spend(who, len(names) * crew.observer.seconds_to_read, "reading")
-    return names, exact + 1e-3 * crew.errors(who, crew.observer.fiducial_um, exact.shape[:2])[:, :, who]
+    return names, exact + 1e-3 * crew.draw_setting_errors(who, crew.observer.fiducial_um, exact.shape[:2])[:, :, who]
 
 
 def _rightly_laid(
@@ -156,5 +156,5 @@ def _set_principal_distance(
     found.principal_distance[who] = c
     bench.seat.spend_setting(who)
     bench.hands.set_element(who, f"c{projector}", c)
-    bench.seat.see_that_it_obeyed(who, f"setting c{projector}")
+    bench.seat.give_up_on_errors(who, f"setting c{projector}")
     bench.crew.enter(who, "", f"{photograph} centred, c{projector}", c)

@@ -30,7 +30,7 @@ class ModelJob:
         """The projector of the right-hand photograph."""
         return 3 - self.left_projector
 
-    def hand_of(self, projector: int) -> int:
+    def side_of(self, projector: int) -> int:
         """Return 1 if a projector holds the left-hand photograph, 2 if the right-hand one."""
         return 1 if projector == self.left_projector else 2
 

@@ -67,16 +67,16 @@ def level_model(
     shown = Control.of(control, [name for name in wanted if name in control.points])
     if shown.is_enough:
         levelling = Levelling(bench, bench.seat.model, shown)
-        fit = levelling.compared(crew.everybody, levelling.measured(crew.everybody, 1))
-        rounds = len(levelling.turned_until_level(crew.everybody, fit, scale_number)[0]) - 1
-        view.learn()
+        fit = levelling.compared(crew.active, levelling.measured(crew.active, 1))
+        rounds = len(levelling.level(crew.active, fit, scale_number)[0]) - 1
+        view.read_projectors()
         points = _measured(bench, wanted)
     absolute = orient_model(bench, points, control, units)
     return LevelModel(absolute, points, scale_number, _tilt(absolute), units, rounds)
 
 
 def _measured(bench: Bench, names: Sequence[str]) -> dict[str, Place]:
-    readings = bench.measure(bench.crew.everybody, names)[:, :, 0].T
+    readings = bench.measure_points(bench.crew.active, names)[:, :, 0].T
     return {
         name: (float(X), float(Y), float(Z))
         for name, (X, Y, Z) in zip(names, readings, strict=True)
@@ -91,7 +91,7 @@ def orient_model(bench: Bench, points: Mapping[str, Place], control: Ground, uni
     try:
         return absolute_orientation(Model(bench.seat.model.name, names, coordinates), control)
     except Undetermined as reason:
-        bench.crew.give_up(bench.crew.everybody, f"{bench.seat.model.name}: absolute orientation: {reason}")
+        bench.crew.give_up(bench.crew.active, f"{bench.seat.model.name}: absolute orientation: {reason}")
         raise
 
 

@@ -117,13 +117,13 @@ class Levelling:
 
     def settings(self, who: Who) -> dict[str, Array]:
         """Return where all elements stand ``(sessions,)``."""
-        return expand_to_batch(self.seat.standing(who, self.names), who, self.crew.sessions)
+        return expand_to_batch(self.seat.exact_values(who, self.names), who, self.crew.size)
 
     def measured(self, who: Who, number: int) -> Array:
         """Return places ``(3, n, m)`` of the control in the frame as a round measures them, mm, Z up."""
         self.bench.begin_round(who, number)
-        readings = self.bench.measure(who, self.control.names)[:, :, who]
-        x, y, z = np.stack([self.seat.place(who, each) for each in np.moveaxis(readings, 1, 0)], axis=1)
+        readings = self.bench.measure_points(who, self.control.names)[:, :, who]
+        x, y, z = np.stack([self.seat.model_position(who, each) for each in np.moveaxis(readings, 1, 0)], axis=1)
         return np.array([x, y, -z])
 
     def compared(self, who: Who, at: Array) -> Fit:
@@ -155,14 +155,14 @@ class Levelling:
                 break
         return np.array([*slopes, np.sqrt(1.0 - (slopes**2).sum(axis=0))])
 
-    def turned_until_level(self, who: Who, fit: Fit, number: float) -> dict[int, list[LevellingRound]]:
+    def level(self, who: Who, fit: Fit, number: float) -> dict[int, list[LevellingRound]]:
         """Turn and measure until it gets no better, the model to a scale number; the best settings stand.
 
         Return the rounds by session.
         """
         crew = self.crew
         rounds: dict[int, list[LevellingRound]] = {int(session): [] for session in who}
-        least = np.full(crew.sessions, np.inf)
+        least = np.full(crew.size, np.inf)
         best = self.settings(who)
         height = 1e-3 * number * self.bench.job.plan.projection_height
         for round_number in range(2, MAX_ROUNDS + 2):
@@ -178,13 +178,13 @@ class Levelling:
                 break
             settings = {name: values[who] for name, values in now.items()}
             upright = levelled_elements(settings, self.model, self.seat.manual, fit.up, fit.factor(number))
-            self.seat.turn_changed(who, upright)
-            who = crew.still(who)
+            self.seat.turn_if_changed(who, upright)
+            who = crew.remaining(who)
             if not who.size:
                 break
             fit = self.compared(who, self.measured(who, round_number))
-        everybody = crew.still(np.array(list(rounds), dtype=np.intp))
-        self.seat.turn_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
+        everybody = crew.remaining(np.array(list(rounds), dtype=np.intp))
+        self.seat.turn_if_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
         return rounds
 
 

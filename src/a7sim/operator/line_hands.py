@@ -34,7 +34,7 @@ class LineHands:
     def reset(self, who: Who) -> None:
         self._send("*RST")
 
-    def engage(self, who: Who, height_gear: str | float, plan_gear: str) -> None:
+    def set_height_gear(self, who: Who, height_gear: str | float, plan_gear: str) -> None:
         self._send(f'GEAR:HEIG "{height_gear}"' if isinstance(height_gear, str) else f"GEAR:HEIG {height_gear}")
         self._send(f'GEAR:PLAN "{plan_gear}"')
 
@@ -106,10 +106,10 @@ class LineHands:
             line += f";:{header(element)}:TURN {amounts[0]:.5f}"
         self._send(line)
 
-    def seen(self, who: Who, eye: int, point: str) -> Array:
+    def view_point(self, who: Who, eye: int, point: str) -> Array:
         return self._looked(f'EYEP{eye}? "{point}"')
 
-    def seen_by_both(self, who: Who, point: str) -> Array:
+    def view_point_stereo(self, who: Who, point: str) -> Array:
         return self._looked(f'EYEP1? "{point}";:EYEP2? "{point}"')
 
     def _looked(self, question: str) -> Array:
@@ -121,6 +121,6 @@ class LineHands:
     def note(self, who: Who, text: str) -> None:
         self._person.note(text)
 
-    def refused(self, who: Who) -> dict[int, list[str]]:
+    def pop_errors(self, who: Who) -> dict[int, list[str]]:
         errors = self._person.client.errors()
         return {0: errors} if errors else {}

@@ -87,11 +87,11 @@ class Area:
         high = [min(along(0, "46")), min(along(1, "34"))]
         return cls(np.array(low), np.array(high))
 
-    def holds(self, place: Array) -> bool:
+    def contains(self, place: Array) -> bool:
         """Return whether a place ``(2,)`` lies in it."""
         return bool((place >= self.low - 1e-6).all() and (place <= self.high + 1e-6).all())
 
-    def shortened(self, place: Array, step: Array) -> Array:
+    def clip_step(self, place: Array, step: Array) -> Array:
         """Return a step ``(2,)`` cut off at the border; the place lies within."""
         beyond = np.where(step > 0.0, self.high - place, self.low - place)
         with np.errstate(divide="ignore", invalid="ignore"):

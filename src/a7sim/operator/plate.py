@@ -35,7 +35,7 @@ def sketch_positions(bench: Bench, who: Who, projector: int) -> dict[str, Array]
     """Return where the sketch of what lies in a projector shows points ``(2, sessions)``, nan for those not asked."""
     prints = {}
     for name, place in bench.hands.prints(who, projector).items():
-        prints[name] = np.full((2, bench.crew.sessions), np.nan)
+        prints[name] = np.full((2, bench.crew.size), np.nan)
         prints[name][:, who] = place
     return prints
 
@@ -45,7 +45,7 @@ def locate_plate(bench: Bench, who: Who, projector: int, certificate: Camera, ti
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
     registered = [view_fiducials(bench, who, projector) for _ in range(times)]
     displacements = np.concatenate([seen for _, seen in registered], axis=1)
-    every = np.zeros((*displacements.shape[:2], bench.crew.sessions))
+    every = np.zeros((*displacements.shape[:2], bench.crew.size))
     every[:, :, who] = displacements
     return plate_placement(every, np.array([marks[name] for names, _ in registered for name in names]).T)
 
@@ -58,8 +58,8 @@ def point_at_crosses(bench: Bench, who: Who, hand: int, crosses: Crosses, level:
     crew = bench.crew
     names = list(crosses)
     _go_below(bench, who, hand)
-    readings = bench.point_with(who, hand, names, level)
-    looking = crew.still(who)
+    readings = bench.point_monocularly(who, hand, names, level)
+    looking = crew.remaining(who)
     for _ in range(MAX_REPETITIONS):
         misread = (
             _misread(readings[:, :, looking], cross_positions(crosses)) if looking.size else np.zeros(0, dtype=np.intp)
@@ -68,14 +68,14 @@ def point_at_crosses(bench: Bench, who: Who, hand: int, crosses: Crosses, level:
         for place in np.unique(misread):
             again = looking[misread == place]
             why = "does not agree with the other crosses of the plate"
-            readings[:, place, again] = bench.point_again(again, hand, names[place], level, why)[:, again]
-        looking = crew.still(looking)
+            readings[:, place, again] = bench.repeat_pointing(again, hand, names[place], level, why)[:, again]
+        looking = crew.remaining(looking)
     return readings
 
 
 def _go_below(bench: Bench, who: Who, hand: int) -> None:
     """Run the mark straight below a centre, whence it can go to any level: from the side the rods may not let it."""
-    x, y = np.round(bench.seat.below(who, hand), 2)
+    x, y = np.round(bench.seat.under_centre(who, hand), 2)
     bench.seat.drive(who, {"X": x, "Y": y})
 
 

@@ -37,7 +37,7 @@ class Order:
 
     contours: tuple[float, ...]
     interval: float | None
-    errands: tuple[Errand, ...]
+    lines: tuple[Errand, ...]
     tracing: Tracing
     map_scale: float | None = None
     """Scale number of the map; when absent, the nearest round one."""
@@ -90,8 +90,8 @@ def compile_map(
 
     Raises DoesNotFit when it cannot be set up, Mistake for a contour that does not run in the model.
     """
-    person.book.head("", "preparation")
-    bench = Bench(Crew.of_one(person), LineHands(person), job, tick)
+    person.book.set_heading("", "preparation")
+    bench = Bench(Crew.single(person), LineHands(person), job, tick)
     record = next(measure_models_batch(bench, begins)).of(0)
     view = StereoView(bench, person)
     begin_form(bench, bench.seat.model, "absolute orientation", begins)
@@ -103,7 +103,7 @@ def compile_map(
     seen = [label for label, name in corners.items() if name in model.points]
     if not all(any(label in seen for label in border) for border in ("34", "56", "35", "46")):
         bench.crew.give_up(
-            bench.crew.everybody,
+            bench.crew.active,
             f"{record.model.name}: of standard points 3 to 6, the corners of the model, only "
             f"{', '.join(seen) or 'none'} can be seen: they leave a side of it open",
         )
@@ -117,7 +117,7 @@ def compile_map(
         begin_form(bench, bench.seat.model, f"contour {height:g}", begins)
         lines += work.contour(height, spots)
         tick()
-    for errand in order.errands:
+    for errand in order.lines:
         begin_form(bench, bench.seat.model, f"line {errand.name}", begins)
         lines.append(work.line(errand, spots))
         tick()
@@ -146,7 +146,7 @@ def _heights(order: Order, spots: Spots) -> tuple[float, ...]:
                 f"--interval {order.interval:g}: expected at most {MAX_CONTOURS} contours from {low:.1f} to "
                 f"{high:.1f} m, got {last - first + 1}"
             )
-        if last < first and not heights and not order.errands:
+        if last < first and not heights and not order.lines:
             raise Mistake(f"--interval {order.interval:g}: expected a multiple of it from {low:.1f} to {high:.1f} m")
         heights |= {order.interval * k for k in range(first, last + 1)}
     return tuple(sorted(heights))
@@ -156,12 +156,12 @@ def _expected(
     bench: Bench, view: StereoView, model: LevelModel, spots: Spots, tracing: Tracing
 ) -> tuple[float, float, float]:
     """Return the height of the centres above the mean spot in m, and the standard errors in m that a person expects."""
-    who, observer = bench.crew.everybody, bench.crew.observer
+    who, observer = bench.crew.active, bench.crew.observer
     look = view.look()
     residuals = model.absolute.fit.at_control
     misfit = np.sqrt(np.nanmean(residuals**2, axis=1))
     setting = 1e-3 * observer.height_um / look.parallax_by_height * model.metres_per_mm
     tremor = 1e-3 * tracing.tremor_um * look.enlargement * model.metres_per_mm
     mean_spot = np.nanmean(spots.readings, axis=(1, 2))[:, None]
-    above = float(bench.seat.place(who, mean_spot)[2, 0]) * model.metres_per_mm
+    above = float(bench.seat.model_position(who, mean_spot)[2, 0]) * model.metres_per_mm
     return above, math.hypot(float(misfit[2]), setting), math.hypot(float(np.hypot(*misfit[:2]) / np.sqrt(2.0)), tremor)

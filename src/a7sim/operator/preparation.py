@@ -111,7 +111,7 @@ class ModelScale:
     bx: float
     width: float
     """How far the corners of the picture reach across the base."""
-    against: tuple[str, ...] = ()
+    reason_rejected: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -137,9 +137,9 @@ def choose_settings(flight: Flight, variant: Variant, map_scale: float | None = 
     optimum = 1e3 * flight.flying_height / _longest(variant)
     gears = {gear.units_per_mm: name for name, gear in variant.height_gears.items()}
     scales = tuple(_scale(flight, variant, gear, map_scale) for gear in gears.values())
-    possible = [scale for scale in scales if not scale.against]
+    possible = [scale for scale in scales if not scale.reason_rejected]
     if not possible:
-        said = "; ".join(f"1:{scale.number:.0f} {scale.against[0]}" for scale in scales)
+        said = "; ".join(f"1:{scale.number:.0f} {scale.reason_rejected[0]}" for scale in scales)
         raise Mistake(f"no model scale of an {variant.name} suits this flight: {said}")
     chosen = min(possible, key=lambda scale: (scale.interval, abs(scale.number - optimum)))
     return Preparation(flight, optimum, _base(flight, optimum), scales, chosen, _reason(chosen, possible))

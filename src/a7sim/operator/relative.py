@@ -83,7 +83,7 @@ class Rounds:
     over_correction: Array | None = None
 
     @cached_property
-    def those(self) -> frozenset[int]:
+    def sessions(self) -> frozenset[int]:
         """Who measured in it, to ask for one."""
         return frozenset(self.who.tolist())
 
@@ -155,7 +155,7 @@ class RelativeOrientations:
         return RelativeOrientation(
             self.method,
             self.case,
-            RoundsOfOne(session, [each for each in self.rounds if session in each.those]),
+            RoundsOfOne(session, [each for each in self.rounds if session in each.sessions]),
             int(self.rough_rounds[session]),
             _picked(listed.elements, session),
             residuals,
@@ -204,22 +204,24 @@ def relative_orientation(
     then have a larger rms than tolerated, in mm, give up, and so do those whose prints show too few of the points.
     """
     crew, seat = bench.crew, bench.seat
-    if not seat.measures_parallax:
+    if not seat.has_parallax_elements:
         crew.give_up(
             who, f"an {seat.manual.name} has no by' and by\" to measure parallaxes with: it is oriented empirically"
         )
         raise NobodyGoesOn
     done = []
     positions = {model.standard_points[label]: label for label in model.all_positions()}
-    for them, points in bench.alike(who, list(positions)):
+    for them, points in bench.group_by_points(who, list(positions)):
         there = [positions[point] for point in points]
         labels = [label for label in there if label in CASES[case]]
         if determine_orientation(labels):
             found = _oriented(bench, them, model, method, case, labels, readings, base)
-            done.append((them, assess_residuals(bench, crew.still(them), model, found, there, readings, tolerated_rms)))
+            done.append(
+                (them, assess_residuals(bench, crew.remaining(them), model, found, there, readings, tolerated_rms))
+            )
         else:
             crew.give_up(them, _too_few(model, case, labels))
-    return merge_groups(done, method, case, crew.sessions, "numerical")
+    return merge_groups(done, method, case, crew.size, "numerical")
 
 
 def _too_few(model: ModelJob, case: str, labels: Sequence[str]) -> str:
@@ -238,35 +240,37 @@ def _oriented(
     measured_with = {"both": (1, 2), "by1": (1,), "by2": (2,)}[plan.measure_with]
     points = [model.standard_points[label] for label in labels]
     rounds: list[Rounds] = []
-    done, rough_rounds = np.zeros((2, crew.sessions), dtype=np.intp)
-    best = _Best(unknowns, crew.sessions)
+    done, rough_rounds = np.zeros((2, crew.size), dtype=np.intp)
+    best = _Best(unknowns, crew.size)
     measuring = who
     while measuring.size:
-        settings = expand_to_batch(seat.elements(measuring, unknowns), measuring, crew.sessions)
+        settings = expand_to_batch(seat.elements(measuring, unknowns), measuring, crew.size)
         bench.begin_round(measuring, int(done[measuring].max()) + 1)
         seen = bench.parallaxes(measuring, points, readings, measured_with)
-        measuring = crew.still(measuring)
-        apart = seen.parted(measuring)
+        measuring = crew.remaining(measuring)
+        apart = seen.disagrees(measuring)
         together = exclude(measuring, apart)
         rough_rounds[apart] += 1
-        _bring_together(bench, apart, model, points, unknowns, base, seen.apart, rough_rounds)
+        _bring_together(bench, apart, model, points, unknowns, base, seen.disagreement, rough_rounds)
         done[together] += 1
-        mean, rms = _mean_and_rms(seen.p, together)
+        mean, rms = _mean_and_rms(seen.parallax_mm, together)
         falling = together[rms[together] < STILL_FALLING * best.rms[together]]
         best.see(together, settings, mean, rms)
-        to_clear = seen.p - mean if method == "independent" else seen.p
+        to_clear = seen.parallax_mm - mean if method == "independent" else seen.parallax_mm
         corrections, sigmas = compute_corrections(
             bench, falling, model, seen.places, to_clear, unknowns, np.full(falling.size, base), labels
         )
-        falling = crew.still(falling)
-        rounds.append(Rounds(together, settings, dict(zip(labels, seen.p, strict=True)), mean, rms, falling, sigmas))
+        falling = crew.remaining(falling)
+        rounds.append(
+            Rounds(together, settings, dict(zip(labels, seen.parallax_mm, strict=True)), mean, rms, falling, sigmas)
+        )
         if falling.size:
-            noted = crew.notes(falling, settings, rounds[-2].settings if len(rounds) > 1 else {})
+            noted = crew.noted_elements(falling, settings, rounds[-2].settings if len(rounds) > 1 else {})
             seat.set_elements(falling, {n: (noted[n] + corrections[n])[falling] for n in unknowns})
-        measuring = crew.still(np.sort(np.concatenate([falling, apart])))
+        measuring = crew.remaining(np.sort(np.concatenate([falling, apart])))
         measuring = measuring[done[measuring] < MAX_ROUNDS]
-    who = crew.still(who)
-    seat.set_changed(who, {name: kept[who] for name, kept in best.settings.items()})
+    who = crew.remaining(who)
+    seat.set_if_changed(who, {name: kept[who] for name, kept in best.settings.items()})
     _set_mean_on_by(bench, who, model, "by1" if method == "independent" else unknowns[3], best.mean)
     bench.begin_round(who, int(done[who].max(initial=0)) + 1)
     return RelativeOrientations(method, case, rounds, rough_rounds, {}, {}, {})
@@ -330,25 +334,28 @@ def assess_residuals(
     """Return an orientation with what is left at standard points; those for whom it is too much give up."""
     crew = bench.crew
     names = [model.standard_points[label] for label in labels]
-    measured = bench.seat.measures_parallax
-    left = bench.parallaxes(who, names, readings) if measured else bench.parallaxes_seen(who, names)
-    who = crew.still(who)
-    apart = left.parted(who)
-    crew.give_up(apart, lambda session: f"{model.name}: the images of {left.apart[session]} cannot be fused any more")
-    who = crew.still(who)
+    measured = bench.seat.has_parallax_elements
+    left = bench.parallaxes(who, names, readings) if measured else bench.look_at_parallaxes(who, names)
+    who = crew.remaining(who)
+    apart = left.disagrees(who)
+    crew.give_up(
+        apart, lambda session: f"{model.name}: the images of {left.disagreement[session]} cannot be fused any more"
+    )
+    who = crew.remaining(who)
     there = [name for name in ALL_ELEMENTS if name in bench.seat.manual.elements]
     orientations = replace(
         found,
-        elements=expand_to_batch(bench.seat.elements(who, there), who, crew.sessions),
-        residuals=dict(zip(labels, left.p, strict=True)),
+        elements=expand_to_batch(bench.seat.elements(who, there), who, crew.size),
+        residuals=dict(zip(labels, left.parallax_mm, strict=True)),
         places=dict(zip(labels, np.moveaxis(left.places, 1, 0), strict=True)),
     )
-    rms, worst = orientations.rms, np.abs(left.p).argmax(axis=0)
+    rms, worst = orientations.rms, np.abs(left.parallax_mm).argmax(axis=0)
     crew.give_up(
         who[rms[who] > tolerated_rms],
         lambda session: (
             f"{model.name}: y-parallaxes of {rms[session]:.3f} mm rms remain, {tolerated_rms:.3f} tolerated; the "
-            f"largest is {left.p[worst[session], session]:+.3f} at point {names[worst[session]]}: a point is mistaken, "
+            f"largest is {left.parallax_mm[worst[session], session]:+.3f} at point {names[worst[session]]}: "
+            "a point is mistaken, "
             "or the photographs do not belong together"
         ),
     )
@@ -365,7 +372,7 @@ def expand_to_batch(values: Mapping[str, Array], who: Who, sessions: int) -> dic
 
 def _set_mean_on_by(bench: Bench, who: Who, model: ModelJob, by: str, mean: Array) -> None:
     if who.size:
-        sense = 1.0 if model.hand_of(int(by[-1])) == 1 else -1.0
+        sense = 1.0 if model.side_of(int(by[-1])) == 1 else -1.0
         bench.seat.set_elements(who, {by: bench.seat.elements(who, [by])[by] + sense * mean[who]})
 
 
@@ -385,24 +392,24 @@ def _bring_together(
         who[rough_rounds[who] > MAX_ROUGH_ROUNDS],
         lambda session: f"{model.name}: the images of {apart[session]} stay too far apart to be fused",
     )
-    for session in crew.still(who):
+    for session in crew.remaining(who):
         one = np.array([session])
         crew.remark(
             one,
             f"{model.name}: the images of {apart[session]} are too far apart for by: rough orientation, each eye alone",
         )
         level = float(seat.counters(one)[2, 0])
-        readings = [bench.point_with(one, hand, points, level) for hand in (1, 2)]
-        if not crew.still(one).size:
+        readings = [bench.point_monocularly(one, hand, points, level) for hand in (1, 2)]
+        if not crew.remaining(one).size:
             continue
-        left, right = (seat.in_frame(one, each[:, :, one], np.array([level])) for each in readings)
+        left, right = (seat.frame_positions(one, each[:, :, one], np.array([level])) for each in readings)
         where_they_meet = base / (left[0] - right[0] + base)
-        places, parallaxes = np.zeros((3, *left.shape[1:-1], crew.sessions)), np.zeros((len(points), crew.sessions))
+        places, parallaxes = np.zeros((3, *left.shape[1:-1], crew.size)), np.zeros((len(points), crew.size))
         parallaxes[:, one] = (left[1] - right[1]) * where_they_meet
         places[:, :, one] = left * where_they_meet
         settings = seat.elements(one, unknowns)
         corrections, _ = compute_corrections(bench, one, model, places, parallaxes, unknowns, np.array([base]))
-        if crew.still(one).size:
+        if crew.remaining(one).size:
             seat.set_elements(one, {name: settings[name] + corrections[name][one] for name in unknowns})
 
 
@@ -421,10 +428,10 @@ def compute_corrections(
     Places ``(3, n, sessions)`` and parallaxes ``(n, sessions)`` in mm, bases ``(m,)``; labels are the positions, which
     a closed form asks for. Those whose points do not determine the elements give up.
     """
-    nothing = {name: np.zeros(bench.crew.sessions) for name in unknowns}
+    nothing = {name: np.zeros(bench.crew.size) for name in unknowns}
     if not who.size:
         return nothing, nothing
-    hands = [f"{name[:-1]}{model.hand_of(int(name[-1]))}" for name in unknowns]
+    hands = [f"{name[:-1]}{model.side_of(int(name[-1]))}" for name in unknowns]
     left = projector_pose(bench, who, model.left_projector, np.zeros(who.size))
     right = projector_pose(bench, who, model.right_projector, base)
     bench.compute(who)
@@ -442,7 +449,7 @@ def compute_corrections(
             b, d, h = _pattern(places[:, :, who[on_pattern]], base[on_pattern])
             found[:, :, on_pattern] = regular_corrections(parallaxes[:, who[on_pattern]], b, d, h, hands)
     values, sigmas = (
-        expand_to_batch(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.sessions) for each in found
+        expand_to_batch(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.size) for each in found
     )
     return values, sigmas
 

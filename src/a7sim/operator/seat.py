@@ -36,21 +36,21 @@ class Seat:
         self.manual: Variant = VARIANTS["A7"]
         self.units_per_mm = 1.0
         """Of the Z counter."""
-        self.z = np.zeros(crew.sessions)
+        self.z = np.zeros(crew.size)
         """How far the mark stood below the base line when the counters were last read."""
         self.c = job.certificate.c
         self._plane = _by_dimensions(np.ones(2))
         """Units of the X and Y counters a mm."""
-        self._settings = {name: np.zeros(crew.sessions) for name in STEADY}
+        self._settings = {name: np.zeros(crew.size) for name in STEADY}
         self._left_at: dict[str, Array] = {}
         """Where drums were left by these hands ``(sessions,)``, between two counts too; nan where that is not known."""
-        self._offset = np.zeros((3, crew.sessions))
+        self._offset = np.zeros((3, crew.size))
 
     def prepare(self, who: Who) -> None:
         """Bring the instruments to their zeros, engage the gears, set base and projection height."""
         plan, hands = self.job.plan, self.hands
         gear = self._learn_manual()
-        hands.engage(who, 1.0, plan.plan_gear)
+        hands.set_height_gear(who, 1.0, plan.plan_gear)
         hands.reset(who)
         self.spend_setting(who, 6)
         self._left_at.clear()
@@ -59,8 +59,8 @@ class Seat:
         self._count_from_origin(who, "XY")
         hands.drive(who, dict(zip("XY", self._offset[:2, who], strict=True)))
         height = hands.counter(who, "Z")
-        hands.engage(who, gear, plan.plan_gear)
-        self.see_that_it_obeyed(who, "preparing the instrument")
+        hands.set_height_gear(who, gear, plan.plan_gear)
+        self.give_up_on_errors(who, "preparing the instrument")
         self._offset[2, who] = hands.counter(who, "Z") - self.units_per_mm * height
 
     def take_over(self, who: Who) -> None:
@@ -84,7 +84,7 @@ class Seat:
     def begin(self, who: Who, model: ModelJob) -> None:
         """Take up a model whose pictures are mounted."""
         self.model = model
-        self.learn_settings(who)
+        self.read_settings(who)
 
     def preset(self, who: Who, readings: tuple[float, float, float]) -> None:
         """Make the counters that can be preset show these readings where the mark stands."""
@@ -92,7 +92,7 @@ class Seat:
         before = self.hands.counters(who)
         self.spend_setting(who)
         self.hands.preset(who, wanted)
-        self.see_that_it_obeyed(who, "presetting the counters")
+        self.give_up_on_errors(who, "presetting the counters")
         for axis, reading in wanted.items():
             self._offset["XYZ".index(axis), who] += reading - before["XYZ".index(axis)]
 
@@ -102,18 +102,18 @@ class Seat:
         before = self.hands.counter(who, axis)
         self.spend_setting(who)
         self.hands.preset_one(who, axis, np.round(before + by, 2))
-        self.see_that_it_obeyed(who, f"presetting the {axis} counter")
+        self.give_up_on_errors(who, f"presetting the {axis} counter")
         more = np.round(self.hands.counter(who, axis) - before, 2)
         self._offset["XYZ".index(axis), who] += more
         return np.asarray(more)
 
-    def engage(self, who: Who, gear: str | float) -> None:
+    def set_height_gear(self, who: Who, gear: str | float) -> None:
         """Engage a height gear; the Z counter goes on from what it shows, the carriage standing on a full count."""
         self.drive(who, {"Z": self.hands.counter(who, "Z")})
         height = (self.hands.counter(who, "Z") - self._offset[2, who]) / self.units_per_mm
         self.spend_setting(who)
-        self.hands.engage(who, gear, self.job.plan.plan_gear)
-        self.see_that_it_obeyed(who, f"engaging the height gear {gear}")
+        self.hands.set_height_gear(who, gear, self.job.plan.plan_gear)
+        self.give_up_on_errors(who, f"engaging the height gear {gear}")
         self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
         self._offset[2, who] = self.hands.counter(who, "Z") - self.units_per_mm * height
 
@@ -129,7 +129,7 @@ class Seat:
         seen = self.hands.elements(who, there) if there else {}
         return {name: seen.get(name, np.zeros(who.size)) for name in names}
 
-    def from_zero(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
+    def elements_from_zero(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
         """Read the counters of elements ``(m,)`` from their zeros; one that the instrument has not stands there."""
         return {
             name: counts - (self.manual.elements[name].zero if name in self.manual.elements else 0.0)
@@ -137,9 +137,9 @@ class Seat:
         }
 
     @property
-    def measures_parallax(self) -> bool:
+    def has_parallax_elements(self) -> bool:
         """Whether y-parallaxes can be measured: with by' and by", which not every plotter has."""
-        return not self.manual.lacks("by1", "by2")
+        return not self.manual.missing_elements("by1", "by2")
 
     def set_elements(self, who: Who, settings: Mapping[str, Array]) -> None:
         """Set elements through their counters to values ``(m,)``, and enter them in the book."""
@@ -147,17 +147,17 @@ class Seat:
             counts = counter_value(name, value)
             self.spend_setting(who)
             self.run_element(who, name, counts)
-            self.see_that_it_obeyed(who, f"setting {name}")
+            self.give_up_on_errors(who, f"setting {name}")
             self.crew.enter(who, "", f"set {name}", counts)
-        self.learn_settings(self.crew.still(who))
+        self.read_settings(self.crew.remaining(who))
 
-    def set_changed(self, who: Who, settings: Mapping[str, Array]) -> None:
+    def set_if_changed(self, who: Who, settings: Mapping[str, Array]) -> None:
         """Set those elements whose counters do not yet show the values ``(m,)`` that they have to."""
         for name, wanted in settings.items():
             if not who.size:
                 return
             off = _difference(name, counter_value(name, wanted), self.elements(who, [name])[name])
-            changed = self.crew.goes_on(who) & (np.abs(off) > LEAST_COUNT / 2.0)
+            changed = self.crew.is_active(who) & (np.abs(off) > LEAST_COUNT / 2.0)
             if changed.any():
                 self.set_elements(who[changed], {name: wanted[changed]})
 
@@ -166,11 +166,11 @@ class Seat:
         self.hands.set_element(who, name, counts)
         self._leave(who, name, counts)
 
-    def standing(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
+    def exact_values(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
         """Read where elements stand ``(m,)``, between two counts too where these hands have left them there."""
         found = {}
         for name, shown in self.elements(who, names).items():
-            left = self._left_at.get(name, np.full(self.crew.sessions, np.nan))[who]
+            left = self._left_at.get(name, np.full(self.crew.size, np.nan))[who]
             near = np.abs(_difference(name, left, shown)) <= ROUNDED_AWAY * LEAST_COUNT
             found[name] = np.where(near, left, shown)
         return found
@@ -178,41 +178,41 @@ class Seat:
     def turn_elements(self, who: Who, settings: Mapping[str, Array]) -> None:
         """Turn elements until they stand at values ``(m,)``, between two counts too, and enter what they show."""
         for name, wanted in settings.items():
-            amounts = _difference(name, wanted, self.take_hold(who, name))
+            amounts = _difference(name, wanted, self.grab_drum(who, name))
             self.spend_setting(who)
             self.hands.turn_element(who, name, amounts)
             self._turned(who, name, amounts)
-            self.see_that_it_obeyed(who, f"turning {name}")
+            self.give_up_on_errors(who, f"turning {name}")
             self.crew.enter(who, "", f"set {name}", self.elements(who, [name])[name])
-        self.learn_settings(self.crew.still(who))
+        self.read_settings(self.crew.remaining(who))
 
-    def turn_changed(self, who: Who, settings: Mapping[str, Array]) -> None:
+    def turn_if_changed(self, who: Who, settings: Mapping[str, Array]) -> None:
         """Turn those elements that do not yet stand at the values ``(m,)`` at which they have to."""
         for name, wanted in settings.items():
             if not who.size:
                 return
-            off = np.abs(_difference(name, wanted, self.standing(who, [name])[name]))
-            changed = self.crew.goes_on(who) & (off >= 10.0**-TURNED_DECIMALS)
+            off = np.abs(_difference(name, wanted, self.exact_values(who, [name])[name]))
+            changed = self.crew.is_active(who) & (off >= 10.0**-TURNED_DECIMALS)
             if changed.any():
                 self.turn_elements(who[changed], {name: wanted[changed]})
 
-    def take_hold(self, who: Who, name: str) -> Array:
+    def grab_drum(self, who: Who, name: str) -> Array:
         """Take a drum in hand to turn it; return where it stands ``(m,)``."""
-        stands = self.standing(who, [name])[name]
+        stands = self.exact_values(who, [name])[name]
         self._leave(who, name, stands)
         return stands
 
-    def in_hand(self, who: Who, name: str) -> Array:
+    def held_position(self, who: Who, name: str) -> Array:
         """Return where a drum that these hands have turned stands ``(m,)``."""
         return self._left_at[name][who]
 
     def _leave(self, who: Who, name: str, at: Array) -> None:
-        self._left_at.setdefault(name, np.full(self.crew.sessions, np.nan))[who] = at
+        self._left_at.setdefault(name, np.full(self.crew.size, np.nan))[who] = at
 
     def _turned(self, who: Who, name: str, amounts: Array) -> None:
         self._left_at[name][who] += amounts.round(TURNED_DECIMALS)
 
-    def learn_settings(self, who: Who) -> None:
+    def read_settings(self, who: Who) -> None:
         """Read off what the places of images depend on."""
         for name, counts in self.elements(who, [name for name in STEADY if name in self.manual.elements]).items():
             self._settings[name][who] = counts
@@ -233,12 +233,12 @@ class Seat:
         put((take(self._offset[2], who) - readings[2]) / self.units_per_mm, who, self.z)
         return readings
 
-    def levels_shown(self, who: Who, levels: Sequence[float]) -> Array:
+    def displayed_levels(self, who: Who, levels: Sequence[float]) -> Array:
         """Return Z readings ``(k, m)`` as the counters show them when they are driven there."""
         shown = []
         for level in levels:
             self.drive(who, {"Z": np.full(who.size, level)})
-            self.see_that_it_obeyed(who, f"driving Z to {level:.2f}")
+            self.give_up_on_errors(who, f"driving Z to {level:.2f}")
             shown.append(self.counters(who)[2])
         return np.array(shown)
 
@@ -258,58 +258,58 @@ class Seat:
         if element is not None and amounts is not None:
             self._turned(who, element, amounts)
 
-    def see_that_it_obeyed(self, who: Who, doing: str) -> None:
+    def give_up_on_errors(self, who: Who, doing: str) -> None:
         """Give up where an instrument has refused anything since the last look."""
-        refused = self.hands.refused(who)
+        refused = self.hands.pop_errors(who)
         if refused:
             sessions = np.array(sorted(refused), dtype=np.intp)
             self.crew.give_up(
                 sessions, lambda session: f"{doing}: the instrument refuses: {'; '.join(refused[session][:2])}"
             )
 
-    def place(self, who: Who, readings: Array) -> Array:
+    def model_position(self, who: Who, readings: Array) -> Array:
         """Return readings ``(3, m)`` as x, y, z in mm: from the left-hand centre, the base line, downward."""
         offset = take(self._offset, who)
-        x, y = self.in_mm(readings[:2] - offset[:2])
+        x, y = self.to_mm(readings[:2] - offset[:2])
         z = (offset[2] - readings[2]) / self.units_per_mm
         return np.array([x - self._share(1) * self.bx(who), y, z])
 
-    def in_frame(self, who: Who, readings: Array, level: Array) -> Array:
+    def frame_positions(self, who: Who, readings: Array, level: Array) -> Array:
         """Return X, Y readings ``(2, n, m)`` at Z readings ``(m,)`` as places x, y, z ``(3, n, m)`` in mm."""
-        x, y = self.in_mm(readings - self._offset[:2, None, who])
+        x, y = self.to_mm(readings - self._offset[:2, None, who])
         x = x - self._share(1) * self.bx(who)
         z = np.broadcast_to((self._offset[2, who] - level) / self.units_per_mm, x.shape)
         return np.array([x, y, z])
 
-    def below(self, who: Who, hand: int) -> Array:
+    def under_centre(self, who: Who, hand: int) -> Array:
         """Return the X and Y readings ``(2, m)`` straight below a photograph's centre, as far as by and bx tell."""
         below = np.array([self._share(hand) * self.bx(who), -self._settings[f"by{self.projector(hand)}"][who]])
-        return self.in_units(below) + self._offset[:2, who]
+        return self.to_counter_units(below) + self._offset[:2, who]
 
     def centre(self, who: Who, hand: int) -> Array:
         """Return the readings ``(3, m)`` of a photograph's centre, as far as elements and scales tell (P 3.1, 3.2)."""
-        heights = self.from_zero(who, [f"bz{self.projector(hand)}"])[f"bz{self.projector(hand)}"]
-        below = self.below(who, hand)
+        heights = self.elements_from_zero(who, [f"bz{self.projector(hand)}"])[f"bz{self.projector(hand)}"]
+        below = self.under_centre(who, hand)
         return np.array([*below, self._offset[2, who] + self.units_per_mm * heights])
 
     def _share(self, hand: int) -> float:
         """Return where a centre stands along X from the frame's origin, as a share of bx."""
         return self.manual.centres_on_base[hand - 1]
 
-    def in_units(self, shift: Array) -> Array:
+    def to_counter_units(self, shift: Array) -> Array:
         """Return shifts ``(2, ...)`` in mm as so much of the X and Y counters."""
         return np.asarray(self._plane[shift.ndim] * shift)
 
-    def in_mm(self, counted: Array) -> Array:
+    def to_mm(self, counted: Array) -> Array:
         """Return differences ``(2, ...)`` of X and Y readings in mm."""
         return np.asarray(counted / self._plane[counted.ndim])
 
     @property
-    def units(self) -> Array:
+    def counter_units_per_mm(self) -> Array:
         """Units a mm ``(3,)`` of the X, Y and Z counters."""
         return np.array([*self._plane[1], self.units_per_mm])
 
-    def on_carrier(self, who: Who, hand: int, print_place: Array) -> Array:
+    def rotate_by_swing(self, who: Who, hand: int, print_place: Array) -> Array:
         """Return places of paper prints ``(2, m)`` as the swing of their photograph turns them."""
         swing = wrap_gon(self._settings[f"kappa{self.projector(hand)}"][who]) * GON
         return mxv(plane_rotation(swing), print_place)

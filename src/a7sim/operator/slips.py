@@ -59,7 +59,7 @@ class Slip:
     entry: int = 0
     """Number of the first entry in the book that suffers from it; 0 where there is none."""
 
-    def shows_in(self, point: str, item: str) -> bool:
+    def affects(self, point: str, item: str) -> bool:
         """Return whether a reading of an item at a point suffers from this slip."""
         if self.kind == "element not re-read":
             return item == f"set {self.point}"
@@ -82,7 +82,7 @@ class Occasion:
         """Return the slip that happened here."""
         return Slip(self.time, self.model, self.form, self.round, self.point, self.item, kind, written, right)
 
-    def fits(self, certain: CertainSlip) -> bool:
+    def matches(self, certain: CertainSlip) -> bool:
         """Return whether a planted slip belongs here."""
         return (
             certain.model in ("", self.model)
@@ -109,35 +109,35 @@ class Slips:
 
     # --- points ---------------------------------------------------------------------------------------
 
-    def come_to(self, each: Occasion, near: Sequence[str], factor: float) -> None:
+    def select_point(self, each: Occasion, near: Sequence[str], factor: float) -> None:
         """Take one of the points near for the point of the occasion, if that happens; `factor` is that of the rate."""
         if not near:
             return
         planted, dice = self._planted_here(each, ("wrong point",)), self._dice[each.session]
-        if planted or dice.lapses(self._rate("wrong point") * factor):
+        if planted or dice.slip_draws(self._rate("wrong point") * factor):
             other = near[0 if planted else dice.choice(len(near))]
             self._taken[each.session] = (each.point, other)
             self._happened(each, "wrong point", each.point, other)
 
-    def come_back(self, sessions: Sequence[int]) -> None:
+    def recheck_points(self, sessions: Sequence[int]) -> None:
         """Take the right points again."""
         if self._taken:
             for session in sessions:
                 self._taken.pop(session, None)
 
-    def taken_for(self, session: int, point: str) -> str:
+    def mistaken_point(self, session: int, point: str) -> str:
         """Return the point that somebody really looks at for another."""
         meant, other = self._taken.get(session, (point, point))
         return other if meant == point else point
 
     @property
-    def all_points_right(self) -> bool:
+    def no_point_mistaken(self) -> bool:
         """Whether everybody looks at the right points."""
         return not self._taken
 
     # --- readings -------------------------------------------------------------------------------------
 
-    def write(self, each: Occasion, shown: float, misread: float, factor: float) -> float:
+    def transcribe(self, each: Occasion, shown: float, misread: float, factor: float) -> float:
         """Return what somebody writes of what a counter shows; `misread` is what chance makes of it already."""
         kind, written = self._written(each, shown, misread, factor)
         if kind is not None:
@@ -154,30 +154,30 @@ class Slips:
         if abs(misread - shown) > LAST_DIGIT / 2.0:
             return "last digit" if abs(misread - shown) < 1.5 * LAST_DIGIT else "gross", misread
         for kind, ways in _written_wrongly(shown, each.item).items():
-            if kind in _RATES and dice.lapses(self._rate(kind) * factor):
+            if kind in _RATES and dice.slip_draws(self._rate(kind) * factor):
                 return kind, ways[dice.choice(len(ways))]
         return None, misread
 
-    def entered(self, session: int, point: str, item: str, number: int) -> None:
+    def note_entry(self, session: int, point: str, item: str, number: int) -> None:
         """Bear in mind under which number a slip stands in the book."""
         log = self.log[session]
         for i in range(len(log) - 1, max(len(log) - 1 - _LATELY, -1), -1):
-            if not log[i].entry and log[i].shows_in(point, item):
+            if not log[i].entry and log[i].affects(point, item):
                 log[i] = replace(log[i], entry=number)
 
     # --- levers and elements --------------------------------------------------------------------------
 
-    def forgets(self, each: Occasion, right: str, other: str, factor: float) -> bool:
+    def forgets_fitting(self, each: Occasion, right: str, other: str, factor: float) -> bool:
         """Return whether somebody leaves the fitting of the occasion in the other position."""
         return self._lapses(each, "forgotten lever", factor, other, right)
 
-    def uses_old(self, each: Occasion, old: float, now: float, factor: float) -> bool:
+    def uses_stale_reading(self, each: Occasion, old: float, now: float, factor: float) -> bool:
         """Return whether somebody goes on with an old reading of the element of the occasion."""
         return old != now and self._lapses(each, "element not re-read", factor, f"{old:.2f}", f"{now:.2f}")
 
     def _lapses(self, each: Occasion, kind: SlipKind, factor: float, written: str, right: str) -> bool:
         planted = self._planted_here(each, (kind,)) is not None
-        lapsed = planted or self._dice[each.session].lapses(self._rate(kind) * factor)
+        lapsed = planted or self._dice[each.session].slip_draws(self._rate(kind) * factor)
         if lapsed:
             self._happened(each, kind, written, right)
         return lapsed
@@ -191,7 +191,7 @@ class Slips:
         """Return the first planted slip of these kinds that belongs here; it does not come again."""
         planted = self._planted[each.session]
         for certain in planted:
-            if certain.kind in kinds and each.fits(certain):
+            if certain.kind in kinds and each.matches(certain):
                 planted.remove(certain)
                 return certain
         return None

@@ -83,7 +83,7 @@ class Look:
         return self.spacing / self.pitch
 
     @cached_property
-    def compared(self) -> Array:
+    def comparison_points(self) -> Array:
         """Displacements in plan ``(2, n)`` of the places at which the pictures are compared, mm in the model."""
         return self.patch(_PATCH)
 
@@ -105,7 +105,7 @@ class Look:
 
         `surface` is height, slope in X, slope in Y in the model, and y-parallax at photo scale.
         """
-        plan = self.compared
+        plan = self.comparison_points
         raised = np.concatenate([plan, [surface[0] + surface[1:3] @ plan]])
         seen = self.shown @ raised
         seen[0, 1] += surface[3] / 2.0
@@ -121,9 +121,9 @@ class StereoView:
         self._person = person
         self._who = np.zeros(1, dtype=np.intp)
         self._elements: dict[str, float] = {}
-        self.learn()
+        self.read_projectors()
 
-    def learn(self) -> None:
+    def read_projectors(self) -> None:
         """Read off how the projectors stand."""
         names = [f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz", "c") for n in (1, 2)]
         counts = self._bench.seat.elements(self._who, [*names, "bx"])
@@ -152,7 +152,7 @@ class StereoView:
     def look(self, pitch: float = FINE_MM) -> Look:
         """Look with both eyes, a picture element being so many mm of the photographs; whoever looks spends the time."""
         bench = self._bench
-        mark = bench.seat.place(self._who, bench.seat.counters(self._who))[:, 0] * (1.0, 1.0, -1.0)
+        mark = bench.seat.model_position(self._who, bench.seat.counters(self._who))[:, 0] * (1.0, 1.0, -1.0)
         magnification = 2.0 * bench.seat.manual.field_radius_mm / (SIDE * pitch)
         pictures = np.array([self._picture(eye, magnification) for eye in (1, 2)])
         shown = self.displacements(mark)

@@ -48,7 +48,7 @@ class ModelRecords:
     """What a crew found of a model; arrays have all sessions as their last axis."""
 
     model: ModelJob
-    who: Who
+    sessions: Who
     """Those who came to the end of it."""
     interior: Mapping[str, InteriorOrientations]
     orientation: RelativeOrientations
@@ -91,8 +91,8 @@ def measure_models(
 
     `begins` is told of every activity, `tick` comes after every point.
     """
-    person.book.head("", "preparation")
-    for records in measure_models_batch(Bench(Crew.of_one(person), LineHands(person), job, tick), begins):
+    person.book.set_heading("", "preparation")
+    for records in measure_models_batch(Bench(Crew.single(person), LineHands(person), job, tick), begins):
         yield records.of(0)
 
 
@@ -107,14 +107,14 @@ def measure_models_batch(bench: Bench, begins: Callable[[str], None] = lambda _:
 def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecords]:
     job, crew = bench.job, bench.crew
     interior: dict[str, InteriorOrientations] = {}
-    bench.seat.prepare(crew.everybody)
+    bench.seat.prepare(crew.active)
     for model in job.models:
         begin_form(bench, model, "interior orientation", begins)
         set_base_and_fittings(bench, model.base, model.polarity)
         mount_photographs(bench, model, interior)
         prints = load_prints(bench, model)
         require_active(bench)
-        bench.begin(crew.everybody, model, prints)
+        bench.begin(crew.active, model, prints)
         note_missing_points(bench, model)
         preset_counters(bench, model)
         begin_form(bench, model, "relative orientation", begins)
@@ -124,7 +124,7 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
             begin_form(bench, model, f"{side} perspective centre", begins)
-            centres[hand] = observe_centre(bench, crew.everybody, model, hand)
+            centres[hand] = observe_centre(bench, crew.active, model, hand)
         on_ground = None
         if job.control:
             begin_form(bench, model, "absolute orientation", begins)
@@ -132,12 +132,12 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
         require_active(bench)
         yield ModelRecords(
             model,
-            crew.everybody,
+            crew.active,
             {name: interior[name] for name in (model.left, model.right)},
             orientation,
             points,
             centres,
-            float(bench.seat.units[0]),
+            float(bench.seat.counter_units_per_mm[0]),
             bench.seat.units_per_mm,
             crew.seconds.copy(),
             on_ground,
@@ -146,7 +146,7 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
 
 def require_active(bench: Bench) -> None:
     """Raise NobodyGoesOn when all have given up."""
-    if not bench.crew.everybody.size:
+    if not bench.crew.active.size:
         raise NobodyGoesOn
 
 
@@ -154,7 +154,7 @@ def note_missing_points(bench: Bench, model: ModelJob) -> None:
     """Write into the book which points of the case lie in water, or are not pricked on both prints."""
     crew = bench.crew
     listed = {label: model.standard_points.get(label, "") for label in CASES[bench.job.plan.case]}
-    for who, there in bench.alike(crew.everybody, list(listed.values())):
+    for who, there in bench.group_by_points(crew.active, list(listed.values())):
         absent = [f"{label} ({name})" if name else label for label, name in listed.items() if name not in there]
         if absent:
             crew.remark(who, f"{model.name}: not pricked on both prints, done without: {', '.join(absent)}")
@@ -166,10 +166,10 @@ def preset_counters(bench: Bench, model: ModelJob) -> None:
     Those who find no standard point at all on both their prints give up.
     """
     crew = bench.crew
-    waiting = crew.everybody
+    waiting = crew.active
     for label in model.all_positions():
         point = model.standard_points[label]
-        there = bench.pricked(waiting, point)
+        there = bench.has_point(waiting, point)
         presetting, waiting = waiting[there], waiting[~there]
         if presetting.size:
             if label != "1":
@@ -183,9 +183,9 @@ def model_coordinates(bench: Bench, model: ModelJob) -> dict[str, Array]:
     crew = bench.crew
     wanted = list(dict.fromkeys([*model.standard_points.values(), *model.other_points]))
     points: dict[str, Array] = {}
-    for alike, names in bench.alike(crew.everybody, wanted):
-        for name, measured in zip(names, np.moveaxis(bench.measure(alike, names), 1, 0), strict=True):
-            points.setdefault(name, np.full((3, crew.sessions), np.nan))[:, alike] = measured[:, alike]
+    for alike, names in bench.group_by_points(crew.active, wanted):
+        for name, measured in zip(names, np.moveaxis(bench.measure_points(alike, names), 1, 0), strict=True):
+            points.setdefault(name, np.full((3, crew.size), np.nan))[:, alike] = measured[:, alike]
     return {name: points[name] for name in wanted if name in points}
 
 
@@ -193,13 +193,13 @@ def begin_form(bench: Bench, model: ModelJob, form: str, begins: Callable[[str],
     """Begin a form of a model in book and journal."""
     require_active(bench)
     begins(f"model {model.name}: {form}")
-    bench.crew.begin(bench.crew.everybody, model.name, form)
-    bench.hands.note(bench.crew.everybody, f"{model.name}: {form}")
+    bench.crew.begin(bench.crew.active, model.name, form)
+    bench.hands.note(bench.crew.active, f"{model.name}: {form}")
 
 
 def orient_model(bench: Bench, model: ModelJob) -> RelativeOrientations:
     """Orient a model by the procedure on the job sheet."""
-    plan, who, tolerated = bench.job.plan, bench.crew.everybody, bench.job.tolerated_parallax_mm
+    plan, who, tolerated = bench.job.plan, bench.crew.active, bench.job.tolerated_parallax_mm
     if plan.start_off_gon:
         perturb_elements(bench, who, model, plan.method, plan.start_off_gon)
     if plan.procedure == "empirical":
@@ -211,21 +211,21 @@ def orient_model(bench: Bench, model: ModelJob) -> RelativeOrientations:
 
 def set_base_and_fittings(bench: Bench, base: str, polarity: str) -> None:
     """Set base in or out, and the fittings that belong to it and to the pictures."""
-    who, hands = bench.crew.everybody, bench.hands
+    who, hands = bench.crew.active, bench.hands
     right = required_fittings(bench.seat.manual, polarity, base)
     bench.seat.spend_setting(who, 1 + len(right))
     hands.set_base_mode(who, base)
     for name, position in right.items():
-        for them, put in bench.crew.puts(who, name, position):
+        for them, put in bench.crew.fitting_positions(who, name, position):
             hands.set_fitting(them, name, put)
-    bench.seat.see_that_it_obeyed(who, f"setting base {base} and its fittings")
+    bench.seat.give_up_on_errors(who, f"setting base {base} and its fittings")
 
 
 def mount_photographs(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientations]) -> None:
     """Mount what is not yet in its projector; a projector with a new picture starts from its counter zeros."""
     seat, hands = bench.seat, bench.hands
     for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
-        who = bench.crew.everybody
+        who = bench.crew.active
         if hands.loaded(who, projector) == photograph:
             continue
         if hands.loaded(who, 3 - projector) == photograph:
@@ -235,21 +235,21 @@ def mount_photographs(bench: Bench, model: ModelJob, interior: dict[str, Interio
         for name, element in seat.manual.elements.items():
             if name.endswith(str(projector)) and not name.startswith("c"):
                 seat.run_element(who, name, np.full(who.size, element.zero))
-        seat.see_that_it_obeyed(who, f"setting projector {projector} to its zeros")
+        seat.give_up_on_errors(who, f"setting projector {projector} to its zeros")
         interior[photograph] = interior_orientation(
-            bench, bench.crew.everybody, projector, photograph, bench.job.certificate
+            bench, bench.crew.active, projector, photograph, bench.job.certificate
         )
 
 
 def load_prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]:
     """Take up the paper prints of both photographs and see that they overlap the right way round."""
     crew = bench.crew
-    who = crew.everybody
+    who = crew.active
     prints = {}
     for hand, projector in ((1, model.left_projector), (2, model.right_projector)):
         prints[hand] = sketch_positions(bench, who, projector)
     common = [name for name in prints[1] if name in prints[2]]
-    shifts = np.array([prints[1][name][0] - prints[2][name][0] for name in common]).reshape(-1, crew.sessions)[:, who]
+    shifts = np.array([prints[1][name][0] - prints[2][name][0] for name in common]).reshape(-1, crew.size)[:, who]
     nowhere = np.isnan(shifts).all(axis=0)
     crew.give_up(
         who[nowhere], f"{model.name}: no point is pricked on both the prints of {model.left} and {model.right}"

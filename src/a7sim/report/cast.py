@@ -37,7 +37,7 @@ class Line:
 
 def make_cast(kept: Kept, speed: float) -> str:
     """Return the film of a session in which simulated time runs `speed` times as fast. Raises Mistake."""
-    with kept.read():
+    with kept.reading_results():
         lines = sorted(_lines(kept), key=lambda line: line.time)
     header = {
         "version": 2,

@@ -70,7 +70,7 @@ def compare_sessions(sessions: Sequence[Kept], everything: bool = False) -> list
         raise Mistake(f"expected sessions of one kind to compare, got several: {shown}")
     facts = []
     for kept in sessions:
-        with kept.read():
+        with kept.reading_results():
             facts.append(dict(_facts(kept.document, ())))
     names = _in_order(facts)
     rows = (Row(name, tuple(each.get(name, ABSENT) for each in facts)) for name in names)

@@ -14,7 +14,7 @@ def strip_deck(kept: Kept, way: str | None = None) -> str:
     """Return the deck of a session's strip, or of the one measured in a `way`. Raises Mistake where there is none."""
     if way is None and (there := kept.text(CARDS)):
         return there
-    with kept.read():
+    with kept.reading_results():
         strip, models, points = _measured(kept, way)
         ground = _ground(kept, strip, points)
     try:

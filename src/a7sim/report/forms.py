@@ -77,7 +77,7 @@ def forms_text(kept: Kept) -> str:
     """Return all forms of a session as plain text, a page break between them. Raises Mistake without a book."""
     if not kept.book:
         raise Mistake(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
-    with kept.read():
+    with kept.reading_results():
         return PAGE_BREAK.join(form.as_text() for form in make_forms(kept))
 
 

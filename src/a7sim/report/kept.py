@@ -54,7 +54,7 @@ class Kept:
         return [_entry(row, f"{path}, row {i}") for i, row in enumerate(rows, start=1)]
 
     @contextmanager
-    def read(self) -> Iterator[None]:
+    def reading_results(self) -> Iterator[None]:
         """Blame what the body does not find in the results on their file. Raises Mistake."""
         try:
             yield

@@ -16,7 +16,7 @@ _ENDS = {
 
 def render_report(kept: Kept) -> str:
     """Return a session's report as a page of HTML. Raises Mistake for damaged results or files."""
-    with kept.read():
+    with kept.reading_results():
         document = kept.document
         title = f"{document['scenario']}: {_TITLES[kept.command]}"
         return page(title, list(_lead(document)), list(make_chapters(kept)))

@@ -93,7 +93,7 @@ class PictureOfGround:
     Without an emulsion nothing resolves or grains it, and the light is even.
     """
 
-    depicted: Depicted
+    appearance: Depicted
     centre: Array
     rotation: Array
     camera: Camera
@@ -114,9 +114,9 @@ class PictureOfGround:
         """Return the greys 0..1 ``(...)`` of picture elements at film places ``(2, ...)``, so many mm wide."""
         edge = self.emulsion.resolved(element) if self.emulsion else element
         perspective = _undone(self.imaging, np.einsum("ij,j...->i...", self._from_film, xy))
-        met = self.depicted.ground.met_by(self.centre, ray_of(perspective, self.rotation, self.camera.c))
-        scale = (self.centre[2] - self.depicted.ground.mean_height) / self.camera.c
-        grey = self.depicted.grey(met[:2], scale * edge)
+        met = self.appearance.ground.intersect(self.centre, ray_of(perspective, self.rotation, self.camera.c))
+        scale = (self.centre[2] - self.appearance.ground.mean_height) / self.camera.c
+        grey = self.appearance.grey(met[:2], scale * edge)
         cover = self._covered(xy, edge)
         if self.emulsion is None:
             return np.asarray(np.maximum(grey, cover))

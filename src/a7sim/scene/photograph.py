@@ -46,7 +46,7 @@ class Photograph:
     points: Marks
     sketch: Marks
     polarity: str = "positive"
-    laid: str = "right way up"
+    placement: str = "right way up"
     content: Content | None = field(default=None, compare=False)
 
 
@@ -64,7 +64,7 @@ class Deformation:
     identification_mm: float
 
     @classmethod
-    def drawn(cls, film: Film, rng: np.random.Generator) -> "Deformation":
+    def sample(cls, film: Film, rng: np.random.Generator) -> "Deformation":
         """Return the deformation of one photograph on this film."""
         shrink = np.asarray(film.shrinkage_ppm) + film.shrinkage_sigma_ppm * rng.standard_normal(2)
         shear = film.shear_sigma_ppm * rng.standard_normal()

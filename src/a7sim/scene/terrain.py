@@ -49,7 +49,7 @@ class Ground:
         waves = np.sin(phases + self.phases.reshape((_WAVES,) + (1,) * (plan.ndim - 1)))
         return np.asarray(self.mean_height + np.einsum("w,w...->...", self.amplitudes, waves))
 
-    def met_by(self, centre: Array, direction: Array) -> Array:
+    def intersect(self, centre: Array, direction: Array) -> Array:
         """Return where rays ``(3, ...)`` going down from a centre ``(3,)`` meet the ground, ``(3, ...)`` in m."""
         rays = direction.reshape(3, -1)
         middle = rays[:, rays.shape[1] // 2, None]

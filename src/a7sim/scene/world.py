@@ -61,7 +61,7 @@ class Scene:
     """Roads and tracks by name."""
 
     @property
-    def drawer(self) -> dict[str, Photograph]:
+    def mountable(self) -> dict[str, Photograph]:
         """All that can be put on a carrier: the photographs and the grid plate."""
         return self.photographs | {self.grid_plate.name: self.grid_plate}
 
@@ -183,7 +183,7 @@ class Flight:
         else:
             stream = (FILM_STREAM, exposure.index)
             filming = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=stream))
-            deformation = Deformation.drawn(self.scenario.film, filming)
+            deformation = Deformation.sample(self.scenario.film, filming)
             fiducials = Marks(exposure.fiducials.names, deformation.of_fiducials(exposure.fiducials.xy, filming))
             imaged = Marks(exposure.points.names, deformation.of_points(exposure.points.xy, filming))
             points = select(imaged, within_format(imaged.xy) & exposure.visible)

@@ -81,7 +81,7 @@ class A8Setup:
         names = common_points(photographs[0].points, photographs[1].points, wanted)
         pictures = tuple(centre_photo(each, names, self.observer, self.rng) for each in photographs)
         left, right = (
-            projector.shown(picture.image, self.rng)
+            projector.project(picture.image, self.rng)
             for projector, picture in zip(self.projectors, pictures, strict=True)
         )
         c = tuple(
@@ -115,7 +115,7 @@ class A8Setup:
 
     def measured(self, shown: "Shown", stand: Cleared) -> Model:
         """Return a model with all its points, mm at its scale."""
-        readings = self._read(stand.seen(shown.left, shown.right)[0], stand, shown.pointing)
+        readings = self._read(stand.model_points(shown.left, shown.right)[0], stand, shown.pointing)
         centres = np.array(a8_centres(self.bx, COLUMN_MM, REFERENCE_MM)).T
         points, ends = (a8_model_coordinates(each, self.bx, COLUMN_MM, REFERENCE_MM) for each in (readings, centres))
         return add_centres(shown.model, shown.names, points, ends)
@@ -168,7 +168,7 @@ def strip_on_a8(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
     )
     test = scenario.instrument.grid_test
     a8 = A8Setup(
-        (Projector.drawn(test, faults), Projector.drawn(test, faults)),
+        (Projector.sample(test, faults), Projector.sample(test, faults)),
         scenario.observer,
         plan.bx,
         plan.parallax_readings,

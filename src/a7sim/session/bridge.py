@@ -52,7 +52,7 @@ def run_bridge(
     if len(scenario.models) < 2 or "outside" not in {model.base for model in scenario.models}:
         raise Mistake("models: expected a strip with base inside and outside in turn, as bridging needs")
     journal = Journal(keeping)
-    session = open_session(scenario, seed, journal.heard)
+    session = open_session(scenario, seed, journal.on_link_event)
     job = session.job
     keeping.prepare(out, force, (INDEPENDENT,))
     done: list[Document] = []
@@ -67,8 +67,8 @@ def run_bridge(
 
     about = make_header("bridge", scenario, seed)
     with recorded_session(document, session, journal, about, out, leaves):
-        for model in bridge_strip(session.person, job, watcher.tick, watcher.begins):
-            places[model.model.name] = model.places_of(0)
+        for model in bridge_strip(session.person, job, watcher.on_point, watcher.on_activity):
+            places[model.model.name] = model.coordinates_of(0)
             done.append(_of_model(model))
     if document["status"] != "complete":
         return document
@@ -85,7 +85,7 @@ def run_bridge(
         folder,
         watcher,
         force or keeping.resumes,
-        keeping=keeping.of_part(folder),
+        keeping=keeping.for_part(folder),
     )
     document |= {"status": alone["status"], "message": alone["message"]}
     document["independent"] = {"strip": alone.get("strip", {}), "hours": alone["operator"]["hours"]}
@@ -114,7 +114,7 @@ def bridge_over_link(scenario: Scenario, seed: int) -> Bridging:
     message = ""
     try:
         for each in bridge_strip(session.person, session.job):
-            models.append(_as_model(each.model.name, each.places_of(0)))
+            models.append(_as_model(each.model.name, each.coordinates_of(0)))
     except (DoesNotFit, Undetermined) as trouble:
         message = str(trouble)
     operator = hours_document(session.person.clock.now, session.person.timesheet)
@@ -126,8 +126,8 @@ def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[Bridging]:
     crowd = open_batch(scenario, seeds)
     models: list[list[Model]] = [[] for _ in seeds]
     for each in bridge_strip_batch(crowd.bench):
-        for session in each.who.tolist():
-            models[session].append(_as_model(each.model.name, each.places_of(session)))
+        for session in each.sessions.tolist():
+            models[session].append(_as_model(each.model.name, each.coordinates_of(session)))
     crew = crowd.bench.crew
     return [
         _bridging(

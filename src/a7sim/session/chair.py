@@ -32,7 +32,7 @@ class Chair:
         self._desk: Desk | None = None
         self._held = False
 
-    def sit_down(self) -> Client:
+    def open(self) -> Client:
         """Return a client of the instrument. Raises Mistake where the journal cannot be written or gone on with."""
         if self._desk is None:
             self._desk = self._anew() if self.begun is None else self._again(self.begun)
@@ -43,18 +43,21 @@ class Chair:
 
     def _anew(self) -> Desk:
         scenario, seed = self._scenario, self._seed
-        desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, seed).drawer, seed), self._journal.heard)
+        desk = Desk(
+            build_autograph(scenario.instrument, build_scene(scenario, seed).mountable, seed),
+            self._journal.on_link_event,
+        )
         self.folder = new_folder(self.folder)
-        self._journal.opened(self.folder, make_header(COMMAND, scenario, seed), desk)
+        self._journal.recording(self.folder, make_header(COMMAND, scenario, seed), desk)
         return desk
 
     def _again(self, begun: Begun) -> Desk:
         desk, now, held_by = restore_instrument(begun, self._journal, from_checkpoint=True)
-        self.clock.pass_to(now)
+        self.clock.advance_to(now)
         self._held = held_by is not None
         return desk
 
-    def past(self) -> Iterator[Event]:
+    def history(self) -> Iterator[Event]:
         """Yield what was said in the session that is gone on with, and what was answered."""
         there = self.begun.journalled if self.begun else None
         for number in range(2, len(there) + 1 if there else 0):
@@ -63,7 +66,7 @@ class Chair:
             if event.dir in ("<", ">"):
                 yield event
 
-    def stand_up(self) -> None:
+    def close(self) -> None:
         """End the journal, which can be gone on with. Raises Mistake where it cannot be written to its end."""
         if self._desk is not None:
-            self._journal.stopped(None)
+            self._journal.close(None)

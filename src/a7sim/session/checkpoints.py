@@ -58,8 +58,8 @@ class Differing:
     """A part of a state that is not as it was: where it stands in it, what it was, and what it is."""
 
     part: str
-    was: Any
-    is_now: Any
+    before: Any
+    after: Any
 
 
 def differences(was: Any, is_now: Any, part: str = "") -> Iterator[Differing]:

@@ -47,7 +47,7 @@ class Cleared:
         c = float(np.ravel(self.c[0])[model]), float(np.ravel(self.c[1])[model])
         return Cleared(c, (self.angles[0][:, model], self.angles[1][:, model]), self.bx, self.rounds)
 
-    def seen(self, left: Array, right: Array) -> tuple[Array, Array]:
+    def model_points(self, left: Array, right: Array) -> tuple[Array, Array]:
         """Return where x-parallax vanishes ``(3, n, ...)``, from the left centre, and y-parallaxes ``(n, ...)``, mm."""
         rays = [
             ray_of(image, turned[:, :, None], c)
@@ -77,7 +77,7 @@ def clear_parallaxes(
     stand = Cleared(c, (level, level), bx, 0)
     clearing = np.ones(swing.shape, dtype=bool)
     for i in range(1, MAX_ROUNDS + 1):
-        points, parallaxes = stand.seen(left, right)
+        points, parallaxes = stand.model_points(left, right)
         enlargement = -points[2] / c[0]
         one, two = (
             Stand(np.array([still + x, still, still]), angles)

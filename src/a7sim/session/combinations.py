@@ -65,7 +65,7 @@ def run_combinations(
             folder,
             watcher,
             force or keeping.resumes,
-            keeping=keeping.of_part(folder),
+            keeping=keeping.for_part(folder),
         )
         if sessions[case]["status"] != "complete":
             document |= {"status": sessions[case]["status"], "message": f"case {case}: {sessions[case]['message']}"}

@@ -50,7 +50,7 @@ class Wanted:
     tremor_um: float | None = None
 
     @classmethod
-    def of(cls, settings: Mapping[str, Any]) -> "Wanted":
+    def from_settings(cls, settings: Mapping[str, Any]) -> "Wanted":
         """Return what the settings of a journal ask for."""
         return msgspec.convert(dict(settings), cls)
 
@@ -72,7 +72,7 @@ def compile_model(
     keeping = keeping or Keeping()
     _see_that_it_can_be(scenario, wanted)
     journal = Journal(keeping)
-    session = open_session(scenario, seed, journal.heard)
+    session = open_session(scenario, seed, journal.on_link_event)
     order = _order(wanted, scenario, session.scene)
     keeping.prepare(out, force)
     document = document_header("compile") | {
@@ -94,7 +94,7 @@ def compile_model(
 
 
 def _see_that_it_can_be(scenario: Scenario, wanted: Wanted) -> None:
-    if VARIANTS[scenario.instrument.variant].lacks(*BASE_COMPONENTS):
+    if VARIANTS[scenario.instrument.variant].missing_elements(*BASE_COMPONENTS):
         raise Mistake(
             "instrument.variant: expected a plotter with by and bz, whose cameras the stereo view knows, "
             f"got an {scenario.instrument.variant}"
@@ -142,7 +142,12 @@ def _sheet(session: Session, wanted: Wanted, order: Order, watcher: Watcher) -> 
     models = tuple(model for model in session.job.models if model.name == wanted.model)
     control = given_control(session.scenario, session.scene)
     return compile_map(
-        session.person, replace(session.job, models=models, control={}), control, order, watcher.tick, watcher.begins
+        session.person,
+        replace(session.job, models=models, control={}),
+        control,
+        order,
+        watcher.on_point,
+        watcher.on_activity,
     )
 
 

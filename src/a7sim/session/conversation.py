@@ -33,7 +33,7 @@ class Told:
     until: Callable[[float], None]
     first: Listener
 
-    def heard(self, event: LinkEvent) -> None:
+    def on_link_event(self, event: LinkEvent) -> None:
         """Tell what happened on the link."""
         self.first(event)
         self.until(event.time)

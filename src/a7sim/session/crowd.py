@@ -30,21 +30,21 @@ class Crowd:
     bench: Bench
     job: Job
 
-    def worked(self) -> Iterator[ModelRecords]:
+    def measure_models(self) -> Iterator[ModelRecords]:
         """Yield the models as they are done; what a session gives up for stands in `bench.crew.reasons`."""
         return measure_models_batch(self.bench)
 
-    def documents(self, strips: bool = True, whole: bool = True) -> list[Document]:
+    def run(self, strips: bool = True, whole: bool = True) -> list[Document]:
         """Work to the end and return a document a seed, as `run` gives it, without what is told of line and book.
 
         Without strips they say nothing of the strip on the ground either, which costs as much as the rest; where they
         are not whole, of the models only what is in `of_model_in_brief`.
         """
         found: list[list[Document]] = [[] for _ in self.seeds]
-        for records in self.worked():
+        for records in self.measure_models():
             plan = next(model for model in self.scenario.models if model.name == records.model.name)
             beside = self._beside(records, self.scenes[0].relative_truth(plan))
-            for member, session in enumerate(records.who.tolist()):
+            for member, session in enumerate(records.sessions.tolist()):
                 record = records.of(session)
                 found[session].append(
                     results.model_document(record, beside, member, plan.published)
@@ -55,7 +55,7 @@ class Crowd:
 
     def _beside(self, records: ModelRecords, truth: RelativeTruth | None) -> Beside:
         """Return the truth about a model of those who did it; their instruments stand as they left them."""
-        who, model, fleet = records.who, records.model, self.fleet
+        who, model, fleet = records.sessions, records.model, self.fleet
         centres = {
             hand: {f"{axis}0": each for axis, each in fleet.readings_at(who, fleet.pose(who, projector)[0]).items()}
             for hand, projector in ((1, model.left_projector), (2, model.right_projector))
@@ -81,7 +81,7 @@ def open_batch(scenario: Scenario, seeds: Sequence[int]) -> Crowd:
     """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
     flight = Flight.of(scenario)
     scenes = tuple(flight.scene(seed) for seed in seeds)
-    fleet = build_batch(scenario.instrument, [scene.drawer for scene in scenes], seeds)
+    fleet = build_batch(scenario.instrument, [scene.mountable for scene in scenes], seeds)
     crew = Crew(scenario.observer, [Dice(scenario.observer, seed) for seed in seeds])
     job = make_job(scenario, scenes[0])
     return Crowd(scenario, tuple(seeds), scenes, fleet, Bench(crew, FleetHands(fleet), job), job)

@@ -43,7 +43,7 @@ class Frame:
     step: int
     time: float
     """Simulated s."""
-    said: str = ""
+    line: str = ""
     """Who said something last, and what."""
     point: str | None = None
     """The point that was last looked at or registered."""
@@ -51,7 +51,7 @@ class Frame:
     """What each counter shows in the origin of the frame."""
     units: dict[str, float] = field(default_factory=dict)
     """Units a mm of each counter."""
-    trouble: str = ""
+    error: str = ""
     """Where what was filmed did not happen again."""
 
 
@@ -94,11 +94,11 @@ class Film:
         """How many lines were said that drew no screen."""
         return len(self._numbers)
 
-    def opened(self) -> Client:
+    def open_client(self) -> Client:
         """Return a client that sees the instrument as it stands in the film."""
         return Client(InProcessSerial(desk=self._front, timeout=TIMEOUT_S))
 
-    def run_to(self, step: int) -> Frame:
+    def seek(self, step: int) -> Frame:
         """Run on, or back, until a step is done with all that came of it; 0 is the beginning."""
         end = self._numbers[step] if step < self.steps else len(self.journalled) + 1
         if self._leaps_to(end):
@@ -106,10 +106,10 @@ class Film:
             self._next = self._replay.seek(end)
             self._front.autograph = self._replay.desk.autograph
         while self._next < end:
-            difference = self._replay.say(self._next, self.journalled.event(self._next))
+            difference = self._replay.apply(self._next, self.journalled.event(self._next))
             if difference is not None and not self._trouble:
                 expected, got = difference.journalled or "nothing", difference.replayed or "nothing"
-                self._trouble = f"{self.journalled.where(difference.line)}: expected again {expected}, got {got}"
+                self._trouble = f"{self.journalled.location(difference.line)}: expected again {expected}, got {got}"
             self._next += 1
         self.frame = self._framed(step)
         return self.frame
@@ -119,11 +119,11 @@ class Film:
         at = bisect_left(self._checkpoints, end) - 1
         return end < self._next or (at >= 0 and self._checkpoints[at] - self._next > MAX_REPLAYED_LINES)
 
-    def run_on(self, enough: Callable[[], bool]) -> Frame:
+    def advance_until(self, enough: Callable[[], bool]) -> Frame:
         """Run on, a step at least if there is one, until that is enough."""
         frame = self.frame
         while frame.step < self.steps:
-            frame = self.run_to(frame.step + 1)
+            frame = self.seek(frame.step + 1)
             if enough():
                 break
         return frame
@@ -137,7 +137,7 @@ class Film:
         at = bisect_right(self._records, step) if way > 0 else bisect_left(self._records, step) - 1
         return self._records[at] if 0 <= at < len(self._records) else None
 
-    def sought(self, words: str) -> int:
+    def find_step(self, words: str) -> int:
         """Return the step that a number, a time, @LINE or the text of a note names. Raises Mistake for another."""
         if words.isdecimal() and int(words) <= self.steps:
             return int(words)
@@ -188,7 +188,7 @@ def _played(file: Path) -> Film:
     """Return the film of a script that is played up to its end, or to where it and the instrument part."""
     script = read_script(file)
     heard: list[LinkEvent] = []
-    Player(script, heard.append).play()
+    Player(script, heard.append).run()
     chain = Chain()
     header = chain.line(make_header("replay", script.scenario, script.seed, script=file.name).line)
     lines = [chain.line(Event(each.time, each.client, each.direction, each.text)) for each in heard]

@@ -23,7 +23,7 @@ class FleetHands:
     def reset(self, who: Who) -> None:
         self._fleet.reset(who)
 
-    def engage(self, who: Who, height_gear: str | float, plan_gear: str) -> None:
+    def set_height_gear(self, who: Who, height_gear: str | float, plan_gear: str) -> None:
         self._fleet.set_height_gear(who, height_gear)
 
     def set_base_mode(self, who: Who, mode: str) -> None:
@@ -86,14 +86,14 @@ class FleetHands:
         return np.asarray(np.all(went, axis=0))
 
     def turn(self, who: Who, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
-        self._fleet.wheels(who, wheels.round(4))
+        self._fleet.turn_handwheels(who, wheels.round(4))
         if element is not None and amounts is not None:
             self.turn_element(who, element, amounts)
 
-    def seen(self, who: Who, eye: int, point: str) -> Array:
+    def view_point(self, who: Who, eye: int, point: str) -> Array:
         return self._fleet.eyepiece(who, eye, point).round(2)
 
-    def seen_by_both(self, who: Who, point: str) -> Array:
+    def view_point_stereo(self, who: Who, point: str) -> Array:
         return self._fleet.both_eyepieces(who, point).round(2)
 
     def record(self, who: Who, point: str) -> None:
@@ -102,5 +102,5 @@ class FleetHands:
     def note(self, who: Who, text: str) -> None:
         """Nobody keeps what a crowd notes."""
 
-    def refused(self, who: Who) -> dict[int, list[str]]:
-        return self._fleet.refused(who)
+    def pop_errors(self, who: Who) -> dict[int, list[str]]:
+        return self._fleet.pop_errors(who)

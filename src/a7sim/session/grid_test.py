@@ -50,7 +50,7 @@ def run_grid_test(
     watcher = watcher or Watcher()
     keeping = keeping or Keeping()
     journal = Journal(keeping)
-    session = open_session(scenario, seed, journal.heard)
+    session = open_session(scenario, seed, journal.on_link_event)
     autograph = session.autograph
     document = _header(scenario, seed, order, autograph)
     keeping.prepare(out, force)
@@ -63,7 +63,7 @@ def run_grid_test(
         "calibrate", scenario, seed, points=order.crosses, levels=order.levels, pointings=order.pointings
     )
     with recorded_session(document, session, journal, about, out, leaves, called="test"):
-        for sheet in measure_grid(session.person, order, watcher.tick, watcher.begins):
+        for sheet in measure_grid(session.person, order, watcher.on_point, watcher.on_activity):
             sheets.append(sheet)
             truth = true_errors(autograph, draw_condition(scenario.instrument, seed), sheet.projector)
             document["projectors"][side_name(sheet.projector)] = projector_document(sheet, truth)

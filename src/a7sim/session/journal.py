@@ -79,7 +79,7 @@ class Keeping:
         if folder is not None and not self.resumes:
             prepare_folder(folder, force, parts)
 
-    def of_part(self, folder: Path | None) -> "Keeping":
+    def for_part(self, folder: Path | None) -> "Keeping":
         """Return how a session is kept that is part of another, which may have been cut off before this one began."""
         begun = folder is not None and has_header(folder / JOURNAL)
         return replace(self, resumes=self.resumes and begun)
@@ -106,7 +106,7 @@ class Journal:
         self._since_checkpoint = 0
         self._changes = 0
 
-    def opened(self, folder: Path | None, header: Header, desk: Desk | None) -> "Journal":
+    def recording(self, folder: Path | None, header: Header, desk: Desk | None) -> "Journal":
         """Begin to write, where there is a folder; about a desk, where there is one.
 
         A session that is resumed sets aside what is torn of its journal. Raises Mistake where it cannot be written.
@@ -122,14 +122,14 @@ class Journal:
                     _leave_scenario(folder, header)
                 self._write(header.line)
                 for event in self._unwritten:
-                    self.heard(event)
+                    self.on_link_event(event)
             except BaseException:
                 self._close()
                 raise
         self._unwritten.clear()
         return self
 
-    def continued(self, there: Journalled, desk: Desk, checkpoints: list[Checkpoint]) -> "Journal":
+    def resume_at(self, there: Journalled, desk: Desk, checkpoints: list[Checkpoint]) -> "Journal":
         """Go on behind a journal whose session stands at a desk. Raises Mistake where it cannot be written."""
         save_truncated_tail(there)
         self._desk = desk
@@ -146,7 +146,7 @@ class Journal:
             self._states = folder / STATES
             self._states.write_bytes(states)
 
-    def heard(self, event: LinkEvent) -> None:
+    def on_link_event(self, event: LinkEvent) -> None:
         """Write what happened on the link. Raises JournalStopped where that fails, unless somebody just went."""
         try:
             self._hear(event)
@@ -163,13 +163,13 @@ class Journal:
             return
         at_once, self._time = False, event.time
         if event.direction == ">":
-            if self._since_checkpoint >= LINES_PER_CHECKPOINT and self._desk is not None and self._desk.quiet:
+            if self._since_checkpoint >= LINES_PER_CHECKPOINT and self._desk is not None and self._desk.is_idle:
                 self._checkpoint(event.time, self._desk)
             at_once = is_registration(event.text)
         self._since_checkpoint += 1
         self._write(Event(event.time, event.client, event.direction, event.text), at_once)
 
-    def written(self, entry: Entry, time: float) -> None:
+    def on_book_entry(self, entry: Entry, time: float) -> None:
         """Write an entry of the observation book, or that it was struck out. Raises Mistake where that fails."""
         if self._file is None:
             return
@@ -192,13 +192,13 @@ class Journal:
                 )
             )
 
-    def stopped(self, error: BaseException | None) -> None:
+    def close(self, error: BaseException | None) -> None:
         """Write nothing more, after a last checkpoint where nothing went wrong. Raises Mistake where that fails."""
         try:
-            if error is None and self._desk is not None and self._desk.quiet and self._since_checkpoint:
+            if error is None and self._desk is not None and self._desk.is_idle and self._since_checkpoint:
                 self._checkpoint(self._time, self._desk)
             if error is None and self._there is not None and self._line < len(self._there):
-                over = self._there.where(self._line + 1)
+                over = self._there.location(self._line + 1)
                 raise Mistake(f"{over}: expected the end of the session, got a line that is left over")
         finally:
             self._close()
@@ -239,7 +239,7 @@ class Journal:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._file is not None:
-            self.stopped(error)
+            self.close(error)
 
 
 def write_header_only(folder: Path, header: Header) -> None:
@@ -262,9 +262,9 @@ def _leave_scenario(folder: Path, header: Header) -> None:
 
 def save_truncated_tail(there: Journalled) -> None:
     """Put what is torn of a journal beside it. Raises Mistake where that cannot be written."""
-    if there.torn:
+    if there.truncated_tail:
         try:
-            (there.path.parent / TORN).write_bytes(there.torn)
+            (there.path.parent / TORN).write_bytes(there.truncated_tail)
         except OSError as error:
             raise Mistake(f"{there.path}: expected a journal that can be written: {error.strerror}") from error
 
@@ -272,5 +272,7 @@ def save_truncated_tail(there: Journalled) -> None:
 def _not_the_same(there: Journalled, number: int, line: bytes) -> str:
     was, is_now = (each[:_MAX_SHOWN_LENGTH].decode("utf-8", "replace") for each in (there.lines[number - 1], line))
     if number == 1:
-        return f"{there.where(number)}: expected a session of {software_version()} and its scenario, got another: {was}"
-    return f"{there.where(number)}: expected what this session does again, {is_now}, got another's, {was}"
+        return (
+            f"{there.location(number)}: expected a session of {software_version()} and its scenario, got another: {was}"
+        )
+    return f"{there.location(number)}: expected what this session does again, {is_now}, got another's, {was}"

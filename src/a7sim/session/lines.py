@@ -54,7 +54,7 @@ class Chain:
         self.crc = zlib.crc32(body, self.crc)
         return body + _END_OF_LINE % self.crc
 
-    def goes_on(self, line: bytes) -> bool:
+    def accepts(self, line: bytes) -> bool:
         """Whether a line is the next one; if so it is counted as that."""
         crc = zlib.crc32(line[:-_LENGTH_OF_END], self.crc)
         if line[-_LENGTH_OF_END:] != _END_OF_LINE % crc:
@@ -71,7 +71,7 @@ class Journalled:
     header: dict[str, Any]
     lines: list[bytes]
     """Without their ends, the header first."""
-    torn: bytes
+    truncated_tail: bytes
     crc: int
     """Of the last line."""
 
@@ -82,7 +82,7 @@ class Journalled:
         """Return the event of a line, counted from 1 as editors do; line 1 is the header."""
         return _DECODER.decode(self.lines[number - 1])
 
-    def where(self, number: int) -> str:
+    def location(self, number: int) -> str:
         """Return the place of a line, for people."""
         return f"{self.path}, line {number}"
 
@@ -107,12 +107,12 @@ def read_journal(path: Path) -> Journalled:
     *lines, torn = data.split(b"\n")
     chain = Chain()
     for number, line in enumerate(lines, start=1):
-        if not chain.goes_on(line):
+        if not chain.accepts(line):
             raise Mistake(f"{path}, line {number}: {_damage(line, number)}")
     crc = chain.crc
     if not lines:
         raise Mistake(f"{path}: expected the journal of a session, got no whole line: nothing was observed yet")
-    if chain.goes_on(torn[:-1]):
+    if chain.accepts(torn[:-1]):
         raise Mistake(f"{path}, line {len(lines) + 1}: expected a line end, got another byte: the journal is damaged")
     return Journalled(path, _header(path, lines[0]), lines, torn, crc)
 

@@ -38,7 +38,7 @@ class Player:
         self._clock = clock or Clock()
         self.desk = desk or _fresh(script, listener)
 
-    def play(self, client: str | None = None) -> NotMet | None:
+    def run(self, client: str | None = None) -> NotMet | None:
         """Carry out the statements up to the first that fails, and return that; an error not expected is one."""
         engine = self.desk.open(client, time=self._clock.now)
         for done, after in zip(self._script.statements, [*self._script.statements[1:], None], strict=False):
@@ -52,14 +52,14 @@ class Player:
 
     def _carry_out(self, engine: Engine, statement: Statement) -> NotMet | None:
         if isinstance(statement, Wait):
-            self._clock.spend(statement.seconds)
+            self._clock.advance(statement.seconds)
             return None
         reply = feed_until_idle(engine, _said(statement).encode("latin-1", "replace") + b"\n", self._clock)
         if isinstance(statement, Say):
             return None
         taken = parse_reply(reply)
         answer = () if taken is None else tuple(field for part in taken.parts for field in _fields(part))
-        if statement.met_by(answer):
+        if statement.matches(answer):
             return None
         errors = f" ({engine.errors[0]})" if engine.errors else ""
         return NotMet(statement.place, str(statement), (", ".join(answer) or "no answer") + errors)
@@ -67,7 +67,7 @@ class Player:
 
 def _fresh(script: Script, listener: Listener | None) -> Desk:
     scene = build_scene(script.scenario, script.seed)
-    return Desk(build_autograph(script.scenario.instrument, scene.drawer, script.seed), listener)
+    return Desk(build_autograph(script.scenario.instrument, scene.mountable, script.seed), listener)
 
 
 def _said(statement: Statement) -> str:

@@ -20,7 +20,7 @@ class Projector:
     scattered: float
 
     @classmethod
-    def drawn(cls, test: GridTest, rng: np.random.Generator) -> "Projector":
+    def sample(cls, test: GridTest, rng: np.random.Generator) -> "Projector":
         """Return a projector of an instrument whose grid tests come out like this."""
         c, *point = rng.standard_normal(3) * [
             test.principal_distance_mm, test.principal_point_mm, test.principal_point_mm,
@@ -34,7 +34,7 @@ class Projector:
             0.0 if smooth else 1e-3 * test.local_um,
         )
 
-    def shown(self, image: Array, rng: np.random.Generator) -> Array:
+    def project(self, image: Array, rng: np.random.Generator) -> Array:
         """Return image points ``(2, n)`` about the principal point as this projector projects them."""
         scatter = self.scattered * rng.standard_normal(image.shape)
         return np.asarray(image + self.principal_point[:, None] + local_errors(self.local, image) + scatter)

@@ -31,15 +31,15 @@ def scenario_of_journal(journalled: Journalled, known: Scenario | None = None) -
     """
     header = journalled.header
     if not knows_scenario(journalled):
-        raise Mistake(f"{journalled.where(1)}: expected a session whose scenario is known, got one that names none")
+        raise Mistake(f"{journalled.location(1)}: expected a session whose scenario is known, got one that names none")
     scenario = known or _scenario_beside(journalled)
     try:
         found = hash_scenario(scenario)
     except Mistake as mistake:
-        raise Mistake(f"{journalled.where(1)}: {mistake}") from mistake
+        raise Mistake(f"{journalled.location(1)}: {mistake}") from mistake
     if found != header.get("scenario_hash"):
         raise Mistake(
-            f"{journalled.where(1)}: expected the scenario and the measurements that the session began with "
+            f"{journalled.location(1)}: expected the scenario and the measurements that the session began with "
             f"(hash {str(header.get('scenario_hash'))[:12]}), got others ({found[:12]})"
         )
     return scenario, header["seed"]
@@ -52,7 +52,7 @@ def knows_scenario(journalled: Journalled) -> bool:
 
 def _scenario_beside(journalled: Journalled) -> Scenario:
     """Return the scenario of a journal, which in version 2 stood in its header. Raises Mistake where there is none."""
-    path, where = journalled.path.with_suffix(SCENARIO_SUFFIX), journalled.where(1)
+    path, where = journalled.path.with_suffix(SCENARIO_SUFFIX), journalled.location(1)
     data = journalled.header.get("scenario")
     if data is None:
         where = str(path)
@@ -92,7 +92,7 @@ class Replay:
         settings = header.get("settings", {})
         if autograph is None:
             scenario, seed = scenario_of_journal(journalled, known)
-            drawer = build_scene(scenario, seed, header.get("pictures", 1)).drawer
+            drawer = build_scene(scenario, seed, header.get("pictures", 1)).mountable
             autograph = build_autograph(scenario.instrument, drawer, seed)
         self.journalled = journalled
         self.desk = Desk(
@@ -124,7 +124,7 @@ class Replay:
             return 2
         *before, last = known
         for each in before:
-            self.desk.autograph.register_again(each.state["autograph"])
+            self.desk.autograph.restore_registrations(each.state["autograph"])
         self.desk.restore(last.state)
         self.checkpoints = known
         self._changes = len(self.desk.autograph.recorder.changes)
@@ -135,7 +135,7 @@ class Replay:
         number = checkpoint.line
         return 1 < number <= len(self.journalled) and self.journalled.event(number).hash == checkpoint.hash
 
-    def say(self, number: int, event: Event) -> Difference | None:
+    def apply(self, number: int, event: Event) -> Difference | None:
         """Let an event of the journal happen again; return how it differs, if it does."""
         self.time = event.t
         if event.kind == "state":
@@ -160,11 +160,11 @@ class Replay:
         self._happen(event)
         return None
 
-    def ended(self) -> Difference | None:
+    def final_difference(self) -> Difference | None:
         """Return what the instrument still says where the journal ends, if it does."""
         return self._left_over(len(self.journalled) + 1)
 
-    def unsaid(self) -> list[LinkEvent]:
+    def pending_events(self) -> list[LinkEvent]:
         """Return what the instrument still says where the journal ends: it broke off before that was written."""
         left = list(self._said)
         self._said.clear()
@@ -198,7 +198,7 @@ class Replay:
             if self._clock is None:
                 engine.feed(received, event.t)
             else:
-                self._clock.pass_to(event.t)
+                self._clock.advance_to(event.t)
                 feed_until_idle(engine, received, self._clock)
 
     def _compared(self, number: int, event: Event) -> Difference | None:
@@ -216,13 +216,13 @@ class Replay:
                 return tuple(differences(checkpoint.state, state))
         return ()
 
-    def parts_that_differ(self, after: int) -> tuple[Differing, ...]:
+    def state_differences(self, after: int) -> tuple[Differing, ...]:
         """Return in what the state differs at the first checkpoint after a line, the rest up to there said again."""
         for number in range(after + 1, len(self.journalled) + 1):
             event = self.journalled.event(number)
             if event.kind == "state":
                 return self._parts(number, self.desk.state(self._changes))
-            self.say(number, event)
+            self.apply(number, event)
         return ()
 
 
@@ -230,7 +230,7 @@ def replay_lines(replay: Replay, first: int = 2) -> Iterator[tuple[int, Event, D
     """Say the lines of a journal again, from a line on; yield each with its number and how it differs."""
     for number in range(first, len(replay.journalled) + 1):
         event = replay.journalled.event(number)
-        yield number, event, replay.say(number, event)
+        yield number, event, replay.apply(number, event)
 
 
 def _bytes_of(event: Event) -> bytes:

@@ -187,7 +187,7 @@ def _on_ground(found: OnGround) -> dict[str, Any]:
         "heights_m": {point: round(off, 3) for point, off in found.heights.items()},
         "distance_m": round(found.distance, 3),
         "tolerated_m": round(found.tolerated, 3),
-        "agrees": found.agrees,
+        "agrees": found.within_tolerance,
         "points": {
             point: {axis: round(value, 3) for axis, value in zip("XYZ", place, strict=True)}
             for point, place in found.points.items()

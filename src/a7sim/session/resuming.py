@@ -37,11 +37,11 @@ def find_resumable(folder: Path, command: str) -> Begun:
     for name, expected in (("command", command), ("software", software_version())):
         got = journalled.header.get(name)
         if got != expected:
-            raise Mistake(f"{journalled.where(1)}: expected a session of {expected} to go on with, got one of {got}")
+            raise Mistake(f"{journalled.location(1)}: expected a session of {expected} to go on with, got one of {got}")
     version = journalled.header["schema_version"]
     if version != SCHEMA_VERSION:
         raise Mistake(
-            f"{journalled.where(1)}: expected schema_version {SCHEMA_VERSION} to go on with, got {version}, "
+            f"{journalled.location(1)}: expected schema_version {SCHEMA_VERSION} to go on with, got {version}, "
             "which can be replayed only"
         )
     return Begun(journalled, *scenario_of_journal(journalled))
@@ -52,7 +52,7 @@ class Again(NamedTuple):
 
     desk: Desk
     time: float
-    held_by: str | None
+    lock_holder: str | None
 
 
 def restore_instrument(begun: Begun, journal: Journal, from_checkpoint: bool = False) -> Again:
@@ -64,11 +64,11 @@ def restore_instrument(begun: Begun, journal: Journal, from_checkpoint: bool = F
     first = replay.seek(len(begun.journalled) + 1) if from_checkpoint else 2
     for number, _, difference in replay_lines(replay, first):
         if difference is not None:
-            raise Mistake(f"{begun.journalled.where(number)}: {_not_again(difference)}")
+            raise Mistake(f"{begun.journalled.location(number)}: {_not_again(difference)}")
     desk = replay.desk
-    desk.listener = journal.continued(begun.journalled, desk, replay.checkpoints).heard
-    for event in replay.unsaid():
-        journal.heard(event)
+    desk.listener = journal.resume_at(begun.journalled, desk, replay.checkpoints).on_link_event
+    for event in replay.pending_events():
+        journal.on_link_event(event)
     held_by = desk.lock_holder
     for client in [*desk.clients]:
         desk.close(client, replay.time)

@@ -69,7 +69,7 @@ class Session:
 def open_session(scenario: Scenario, seed: int, listener: Listener | None = None, cable: Cable = direct) -> Session:
     """Return a session ready to begin. Raises Mistake when a file of measurements is bad."""
     scene = build_scene(scenario, seed)
-    autograph = build_autograph(scenario.instrument, scene.drawer, seed)
+    autograph = build_autograph(scenario.instrument, scene.mountable, seed)
     clock = Clock()
     desk = Desk(autograph, listener)
     port = InProcessSerial(desk=desk, clock=clock, timeout=1.0)
@@ -104,8 +104,8 @@ def _control_of(scenario: Scenario, scene: Scene) -> dict[str, tuple[float, floa
 class Watcher:
     """Who is told how a session goes on: an activity begins, a point is done."""
 
-    begins: Callable[[str], None] = lambda _: None
-    tick: Callable[[], None] = lambda: None
+    on_activity: Callable[[str], None] = lambda _: None
+    on_point: Callable[[], None] = lambda: None
 
 
 def run(
@@ -128,7 +128,7 @@ def run(
     watcher = watcher or Watcher()
     keeping = keeping or Keeping()
     journal = Journal(keeping)
-    session = open_session(scenario, seed, journal.heard, cable)
+    session = open_session(scenario, seed, journal.on_link_event, cable)
     job = session.job
     keeping.prepare(out, force)
     done: list[Document] = []
@@ -138,10 +138,10 @@ def run(
         return {MODELS: results.models_csv(models_from_documents(done))}
 
     with recorded_session(document, session, journal, make_header("run", scenario, seed), out, leaves):
-        for record in measure_models(session.person, job, watcher.tick, watcher.begins):
+        for record in measure_models(session.person, job, watcher.on_point, watcher.on_activity):
             plan = next(model for model in scenario.models if model.name == record.model.name)
             truth = session.scene.relative_truth(plan)
-            beside = Beside.of_record(record, session.autograph, truth)
+            beside = Beside.from_record(record, session.autograph, truth)
             done.append(results.model_document(record, beside, published=plan.published))
     return _concluded(session, document, out)
 

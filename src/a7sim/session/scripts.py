@@ -72,7 +72,7 @@ class Expect:
         tolerance = f" +- {self.within:g}" if self.within else ""
         return f"{self.query} = {', '.join(self.values)}{tolerance}"
 
-    def met_by(self, answer: tuple[str, ...]) -> bool:
+    def matches(self, answer: tuple[str, ...]) -> bool:
         """Whether an answer is the one expected."""
         return len(answer) == len(self.values) and all(map(self._met, self.values, answer))
 

@@ -25,13 +25,13 @@ class Left:
     """Why it cannot be gone on with, where `begun` is None."""
 
     @property
-    def lasted(self) -> float:
+    def ended_at_s(self) -> float:
         """The simulated time in s at which it was left."""
         journalled = self.begun.journalled if self.begun else ()
         return self.begun.journalled.event(len(journalled)).t if self.begun and len(journalled) > 1 else 0.0
 
     @property
-    def worked(self) -> bool:
+    def has_changes(self) -> bool:
         """Whether anything was done, and not only looked at."""
         if self.begun is None:
             return False
@@ -40,7 +40,7 @@ class Left:
         return any(event.dir == ">" and _does(event.text) for event in events)
 
     @property
-    def when(self) -> float:
+    def last_activity(self) -> float:
         """When something was last said, in s of the wall's calendar."""
         return (self.folder / JOURNAL).stat().st_mtime
 

@@ -41,8 +41,8 @@ def recorded_session(
     """
     document |= {"status": "failed", "message": ""}
     person = seated.person
-    with journal.opened(out, header, seated.desk):
-        person.book.listener = lambda entry: journal.written(entry, person.clock.now)
+    with journal.recording(out, header, seated.desk):
+        person.book.listener = lambda entry: journal.on_book_entry(entry, person.clock.now)
         try:
             yield
             document["status"] = "complete"

@@ -23,7 +23,7 @@ class Relative:
     base: Array
 
     @classmethod
-    def of_counters(cls, elements: Elements, model: ModelJob, variant: Variant) -> "Relative":
+    def from_counters(cls, elements: Elements, model: ModelJob, variant: Variant) -> "Relative":
         """Return the relative orientation that the counters ``(...)`` of a model describe."""
         left, right = model.left_projector, model.right_projector
 
@@ -35,11 +35,11 @@ class Relative:
         return cls(mxm(to_left, turned(right)), mxv(to_left, base) / length_of(base))
 
     @classmethod
-    def of_truth(cls, truth: RelativeTruth) -> "Relative":
+    def from_truth(cls, truth: RelativeTruth) -> "Relative":
         """Return a true or published relative orientation."""
         return cls(truth.rotation, truth.base / length_of(truth.base))
 
-    def of_many(self) -> "Relative":
+    def batch(self) -> "Relative":
         """Return the same for any number of sessions, with an axis of theirs at the end."""
         return Relative(self.rotation[..., None], self.base[..., None])
 
@@ -145,12 +145,12 @@ class Beside:
         """Return the truth beside the elements ``(m,)`` of sessions that turned them by a method."""
         if truth is None:
             return cls(centres, None)
-        true, found = Relative.of_truth(truth), Relative.of_counters(elements, model, variant)
-        exact = true_elements(true.of_many(), method, elements, model, variant)
-        return cls(centres, RelativeBeside(truth.source, true, found, *found.differences_gon(true.of_many()), exact))
+        true, found = Relative.from_truth(truth), Relative.from_counters(elements, model, variant)
+        exact = true_elements(true.batch(), method, elements, model, variant)
+        return cls(centres, RelativeBeside(truth.source, true, found, *found.differences_gon(true.batch()), exact))
 
     @classmethod
-    def of_record(cls, record: ModelRecord, standing: "Standing", truth: RelativeTruth | None) -> "Beside":
+    def from_record(cls, record: ModelRecord, standing: "Standing", truth: RelativeTruth | None) -> "Beside":
         """Return the truth about one session, whose instrument stands as the operator left it."""
         model = record.model
         centres = {

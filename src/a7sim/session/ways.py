@@ -61,7 +61,7 @@ def run_all_methods_batch(
     `whole`, of its models only what the responses of a study that have names are read from.
     """
     if "plotter" in scenario.work:
-        documents = open_batch(scenario, seeds).documents(strips, whole)
+        documents = open_batch(scenario, seeds).run(strips, whole)
     else:
         documents = [results.results_header(scenario, seed) | {"status": "complete", "message": ""} for seed in seeds]
     if scenario.work == ["plotter"]:

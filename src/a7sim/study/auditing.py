@@ -28,8 +28,8 @@ class Difference:
     seed: int
     place: str
     """A response, or the path of a value in the results."""
-    on_the_bench: Any
-    over_the_link: Any
+    batch_value: Any
+    link_value: Any
     others: int = 0
     """How many values more are not the same."""
 
@@ -37,7 +37,7 @@ class Difference:
         more = f" ({self.others} values more differ)" if self.others else ""
         return (
             f"cell {self.cell}, replicate {self.replicate}, seed {self.seed}: {self.place} is "
-            f"{_said(self.on_the_bench)} on the batch bench and {_said(self.over_the_link)} over the link{more}"
+            f"{_said(self.batch_value)} on the batch bench and {_said(self.link_value)} over the link{more}"
         )
 
 
@@ -54,8 +54,8 @@ def audit_study(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] =
         seeds = [replicate_seed(laid.study.seed, replicate) for replicate in replicates]
         sample = tally.sample(i)
         task, cell = laid.task_of(i)
-        for replicate, seed, on_the_bench in zip(replicates, seeds, task.crowded(cell, seeds), strict=True):
-            linked = task.linked(cell, seed)
+        for replicate, seed, on_the_bench in zip(replicates, seeds, task.batch_documents(cell, seeds), strict=True):
+            linked = task.link_document(cell, seed)
             kept = zip(laid.responses, sample[:, replicate].tolist(), strict=True)
             differences = [
                 *((response.name, one, other) for response, one in kept if _off(one, other := response.of(linked))),

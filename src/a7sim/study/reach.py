@@ -55,7 +55,7 @@ def _orientation_beyond_reach(model: Model, left: Photo, right: Photo, plan: Pla
     counters = {name: element.zero for name, element in variant.elements.items()} | {"bx": plan.bx}
     start = {name: np.array([shown]) for name, shown in counters.items()}
     job = ModelJob(model.name, left.name, right.name, model.base, "", {})
-    for name, (value,) in true_elements(_flown(left, right).of_many(), plan.method, start, job, variant).items():
+    for name, (value,) in true_elements(_flown(left, right).batch(), plan.method, start, job, variant).items():
         element = variant.elements.get(name)
         if element is not None and not element.endless and not element.low <= value <= element.high:
             yield (
@@ -67,7 +67,7 @@ def _orientation_beyond_reach(model: Model, left: Photo, right: Photo, plan: Pla
 def _flown(left: Photo, right: Photo) -> Relative:
     to_left = transposed(_turned(left))
     base = np.subtract(right.position or (), left.position or ())
-    return Relative.of_truth(RelativeTruth(mxm(to_left, _turned(right)), mxv(to_left, base), "the flight"))
+    return Relative.from_truth(RelativeTruth(mxm(to_left, _turned(right)), mxv(to_left, base), "the flight"))
 
 
 def _turned(photo: Photo) -> Array:

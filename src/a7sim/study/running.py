@@ -164,4 +164,4 @@ def _up_to(
 def _timed(task: Task, seeds: Sequence[int]) -> tuple[Array, float]:
     """Return the responses ``(cells, responses, seeds)`` of replicates and the seconds that a processor took."""
     began = time.process_time()
-    return task.together(seeds), time.process_time() - began
+    return task.run_batch(seeds), time.process_time() - began

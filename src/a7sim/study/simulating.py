@@ -40,7 +40,7 @@ class Task:
         """How many cells get their numbers from it."""
         return len(cases_of_strips(tuple(CASES), len(self.scenario.models))) if self.strips else 1
 
-    def together(self, seeds: Sequence[int]) -> Array:
+    def run_batch(self, seeds: Sequence[int]) -> Array:
         """Return responses ``(cells, responses, seeds)`` of sessions worked at once; nan where one gave up.
 
         Raises Mistake for a response that the results do not have.
@@ -48,16 +48,16 @@ class Task:
         strips, whole = any(map(needs_strip, self.responses)), any(map(is_path, self.responses))
         return self._values(self._crowded(seeds, tuple(CASES), strips, whole))
 
-    def alone(self, cell: int, seed: int) -> Array:
+    def run_single(self, cell: int, seed: int) -> Array:
         """Return responses ``(responses,)`` of one cell, its sessions worked over the link as `a7sim run` does."""
-        return np.asarray(self._values([[self.linked(cell, seed)]])[0, :, 0])
+        return np.asarray(self._values([[self.link_document(cell, seed)]])[0, :, 0])
 
-    def crowded(self, cell: int, seeds: Sequence[int]) -> list[Document]:
+    def batch_documents(self, cell: int, seeds: Sequence[int]) -> list[Document]:
         """Return documents of one cell by seed, of sessions worked at once."""
         cases, place = self._cases_of(cell)
         return [each[place] for each in self._crowded(seeds, cases, strips=True, whole=True)]
 
-    def linked(self, cell: int, seed: int) -> Document:
+    def link_document(self, cell: int, seed: int) -> Document:
         """Return the document of one cell, of sessions worked over the link."""
         if not self.strips:
             return run_all_methods(self.scenario, seed)

@@ -193,7 +193,7 @@ def _design(scenario: Scenario, model: ModelJob, names: Sequence[str]) -> Array:
     """Return the coefficients ``(n, 5)`` of thesis 2.32 at the points of the plan."""
     x, y, z = _places(scenario)
     every = near_vertical_parallax_coefficients(x, y, z, scenario.plan.bx)
-    hands = [f"{name[:-1]}{model.hand_of(int(name[-1]))}" for name in names]
+    hands = [f"{name[:-1]}{model.side_of(int(name[-1]))}" for name in names]
     return np.asarray(every[[PARALLAX_ELEMENTS.index(hand) for hand in hands]].T)
 
 
@@ -206,7 +206,7 @@ def _fractions(scenario: Scenario, scene: Scene, number: int, names: Sequence[st
     counters = {name: element.zero for name, element in variant.elements.items()} | {"bx": scenario.plan.bx}
     zeros = {name: np.array([shown]) for name, shown in counters.items()}
     model = make_job(scenario, scene).models[number]
-    true = true_elements(Relative.of_truth(truth).of_many(), scenario.plan.method, zeros, model, variant)
+    true = true_elements(Relative.from_truth(truth).batch(), scenario.plan.method, zeros, model, variant)
     taking_the_mean = np.abs(to_mean) > 1e-6 * np.abs(to_mean).max()
     return np.where(taking_the_mean, np.nan, [true[name][0] / LEAST_COUNT % 1.0 for name in names])
 

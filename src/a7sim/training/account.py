@@ -32,7 +32,7 @@ class Account:
     """What the maker of the papers knows and did not hand out."""
 
     @property
-    def deeds(self) -> Sequence[Deed]:
+    def actions(self) -> Sequence[Deed]:
         """The student's deeds."""
         return [each for each in self.witness.deeds if each.client != OPENING]
 
@@ -56,7 +56,7 @@ class Account:
     def answers(self) -> dict[str, str]:
         """What was answered, in notes at the instrument or beside the journal; the later answer counts."""
         noted: dict[str, str] = {}
-        for deed in self.deeds:
+        for deed in self.actions:
             if deed.what == "note" and deed.text.lower().startswith(ANSWER):
                 noted |= parse_answers(deed.text[len(ANSWER) :].split())
         return noted | dict(self.written)

@@ -44,7 +44,7 @@ def start_attempt(shelved: Shelved, seed: int, folder: Path, student: str, mode:
 def resume_attempt(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
     """Go on with an attempt that was left, or cut off. Raises Mistake."""
     with resume_environment(shelved, seed, folder) as room:
-        if not room.witness.opened:
+        if not room.action_log.opened:
             run_opening(room)
         yield room
 
@@ -81,7 +81,7 @@ def play_item(room: Room, played: Played, client: str = STUDENT) -> str:
 
 def play_script(room: Room, script: Script, client: str = STUDENT) -> str:
     """Play a script at the instrument of an attempt; return what it expected in vain, empty where nothing."""
-    not_met = Player(script, desk=room.desk, clock=room.clock).play(client)
+    not_met = Player(script, desk=room.desk, clock=room.clock).run(client)
     if not_met is not None and client in room.desk.clients:
         room.desk.close(client, room.clock.now)
     return str(not_met) if not_met is not None else ""

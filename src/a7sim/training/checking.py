@@ -100,7 +100,7 @@ def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
             for band, limit in (("excellent", each.excellent), ("pass", each.passing)):
                 if limit < floor:
                     yield f"{each.id}: expected {band} no better than eye and least count, {floor:g}, got {limit:g}"
-        if not measure.reached(each.excellent, each.passing):
+        if not measure.meets(each.excellent, each.passing):
             yield f"{each.id}: expected excellent no worse than pass, got {each.excellent:g} and {each.passing:g}"
 
 
@@ -113,14 +113,14 @@ def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
     rehearsals = Rehearsals(shelved)
     accounts = {"reference": _of_reference(shelved, place)}
     for i, played in enumerate(exercise.faulty, start=1):
-        accounts[f"faulty {i}"], trouble = rehearsals.attempted(played)
+        accounts[f"faulty {i}"], trouble = rehearsals.run_attempt(played)
         if trouble and played.script:
             raise Mistake(f"{played.script}: {trouble}")
     seed = seed_for(shelved, exercise.reference)
     script = read_script(shelved.folder / exercise.reference.script) if exercise.reference.script else None
-    accounts["nothing"] = rehearsals.left(seed, None)
-    accounts["slow"] = rehearsals.left(seed, script, 10.0 * exercise.minutes)
-    accounts["half"] = rehearsals.left(seed, _half_of(script)) if script else accounts["nothing"]
+    accounts["nothing"] = rehearsals.run_and_leave(seed, None)
+    accounts["slow"] = rehearsals.run_and_leave(seed, script, 10.0 * exercise.minutes)
+    accounts["half"] = rehearsals.run_and_leave(seed, _half_of(script)) if script else accounts["nothing"]
     return accounts
 
 
@@ -157,10 +157,10 @@ def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
         yield "expected who does nothing not to pass, got a pass"
     for step in exercise.steps:
         measure = make_metric(step)
-        found = measure.of(runs["reference"].account)
-        if not measure.reached(found.value, step.done):
+        found = measure.evaluate(runs["reference"].account)
+        if not measure.meets(found.value, step.done):
             yield f"step {step.text!r}: expected the reference to tick it, got {found.reason}"
-        if exercise.opening is not None and measure.reached(measure.of(runs["nothing"].account).value, step.done):
+        if exercise.opening is not None and measure.meets(measure.evaluate(runs["nothing"].account).value, step.done):
             yield f"step {step.text!r}: expected it to be still to do after the opening, got it ticked"
 
 

@@ -29,10 +29,10 @@ class Checklist:
 
     def ticks(self) -> list[bool]:
         """Return which steps are done."""
-        account = self.room.account(written_answers(self.attempt.folder))
+        account = self.room.record(written_answers(self.attempt.folder))
         measures = [make_metric(each) for each in self.exercise.steps]
         return [
-            measure.reached(measure.of(account).value, step.done)
+            measure.meets(measure.evaluate(account).value, step.done)
             for measure, step in zip(measures, self.exercise.steps, strict=True)
         ]
 
@@ -51,7 +51,7 @@ class Checklist:
 
     def head(self) -> str:
         """Return exercise and time for people."""
-        exercise, minutes = self.exercise, self.room.account().seconds / 60.0
+        exercise, minutes = self.exercise, self.room.record().seconds / 60.0
         exam = ", exam" if self.attempt.mode == EXAM else ""
         over = ", the time is up" if minutes > exercise.minutes else ""
         return f"{exercise.number} {exercise.title}{exam}: {minutes:.0f} of {exercise.minutes:g} minutes{over}"

@@ -86,7 +86,7 @@ def grade_record(account: Account, hints: HintsTaken | None = None, shelved_name
 
 def evaluate_metrics(account: Account) -> list[Found]:
     """Return what the measure of every criterion comes to, in their order."""
-    return [make_metric(each).of(account) for each in account.exercise.criteria]
+    return [make_metric(each).evaluate(account) for each in account.exercise.criteria]
 
 
 def grade_by(
@@ -118,9 +118,9 @@ def grade_criterion(criterion: Criterion, found: Found) -> Marked:
     """Return a criterion with its band and points by what its measure came to."""
     measure = make_metric(criterion)
     value = found.value
-    if measure.reached(value, criterion.excellent):
+    if measure.meets(value, criterion.excellent):
         band, share = EXCELLENT, 1.0
-    elif measure.reached(value, criterion.passing) and value is not None:
+    elif measure.meets(value, criterion.passing) and value is not None:
         width = criterion.passing - criterion.excellent
         left = (criterion.passing - value) / width if width else 1.0
         band, share = PASSED, JUST_PASSED + (1.0 - JUST_PASSED) * left
@@ -162,7 +162,7 @@ def make_record(room: Room, written: dict[str, str] | None = None) -> Account:
     """Return the account of an attempt with what was answered on paper, and what its maker of papers knows."""
     exercise = room.shelved.exercise
     hidden = make_handout(exercise.handout, room.scenario, room.seed, exercise.handout_options).hidden
-    return room.account(written, dict(hidden))
+    return room.record(written, dict(hidden))
 
 
 def grade_lines(grade: Grade) -> Sequence[str]:

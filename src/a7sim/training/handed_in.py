@@ -27,7 +27,7 @@ class HandedIn(msgspec.Struct, frozen=True):
     student: str = ""
     exercise: str = ""
     grade: Grade | None = None
-    trouble: str = ""
+    error: str = ""
 
 
 def find_submissions(folders: Sequence[Path]) -> list[Path]:
@@ -57,10 +57,10 @@ def grade_submission(folder: Path, seed: int | None = None) -> HandedIn:
     try:
         exercise, student, mode = attempt_mode(folder)
     except Mistake as mistake:
-        return HandedIn(str(folder), trouble=str(mistake))
+        return HandedIn(str(folder), error=str(mistake))
     try:
         drawn = attempt_seed(student, exercise, mode) if seed is None else seed
         grade = grade_folder(find_exercise(exercise), drawn, folder, HintsTaken(*written_hints(folder)))
     except Mistake as mistake:
-        return HandedIn(str(folder), student, exercise, trouble=str(mistake))
+        return HandedIn(str(folder), student, exercise, error=str(mistake))
     return HandedIn(str(folder), student, exercise, grade)

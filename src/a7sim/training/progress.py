@@ -221,7 +221,7 @@ class Progress:
         number, cost = self._database.execute(query, (attempt.id,)).fetchone()
         return HintsTaken(int(number), float(cost))
 
-    def give(self, attempt: Attempt, grade: Grade) -> None:
+    def record_grade(self, attempt: Attempt, grade: Grade) -> None:
         """Record a grade; an exam is over with it."""
         with self._writing():
             self._database.execute(
@@ -231,7 +231,7 @@ class Progress:
             if attempt.mode == EXAM:
                 self._close_open(attempt.student, attempt.exercise)
 
-    def given(self, attempt: Attempt) -> Grade | None:
+    def first_grade(self, attempt: Attempt) -> Grade | None:
         """Return the grade that an attempt was given first, None where it has none."""
         row = self._database.execute(
             "SELECT document FROM grade WHERE attempt = ? ORDER BY id", (attempt.id,)

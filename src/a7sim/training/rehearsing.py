@@ -18,25 +18,25 @@ class Rehearsals:
     _opened: dict[int, Room] = field(default_factory=dict)
     """Rooms in which the opening is done and nothing else, by seed."""
 
-    def opened(self, seed: int) -> Room:
+    def open_environment(self, seed: int) -> Room:
         """Return a room of its own in which the opening is done. Raises Mistake where it cannot be done."""
         if seed not in self._opened:
             room = dry_run_environment(self.shelved, seed)
             run_opening(room)
             self._opened[seed] = room
-        return self._opened[seed].as_it_stands()
+        return self._opened[seed].snapshot()
 
-    def attempted(self, played: Played) -> tuple[Account, str]:
+    def run_attempt(self, played: Played) -> tuple[Account, str]:
         """Do the exercise to its end; return the account, and what kept it from its end. Raises Mistake."""
-        room = self.opened(seed_for(self.shelved, played))
+        room = self.open_environment(seed_for(self.shelved, played))
         trouble = play_item(room, played)
         return make_record(room), trouble
 
-    def left(self, seed: int, script: Script | None, minutes: float = 0.0) -> Account:
+    def run_and_leave(self, seed: int, script: Script | None, minutes: float = 0.0) -> Account:
         """Play a script, if any, come again so many minutes later, and be gone. Raises Mistake."""
-        room = self.opened(seed)
+        room = self.open_environment(seed)
         if script is not None:
             play_script(room, script)
-        room.clock.spend(60.0 * minutes)
+        room.clock.advance(60.0 * minutes)
         room.desk.close(room.desk.open("late", time=room.clock.now).client, room.clock.now)
         return make_record(room)

@@ -44,24 +44,26 @@ class Room:
     autograph: WitnessedAutograph
 
     @property
-    def witness(self) -> Witness:
+    def action_log(self) -> Witness:
         """Who saw all that happened."""
         return self.autograph.witness
 
-    def account(self, written: dict[str, str] | None = None, hidden: dict[str, Any] | None = None) -> Account:
+    def record(self, written: dict[str, str] | None = None, hidden: dict[str, Any] | None = None) -> Account:
         """Return the account of what has happened so far."""
         exercise = self.shelved.exercise
-        return Account(exercise, self.scenario, self.scene, self.autograph, self.witness, written or {}, hidden or {})
+        return Account(
+            exercise, self.scenario, self.scene, self.autograph, self.action_log, written or {}, hidden or {}
+        )
 
-    def as_it_stands(self) -> "Room":
+    def snapshot(self) -> "Room":
         """Return a room of its own in which all has happened as in this one, of which no journal is kept.
 
         To be asked while every client is gone.
         """
-        autograph = WitnessedAutograph.of(self.scenario.instrument, self.scene.drawer, self.seed)
-        desk = Desk(autograph, autograph.witness.heard)
+        autograph = WitnessedAutograph.from_parts(self.scenario.instrument, self.scene.mountable, self.seed)
+        desk = Desk(autograph, autograph.witness.on_link_event)
         desk.restore(self.desk.state())
-        autograph.witness.know(self.witness)
+        autograph.witness.copy_from(self.action_log)
         return replace(self, desk=desk, clock=Clock(self.clock.now), autograph=autograph)
 
 
@@ -74,13 +76,13 @@ def header_for(shelved: Shelved, scenario: Scenario, seed: int, student: str, mo
 def _built(shelved: Shelved, seed: int, observer: dict[str, Any]) -> tuple[Scenario, Scene, WitnessedAutograph]:
     scenario = scenario_for(shelved, seed, observer)
     scene = build_scene(scenario, seed)
-    return scenario, scene, WitnessedAutograph.of(scenario.instrument, scene.drawer, seed)
+    return scenario, scene, WitnessedAutograph.from_parts(scenario.instrument, scene.mountable, seed)
 
 
 def dry_run_environment(shelved: Shelved, seed: int) -> Room:
     """Return the room of an attempt of which no journal is kept; the opening is still to be done."""
     scenario, scene, autograph = _built(shelved, seed, {})
-    return Room(shelved, scenario, seed, scene, Desk(autograph, autograph.witness.heard), Clock(), autograph)
+    return Room(shelved, scenario, seed, scene, Desk(autograph, autograph.witness.on_link_event), Clock(), autograph)
 
 
 @contextmanager
@@ -93,9 +95,9 @@ def open_environment(
     """
     scenario, scene, autograph = _built(shelved, seed, observer or {})
     journal = Journal(Keeping(states=False))
-    desk = Desk(autograph, tee_listener(journal.heard, autograph.witness.heard))
+    desk = Desk(autograph, tee_listener(journal.on_link_event, autograph.witness.on_link_event))
     nominal = scenario_for(shelved, seed)
-    with journal.opened(folder, header_for(shelved, nominal, seed, student, mode), desk):
+    with journal.recording(folder, header_for(shelved, nominal, seed, student, mode), desk):
         yield Room(shelved, scenario, seed, scene, desk, Clock(), autograph)
 
 
@@ -105,15 +107,15 @@ def resume_environment(shelved: Shelved, seed: int, folder: Path) -> Iterator[Ro
     there = read_journal(folder / JOURNAL)
     if there.header.get("software") != software_version():
         raise Mistake(
-            f"{there.where(1)}: expected an attempt of {software_version()} to go on with, got one of "
+            f"{there.location(1)}: expected an attempt of {software_version()} to go on with, got one of "
             f"{there.header.get('software')} (a7sim train reset begins anew)"
         )
     room, replay = _replayed(shelved, seed, there)
-    journal = Journal(Keeping(resumes=True, states=False)).continued(there, room.desk, replay.checkpoints)
-    room.desk.listener = tee_listener(journal.heard, room.witness.heard)
+    journal = Journal(Keeping(resumes=True, states=False)).resume_at(there, room.desk, replay.checkpoints)
+    room.desk.listener = tee_listener(journal.on_link_event, room.action_log.on_link_event)
     with journal:
-        for event in replay.unsaid():
-            journal.heard(event)
+        for event in replay.pending_events():
+            journal.on_link_event(event)
         for client in [*room.desk.clients]:
             room.desk.close(client, room.clock.now)
         yield room
@@ -130,16 +132,16 @@ def _replayed(shelved: Shelved, seed: int, there: Journalled) -> tuple[Room, Rep
     for name in ("command", "scenario_hash", "seed"):
         got = there.header.get(name)
         if got != expected[name]:
-            raise Unreliable(f"{there.where(1)}: expected an attempt with {name} {expected[name]}, got {got}")
+            raise Unreliable(f"{there.location(1)}: expected an attempt with {name} {expected[name]}, got {got}")
     replay = Replay(there, autograph=autograph)
     autograph.blind = True
     assert replay.desk.listener is not None
-    replay.desk.listener = tee_listener(replay.desk.listener, autograph.witness.heard)
+    replay.desk.listener = tee_listener(replay.desk.listener, autograph.witness.on_link_event)
     for number, _, difference in replay_lines(replay):
         if difference is not None and not _same_but_for_pictures(difference):
             expected_, got = difference.replayed or "nothing", difference.journalled or "nothing"
             raise Unreliable(
-                f"{there.where(number)}: expected what the instrument does again, {expected_[:200]}, got {got[:200]}"
+                f"{there.location(number)}: expected what the instrument does again, {expected_[:200]}, got {got[:200]}"
             )
     autograph.blind = False
     return Room(shelved, scenario, seed, scene, replay.desk, Clock(replay.time), autograph), replay

@@ -29,7 +29,7 @@ class Deed(Struct, frozen=True, gc=False):
     'note'; `name` the element, axis, fitting, projector or point.
     """
 
-    place: int
+    index: int
     """Counted from 0 in the order of things."""
     time: float
     client: str
@@ -83,12 +83,12 @@ class Witness:
     now: float = 0.0
     client: str = ""
 
-    def know(self, other: "Witness") -> None:
+    def copy_from(self, other: "Witness") -> None:
         """Know what another has seen so far, and nothing else."""
         self.deeds, self.readings, self.sides = [*other.deeds], [*other.readings], dict(other.sides)
         self.began, self.opened, self.now, self.client = other.began, other.opened, other.now, other.client
 
-    def heard(self, event: LinkEvent) -> None:
+    def on_link_event(self, event: LinkEvent) -> None:
         """Take note of who speaks, when, and what is noted down."""
         if event.direction == "<":
             return
@@ -104,19 +104,19 @@ class Witness:
 
     def _take_note(self, unit: Step | Fault) -> None:
         if isinstance(unit, Step) and unit.command.header == "NOTE" and unit.given:
-            self.did("note", text=str(getattr(unit.given[0], "value", "")))
+            self.add_action("note", text=str(getattr(unit.given[0], "value", "")))
         if isinstance(unit, Step) and unit.command.header == "PHOTo<n>:FIDucial?":
-            self.did("fiducials", str(unit.suffix))
+            self.add_action("fiducials", str(unit.suffix))
 
-    def did(self, what: str, name: str = "", before: float = 0.0, after: float = 0.0, text: str = "") -> None:
+    def add_action(self, what: str, name: str = "", before: float = 0.0, after: float = 0.0, text: str = "") -> None:
         """Take note of a deed."""
         if what in PLAIN and before != after:
             self.sides[name] = 1 if after > before else -1
         self.deeds.append(Deed(len(self.deeds), self.now, self.client, what, name, before, after, text))
 
-    def registered(self, autograph: Autograph, made: Registration) -> None:
+    def add_reading(self, autograph: Autograph, made: Registration) -> None:
         """Take note of a registration and of how everything stands."""
-        self.did("record", made.point)
+        self.add_action("record", made.point)
         shown = {axis: autograph.counter(axis) for axis in AXES}
         shown |= {name: autograph.element(name) for name in autograph.variant.elements}
         x, y, z = autograph.mark_in_model().tolist()
@@ -141,9 +141,9 @@ class Witness:
             )
         )
 
-    def struck(self, number: int) -> None:
+    def strike_reading(self, number: int) -> None:
         """Take note that a registration was struck out."""
-        self.did("strike", str(number))
+        self.add_action("strike", str(number))
         self.readings = [replace(each, struck=True) if each.number == number else each for each in self.readings]
 
 
@@ -154,12 +154,12 @@ class _WitnessedRecorder(Recorder):
 
     def register(self, point: str, readings: list[tuple[str, str]]) -> Registration:
         made = super().register(point, readings)
-        self._autograph.witness.registered(self._autograph, made)
+        self._autograph.witness.add_reading(self._autograph, made)
         return made
 
     def strike(self, number: int, why: str) -> None:
         super().strike(number, why)
-        self._autograph.witness.struck(number)
+        self._autograph.witness.strike_reading(number)
 
 
 class WitnessedAutograph(Autograph):
@@ -194,85 +194,85 @@ class WitnessedAutograph(Autograph):
         """Set an element through its counter."""
         before = self._spindle(name).at
         super().set_element(name, value)
-        self.witness.did("set", name, before, self._spindle(name).at)
+        self.witness.add_action("set", name, before, self._spindle(name).at)
 
     def turn_element(self, name: str, amount: float) -> None:
         """Turn the drum of an element."""
         before = self._spindle(name).at
         super().turn_element(name, amount)
-        self.witness.did("turn", name, before, self._spindle(name).at)
+        self.witness.add_action("turn", name, before, self._spindle(name).at)
 
     def drive(self, axis: str, reading: float) -> None:
         """Run a carriage to a reading."""
         before = self._counted(axis)
         super().drive(axis, reading)
-        self.witness.did("drive", axis, before, self._counted(axis))
+        self.witness.add_action("drive", axis, before, self._counted(axis))
 
-    def wheel(self, axis: str, amount: float) -> None:
+    def turn_handwheel(self, axis: str, amount: float) -> None:
         """Turn a handwheel."""
         before = self._counted(axis)
-        super().wheel(axis, amount)
-        self.witness.did("wheel", axis, before, self._counted(axis))
+        super().turn_handwheel(axis, amount)
+        self.witness.add_action("wheel", axis, before, self._counted(axis))
 
     def preset(self, axis: str, reading: float) -> None:
         """Preset a counter."""
         before = self._counted(axis)
         super().preset(axis, reading)
-        self.witness.did("preset", axis, before, self._counted(axis))
+        self.witness.add_action("preset", axis, before, self._counted(axis))
 
     def set_fitting(self, name: str, position: str) -> None:
         """Put a fitting over."""
         super().set_fitting(name, position)
-        self.witness.did("fit", name, text=position)
+        self.witness.add_action("fit", name, text=position)
 
     def set_base_mode(self, mode: str) -> None:
         """Set base in or out."""
         super().set_base_mode(mode)
-        self.witness.did("base", text=mode)
+        self.witness.add_action("base", text=mode)
 
     def set_height_gear(self, gear: str | float) -> None:
         """Engage a height gear."""
         super().set_height_gear(gear)
-        self.witness.did("gear", text=self.height_gear)
+        self.witness.add_action("gear", text=self.height_gear)
 
     def load(self, projector: int, name: str) -> None:
         """Lay a picture on a carrier."""
         super().load(projector, name)
-        self.witness.did("load", str(projector), text=name)
+        self.witness.add_action("load", str(projector), text=name)
 
     def unload(self, projector: int) -> None:
         """Take a picture off."""
         super().unload(projector)
-        self.witness.did("unload", str(projector))
+        self.witness.add_action("unload", str(projector))
 
     def centre_picture(self, projector: int, dx: float, dy: float, dkappa: float) -> None:
         """Shift and turn a picture on its carrier."""
         super().centre_picture(projector, dx, dy, dkappa)
-        self.witness.did("centre", str(projector))
+        self.witness.add_action("centre", str(projector))
 
     def reset(self) -> None:
         """Run everything to its zero."""
         before = {name: spindle.at for name, spindle in self._spindles.items()}
         super().reset()
-        self.witness.did("reset")
+        self.witness.add_action("reset")
         for name, spindle in self._spindles.items():
             if spindle.at != before[name]:
-                self.witness.did("set", name, before[name], spindle.at)
+                self.witness.add_action("set", name, before[name], spindle.at)
 
     def eyepiece(self, eyepiece: int, name: str) -> tuple[float, float] | None:
         """Look at a point through an eyepiece."""
-        self.witness.did("look", name)
+        self.witness.add_action("look", name)
         return super().eyepiece(eyepiece, name)
 
     def stereo(self, name: str) -> tuple[float, float] | None:
         """Look at a point with both eyes."""
-        self.witness.did("look", name)
+        self.witness.add_action("look", name)
         left, right = Autograph.eyepiece(self, 1, name), Autograph.eyepiece(self, 2, name)
         return None if left is None or right is None else (left[0] - right[0], left[1] - right[1])
 
     def picture(self, eyepiece: int, columns: int, rows: int, magnification: float) -> Any:
         """Look at the picture that an eyepiece shows."""
-        self.witness.did("look")
+        self.witness.add_action("look")
         if self.blind:
             return np.zeros((rows, columns))
         return super().picture(eyepiece, columns, rows, magnification)

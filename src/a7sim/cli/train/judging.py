@@ -51,14 +51,14 @@ def verify_(
         raise click.exceptions.Exit(_tell_of_many(grade_submissions(find_submissions(folders), seed), as_document))
     with progress_in(home) as progress:
         attempt = last_attempt(progress, student_name(student), exercise)
-        given = progress.given(attempt) if attempt.mode == EXAM else None
+        given = progress.first_grade(attempt) if attempt.mode == EXAM else None
         try:
             grade = given or _graded(progress, attempt)
         except Unreliable as unreliable:
             click.echo(f"a7sim: {unreliable}", err=True)
             raise click.exceptions.Exit(EXIT_DIFFERS) from unreliable
         if given is None:
-            progress.give(attempt, grade)
+            progress.record_grade(attempt, grade)
     if as_document:
         click.echo(as_json(document_header("train verify") | msgspec.to_builtins(grade)), nl=False)
     else:
@@ -73,7 +73,7 @@ def _tell_of_many(handed_in: list[HandedIn], as_document: bool) -> int:
         click.echo(as_json(document_header("train verify") | {"handed_in": documents}), nl=False)
     for each in handed_in:
         if each.grade is None:
-            click.echo(f"a7sim: {each.trouble}", err=True)
+            click.echo(f"a7sim: {each.error}", err=True)
         elif not as_document:
             click.echo(f"{each.folder}: {each.student}")
             click.echo("\n".join(grade_lines(each.grade)))

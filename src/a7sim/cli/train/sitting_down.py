@@ -41,7 +41,7 @@ def open_console(room: Room, checklist: Checklist, plain: bool) -> None:
     began, clock, so_far = time.monotonic(), room.clock, room.clock.now
 
     def at_the_instrument() -> float:
-        clock.pass_to(so_far + time.monotonic() - began)
+        clock.advance_to(so_far + time.monotonic() - began)
         return clock.now
 
     own_keys = data_folder() / KEYMAP
@@ -56,8 +56,8 @@ def open_console(room: Room, checklist: Checklist, plain: bool) -> None:
             drawing=Drawing.WORDS if plain else None,
             theme="contrast" if plain else "enamel",
             tasks=checklist.lines,
-            goal=fill(" ".join(checklist.exercise.goal.split()), GOAL_WIDTH),
-            past=lambda: [Said(each.text, each.dir == "<") for each in _past(checklist)],
+            exercise_goal=fill(" ".join(checklist.exercise.goal.split()), GOAL_WIDTH),
+            history=lambda: [Said(each.text, each.dir == "<") for each in _past(checklist)],
         )
     ).run()
 

@@ -53,23 +53,23 @@ class Desk:
     busy_until: float = -math.inf
     """Simulated time in s at which it ends."""
     _parts_busy_until: dict[str, float] = field(default_factory=dict)
-    opened: int = 0
+    client_count: int = 0
     """How many clients have come."""
     clients: dict[str, Engine] = field(default_factory=dict)
     """Those that are there."""
 
     def open(self, client: str | None = None, cr_ends_line: bool = True, time: float = 0.0) -> Engine:
         """Return an engine for a client that comes; it gets a name of its own unless it brings one."""
-        self.opened += 1
-        engine = Engine(self, client or f"client{self.opened}", cr_ends_line)
+        self.client_count += 1
+        engine = Engine(self, client or f"client{self.client_count}", cr_ends_line)
         self.clients[engine.client] = engine
-        self.heard(time, engine.client, "+", "")
+        self.notify(time, engine.client, "+", "")
         return engine
 
     def close(self, client: str, time: float = 0.0) -> None:
         """Forget a client that goes; a lock that it holds is free again."""
         if self.clients.pop(client, None) is not None:
-            self.heard(time, client, "-", "")
+            self.notify(time, client, "-", "")
         self.release_lock(client)
 
     def request_lock(self, client: str) -> bool:
@@ -83,30 +83,30 @@ class Desk:
         if self.lock_holder == client:
             self.lock_holder = None
 
-    def may_turn(self, client: str) -> bool:
+    def may_move(self, client: str) -> bool:
         """Whether a client may move anything: it holds the lock, or nobody does."""
         return self.lock_holder in (None, client)
 
-    def moved(self, time: float) -> None:
+    def note_movement(self, time: float) -> None:
         """Take note of what has set out at a simulated time in s."""
-        for part, seconds in self.autograph.time_taken().items():
+        for part, seconds in self.autograph.pop_travel_times().items():
             if time >= self.busy_until:
                 self.busy_since = time
             ends = max(time, self._parts_busy_until.get(part, time)) + seconds
             self._parts_busy_until[part] = ends
             self.busy_until = max(self.busy_until, ends)
 
-    def polled(self, time: float) -> float | None:
+    def poll_until(self, time: float) -> float | None:
         """Return until when a client waits that looked at the status while something moves, None if it need not."""
         return min(time + self.poll_takes, self.busy_until) if self.poll_takes else None
 
-    def heard(self, time: float, client: str, direction: str, text: str) -> None:
+    def notify(self, time: float, client: str, direction: str, text: str) -> None:
         """Tell the listener what happened on the link."""
         if self.listener is not None:
             self.listener(LinkEvent(time, client, direction, text))
 
     @property
-    def quiet(self) -> bool:
+    def is_idle(self) -> bool:
         """Whether no line waits to go on."""
         return all(each.waits_until is None for each in self.clients.values())
 
@@ -120,7 +120,7 @@ class Desk:
             "lock_holder": self.lock_holder,
             "busy": [each if math.isfinite(each) else None for each in (self.busy_since, self.busy_until)],
             "parts": dict(self._parts_busy_until),
-            "opened": self.opened,
+            "opened": self.client_count,
             "clients": {name: each.state() for name, each in self.clients.items()},
         }
 
@@ -130,7 +130,7 @@ class Desk:
         self.lock_holder = state["lock_holder"]
         self.busy_since, self.busy_until = (-math.inf if each is None else each for each in state["busy"])
         self._parts_busy_until = dict(state["parts"])
-        self.opened = state["opened"]
+        self.client_count = state["opened"]
         self.clients = {name: Engine(self, name) for name in state["clients"]}
         for name, each in state["clients"].items():
             self.clients[name].restore(each)

@@ -78,9 +78,9 @@ class Engine:
 
     def feed(self, received: bytes, time: float) -> bytes:
         """Take bytes that arrived at a simulated time in s; return the bytes of the replies."""
-        return b"".join(self.replies_to(received, time))
+        return b"".join(self.feed_with_replies(received, time))
 
-    def replies_to(self, received: bytes, time: float) -> list[bytes]:
+    def feed_with_replies(self, received: bytes, time: float) -> list[bytes]:
         """Take bytes that arrived at a simulated time in s; return the reply to each line that has one."""
         self._time = time
         if self.waits_until is None and not self._pending and self._admitted and self.desk.listener is None:
@@ -169,7 +169,7 @@ class Engine:
             self._heard(">", text if token is None else redact_token(text, token))
 
     def _heard(self, direction: str, text: str) -> None:
-        self.desk.heard(self._time, self.client, direction, text)
+        self.desk.notify(self._time, self.client, direction, text)
 
     def _obey_rest(self, replies: list[bytes]) -> None:
         """Obey the units of a line that are left, up to one that waits; at its end, add its reply if it has one."""
@@ -196,14 +196,14 @@ class Engine:
 
     def _obey(self, unit: Step | Fault) -> bool:
         """Obey a unit; return whether it is done, or is still to come after a wait. Raises LanguageError."""
-        if not self._admitted and (isinstance(unit, Fault) or not unit.command.open_to_all):
+        if not self._admitted and (isinstance(unit, Fault) or not unit.command.allowed_before_login):
             raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "expected SYSTem:LOGin first")
         if isinstance(unit, Fault):
             raise LanguageError(unit.number, unit.detail)
         command = unit.command
         try:
             call = unit.bare or unit.call(self)
-            if command.turns and not self.desk.may_turn(self.client):
+            if command.moves and not self.desk.may_move(self.client):
                 raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "another client holds the lock")
             if command.waits and self._has_to_wait():
                 return False
@@ -213,12 +213,12 @@ class Engine:
         except Refusal as refusal:
             raise _error_of(refusal, unit.text) from refusal
         finally:
-            if command.turns:
-                self.desk.moved(self._time)
+            if command.moves:
+                self.desk.note_movement(self._time)
         if reply is not None:
             self._answered(reply)
         if command.polls and self._time < self.desk.busy_until:
-            self.waits_until = self.desk.polled(self._time)
+            self.waits_until = self.desk.poll_until(self._time)
         return True
 
     def _has_to_wait(self) -> bool:
@@ -288,9 +288,9 @@ class Engine:
     def clear(self) -> None:
         """Clear events and errors (`*CLS`)."""
         self.status.clear()
-        self.forget_completion()
+        self.cancel_completion()
 
-    def forget_completion(self) -> None:
+    def cancel_completion(self) -> None:
         """Raise no bit of operation complete that was to be raised."""
         self._completes_at = None
 

@@ -70,7 +70,7 @@ def _kept_question(received: bytes, cr_ends_line: bool) -> Question | None:
         return None
     program = parse_program(received)
     step = program[0] if len(program) == 1 else None
-    if not isinstance(step, Step) or step.bare is None or not step.command.query or step.command.holds:
+    if not isinstance(step, Step) or step.bare is None or not step.command.query or step.command.may_wait:
         return None
     return Question(step.text, step.command.handler, step.bare)
 
@@ -102,5 +102,5 @@ _kept = lru_cache(maxsize=LINES_KEPT)(_taken_apart)
 
 def _step(text: str, unit: Unit, command: Command, suffix: int) -> Step:
     given = unit.parameters()
-    bare = Call(suffix, ()) if not given and all(each.optional for each in command.takes) else None
+    bare = Call(suffix, ()) if not given and all(each.optional for each in command.parameters) else None
     return Step(text, command, suffix, given, bare)

@@ -35,7 +35,7 @@ class Call(Struct, frozen=True, gc=False):
 
 
 class Taken(Protocol):
-    """A kind of parameter: how it reads what came, and how it is described."""
+    """A kind of parameter: how it reads what came, and how it is describe."""
 
     @property
     def optional(self) -> bool:
@@ -44,7 +44,7 @@ class Taken(Protocol):
     def read(self, parameter: Parameter, client: Any, suffix: int) -> Any:
         """Return the value. Raises LanguageError."""
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Return how the parameter is written, for people."""
 
 
@@ -84,7 +84,7 @@ class Quantity:
             raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected {allowed}, got {word.value}")
         return self.limits(client, suffix)[places[word.value]]
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Return how the number is written."""
         return f"<{self.name}{' ' + self.unit if self.unit else ''}>"
 
@@ -99,13 +99,13 @@ class Choice:
     def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
         """Return the chosen word in lower case, whole."""
         if not isinstance(parameter, Word):
-            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected {self.described()}")
+            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected {self.describe()}")
         for word in self.words:
             if parameter.value in (short_form(word), word.upper()):
                 return word.lower()
-        raise LanguageError(ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected {self.described()}, got {parameter.value}")
+        raise LanguageError(ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected {self.describe()}, got {parameter.value}")
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Return the words with a bar between them."""
         return "|".join(self.words)
 
@@ -123,7 +123,7 @@ class Quoted:
             raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a text in quotes, got {parameter.value}")
         return parameter.value
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Return the name in quotes."""
         return f'"{self.name}"'
 
@@ -141,7 +141,7 @@ class QuotedOrNumber:
             return parameter.value
         return Quantity().read(parameter, client, suffix)
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Return both ways."""
         return f'"{self.name}"|<value>'
 
@@ -159,7 +159,7 @@ class AnyWord:
             raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a word, got {parameter.value}")
         return parameter.value
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Return the name."""
         return f"[{self.name}]"
 
@@ -170,18 +170,18 @@ class Command:
 
     header: str
     handler: Handler
-    takes: tuple[Taken, ...] = ()
-    repeats: Taken | None = None
+    parameters: tuple[Taken, ...] = ()
+    repeated_parameter: Taken | None = None
     """A parameter that may follow the others any number of times."""
-    turns: bool = False
+    moves: bool = False
     """Whether it moves something, which the holder of the lock may do alone."""
     waits: bool = False
     """Whether it waits until the movement that is going on is done."""
     polls: bool = False
     """Whether it looks at the status, as who waits for movement may do again and again."""
-    open_to_all: bool = False
+    allowed_before_login: bool = False
     """Whether who has not logged in may say it."""
-    about: str = ""
+    help: str = ""
     suffixes: tuple[int, ...] = field(default=(1, 2))
 
     @property
@@ -190,31 +190,35 @@ class Command:
         return self.header.endswith("?")
 
     @property
-    def holds(self) -> bool:
+    def may_wait(self) -> bool:
         """Whether it may be held back, or hold back what follows."""
-        return self.turns or self.waits or self.polls
+        return self.moves or self.waits or self.polls
 
-    def written(self) -> str:
+    def syntax(self) -> str:
         """Return header and parameters as the manual prints them."""
-        parts = [f"[{each.described()}]" if each.optional else each.described() for each in self.takes]
-        if self.repeats:
-            parts.append(f"{self.repeats.described()}...")
+        parts = [f"[{each.describe()}]" if each.optional else each.describe() for each in self.parameters]
+        if self.repeated_parameter:
+            parts.append(f"{self.repeated_parameter.describe()}...")
         return " ".join([self.header, ",".join(parts)]).strip()
 
     def call(self, given: Sequence[Parameter], suffix: int, client: Any) -> Call:
         """Return the call that the parameters of a unit make of this command. Raises LanguageError."""
-        taken = self.takes if len(given) == len(self.takes) else self._taken(len(given))
+        taken = self.parameters if len(given) == len(self.parameters) else self._taken(len(given))
         values = [kind.read(parameter, client, suffix) for kind, parameter in zip(taken, given, strict=False)]
         return Call(suffix, tuple(values))
 
     def _taken(self, given: int) -> Sequence[Taken]:
         """Return what so many parameters are, one by one; those that are left out stand behind them."""
-        if given < sum(not each.optional for each in self.takes):
-            raise LanguageError(ErrorNumber.MISSING_PARAMETER, f"expected {self.written()}")
-        more = max(0, given - len(self.takes))
-        if more and self.repeats is None:
-            raise LanguageError(ErrorNumber.PARAMETER_NOT_ALLOWED, f"expected {self.written()}")
-        return self.takes if self.repeats is None else [*self.takes, *[self.repeats] * more]
+        if given < sum(not each.optional for each in self.parameters):
+            raise LanguageError(ErrorNumber.MISSING_PARAMETER, f"expected {self.syntax()}")
+        more = max(0, given - len(self.parameters))
+        if more and self.repeated_parameter is None:
+            raise LanguageError(ErrorNumber.PARAMETER_NOT_ALLOWED, f"expected {self.syntax()}")
+        return (
+            self.parameters
+            if self.repeated_parameter is None
+            else [*self.parameters, *[self.repeated_parameter] * more]
+        )
 
 
 def short_form(word: str) -> str:

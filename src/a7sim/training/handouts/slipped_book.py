@@ -91,10 +91,10 @@ class _Round:
 
 def _worked(scenario: Scenario, seed: int) -> tuple[Seated, list[_Round]]:
     session = open_session(scenario, seed)
-    seated = Seated.at(session.person, session.job, session.job.models[0].name)
+    seated = Seated.for_model(session.person, session.job, session.job.models[0].name)
     seated.set_up()
     bench, model, plan = seated.bench, seated.model, session.job.plan
-    who, elements = bench.crew.everybody, unknown_elements(plan.method, model)
+    who, elements = bench.crew.active, unknown_elements(plan.method, model)
     labels = model.points_of_case(plan.case)
     rounds = []
     for _ in range(ROUNDS):
@@ -102,9 +102,9 @@ def _worked(scenario: Scenario, seed: int) -> tuple[Seated, list[_Round]]:
         before = bench.seat.elements(who, elements)
         seen = bench.parallaxes(who, [model.standard_points[label] for label in labels], plan.parallax_readings)
         entries = [each for each in session.person.book.entries[begun:] if each.item in MEASURING and not each.struck]
-        mean = seen.p.mean(axis=0) if float(np.sqrt(np.mean(seen.p**2))) < GROSS_MM else 0.0
+        mean = seen.parallax_mm.mean(axis=0) if float(np.sqrt(np.mean(seen.parallax_mm**2))) < GROSS_MM else 0.0
         base = np.full(who.size, plan.bx)
-        found, _ = compute_corrections(bench, who, model, seen.places, seen.p - mean, elements, base, labels)
+        found, _ = compute_corrections(bench, who, model, seen.places, seen.parallax_mm - mean, elements, base, labels)
         bench.seat.set_elements(who, {name: before[name] + found[name][who] for name in elements})
         after = bench.seat.elements(who, elements)
         counts = [{name: float(each[name][0]) for name in elements} for each in (before, after)]

@@ -20,7 +20,7 @@ class NotAnswered(Measure, frozen=True, kw_only=True):
     keys: list[str] = field(default_factory=list)
     """All that the exercise asks for, where none are named."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         missing = [key for key in self.keys or account.exercise.answers if not account.answers.get(key)]
         return Found(float(len(missing)), f"not answered: {join_words(missing)}" if missing else "all is answered")
@@ -40,7 +40,7 @@ class AnswerOff(Measure, frozen=True, kw_only=True):
     least: float = 0.0
     """What can be read of it: no tolerance is below."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         answered = account.answers.get(self.key, "")
         try:
@@ -73,7 +73,7 @@ class AnswersOff(Measure, frozen=True, kw_only=True):
     least: float = 0.0
     """What can be read of them: no tolerance is below."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         off: dict[str, float] = {}
         for key in self.keys:
@@ -101,7 +101,7 @@ class AnswerWrong(Measure, frozen=True, kw_only=True):
     truth = True
     keys: list[str]
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         missing = [key for key in self.keys if not account.answers.get(key)]
         wrong = [key for key in self.keys if key not in missing and not self._right(account, key)]
@@ -124,7 +124,7 @@ class PlaceByScales(Measure, frozen=True, kw_only=True):
     keys: list[str]
     """Of the answers for x and y."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return the distance from the nearest registration of the point."""
         try:
             answered = [float(account.answers.get(key, "")) for key in self.keys]

@@ -46,7 +46,7 @@ class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Whether it looks at what cannot be seen at the link."""
     more_is_better: ClassVar[bool] = False
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return what it comes to."""
         raise NotImplementedError
 
@@ -54,7 +54,7 @@ class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         """Return what nobody can be asked to stay below: what an eye and a least count allow."""
         return 0.0
 
-    def reached(self, value: float | None, limit: float) -> bool:
+    def meets(self, value: float | None, limit: float) -> bool:
         """Whether a value is as good as a limit."""
         if value is None:
             return False

@@ -82,7 +82,7 @@ class LevelsMissing(_Centres, frozen=True, kw_only=True):
 
     unit = "registrations"
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         short = []
         for element in self.elements:
@@ -104,12 +104,12 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
     unit = "um"
     truth = True
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it, over all registrations at the levels."""
         off: list[float] = []
         worst = (0.0, "")
         for element in self.elements:
-            eye = account.model.hand_of(int(element[-1]))
+            eye = account.model.side_of(int(element[-1]))
             for each in (each for some in self._pointings(account, element).values() for each in some):
                 seen = each.eyes[eye - 1]
                 if seen is None:
@@ -138,7 +138,7 @@ class PointingsApart(_Centres, frozen=True, kw_only=True):
 
     unit = "mm"
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         centres = self._centres(account)
         if len(centres) < len(self.elements):
@@ -201,7 +201,7 @@ class _Answered(_Centres, frozen=True, kw_only=True):
 class CentreSumsOff(_Answered, frozen=True, kw_only=True):
     """The largest difference of answered coordinates from those that follow from one's own registrations."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         centres = self._centres(account)
         if len(centres) < len(self.elements):
@@ -220,7 +220,7 @@ class CentreSumsOff(_Answered, frozen=True, kw_only=True):
 class CentreOff(_Answered, frozen=True, kw_only=True):
     """The largest difference of answered coordinates from where the centres truly are, in counter units."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it; counters are as they stood at the registrations."""
         readings = {element: self._pointings(account, element) for element in self.elements}
         if not all(readings.values()):

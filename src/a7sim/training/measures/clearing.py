@@ -58,7 +58,7 @@ class StepsMissing(_Clearing, frozen=True, kw_only=True):
 
     unit = "steps"
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         first: dict[str, int] = {}
         elsewhere: list[Reading] = []
@@ -132,7 +132,7 @@ class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
     least: float = 0.15
     """Gon."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         turns = self._turns(account)
         last, omega = list(self._elements().items())[-1]
@@ -150,7 +150,7 @@ class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
 
     def _turns(self, account: Account) -> list[Turn]:
         *_, (last, omega) = self._elements().items()
-        begun = [each.before for each in account.deeds if each.name == omega and each.what in ("set", "turn")]
+        begun = [each.before for each in account.actions if each.name == omega and each.what in ("set", "turn")]
         before = begun[0] if begun else account.autograph.element(omega)
         readings = [each for each in account.readings if self._step_of(account, each) is not None]
         latest: dict[str, Reading] = {}
@@ -181,7 +181,7 @@ class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
         return Turn(cleared, before, cleared.shown[omega], left, needed)
 
     def _coefficients(self, account: Account, marks: Array, reading: Reading) -> Array:
-        hands = [f"{name[:-1]}{account.model.hand_of(int(name[-1]))}" for name in self._elements().values()]
+        hands = [f"{name[:-1]}{account.model.side_of(int(name[-1]))}" for name in self._elements().values()]
         rows = [PARALLAX_ELEMENTS.index(name) for name in hands]
         return clearing_coefficients(marks, *projector_poses(account, reading))[rows]
 
@@ -198,7 +198,7 @@ class MissingPointWrong(Measure, frozen=True, kw_only=True):
     truth = True
     key: str
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         answered = account.answers.get(self.key, "")
         if not answered:

@@ -32,7 +32,7 @@ class OutOfOrder(Measure, frozen=True, kw_only=True):
     unit = "deeds"
     chains: list[list[str]]
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         missing: list[str] = []
         early: list[str] = []
@@ -54,8 +54,8 @@ class OutOfOrder(Measure, frozen=True, kw_only=True):
         what, _, name = deed.removesuffix("!").partition(" ")
         kinds = {"move": PLAIN, "adjust": ("set", "turn")}.get(what, (what,))
         places = [
-            each.place
-            for each in account.deeds
+            each.index
+            for each in account.actions
             if each.what in kinds and (not name or account.name_of(name) == each.name or name in (each.name, each.text))
         ]
         return (places[0] if deed.endswith("!") else places[-1]) if places else None
@@ -74,7 +74,7 @@ class RunByMotor(Measure, frozen=True, kw_only=True):
     handles: list[str]
     points: list[str] = field(default_factory=list)
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         readings = readings_with(account, "", self.points)
         if not readings:
@@ -84,7 +84,7 @@ class RunByMotor(Measure, frozen=True, kw_only=True):
         return Found(float(len(ran)), f"{join_words(map(handle_label, self.handles))}: {told}")
 
     def _ran(self, account: Account, reading: Reading, handle: str) -> bool:
-        before = [each for each in account.deeds if each.name == handle and each.place < reading.place]
+        before = [each for each in account.actions if each.name == handle and each.index < reading.place]
         return bool(before) and before[-1].what in ("drive", "set")
 
 
@@ -96,14 +96,14 @@ class HandlesMoved(Measure, frozen=True, kw_only=True):
     handles: list[str]
     within: float = HALF_A_COUNT
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         moved = [handle for handle in self.handles if self._by_how_much(account, handle) > self.within + 1e-9]
         told = f"{join_words(map(handle_label, moved))} moved" if moved else "all of it stands where it stood"
         return Found(float(len(moved)), told)
 
     def _by_how_much(self, account: Account, handle: str) -> float:
-        deeds = [each for each in account.deeds if each.name == handle and each.what in PLAIN]
+        deeds = [each for each in account.actions if each.name == handle and each.what in PLAIN]
         if not deeds:
             return 0.0
         moved = abs(deeds[-1].after - deeds[0].before)
@@ -117,14 +117,14 @@ class NotLooked(Measure, frozen=True, kw_only=True):
     unit = "points"
     points: list[str]
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         blind = []
         for point in self.points:
             readings = readings_with(account, "", [point])
-            before = [each for each in account.deeds if readings and each.place < readings[-1].place]
-            looks = [each.place for each in before if each.what == "look"]
-            levers = [each.place for each in before if each.what in ("fit", "base", "load")]
+            before = [each for each in account.actions if readings and each.index < readings[-1].place]
+            looks = [each.index for each in before if each.what == "look"]
+            levers = [each.index for each in before if each.what in ("fit", "base", "load")]
             if not readings or max(looks, default=-1) < max(levers, default=0):
                 blind.append(point)
         told = f"at {join_words(blind)} nobody looked after the last lever" if blind else "looked every time"
@@ -137,7 +137,7 @@ class Minutes(Measure, frozen=True, kw_only=True):
 
     unit = "min"
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return them."""
         minutes = account.seconds / 60.0
         return Found(
@@ -152,7 +152,7 @@ class ElementOff(Measure, frozen=True, kw_only=True):
     unit = "mm or gon"
     wanted: dict[str, float]
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         shown = {
             name: account.autograph.counter(name) if name in AXES else account.autograph.element(name)
@@ -185,10 +185,10 @@ class WrongFittings(Measure, frozen=True, kw_only=True):
     by_job: bool = False
     """Whether base and pictures must be those of the exercise's model on the job sheet."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number, the base counted where it is not as it should be."""
         if self.by_job:
-            return self._as_ordered(account.model).of(account)
+            return self._as_ordered(account.model).evaluate(account)
         autograph = account.autograph
         fittings, base = autograph.fittings.as_words(), autograph.base_mode
         lying = autograph.loaded(1), autograph.loaded(2)

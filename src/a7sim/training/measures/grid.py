@@ -43,7 +43,7 @@ class LevelsNear(Measure, frozen=True, kw_only=True):
 
     points: list[str]
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it, by the counter of Z, which counts mm from the base line in a grid test."""
         names = [account.name_of(point) for point in self.points]
         depths = [-each.mark[2] for each in account.readings if each.point in names]
@@ -65,7 +65,7 @@ class ErrorsAnswered(Measure, frozen=True, kw_only=True):
     reach_mm: float = 100.0
     """How far from the middle of the plate the crosses lie."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it: what stands minus what the counter shows."""
         off: dict[str, float] = {}
         for element in self.elements:

@@ -47,7 +47,7 @@ def last_readings(account: Account, points: Iterable[str], base: str = "") -> di
 
 def pointings(account: Account, name: str, base: str = "") -> list[Reading]:
     """Return the registrations of a point's coordinates: those that are no readings of an element just turned there."""
-    deeds = [each for each in account.deeds if each.what in PLAIN]
+    deeds = [each for each in account.actions if each.what in PLAIN]
     there = [each for each in account.readings if each.point == name and base in ("", each.base)]
     return [each for each in there if not _turned_there(deeds, each)]
 
@@ -57,7 +57,7 @@ def _turned_there(deeds: Sequence[Deed], reading: Reading) -> bool:
 
     At the console whatever is in hand is registered, so that it is named says nothing.
     """
-    for deed in reversed(deeds[: bisect_left(deeds, reading.place, key=lambda each: each.place)]):
+    for deed in reversed(deeds[: bisect_left(deeds, reading.place, key=lambda each: each.index)]):
         if deed.name in reading.named:
             return True
         if deed.name in PLAN_AXES and abs(deed.after - deed.before) >= ARRIVAL:
@@ -91,7 +91,7 @@ class MissingPointings(Measure, frozen=True, kw_only=True):
     each: int = 1
     bases: list[str] = field(default_factory=lambda: [""])
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         lacking = {
             f"{point}{f' with base {base}' if base else ''}": self.each
@@ -117,7 +117,7 @@ class HeightsOff(Measure, frozen=True, kw_only=True):
     """Of the model, by which the counter reads metres."""
     largest: bool = False
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it, by the last two registrations of each point."""
         readings = last_readings(account, self.points)
         missing = [point for point in self.points if account.name_of(point) not in readings]
@@ -146,7 +146,7 @@ class DistancesOff(Measure, frozen=True, kw_only=True):
     shortest_m: float = 500.0
     """Distances shorter than that tell little of the scale."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return the share in the mean of all pairs, by the last two registrations of each point."""
         readings = last_readings(account, self.points)
         truth = account.scene.ground_points
@@ -173,14 +173,14 @@ class DistancesOff(Measure, frozen=True, kw_only=True):
 def element_at(account: Account, name: str, place: int) -> float:
     """Return where an element stood before a deed."""
     moved = [each for each in account.witness.deeds if each.what in ("set", "turn") and each.name == name]
-    before = [each.after for each in moved if each.place < place]
-    later = [each.before for each in moved if each.place >= place]
+    before = [each.after for each in moved if each.index < place]
+    later = [each.before for each in moved if each.index >= place]
     return before[-1] if before else later[0] if later else account.autograph.element(name)
 
 
 def change_of_base(account: Account, mode: str) -> Deed | None:
     """Return the student's deed by which the base was last changed over to a mode, None where it never was."""
-    changes = [each for each in account.deeds if each.what == "base" and each.text == mode]
+    changes = [each for each in account.actions if each.what == "base" and each.text == mode]
     return changes[-1] if changes else None
 
 
@@ -193,14 +193,14 @@ class MovedSince(Measure, frozen=True, kw_only=True):
     base: str = "outside"
     """To which it was changed."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         change = change_of_base(account, self.base)
         if change is None:
             return Found(None, f"the base was never set {self.base}")
         moved = {}
         for name in self.elements:
-            off = account.autograph.element(name) - element_at(account, name, change.place)
+            off = account.autograph.element(name) - element_at(account, name, change.index)
             moved[name] = abs((off + 200.0) % 400.0 - 200.0) if name.startswith("kappa") else abs(off)
         worst = max(moved, key=lambda name: moved[name])
         told = [f"{handle_label(name)} by {amount:.2f}" for name, amount in moved.items() if amount > HALF_A_COUNT]
@@ -222,7 +222,7 @@ class TiesApart(Measure, frozen=True, kw_only=True):
     points: list[str]
     axes: list[str] = field(default_factory=lambda: list(AXES))
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it, by the last two registrations of each point in either model."""
         inside, outside = (last_readings(account, self.points, base) for base in ("inside", "outside"))
         missing = [point for point in self.points if account.name_of(point) not in inside.keys() & outside.keys()]
@@ -255,14 +255,14 @@ class ScaleNotCarried(Measure, frozen=True, kw_only=True):
     first: str = "1"
     base: str = "outside"
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         change = change_of_base(account, self.base)
         if change is None:
             return Found(None, f"the base was never set {self.base}")
         models = {each.name: each for each in account.scenario.models}
-        before = self._scale(account, models[self.first], change.place)
-        after = self._scale(account, models[account.model.name], account.witness.deeds[-1].place + 1)
+        before = self._scale(account, models[self.first], change.index)
+        after = self._scale(account, models[account.model.name], account.witness.deeds[-1].index + 1)
         share = 1e3 * (after / before - 1.0)
         told = f"the second model is {abs(share):.2f} per mille {'larger' if share > 0 else 'smaller'} than the first"
         return Found(round(abs(share), 4), told)

@@ -154,7 +154,7 @@ class SumsOff(Measure, frozen=True, kw_only=True):
     truth = True
     case: str
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         found = answered_case(account, self.case)
         if found is None:
@@ -178,7 +178,7 @@ class SetOtherwise(Measure, frozen=True, kw_only=True):
     truth = True
     cases: list[str] = field(default_factory=lambda: ["A"])
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         there = {case: each for case in self.cases if (each := answered_case(account, case)) is not None}
         if len(there) < len(self.cases):
@@ -206,7 +206,7 @@ class ParallaxRms(Measure, frozen=True, kw_only=True):
     truth = True
     elements: list[str] = field(default_factory=lambda: list(BYS))
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         left = [
             each.stereo[1]

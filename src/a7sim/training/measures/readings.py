@@ -32,11 +32,11 @@ class MissingReadings(Measure, frozen=True, kw_only=True):
     after: list[str] = field(default_factory=list)
     """Only those count that were made after the last movement of these handles."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         short: dict[str, list[str]] = {}
         missing = 0
-        moved = [each.place for each in account.deeds if each.name in self.after and each.what in PLAIN]
+        moved = [each.index for each in account.actions if each.name in self.after and each.what in PLAIN]
         last = max(moved, default=-1)
         for point in self.points:
             for element in self.elements or [""]:
@@ -68,7 +68,7 @@ class WrongApproach(Measure, frozen=True, kw_only=True):
     besides: list[str] = field(default_factory=list)
     """Points at which it does not matter."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         spared = {account.name_of(point) for point in self.besides}
         readings = [each for each in readings_with(account, "", self.points) if each.point not in spared]
@@ -98,7 +98,7 @@ class OneSideOnly(Measure, frozen=True, kw_only=True):
     point: str
     handles: list[str]
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         readings = readings_with(account, "", [self.point])
         if not readings:
@@ -122,7 +122,7 @@ class NotLeftBetween(Measure, frozen=True, kw_only=True):
     away: float = 0.1
     """By how much it must have gone away, in units of its counter."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         lazy = {
             point: [handle for handle in self.handles if not self._came_back(account, point, handle)]
@@ -143,7 +143,9 @@ class NotLeftBetween(Measure, frozen=True, kw_only=True):
         return any(self._left(account, handle, *pair) for pair in pairwise(readings))
 
     def _left(self, account: Account, handle: str, first: Reading, then: Reading) -> bool:
-        stood = [each.after for each in account.deeds if each.name == handle and first.place < each.place < then.place]
+        stood = [
+            each.after for each in account.actions if each.name == handle and first.place < each.index < then.place
+        ]
         return any(abs(at - first.shown[handle]) >= self.away - 1e-9 for at in stood)
 
 
@@ -155,7 +157,7 @@ class OffTarget(Measure, frozen=True, kw_only=True):
     targets: dict[str, dict[str, float]]
     """By point, by counter or element."""
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it, by the last registration of each point."""
         off: list[tuple[float, str]] = []
         missing = []
@@ -190,7 +192,7 @@ class OtherNotAtRest(Measure, frozen=True, kw_only=True):
     at: float = 0.0
     within: float = 0.005
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return their number."""
         told, count, all_read = [], 0, 0
         for read, other in self.pairs.items():
@@ -219,7 +221,7 @@ class Spread(Measure, frozen=True, kw_only=True):
     handles: list[str]
     points: list[str] = field(default_factory=list)
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         spreads: list[tuple[float, str]] = []
         for handle in self.handles:
@@ -254,7 +256,7 @@ class NotOpposed(Measure, frozen=True, kw_only=True):
     other: str = "by2"
     points: list[str] = field(default_factory=list)
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return the largest sum at a point."""
         sums: list[tuple[float, str]] = []
         for point in dict.fromkeys(each.point for each in readings_with(account, self.one, self.points)):

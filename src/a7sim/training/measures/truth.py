@@ -43,7 +43,7 @@ class AtReadings(Measure, frozen=True, kw_only=True):
     """Only where one of these was registered."""
     points: list[str] = field(default_factory=list)
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         names = [account.name_of(point) for point in self.points]
         readings = [
@@ -164,7 +164,7 @@ class ResidualParallax(Measure, frozen=True, kw_only=True):
     points: list[str] = field(default_factory=lambda: list(CASES["A"]))
     largest: bool = False
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         names = {point: account.name_of(point) for point in self.points if point in account.model.standard_points}
         found = {point: y_parallax_at(account, name) for point, name in names.items()}
@@ -191,7 +191,7 @@ class PictureOffCentre(Measure, frozen=True, kw_only=True):
     truth = True
     projectors: list[int] = field(default_factory=lambda: [1, 2])
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         left: list[tuple[float, str]] = []
         for projector in self.projectors:
@@ -232,7 +232,7 @@ class PrincipalDistanceOff(Measure, frozen=True, kw_only=True):
     truth = True
     projectors: list[int] = field(default_factory=lambda: [1, 2])
 
-    def of(self, account: Account) -> Found:
+    def evaluate(self, account: Account) -> Found:
         """Return it."""
         off: list[tuple[float, str]] = []
         for projector in self.projectors:

@@ -44,9 +44,9 @@ class Seated:
     """What was handed out, by file name."""
 
     @classmethod
-    def at(cls, person: Person, job: Job, model: str) -> "Seated":
+    def for_model(cls, person: Person, job: Job, model: str) -> "Seated":
         """Return an operator who is to work on a model of a job."""
-        bench = Bench(Crew.of_one(person), LineHands(person), job)
+        bench = Bench(Crew.single(person), LineHands(person), job)
         return cls(person, bench, next(each for each in job.models if each.name == model))
 
     def points(self) -> list[str]:
@@ -57,7 +57,7 @@ class Seated:
     def set_up(self) -> None:
         """Bring the instrument to the settings of the job sheet, mount and centre pictures, take up the prints."""
         bench = self.bench
-        who = bench.crew.everybody
+        who = bench.crew.active
         self.begin("preparation")
         bench.seat.prepare(who)
         self.begin("interior orientation")
@@ -68,7 +68,7 @@ class Seated:
 
     def take_over(self) -> None:
         """Sit down at an instrument that stands ready: base and pictures set, its counters as `*RST` leaves them."""
-        who = self.bench.crew.everybody
+        who = self.bench.crew.active
         self.bench.seat.take_over(who)
         self.bench.seat.counters(who)
         self.bench.begin(who, self.model, load_prints(self.bench, self.model))
@@ -80,13 +80,13 @@ class Seated:
 
     def begin(self, form: str) -> None:
         """Begin a form of the book."""
-        self.bench.crew.begin(self.bench.crew.everybody, self.model.name, form)
+        self.bench.crew.begin(self.bench.crew.active, self.model.name, form)
         self.person.note(f"{self.model.name}: {form}")
 
 
 def perturb_elements(seated: Seated, elements: Mapping[str, float]) -> None:
     """Turn elements by so much, by mistake."""
-    who = seated.bench.crew.everybody
+    who = seated.bench.crew.active
     standing = seated.bench.seat.elements(who, list(elements))
     seated.bench.seat.turn_elements(who, {name: standing[name] + amount for name, amount in elements.items()})
 
@@ -94,7 +94,7 @@ def perturb_elements(seated: Seated, elements: Mapping[str, float]) -> None:
 def misplace_fittings(seated: Seated, fittings: Mapping[str, str]) -> None:
     """Put fittings into positions, by mistake."""
     for name, position in fittings.items():
-        seated.bench.hands.set_fitting(np.asarray(seated.bench.crew.everybody), name, position)
+        seated.bench.hands.set_fitting(np.asarray(seated.bench.crew.active), name, position)
 
 
 Procedure = Callable[..., None]
@@ -122,7 +122,7 @@ def run_procedure(room: Room, played: Played, client: str, papers: Mapping[str, 
     port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
     observer = scenario_for(room.shelved, room.seed, played.observer).observer
     person = Person(Client(port), room.clock, observer, room.seed)
-    seated = Seated.at(person, make_job(room.scenario, room.scene), room.shelved.exercise.model)
+    seated = Seated.for_model(person, make_job(room.scenario, room.scene), room.shelved.exercise.model)
     person.book.listener = _Button(person.client, seated.model).written
     try:
         PROCEDURES[played.procedure](replace(seated, papers=papers or {}), **played.options)
@@ -183,7 +183,7 @@ def measure_parallaxes(seated: Seated, readings: int = 2) -> None:
     seated.take_over()
     seated.begin("y-parallaxes")
     for _ in range(readings):
-        seated.bench.parallaxes(seated.bench.crew.everybody, seated.points(), 1)
+        seated.bench.parallaxes(seated.bench.crew.active, seated.points(), 1)
 
 
 @procedure("relative orientation")
@@ -193,7 +193,7 @@ def relative_orientation(seated: Seated) -> None:
     seated.begin("relative orientation")
     orient_model(seated.bench, seated.model)
     seated.begin("last look")
-    seated.bench.parallaxes_seen(seated.bench.crew.everybody, seated.points())
+    seated.bench.look_at_parallaxes(seated.bench.crew.active, seated.points())
 
 
 @procedure("day's work")

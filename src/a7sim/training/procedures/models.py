@@ -24,15 +24,15 @@ def prepared_model(seated: Seated, model: str = "", orient: bool = True) -> None
     Seated(seated.person, bench, chosen).set_up()
     if orient:
         orient_model(bench, chosen)
-    who = bench.crew.everybody
-    heights = bench.seat.from_zero(who, [f"bz{chosen.left_projector}"])[f"bz{chosen.left_projector}"]
+    who = bench.crew.active
+    heights = bench.seat.elements_from_zero(who, [f"bz{chosen.left_projector}"])[f"bz{chosen.left_projector}"]
     bench.seat.shift_counter(who, "Z", bench.seat.units_per_mm * heights - bench.seat.centre(who, 1)[2])
 
 
 def take_over(seated: Seated, model: ModelJob) -> None:
     """Go on at an instrument that somebody else left, a model mounted in it and its counters not preset."""
     bench = seated.bench
-    who = bench.crew.everybody
+    who = bench.crew.active
     bench.seat.take_over(who)
     bench.seat.counters(who)
     bench.begin(who, model, load_prints(bench, model))
@@ -91,9 +91,9 @@ def a8_model(
         reading, bx = np.array(on_ground.points[name]), on_ground.elements["bx"]
     else:
         wanted = dict.fromkeys([*bench.job.control, *model.other_points])
-        shown = [each for each in wanted if bench.pricked(crew.everybody, each).all()]
-        reading = bench.measure(crew.everybody, shown)[:, shown.index(name), 0]
-        bx = float(bench.seat.bx(crew.everybody)[0])
+        shown = [each for each in wanted if bench.has_point(crew.active, each).all()]
+        reading = bench.measure_points(crew.active, shown)[:, shown.index(name), 0]
+        bx = float(bench.seat.bx(crew.active)[0])
     scales = [bench.seat.manual.scales[axis] for axis in "XY"]
     x, y = (each - scale.at_origin for each, scale in zip(reading[:2].tolist(), scales, strict=True))
     mm = 1.0 / scales[0].units_per_mm if doubled else 1.0
@@ -130,30 +130,30 @@ def base_change(
     """
     bench, model = seated.bench, seated.model
     crew, plan = bench.crew, bench.job.plan
-    who = crew.everybody
+    who = crew.active
     models = bench.job.models
     first = models[models.index(model) - 1]
     take_over(seated, first)
     seated.begin("common points")
     common = [name for name in map(model.standard_points.get, "135") if name]
-    readings = bench.measure(who, common)
+    readings = bench.measure_points(who, common)
     before = {name: readings[:, i] for i, name in enumerate(common)}
     seated.begin("interior orientation")
     if counters:
         extend_strip(bench, model)
     set_base_and_fittings(bench, model.base, model.polarity)
     mount_photographs(bench, model, {})
-    bench.begin(crew.everybody, model, load_prints(bench, model))
+    bench.begin(crew.active, model, load_prints(bench, model))
     copy_common_photo_orientation(bench, model)
     seated.begin("relative orientation")
     method = "dependent" if kept else "independent"
     tolerated = bench.job.tolerated_parallax_mm
-    relative_orientation(bench, crew.everybody, model, method, plan.case, plan.parallax_readings, plan.bx, tolerated)
+    relative_orientation(bench, crew.active, model, method, plan.case, plan.parallax_readings, plan.bx, tolerated)
     seated.begin("scale")
     if scale:
-        transfer_scale(bench, crew.everybody, model, before)
+        transfer_scale(bench, crew.active, model, before)
     seated.begin("model coordinates")
     if read_again:
-        bench.measure(crew.everybody, common)
+        bench.measure_points(crew.active, common)
     perturb_elements(seated, knocked or {})
     misplace_fittings(seated, wrong_fittings or {})

@@ -40,7 +40,7 @@ def clear_the_model(
         seated.person.note(f"{ANSWER}missing={missing or ','.join(gone)}")
     empirical_orientation(
         bench,
-        bench.crew.everybody,
+        bench.crew.active,
         seated.model,
         method,
         case,
@@ -65,39 +65,39 @@ def numerical_orientation(
     """
     seated.take_over()
     bench, model = seated.bench, seated.model
-    who, unknowns = bench.crew.everybody, unknown_elements(INDEPENDENT, model)
+    who, unknowns = bench.crew.active, unknown_elements(INDEPENDENT, model)
     for number, case in enumerate(cases, start=1):
         seated.begin(f"relative orientation, case {case}")
         bench.begin_round(who, number)
         settings = bench.seat.elements(who, unknowns)
         labels = model.points_of_case(case)
         seen = _parallaxes(seated, case, readings)
-        mean = seen.p.mean(axis=0)
+        mean = seen.parallax_mm.mean(axis=0)
         base = np.full(who.size, bench.job.plan.bx)
-        found, _ = compute_corrections(bench, who, model, seen.places, seen.p - mean, unknowns, base, labels)
+        found, _ = compute_corrections(bench, who, model, seen.places, seen.parallax_mm - mean, unknowns, base, labels)
         found["phi1"] = found["phi1"] + slip_gon
         seated.answer({f"{case.lower()}-{name}": float(found[name][0]) for name in unknowns})
-        noted = bench.crew.notes(who, settings, {})
+        noted = bench.crew.noted_elements(who, settings, {})
         bench.seat.set_elements(who, {name: noted[name] + sense * found[name] for name in unknowns})
         if mean_on_by == "at once":
             _put_on_by(seated, mean)
     if mean_on_by == "in the end":
         bench.begin_round(who, len(cases) + 1)
-        _put_on_by(seated, _parallaxes(seated, "A", readings).p.mean(axis=0))
+        _put_on_by(seated, _parallaxes(seated, "A", readings).parallax_mm.mean(axis=0))
 
 
 def _parallaxes(seated: Seated, case: str, readings: int) -> Parallaxes:
     bench, model = seated.bench, seated.model
     points = [model.standard_points[label] for label in model.points_of_case(case)]
-    seen = bench.parallaxes(bench.crew.everybody, points, readings)
-    bench.crew.give_up(seen.parted(bench.crew.everybody), f"{model.name}: images too far apart to be fused")
+    seen = bench.parallaxes(bench.crew.active, points, readings)
+    bench.crew.give_up(seen.disagrees(bench.crew.active), f"{model.name}: images too far apart to be fused")
     return seen
 
 
 def _put_on_by(seated: Seated, mean: Array) -> None:
     """Set by of the left-hand photograph's projector on by a mean parallax."""
     bench, by = seated.bench, f"by{seated.model.left_projector}"
-    who = bench.crew.everybody
+    who = bench.crew.active
     bench.seat.set_elements(who, {by: bench.seat.elements(who, [by])[by] + mean})
 
 
@@ -139,11 +139,11 @@ def find_centres(seated: Seated, hands: Sequence[int], swapped: bool, height_in_
     """Preset the counters at point 1, point at both levels and answer the centres."""
     bench, model, plan = seated.bench, seated.model, seated.bench.job.plan
     seated.begin("model coordinates")
-    bench.parallaxes_seen(bench.crew.everybody, [model.standard_points["1"]])
-    bench.seat.preset(bench.crew.everybody, plan.preset)
+    bench.look_at_parallaxes(bench.crew.active, [model.standard_points["1"]])
+    bench.seat.preset(bench.crew.active, plan.preset)
     for hand in hands:
         seated.begin(f"{side_name(hand)} perspective centre")
-        centre = centre_of(observe_centre(bench, bench.crew.everybody, model, hand), 0)
+        centre = centre_of(observe_centre(bench, bench.crew.active, model, hand), 0)
         X, Y, Z = (float(each) for each in (centre.X0, centre.Y0, centre.Z0))
         if height_in_mm:
             Z = plan.centre_levels[0] + (Z - plan.centre_levels[0]) / bench.seat.units_per_mm

@@ -54,35 +54,35 @@ def _axis(axis: str) -> list[Command]:
         autograph_for(engine).drive(axis, call.arguments[0])
 
     def wheel(engine: "Engine", call: Call) -> None:
-        autograph_for(engine).wheel(axis, call.arguments[0])
+        autograph_for(engine).turn_handwheel(axis, call.arguments[0])
 
     return [
-        Command(f"COUNter:{axis}?", lambda e, c: autograph_for(e).counter_text(axis), about=f"{axis} counter"),
+        Command(f"COUNter:{axis}?", lambda e, c: autograph_for(e).counter_text(axis), help=f"{axis} counter"),
         Command(
             f"COUNter:{axis}:PRESet",
             preset,
             (Quantity(usual, preset_limits, name="reading", unit_there=unit),),
-            turns=True,
-            about="what the counter shall show here",
+            moves=True,
+            help="what the counter shall show here",
         ),
         Command(
             f"DRIVe:{axis}",
             drive,
             (Quantity(usual, limits, name="reading", unit_there=unit),),
-            turns=True,
-            about="run to a counter reading",
+            moves=True,
+            help="run to a counter reading",
         ),
         Command(
             f"WHEel:{axis}",
             wheel,
             (Quantity(usual, to_the_ends, name="amount", unit_there=unit),),
-            turns=True,
-            about="turn by so much counter, signed",
+            moves=True,
+            help="turn by so much counter, signed",
         ),
     ]
 
 
 CARRIAGES = [
-    Command("COUNter?", _counters, about="X, Y and Z"),
+    Command("COUNter?", _counters, help="X, Y and Z"),
     *(command for axis in "XYZ" for command in _axis(axis)),
 ]

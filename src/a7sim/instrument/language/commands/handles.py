@@ -53,14 +53,14 @@ def _element(header: str, name_of: Callable[[int], str], unit: str, about: str) 
         return format_fixed(shown)
 
     return [
-        Command(header, move, (Quantity(unit, limits),), turns=True, about=about),
+        Command(header, move, (Quantity(unit, limits),), moves=True, help=about),
         Command(f"{header}?", show, (LIMIT,)),
         Command(
             f"{header}:TURN",
             turn,
             (Quantity(unit, to_the_ends, name="amount"),),
-            turns=True,
-            about="turn its drum by so much, signed, between two counts too",
+            moves=True,
+            help="turn its drum by so much, signed, between two counts too",
         ),
     ]
 
@@ -84,7 +84,7 @@ def _fitting(node: str, name: str, words: tuple[str, ...], about: str) -> list[C
         autograph_for(engine).set_fitting(name, call.arguments[0])
 
     return [
-        Command(f"FITTing:{node}", put, (Choice(words),), turns=True, about=about),
+        Command(f"FITTing:{node}", put, (Choice(words),), moves=True, help=about),
         Command(f"FITTing:{node}?", lambda e, c: shown[autograph_for(e).fitting(name)]),
     ]
 
@@ -111,7 +111,7 @@ ELEMENT_COMMANDS = [
         for command in _element(f"PROJector<n>:{node}", _numbered(name), unit, about)
     ),
     *_element("BASE:BX", lambda suffix: "bx", "mm", "base component along the base"),
-    Command("BASE:MODE", _base_mode, (Choice(("INside", "OUTside")),), turns=True, about="Zeiss parallelogram"),
+    Command("BASE:MODE", _base_mode, (Choice(("INside", "OUTside")),), moves=True, help="Zeiss parallelogram"),
     Command("BASE:MODE?", lambda e, c: {"inside": "IN", "outside": "OUT"}[autograph_for(e).base_mode]),
     *_element("COMMon:PHI", lambda suffix: "common_phi", "gon", "common longitudinal tilt (A8)"),
     *(command for fitting in _FITTING_NODES for command in _fitting(*fitting)),
@@ -119,16 +119,16 @@ ELEMENT_COMMANDS = [
         "GEAR:HEIGht",
         _height_gear,
         (QuotedOrNumber("combination"),),
-        turns=True,
-        about="height gear, or units a mm",
+        moves=True,
+        help="height gear, or units a mm",
     ),
     Command("GEAR:HEIGht?", lambda e, c: _gear_text(autograph_for(e).height_gear)),
     Command(
         "GEAR:PLAN",
         _plan_gear,
         (QuotedOrNumber("combination"),),
-        turns=True,
-        about="gear to the plotting table",
+        moves=True,
+        help="gear to the plotting table",
     ),
     Command("GEAR:PLAN?", lambda e, c: _gear_text(autograph_for(e).plan_gear)),
 ]

@@ -93,10 +93,10 @@ def _picture(engine: "Engine", call: Call) -> bytes:
 
 
 PICTURES = [
-    Command("PHOTo<n>:LOAD", _load, (Quoted("picture"),), turns=True, about="lay a picture on the carrier"),
-    Command("PHOTo<n>:UNLoad", _unload, turns=True, about="take it off"),
-    Command("PHOTo<n>?", lambda e, c: quote_text(autograph_for(e).loaded(c.suffix) or ""), about="its name"),
-    Command("PHOTo:CATalog?", _catalogue, about="the pictures at hand"),
+    Command("PHOTo<n>:LOAD", _load, (Quoted("picture"),), moves=True, help="lay a picture on the carrier"),
+    Command("PHOTo<n>:UNLoad", _unload, moves=True, help="take it off"),
+    Command("PHOTo<n>?", lambda e, c: quote_text(autograph_for(e).loaded(c.suffix) or ""), help="its name"),
+    Command("PHOTo:CATalog?", _catalogue, help="the pictures at hand"),
     Command(
         "PHOTo<n>:CENTring",
         _centre,
@@ -105,21 +105,21 @@ PICTURES = [
             Quantity("mm", _centring_limits("centring_mm"), name="dy"),
             Quantity("gon", _centring_limits("centring_gon"), name="dkappa"),
         ),
-        turns=True,
-        about="shift and turn the picture from where it was laid",
+        moves=True,
+        help="shift and turn the picture from where it was laid",
     ),
     Command("PHOTo<n>:CENTring?", _centring),
     Command(
         "PHOTo<n>:FIDucial?",
         _fiducials,
-        about="name,dx,dy,... of the fiducials from their collimating marks, mm",
+        help="name,dx,dy,... of the fiducials from their collimating marks, mm",
     ),
-    Command("PHOTo<n>:SKETch?", _sketch, about="name,x,y,... of the points pricked on the paper print, mm"),
+    Command("PHOTo<n>:SKETch?", _sketch, help="name,x,y,... of the points pricked on the paper print, mm"),
     Command(
         "EYEPiece<n>?",
         _eyepiece,
         (Quoted("point"),),
-        about="dx,dy of the image from the floating mark, um at photo scale; n is the observer's eye",
+        help="dx,dy of the image from the floating mark, um at photo scale; n is the observer's eye",
     ),
     Command(
         "EYEPiece<n>:PICTure?",
@@ -129,12 +129,12 @@ PICTURES = [
             Quantity(whole=True, name="rows"),
             Quantity(name="magnification"),
         ),
-        about="block of grey bytes, row by row from the top",
+        help="block of grey bytes, row by row from the top",
     ),
     Command(
         "EYEPiece:STEReo?",
         _stereo,
         (Quoted("point"),),
-        about="px,py, left image minus right, um at photo scale",
+        help="px,py, left image minus right, um at photo scale",
     ),
 ]

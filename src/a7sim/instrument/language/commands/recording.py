@@ -55,7 +55,7 @@ def _last_record(engine: "Engine", call: Call) -> str:
 
 
 def _numbered_record(engine: "Engine", call: Call) -> str:
-    return _shown(autograph_for(engine).recorder.numbered(int(call.arguments[0])))
+    return _shown(autograph_for(engine).recorder.by_number(int(call.arguments[0])))
 
 
 def _shown(registration: Registration) -> str:
@@ -83,23 +83,23 @@ RECORDING = [
         "RECord",
         _record,
         (Quoted("point"),),
-        repeats=AnyWord("element"),
-        about="register X, Y, Z and the named elements (BY1, KAPP2, BX, CPHI ...) under the point",
+        repeated_parameter=AnyWord("element"),
+        help="register X, Y, Z and the named elements (BY1, KAPP2, BX, CPHI ...) under the point",
     ),
     Command(
         "RECord?",
         _numbered_record,
         (Quantity(whole=True, name="number"),),
-        about="a registration as it stands: number, point, X, Y, Z and element,reading ...",
+        help="a registration as it stands: number, point, X, Y, Z and element,reading ...",
     ),
-    Command("RECord:LAST?", _last_record, about="number, point, X, Y, Z and element,reading ..."),
-    Command("RECord:COUNt?", lambda e, c: str(len(autograph_for(e).recorder.registrations)), about="registrations"),
+    Command("RECord:LAST?", _last_record, help="number, point, X, Y, Z and element,reading ..."),
+    Command("RECord:COUNt?", lambda e, c: str(len(autograph_for(e).recorder.registrations)), help="registrations"),
     Command(
         "RECord:STRike",
         _strike,
         (Quantity(whole=True, name="number"), Quoted("why")),
-        about="strike a registration out; it stays, marked",
+        help="strike a registration out; it stays, marked",
     ),
-    Command("RECord:STRike:COUNt?", _struck_records, about="registrations that are struck out"),
-    Command("NOTE", _note, (Quoted("text"),), about="a remark into the journal"),
+    Command("RECord:STRike:COUNt?", _struck_records, help="registrations that are struck out"),
+    Command("NOTE", _note, (Quoted("text"),), help="a remark into the journal"),
 ]

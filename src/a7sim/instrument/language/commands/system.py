@@ -33,7 +33,7 @@ def _complete(engine: "Engine", call: Call) -> None:
 
 
 def _reset(engine: "Engine", call: Call) -> None:
-    engine.forget_completion()
+    engine.cancel_completion()
     autograph_for(engine).reset()
 
 
@@ -73,56 +73,56 @@ def _registers(node: str, which: Callable[["Engine"], Register]) -> list[Command
             f"STATus:{node}[:EVENt]?",
             lambda e, c: str(which(e).read_event()),
             polls=True,
-            about="events, cleared by reading",
+            help="events, cleared by reading",
         ),
         Command(
             f"STATus:{node}:CONDition?",
             lambda e, c: str(which(e).condition),
             polls=True,
-            about="condition now",
+            help="condition now",
         ),
-        Command(f"STATus:{node}:ENABle", enable, (Quantity(whole=True, name="mask"),), about="what is reported"),
+        Command(f"STATus:{node}:ENABle", enable, (Quantity(whole=True, name="mask"),), help="what is reported"),
         Command(f"STATus:{node}:ENABle?", lambda e, c: str(which(e).enable)),
     ]
 
 
 SYSTEM = [
-    Command("*CLS", _clear, about="clear events and errors"),
-    Command("*ESE", _enable_events, (Quantity(whole=True, name="mask"),), about="events that bit 5 sums up"),
+    Command("*CLS", _clear, help="clear events and errors"),
+    Command("*ESE", _enable_events, (Quantity(whole=True, name="mask"),), help="events that bit 5 sums up"),
     Command("*ESE?", lambda e, c: str(e.status.event_enable)),
-    Command("*ESR?", lambda e, c: str(e.status.read_event()), polls=True, about="standard events, cleared by reading"),
-    Command("*IDN?", _identity, open_to_all=True, about="maker, type, serial number, version"),
-    Command("*OPC", _complete, about="raise bit 0 of the events when all movement is done"),
-    Command("*OPC?", lambda e, c: "1", waits=True, about="1 when all movement is done"),
+    Command("*ESR?", lambda e, c: str(e.status.read_event()), polls=True, help="standard events, cleared by reading"),
+    Command("*IDN?", _identity, allowed_before_login=True, help="maker, type, serial number, version"),
+    Command("*OPC", _complete, help="raise bit 0 of the events when all movement is done"),
+    Command("*OPC?", lambda e, c: "1", waits=True, help="1 when all movement is done"),
     Command(
         "*RST",
         _reset,
-        turns=True,
-        about="elements to their zeros, base inside, fittings for a positive, no presets",
+        moves=True,
+        help="elements to their zeros, base inside, fittings for a positive, no presets",
     ),
-    Command("*SRE", _enable_service, (Quantity(whole=True, name="mask"),), about="bits that ask for service"),
+    Command("*SRE", _enable_service, (Quantity(whole=True, name="mask"),), help="bits that ask for service"),
     Command("*SRE?", lambda e, c: str(e.status.service_enable)),
-    Command("*STB?", lambda e, c: str(e.status.status_byte()), polls=True, about="status byte"),
-    Command("*TST?", lambda e, c: "0", about="0: the instrument finds itself in order"),
-    Command("*WAI", lambda e, c: None, waits=True, about="wait until all movement is done"),
-    Command("SYSTem:ERRor[:NEXT]?", lambda e, c: e.status.next_error(), about="oldest error, taken off the queue"),
-    Command("SYSTem:ERRor:COUNt?", lambda e, c: str(len(e.status.errors)), about="errors in the queue"),
-    Command("SYSTem:VERSion?", lambda e, c: SCPI_VERSION, about="version of SCPI"),
-    Command("SYSTem:HELP:HEADers?", lambda e, c: ",".join(map(quote_text, e.headers)), about="all headers, in quotes"),
+    Command("*STB?", lambda e, c: str(e.status.status_byte()), polls=True, help="status byte"),
+    Command("*TST?", lambda e, c: "0", help="0: the instrument finds itself in order"),
+    Command("*WAI", lambda e, c: None, waits=True, help="wait until all movement is done"),
+    Command("SYSTem:ERRor[:NEXT]?", lambda e, c: e.status.next_error(), help="oldest error, taken off the queue"),
+    Command("SYSTem:ERRor:COUNt?", lambda e, c: str(len(e.status.errors)), help="errors in the queue"),
+    Command("SYSTem:VERSion?", lambda e, c: SCPI_VERSION, help="version of SCPI"),
+    Command("SYSTem:HELP:HEADers?", lambda e, c: ",".join(map(quote_text, e.headers)), help="all headers, in quotes"),
     Command(
         "SYSTem:LOCK:REQuest?",
         lambda e, c: "1" if e.desk.request_lock(e.client) else "0",
-        about="1: this client alone may turn now; 0: another may",
+        help="1: this client alone may turn now; 0: another may",
     ),
     Command(
         "SYSTem:LOGin",
         _log_in,
         (Quoted("token"),),
-        open_to_all=True,
-        about="first of all, where the instrument is served to other machines",
+        allowed_before_login=True,
+        help="first of all, where the instrument is served to other machines",
     ),
-    Command("SYSTem:LOCK:RELease", _release, about="give the lock back"),
+    Command("SYSTem:LOCK:RELease", _release, help="give the lock back"),
     *_registers("OPERation", lambda e: e.status.operation),
     *_registers("QUEStionable", lambda e: e.status.questionable),
-    Command("STATus:PRESet", _preset_status, about="report nothing of the two registers"),
+    Command("STATus:PRESet", _preset_status, help="report nothing of the two registers"),
 ]
