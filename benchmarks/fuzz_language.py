@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from figures import Figure, Target, tell
 
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import MAX_LINE_LENGTH, Desk
+from a7sim.instrument.language import MAX_LINE_LENGTH, SharedInstrument
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.status import QUEUE_LENGTH, Status
 from a7sim.instrument.language.table import Choice, Quantity, short_form
@@ -203,7 +203,7 @@ def instruments(seed):
     number = 0
     while True:
         number += 1
-        desk = Desk(build_autograph(scenario.instrument, drawer, seed))
+        desk = SharedInstrument(build_autograph(scenario.instrument, drawer, seed))
         desk.open().feed(MOUNTING, 0.0)
         if number % 4 == 0:
             desk.token = "not to be guessed"

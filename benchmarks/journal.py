@@ -15,12 +15,12 @@ from pathlib import Path
 from figures import Figure, Target, tell
 
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import run
 from a7sim.session.durable import DURABILITIES
-from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.lines import read_journal
 from a7sim.session.replaying import Replay, replay_lines
 
@@ -34,7 +34,7 @@ TARGETS = {"none": Target("below", 15)}
 
 
 def seconds(scenario, folder, durability):
-    keeping = Keeping(durability) if durability else None
+    keeping = JournalOptions(durability) if durability else None
     began = time.perf_counter()
     run(scenario, SEED, folder if durability else None, keeping=keeping, force=True)
     return time.perf_counter() - began
@@ -63,10 +63,10 @@ def cost(home, repeats):
 def long_session(folder, events):
     """Leave the journal of a session of so many events: turning, looking, reading, registering."""
     scenario = load_scenario("akwanga")
-    desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, SEED).mountable, SEED))
+    desk = SharedInstrument(build_autograph(scenario.instrument, build_scene(scenario, SEED).mountable, SEED))
     folder.mkdir()
     dice = random.Random(SEED)
-    with Journal(Keeping("none")).recording(folder, make_header("serve", scenario, SEED), desk) as journal:
+    with Journal(JournalOptions("none")).recording(folder, make_header("serve", scenario, SEED), desk) as journal:
         desk.listener = journal.on_link_event
         engine = desk.open()
         engine.feed(b'PHOT1:LOAD "101";:PHOT2:LOAD "102";:BASE:BX 194.99\n', 0.0)

@@ -18,9 +18,9 @@ from statistics import median
 from figures import Figure, Target, tell
 from msgspec.structs import replace
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.training.attempts import run_attempt
-from a7sim.training.exercise import Played
+from a7sim.training.exercise import PlayedRun
 from a7sim.training.grading import grade_folder
 from a7sim.training.shelf import all_exercises, find_exercise
 
@@ -35,9 +35,9 @@ ASKED_OF = 50
 OF = range(5, 12)
 
 BY_HAND = {
-    "03-interior": Played(procedure="interior orientation"),
-    "04-parallax": Played(procedure="measure parallaxes"),
-    "05-one-projector": Played(procedure="relative orientation"),
+    "03-interior": PlayedRun(procedure="interior orientation"),
+    "04-parallax": PlayedRun(procedure="measure parallaxes"),
+    "05-one-projector": PlayedRun(procedure="relative orientation"),
 }
 """What the operator does where the reference is a script."""
 
@@ -87,7 +87,7 @@ def attempt(name, profile, seed):
         try:
             run_attempt(shelved, played, Path(place), seed)
             grade = grade_folder(shelved, seed, Path(place))
-        except Mistake as mistake:
+        except A7SimError as mistake:
             raise SystemExit(f"{name}, {profile}, seed {seed}: {mistake}") from mistake
     return grade.passed, grade.points, grade.minutes, [each.id for each in grade.failed]
 

@@ -25,7 +25,7 @@ from a7sim.session.crowd import open_batch
 from a7sim.session.strips import ground_control, models_from_documents
 from a7sim.standard_points import CASES
 from a7sim.study.loading import StudyError, load_study
-from a7sim.study.running import Pace
+from a7sim.study.running import ChunkPolicy
 from a7sim.study.simulating import replicate_seed
 
 TARGET = Target("at most", 5, "ratio")
@@ -189,7 +189,7 @@ def growth(replicates):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--replicates", type=int, default=200)
-    parser.add_argument("--chunk", type=int, default=Pace.largest_chunk, help="replicates at once")
+    parser.add_argument("--chunk", type=int, default=ChunkPolicy.largest_chunk, help="replicates at once")
     parser.add_argument("--growth", type=int, default=200, help="replicates of how time grows; 0 for none")
     asked = parser.parse_args()
     figures = the_whole(asked.replicates, asked.chunk)

@@ -11,7 +11,7 @@ from figures import Figure, Target, tell
 
 from a7sim.session.lines import read_journal
 from a7sim.training.attempts import run_attempt
-from a7sim.training.exercise import Played
+from a7sim.training.exercise import PlayedRun
 from a7sim.training.grading import grade_folder
 from a7sim.training.handed_in import grade_submissions
 from a7sim.training.room import replay_environment
@@ -20,7 +20,7 @@ from a7sim.training.variation import attempt_seed
 
 STUDENTS, CORES = 200, 2
 
-DONE = (("4", Played(procedure="measure parallaxes", observer={"skill": "trained"})), ("14", None), ("1", None))
+DONE = (("4", PlayedRun(procedure="measure parallaxes", observer={"skill": "trained"})), ("14", None), ("1", None))
 """A long journal, one whose papers are to be made again, and a short one, by turns."""
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from tests.sitting_down import Person
 
 from a7sim.console.app import Console
-from a7sim.console.eyepiece import Drawing
-from a7sim.console.seat import Seat
+from a7sim.console.eyepiece import DrawingMode
+from a7sim.console.seat import ConsoleConfig
 from a7sim.console.sheet import JobSheet
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
@@ -135,12 +135,12 @@ def main():
         attempt = progress.begin("ada", shelved)
         with start_attempt(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
             port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
-            seat = Seat(
+            seat = ConsoleConfig(
                 lambda: Client(port),
                 lambda: room.clock.now,
                 where="exercise 4",
                 sheet=JobSheet("exercise 4", room.scenario.camera),
-                drawing=Drawing.HALVES,
+                drawing=DrawingMode.HALVES,
                 tasks=Checklist(room, attempt).lines,
             )
             asyncio.run(work(Console(seat), room))

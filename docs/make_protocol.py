@@ -12,12 +12,12 @@ from itertools import groupby
 from pathlib import Path
 
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk, Engine, ErrorNumber
+from a7sim.instrument.language import Engine, ErrorNumber, SharedInstrument
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.commands.carriages import MAX_READING
 from a7sim.instrument.language.commands.pictures import MAX_PICTURE
 from a7sim.instrument.language.table import Choice, Command, Quantity, QuotedOrNumber, short_form
-from a7sim.instrument.refusals import Refusal
+from a7sim.instrument.refusals import AutographError
 from a7sim.link.clock import Clock
 from a7sim.link.replies import parse_reply, part_as_text
 from a7sim.link.waiting import feed_until_idle
@@ -191,7 +191,7 @@ class Instrument:
 
     def __init__(self, variant):
         scenario, drawer = _equipment(variant)
-        self.engine: Engine = Desk(build_autograph(scenario.instrument, drawer, 7)).open()
+        self.engine: Engine = SharedInstrument(build_autograph(scenario.instrument, drawer, 7)).open()
         self._clock = Clock()
         self.say(MOUNTED[variant])
 
@@ -253,7 +253,7 @@ def _of_both(quantity, engine, command):
 def _limits(quantity, engine, number):
     try:
         low, high, usual = quantity.limits(engine, number)
-    except Refusal:
+    except AutographError:
         return "not on it"
     unit = quantity.unit_there(engine) if quantity.unit_there else quantity.unit
     if high == MAX_READING:

@@ -22,12 +22,12 @@ HEAD = """# The Python face
 
 Everything a script needs comes from `a7sim` itself. Importing it is light: what is named is imported when it is asked
 for, and it is typed (`py.typed`). This page is written from the docstrings by `docs/make_python.py`, and a test runs
-every example. A mistake of a user is an `a7sim.Mistake`, whose text is one sentence.
+every example. A mistake of a user is an `a7sim.A7SimError`, whose text is one sentence.
 """
 
 ORDER = (
-    *("connect", "Client", "InstrumentRefused", "Scenario", "Operator", "Study", "Autograph"),
-    *("reduction", "computing", "Mistake"),
+    *("connect", "Client", "InstrumentError", "Scenario", "Operator", "Study", "Autograph"),
+    *("reduction", "computing", "A7SimError"),
 )
 """The names in the order in which a script meets them."""
 

@@ -3,7 +3,7 @@
 from functools import cache
 
 from a7sim.instrument import Autograph, build_autograph
-from a7sim.instrument.language import Desk, Listener
+from a7sim.instrument.language import Listener, SharedInstrument
 from a7sim.link.clock import Clock
 from a7sim.link.waiting import feed_until_idle
 from a7sim.manual import VARIANTS
@@ -23,8 +23,8 @@ MODEL_1 = (
 class Door:
     """A client of an instrument."""
 
-    def __init__(self, desk: Desk | None = None, cr_ends_line: bool = True) -> None:
-        self.desk = desk or Desk(Autograph(VARIANTS["A7"]))
+    def __init__(self, desk: SharedInstrument | None = None, cr_ends_line: bool = True) -> None:
+        self.desk = desk or SharedInstrument(Autograph(VARIANTS["A7"]))
         self.engine = self.desk.open(cr_ends_line=cr_ends_line)
         self.clock = Clock()
 
@@ -52,7 +52,7 @@ def _photographs() -> dict[str, Photograph]:
 
 def with_photographs(listener: Listener | None = None) -> Door:
     """Return a door to Akwanga's instrument, its pictures in the drawer."""
-    return Door(Desk(build_autograph(load_scenario("akwanga").instrument, _photographs(), SEED), listener))
+    return Door(SharedInstrument(build_autograph(load_scenario("akwanga").instrument, _photographs(), SEED), listener))
 
 
 def with_model(listener: Listener | None = None) -> Door:

@@ -6,11 +6,11 @@ import threading
 from collections.abc import Callable
 
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.link.addresses import Address
 from a7sim.link.clock import Clock, WallClock
-from a7sim.link.conversation import Terms
-from a7sim.link.serving import Doors, Server
+from a7sim.link.conversation import ServerLimits
+from a7sim.link.serving import Endpoints, Server
 from a7sim.manual import VARIANTS
 
 ANYWHERE = Address("127.0.0.1", 0)
@@ -67,15 +67,15 @@ class Served:
 
     def __init__(
         self,
-        desk: Desk | None = None,
-        terms: Terms | None = None,
-        doors: Doors | None = None,
+        desk: SharedInstrument | None = None,
+        terms: ServerLimits | None = None,
+        doors: Endpoints | None = None,
         realtime: bool = False,
     ) -> None:
-        self.desk = desk or Desk(Autograph(VARIANTS["A7"]), poll_takes=0.0 if realtime else 0.1)
+        self.desk = desk or SharedInstrument(Autograph(VARIANTS["A7"]), poll_takes=0.0 if realtime else 0.1)
         self.clock = WallClock() if realtime else Clock()
-        self._terms = terms or Terms()
-        self._doors = doors or Doors(tcp=[ANYWHERE])
+        self._terms = terms or ServerLimits()
+        self._doors = doors or Endpoints(tcp=[ANYWHERE])
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._lines: list[Line] = []

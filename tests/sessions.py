@@ -6,7 +6,7 @@ from scipy.optimize import least_squares
 
 from a7sim.geometry import GON, angles_of, mxm, mxv, rotation
 from a7sim.scenario import Observer, load_scenario
-from a7sim.scenario.schema import Film
+from a7sim.scenario.schema import FilmDeformation
 from a7sim.session import open_session
 
 
@@ -27,7 +27,7 @@ def tilted_flight(tilts, **overrides):
 
 def without_errors(scenario):
     """Return a scenario with film and operator faultless, who need not read twice; counters are still read to 0.01."""
-    return read_once(msgspec.structs.replace(scenario, film=Film(), observer=Observer.faultless()))
+    return read_once(msgspec.structs.replace(scenario, film=FilmDeformation(), observer=Observer.faultless()))
 
 
 def read_once(scenario):

@@ -10,11 +10,11 @@ from textual.pilot import Pilot
 from textual.widgets import Input, OptionList
 
 from a7sim.console.app import Console
-from a7sim.console.eyepiece import Drawing, picture_size
+from a7sim.console.eyepiece import DrawingMode, picture_size
 from a7sim.console.hands import STEP_SIZES
-from a7sim.console.seat import Seat
+from a7sim.console.seat import ConsoleConfig
 from a7sim.console.sheet import JobSheet
-from a7sim.console.window import Eyepiece
+from a7sim.console.window import EyepieceWidget
 from a7sim.instrument.language import Listener
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
@@ -28,9 +28,9 @@ def at(door: Door, **others: Any) -> Console:
     """Return a console at a door's instrument, pictures in half-blocks."""
     akwanga = load_scenario("akwanga")
     port = InProcessSerial(desk=door.desk, clock=door.clock, timeout=5.0)
-    drawing = others.pop("drawing", Drawing.HALVES)
+    drawing = others.pop("drawing", DrawingMode.HALVES)
     sheet = JobSheet(akwanga.title, akwanga.camera)
-    return Console(Seat(lambda: Client(port), lambda: 0.0, sheet=sheet, drawing=drawing, **others))
+    return Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, sheet=sheet, drawing=drawing, **others))
 
 
 def at_akwanga(listener: Listener | None = None, **others: Any) -> Console:
@@ -68,7 +68,7 @@ class Person:
 
     def _fills_the_windows(self) -> bool:
         console = self.console
-        sizes = {picture_size(console.view.drawing, *eyepiece.cells) for eyepiece in console.main.query(Eyepiece)}
+        sizes = {picture_size(console.view.drawing, *eyepiece.cells) for eyepiece in console.main.query(EyepieceWidget)}
         sight = console.sight
         return sight is not None and sizes == {(sight.look.columns, sight.look.rows)}
 

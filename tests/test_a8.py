@@ -11,7 +11,7 @@ from serial import serial_for_url
 import a7sim
 from a7sim.geometry import GON, image_of, rotation
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.manual import A7, A8
 from a7sim.reduction.modelling import a8_model_coordinates
 from tests.door import Door
@@ -26,7 +26,7 @@ BASE, C = 184.0, 152.0
 
 
 def an_a8(**photographs) -> Door:
-    return Door(Desk(Autograph(A8, photographs=photographs)))
+    return Door(SharedInstrument(Autograph(A8, photographs=photographs)))
 
 
 def test_it_says_that_it_is_an_a8():
@@ -58,10 +58,10 @@ def test_what_it_has_not_is_a_settings_conflict(line):
 def test_what_it_has_not_is_what_its_data_do_not_list():
     """An A7 whose table had no by is refused it, an A8 whose table had one sets it: no name decides anything."""
     with_by = replace(A8, elements={**A8.elements, "by1": A7.elements["by1"]}, fittings=A7.fittings)
-    door = Door(Desk(Autograph(with_by)))
+    door = Door(SharedInstrument(Autograph(with_by)))
     assert door.say("PROJ1:BY 1.5;:PROJ1:BY?;:FITT:DOVE?") == "1.50;OUT"
     without = replace(A7, elements={name: each for name, each in A7.elements.items() if name != "by1"})
-    door = Door(Desk(Autograph(without)))
+    door = Door(SharedInstrument(Autograph(without)))
     door.say("PROJ1:BY 1;:PROJ2:BY 1;:COMM:PHI 101")
     assert door.errors() == [-221, -221]
 
@@ -186,7 +186,7 @@ def test_readings_of_a_model_become_its_coordinates_by_the_rules_of_p():
     """P 3.1 and 3.2 from the door: the mark set on every point, the scales read, the left centre at the origin."""
     points = {str(i): place for i, place in enumerate(GROUND.T)}
     tilts = (0.6, -0.4, 1.0), (-0.5, 0.7, -2.0)
-    door = Door(Desk(_set_up(_pictures_of(points, *tilts), *tilts)))
+    door = Door(SharedInstrument(_set_up(_pictures_of(points, *tilts), *tilts)))
     door.say('GEAR:HEIG "1:10000"')
     door.say("DRIV:Z -300;:COUN:Z:PRES 400")
     readings = []

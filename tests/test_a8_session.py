@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from a7sim.operator import DoesNotFit, measure_models
+from a7sim.operator import OperatorGaveUp, measure_models
 from a7sim.scenario import ScenarioError, load_scenario
 from a7sim.session import open_session, run
 from tests.sessions import without_errors
@@ -44,7 +44,7 @@ def test_elements_are_those_an_a8_has(without_any_error):
 
 def test_parallaxes_cannot_be_measured_and_the_operator_says_so():
     session = open_session(a8(**{"plan.procedure": '"numerical"'}), 1)
-    with pytest.raises(DoesNotFit, match="an A8 has no by' and by\" to measure parallaxes with"):
+    with pytest.raises(OperatorGaveUp, match="an A8 has no by' and by\" to measure parallaxes with"):
         list(measure_models(session.person, session.job))
 
 

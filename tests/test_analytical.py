@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from a7sim.instrument.local_errors import powers_at, smooth_local_errors
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction import Undetermined
 from a7sim.reduction.absolute import root_mean_square
 from a7sim.reduction.strips import is_centre
 from a7sim.scenario import GridTest, Observer, load_scenario
-from a7sim.scenario.schema import Film
+from a7sim.scenario.schema import FilmDeformation
 from a7sim.scene import build_scene
 from a7sim.session import a8_strip
 from a7sim.session.a8_strip import strip_on_a8
@@ -27,7 +27,9 @@ def perfect(name, **overrides):
     scenario = load_scenario(name, {"comparator.least_count_um": "0.0", **overrides})
     faultless = GridTest(local_um=0.0, principal_distance_mm=0.0, principal_point_mm=0.0)
     instrument = msgspec.structs.replace(scenario.instrument, grid_test=faultless)
-    return msgspec.structs.replace(scenario, film=Film(), observer=Observer.faultless(), instrument=instrument)
+    return msgspec.structs.replace(
+        scenario, film=FilmDeformation(), observer=Observer.faultless(), instrument=instrument
+    )
 
 
 def errors_on_the_ground(result, scene):
@@ -157,7 +159,7 @@ def test_a_model_with_too_few_common_points_is_named():
 
 def test_nobody_works_a_plotter_without_a_plan():
     scenario = load_scenario("schut-1956")
-    with pytest.raises(Mistake, match="plan: expected the settings of a plotter"):
+    with pytest.raises(A7SimError, match="plan: expected the settings of a plotter"):
         strip_on_a8(scenario, build_scene(scenario, 1), 1)
 
 

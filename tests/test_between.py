@@ -6,9 +6,9 @@ import threading
 from contextlib import contextmanager
 
 from a7sim.link import between
-from a7sim.link.between import POLL_INTERVAL_S, Between
+from a7sim.link.between import POLL_INTERVAL_S, RecordingProxy
 from a7sim.link.clock import WallClock
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from tests.served import PATIENCE
 
 AT_ONCE = struct.pack("ii", 1, 0)
@@ -24,14 +24,14 @@ class Recorder:
         self.trouble = None
         self.stop = threading.Event()
         self._is_there = threading.Condition()
-        between_them = Between("a7sim://akwanga", self._listen, WallClock(), self.stop)
+        between_them = RecordingProxy("a7sim://akwanga", self._listen, WallClock(), self.stop)
         self.thread = threading.Thread(target=self._serve, args=(between_them, door))
         self.thread.start()
 
     def _serve(self, between_them, door):
         try:
             between_them.serve(door)
-        except Mistake as mistake:
+        except A7SimError as mistake:
             self.trouble = str(mistake)
 
     def _listen(self, event):

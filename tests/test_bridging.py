@@ -7,11 +7,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.operator import bridging
-from a7sim.operator.bench import Bench, Parallaxes
+from a7sim.operator.bench import Parallaxes, Workstation
 from a7sim.operator.bridging import bridge_strip_batch
-from a7sim.operator.crew import NobodyGoesOn
+from a7sim.operator.crew import AllGaveUpError
 from a7sim.reduction import similarity_by_quaternion
 from a7sim.scenario import ScenarioError, load_scenario
 from a7sim.scenario.schema import GroundPoint
@@ -137,7 +137,7 @@ def test_a_bridge_that_does_not_close_says_why_in_both(monkeypatch):
 
 def _gives_up(bench, who, model, before):
     bench.crew.give_up(who, "no scale")
-    raise NobodyGoesOn
+    raise AllGaveUpError
 
 
 def test_a_scenario_without_base_out_cannot_ask_for_a_bridge():
@@ -146,7 +146,7 @@ def test_a_scenario_without_base_out_cannot_ask_for_a_bridge():
 
 
 def test_a_strip_without_base_out_cannot_be_bridged():
-    with pytest.raises(Mistake, match="inside and outside in turn"):
+    with pytest.raises(A7SimError, match="inside and outside in turn"):
         run_bridge(msgspec.structs.replace(load_scenario("akwanga"), models=load_scenario("akwanga").models[:1]), 1)
 
 
@@ -166,7 +166,7 @@ def test_what_cannot_be_looked_at_again_stays_as_it_was_oriented(monkeypatch):
         apart = np.full(bench.crew.size, points[0], dtype=object)
         return Parallaxes(nothing, np.zeros((3, *nothing.shape)), apart)
 
-    monkeypatch.setattr(Bench, "parallaxes_seen", all_apart)
+    monkeypatch.setattr(Workstation, "parallaxes_seen", all_apart)
     _, models = worked(scenario_of(1))
     assert abs(models[0].orientation.elements["omega2"][0] - 100.0) < 5.0
     assert abs(models[0].orientation.elements["phi2"][0] - 100.0) < 5.0

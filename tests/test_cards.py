@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground, absolute_orientation
 from a7sim.reduction.cards import deck_lines, free_format_lines, is_deck, output_lines, read_cards, write_cards
 from a7sim.reduction.strips import Model, formed_strip, is_centre
@@ -148,7 +148,7 @@ CARDS = [i for i, line in enumerate(DECK.splitlines()) if len(line) == 36]
 def test_a_card_one_column_off_is_found(tmp_path, card, off):
     lines = DECK.splitlines()
     lines[card] = " " + lines[card] if off == "right" else lines[card][1:]
-    with pytest.raises(Mistake, match=rf"aba\.txt, line {card + 1}, columns? \d+"):
+    with pytest.raises(A7SimError, match=rf"aba\.txt, line {card + 1}, columns? \d+"):
         read_cards(deck(tmp_path, "\n".join(lines) + "\n"))
 
 
@@ -157,14 +157,14 @@ def test_a_full_card_one_column_off_is_found_though_every_field_still_reads(tmp_
     full = "   112271" + "12345.678" + "23456.789" + "34567.891"
     lines = DECK.splitlines()
     lines[4] = " " + full if off == "right" else full[1:]
-    with pytest.raises(Mistake, match=r"line 5, columns? \d+"):
+    with pytest.raises(A7SimError, match=r"line 5, columns? \d+"):
         read_cards(deck(tmp_path, "\n".join(lines) + "\n"))
 
 
 @pytest.mark.parametrize("off", [" ", ""])
 def test_a_control_card_off_its_columns_is_found(tmp_path, off):
     text = DECK.replace("  -2\n", f"{off}  -2\n" if off else " -2\n", 1)
-    with pytest.raises(Mistake, match="line 7, column"):
+    with pytest.raises(A7SimError, match="line 7, column"):
         read_cards(deck(tmp_path, text))
 
 
@@ -209,7 +209,7 @@ def deck_lines_of(read):
 )
 def test_a_bad_card_is_named_by_file_line_and_column(tmp_path, old, new, where):
     assert old in DECK
-    with pytest.raises(Mistake) as caught:
+    with pytest.raises(A7SimError) as caught:
         read_cards(deck(tmp_path, DECK.replace(old, new, 1)))
     assert f"aba.txt, {where}" in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -219,17 +219,17 @@ def test_a_bad_card_is_named_by_file_line_and_column(tmp_path, old, new, where):
 def test_files_that_are_no_decks_are_refused(tmp_path):
     lines = DECK.splitlines(keepends=True)
     for text in ("", "\n\n", "".join(lines[:3]), "".join(lines[:4]), "".join(lines[:10]), "".join(lines[:11])):
-        with pytest.raises(Mistake, match=r"aba\.txt"):
+        with pytest.raises(A7SimError, match=r"aba\.txt"):
             read_cards(deck(tmp_path, text))
-    with pytest.raises(Mistake, match="readable"):
+    with pytest.raises(A7SimError, match="readable"):
         read_cards(tmp_path / "none.txt")
     noise = tmp_path / "noise.txt"
     with noise.open("wb") as file:
         file.truncate(100_000_000)
-    with pytest.raises(Mistake, match="at most"):
+    with pytest.raises(A7SimError, match="at most"):
         read_cards(noise)
     (tmp_path / "bytes.txt").write_bytes(np.random.default_rng(0).bytes(5000))
-    with pytest.raises(Mistake, match=r"bytes\.txt, line \d+, column \d+"):
+    with pytest.raises(A7SimError, match=r"bytes\.txt, line \d+, column \d+"):
         read_cards(tmp_path / "bytes.txt")
 
 
@@ -241,19 +241,19 @@ def without_centres(model):
 
 def test_what_does_not_fit_a_card_is_refused():
     models, ground = strip_of(np.random.default_rng(1), 2)
-    with pytest.raises(Mistake, match="nine columns"):
+    with pytest.raises(A7SimError, match="nine columns"):
         deck_lines(Ground(("1",), np.array([[4505079.577], [0.0], [0.0]]), ("control",)), models)
-    with pytest.raises(Mistake, match="at most 5 digits"):
+    with pytest.raises(A7SimError, match="at most 5 digits"):
         deck_lines(Ground(("8031901",), np.zeros((3, 1)), ("control",)), models)
     named = Model("left", models[0].points, models[0].coordinates)
-    with pytest.raises(Mistake, match="at most 4 digits"):
+    with pytest.raises(A7SimError, match="at most 4 digits"):
         deck_lines(ground, [named])
-    with pytest.raises(Mistake, match=r"expected one common projection centre \(<photo>:centre\)"):
+    with pytest.raises(A7SimError, match=r"expected one common projection centre \(<photo>:centre\)"):
         deck_lines(ground, [without_centres(model) for model in strip_of(np.random.default_rng(1), 3)[0]])
 
 
 def test_free_format_models_end_with_minus_99():
     lines = free_format_lines([Model("12", ("3:centre", "101"), np.array([[0.0, 1.5], [0.0, 2.0], [150.0, -0.25]]))])
     assert lines == ["12", "3 0.0000 0.0000 150.0000", "101 1.5000 2.0000 -0.2500", "-99"]
-    with pytest.raises(Mistake, match="number of its own"):
+    with pytest.raises(A7SimError, match="number of its own"):
         free_format_lines([Model("12", ("3:centre", "3"), np.zeros((3, 2)))])

@@ -7,13 +7,13 @@ import pytest
 import serial
 
 import a7sim
-from a7sim.instrument.language import Desk
-from a7sim.link.client import Client, Identity, InstrumentRefused
+from a7sim.instrument.language import SharedInstrument
+from a7sim.link.client import Client, Identity, InstrumentError
 from a7sim.link.completion import completions
 from a7sim.link.exchange import send_line
 from a7sim.link.opening import open_port, port_errors
-from a7sim.link.replies import NotAReply, parse_reply
-from a7sim.mistakes import Mistake
+from a7sim.link.replies import MalformedReplyError, parse_reply
+from a7sim.mistakes import A7SimError
 from tests.door import MODEL_1
 from tests.test_language import EXAMPLES
 from tests.wires import new_desk, served
@@ -72,7 +72,7 @@ def unused_port():
     ],
 )
 def test_what_cannot_be_opened_is_one_clear_sentence(url, sentence):
-    with pytest.raises(Mistake, match=sentence) as raised:
+    with pytest.raises(A7SimError, match=sentence) as raised:
         open_port(url)
     assert "\n" not in str(raised.value)
     assert url in str(raised.value)
@@ -80,14 +80,16 @@ def test_what_cannot_be_opened_is_one_clear_sentence(url, sentence):
 
 @pytest.mark.parametrize("scheme", ["tcp", "socket", "rfc2217"])
 def test_where_nobody_listens_it_is_said(scheme):
-    with pytest.raises(Mistake, match=r"127\.0\.0\.1:\d+: expected an instrument to answer there: connection refused"):
+    with pytest.raises(
+        A7SimError, match=r"127\.0\.0\.1:\d+: expected an instrument to answer there: connection refused"
+    ):
         open_port(f"{scheme}://127.0.0.1:{unused_port()}")
 
 
 def test_a_line_that_breaks_is_one_clear_sentence():
     with socket.create_server(("127.0.0.1", 0)) as server:
         url = f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        with pytest.raises(Mistake, match=f"{url}: the line broke: the other end hung up"), port_errors(url):
+        with pytest.raises(A7SimError, match=f"{url}: the line broke: the other end hung up"), port_errors(url):
             port = open_port(url)
             server.accept()[0].close()
             port.readline()
@@ -158,7 +160,7 @@ def test_a_client_holds_the_lock_while_it_works_and_gives_it_back(client, desk):
 def test_a_client_is_told_that_another_holds_the_lock(client, desk):
     other = desk.open()
     other.feed(b"SYST:LOCK:REQ?\n", 0.0)
-    with pytest.raises(InstrumentRefused, match="another client holds the lock"), client.lock():
+    with pytest.raises(InstrumentError, match="another client holds the lock"), client.lock():
         pytest.fail("the lock was given twice")
     desk.close(other.client)
 
@@ -219,7 +221,7 @@ def test_a_reply_is_taken_apart_when_it_is_whole_and_not_before(received, parts,
 
 @pytest.mark.parametrize("received", [b"#0abc\n", b"#x\n", b"#2ab1\n", b"#11ab\n"])
 def test_bytes_that_are_no_reply_are_not_taken_for_one(received):
-    with pytest.raises(NotAReply):
+    with pytest.raises(MalformedReplyError):
         parse_reply(received)
 
 
@@ -230,7 +232,7 @@ def test_a_client_reads_a_picture_behind_other_answers(client):
     done, grey, base = client.reply()
     assert (done, len(grey), base) == ("1", 20000, "194.99")
     assert client.block("EYEP1:PICT? 200,100,1") == grey
-    with pytest.raises(InstrumentRefused):
+    with pytest.raises(InstrumentError):
         client.block("*OPC?")
     client.send("PHOT1:UNL;:PHOT2:UNL")
     assert client.errors() == []
@@ -265,7 +267,7 @@ def test_an_exchange_is_the_reply_to_a_line_and_the_errors_of_it(client, line, s
 
 def test_a_line_that_nobody_answers_is_one_clear_sentence(pair):
     port, _ = pair
-    with pytest.raises(Mistake, match=r"\*OPC\?: expected an answer in time, got none"):
+    with pytest.raises(A7SimError, match=r"\*OPC\?: expected an answer in time, got none"):
         send_line(Client(port), "*OPC?")
 
 
@@ -314,10 +316,10 @@ def test_whatever_is_completed_is_a_header_of_the_instrument(client):
 
 
 def test_who_has_not_logged_in_is_told_of_the_token(desk):
-    guarded = Desk(desk.autograph)
+    guarded = SharedInstrument(desk.autograph)
     guarded.token = "secret"
     with served("tcp", guarded) as url:
-        with Client.open(url, timeout=SHORT) as stranger, pytest.raises(Mistake, match="asks for a token"):
+        with Client.open(url, timeout=SHORT) as stranger, pytest.raises(A7SimError, match="asks for a token"):
             send_line(stranger, "BASE:BX?")
         with Client.open(url, timeout=SHORT, token="secret") as friend:
             assert send_line(friend, "BASE:BX?").shown == "0.00"

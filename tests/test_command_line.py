@@ -16,7 +16,7 @@ from click.shell_completion import BashComplete
 from a7sim.cli import cli, doctor, main
 from a7sim.cli.options import PLOTTERS
 from a7sim.cli.prompt import data_folder
-from a7sim.cli.verbs import Verbs
+from a7sim.cli.verbs import LazyGroup
 from a7sim.manual import VARIANTS
 from a7sim.shelves import bundled_names
 from tests.processes import a7sim_here
@@ -227,7 +227,7 @@ def test_an_option_that_no_command_has_is_refused_by_all(typed, name):
     assert err.startswith("a7sim: ")
 
 
-@pytest.mark.parametrize("group", [name for name, each in COMMANDS.items() if isinstance(each, Verbs)])
+@pytest.mark.parametrize("group", [name for name, each in COMMANDS.items() if isinstance(each, LazyGroup)])
 def test_what_a_list_says_of_a_command_fits_a_line(typed, group):
     _, listed, _ = typed(*group.split(), "--help")
     lines = listed.partition("Commands:\n")[2].splitlines()

@@ -7,20 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from a7sim.mistakes import Mistake
-from a7sim.operator.bench import Bench
+from a7sim.mistakes import A7SimError
+from a7sim.operator.bench import Workstation
 from a7sim.operator.compilation import Compilation
-from a7sim.operator.crew import Crew
+from a7sim.operator.crew import OperatorBatch
 from a7sim.operator.level_model import level_model
-from a7sim.operator.line_hands import LineHands
-from a7sim.operator.map_lines import Area, Errand, Spots, Tracing, as_polyline
-from a7sim.operator.plotting import Order, Sheet, _heights
+from a7sim.operator.line_hands import ScpiDriver
+from a7sim.operator.map_lines import Area, LineTarget, SpotHeights, Tracing, as_polyline
+from a7sim.operator.plotting import CompiledMap, MapRequest, _heights
 from a7sim.operator.stereo_view import FINE_MM, StereoView
 from a7sim.operator.work import measure_models_batch
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import open_session
-from a7sim.session.compiling import Wanted, compile_model
+from a7sim.session.compiling import CompilationRequest, compile_model
 from a7sim.session.map_sheet import index_contours, to_geojson, to_svg
 from a7sim.session.strips import given_control, ground_control
 from tests.sessions import without_errors
@@ -41,7 +41,7 @@ class Worker:
         job = replace(self.session.job, models=self.session.job.models[:1])
         person = self.session.person
         person.book.set_heading("", "preparation")
-        self.bench = Bench(Crew.single(person), LineHands(person), job)
+        self.bench = Workstation(OperatorBatch.single(person), ScpiDriver(person), job)
         self.record = next(measure_models_batch(self.bench)).of(0)
         self.view = StereoView(self.bench, person)
         control = ground_control(scenario, self.session.scene)
@@ -58,7 +58,7 @@ class Worker:
         return (up if height is None else height) - self.session.scene.ground.height(east, north)
 
     def sheet(self, lines, heights):
-        return Sheet(
+        return CompiledMap(
             self.record, self.model, self.area, self.spots, tuple(lines), heights, 1.5, 1220.0, 0.05, 0.1
         )  # fmt: skip
 
@@ -141,7 +141,7 @@ def test_a_road_is_followed_by_its_middle(worker):
     readings = worker.model.readings_of(np.array([east, north, np.full(east.size, 455.0)]))
     within = [i for i in range(east.size) if worker.area.holds(readings[:2, i])]
     start, towards, end = ((east[i], north[i]) for i in (within[2], within[4], within[-1]))
-    line = work.line(Errand("road1", "road", start, towards, end), worker.spots)
+    line = work.line(LineTarget("road1", "road", start, towards, end), worker.spots)
     at = worker.model.on_ground(line.readings)
     off = [float(worker.session.scene.lines["road1"].distance(place[:, None])[0]) for place in at[:2].T]
     assert len(off) > 5
@@ -204,23 +204,23 @@ def test_index_contours_are_every_fifth_of_their_interval():
 
 
 def test_a_height_outside_the_model_is_a_mistake(worker):
-    with pytest.raises(Mistake, match=r"--contour 900: expected a height within the model"):
-        _heights(Order((900.0,), None, (), Tracing(0.0)), worker.spots)
-    flat = Spots(np.zeros((3, 1, 2)), np.array([[1.0, 2.0]]))
-    with pytest.raises(Mistake, match="at most 100 contours"):
-        _heights(Order((), 0.001, (), Tracing(0.0)), flat)
+    with pytest.raises(A7SimError, match=r"--contour 900: expected a height within the model"):
+        _heights(MapRequest((900.0,), None, (), Tracing(0.0)), worker.spots)
+    flat = SpotHeights(np.zeros((3, 1, 2)), np.array([[1.0, 2.0]]))
+    with pytest.raises(A7SimError, match="at most 100 contours"):
+        _heights(MapRequest((), 0.001, (), Tracing(0.0)), flat)
 
 
 @pytest.mark.parametrize(
     ("wanted", "said"),
     [
-        (Wanted("9", (460.0,)), "--model: expected one of 1, 2"),
-        (Wanted("1", lines=("road9",)), "--line: expected one of road1, track1, got road9"),
-        (Wanted("1"), "compile: expected a --contour"),
+        (CompilationRequest("9", (460.0,)), "--model: expected one of 1, 2"),
+        (CompilationRequest("1", lines=("road9",)), "--line: expected one of road1, track1, got road9"),
+        (CompilationRequest("1"), "compile: expected a --contour"),
     ],
 )
 def test_what_cannot_be_compiled_is_said_before_any_work(wanted, said):
-    with pytest.raises(Mistake, match=said):
+    with pytest.raises(A7SimError, match=said):
         compile_model(load_scenario("akwanga"), 1, wanted)
 
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from a7sim.geometry import GON, length_of, rotation
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.condition import FAULT_SIGMAS, draw_condition, local_coefficients
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.instrument.local_errors import smooth_local_errors
 from a7sim.instrument.projection import attitude_from_angles, eccentric_offset, place_on_carrier, pose
-from a7sim.instrument.spindles import Counter, Runout, Spindle
+from a7sim.instrument.spindles import Counter, PeriodicError, Spindle
 from a7sim.manual import A7, VARIANTS
 from a7sim.scenario import (
     Condition,
@@ -50,7 +50,7 @@ def grid_test(stated: Instrument, seed: int, projector: int) -> float:
     Every cross is brought under the mark from the lower left, the scales are read, and shift, principal distance, swing
     and both tilts are taken off.
     """
-    door = Door(Desk(build_autograph(stated, {"grid": photograph("grid", CROSSES)}, seed)))
+    door = Door(SharedInstrument(build_autograph(stated, {"grid": photograph("grid", CROSSES)}, seed)))
     door.say(f'PHOT{projector}:LOAD "grid";:PROJ{projector}:PDIS 150;:DRIV:Z -300')
     scales = VARIANTS[stated.variant].scales
     units = np.array([scales[axis].units_per_mm for axis in "XY"])
@@ -211,7 +211,7 @@ PLAY = 0.05
 def _parallaxes(approach):
     """Return the y-parallax in um at photo scale each time by' was set to zero after `approach` of its turns."""
     pictures = {"L": photograph("L", {"P": (0.0, 0.0)}), "R": photograph("R", {"P": (-90.0, 0.0)})}
-    door = Door(Desk(Autograph(A7, Condition(backlash_mm=PLAY), pictures)))
+    door = Door(SharedInstrument(Autograph(A7, Condition(backlash_mm=PLAY), pictures)))
     door.say('PHOT1:LOAD "L";:PHOT2:LOAD "R";:BASE:BX 180;:DRIV:Z -300')
     seen = []
     for start in approach:
@@ -251,7 +251,7 @@ def test_the_error_of_a_screw_repeats_with_every_turn():
 
 @given(st.floats(-250.0, 250.0), st.floats(0.0, 0.05), st.floats(0.0, 6.3))
 def test_the_truth_about_a_place_undoes_the_screws(place, amplitude, phase):
-    spindle = Spindle(-280.0, 280.0, 0.0, periodic_error=Runout(amplitude, 5.0, phase))
+    spindle = Spindle(-280.0, 280.0, 0.0, periodic_error=PeriodicError(amplitude, 5.0, phase))
     spindle.turn_to(spindle.position_without_periodic_error(place), np.random.default_rng(0))
     assert spindle.position == pytest.approx(place, abs=1e-9)
 
@@ -260,7 +260,7 @@ def test_the_truth_about_a_place_undoes_the_screws(place, amplitude, phase):
 
 
 def test_a_counter_that_never_carries_loses_every_unit_until_it_is_preset():
-    door = Door(Desk(Autograph(A7, Condition(counter_slip_share=1.0))))
+    door = Door(SharedInstrument(Autograph(A7, Condition(counter_slip_share=1.0))))
     assert door.say("WHE:X 0.6;:COUN:X?") == "0.60"
     assert door.say("WHE:X 0.6;:COUN:X?") == "0.20"
     assert door.say("WHE:X -0.6;:COUN:X?") == "0.60"
@@ -356,7 +356,7 @@ def test_nothing_but_the_view_differs_between_a_faulty_instrument_and_a_faultles
         "DRIV:X? ;:COMM:PHI 101;:COMM:PHI?;:SYST:ERR?;:SYST:ERR?",
     ]
     faulty, faultless = (
-        Door(Desk(build_autograph(instrument(each, variant), {"L": photograph("L", {"P": (1.0, 2.0)})}, 6)))
+        Door(SharedInstrument(build_autograph(instrument(each, variant), {"L": photograph("L", {"P": (1.0, 2.0)})}, 6)))
         for each in (upkeep, Condition())
     )
     for line in lines:

@@ -8,20 +8,20 @@ from typing import Any
 import pytest
 
 from a7sim.console.app import Console
-from a7sim.console.drum_panels import Elements, Wheeled
-from a7sim.console.eyepiece import Drawing
+from a7sim.console.drum_panels import DrumScrolled, ElementsPanel
+from a7sim.console.eyepiece import DrawingMode
 from a7sim.console.keymap import actions_for
 from a7sim.console.looking import MAGNIFICATIONS
-from a7sim.console.panels import Book
-from a7sim.console.prints import Pointed
-from a7sim.console.seat import Seat
-from a7sim.console.window import Eyepiece
+from a7sim.console.panels import BookPanel
+from a7sim.console.prints import PointClicked
+from a7sim.console.seat import ConsoleConfig
+from a7sim.console.window import EyepieceWidget
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk, LinkEvent
+from a7sim.instrument.language import LinkEvent, SharedInstrument
 from a7sim.link.addresses import Address
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.link.serving import Doors
+from a7sim.link.serving import Endpoints
 from a7sim.scenario import load_scenario
 from tests.door import Door, with_model, with_photographs
 from tests.served import Served
@@ -78,7 +78,7 @@ def test_a_person_orients_by_eye_and_what_is_recorded_is_what_the_same_lines_giv
             entries = console.entries
             assert [entry.point for entry in entries] == list(POINTS)
             assert all(name == "by'" for entry in entries for name, _ in entry.elements)
-            shown = str(console.query_one(Book).render())
+            shown = str(console.query_one(BookPanel).render())
             assert all(point in shown for point in POINTS)
             await pilot.press("q")
         assert console.return_code == 0
@@ -131,7 +131,7 @@ def test_keys_pressed_before_anything_answers_are_done_when_it_does() -> None:
         assert answers.wait(20.0)
         return Client(InProcessSerial(desk=door.desk, clock=door.clock, timeout=5.0))
 
-    console = Console(Seat(connected, lambda: 0.0, drawing=Drawing.HALVES))
+    console = Console(ConsoleConfig(connected, lambda: 0.0, drawing=DrawingMode.HALVES))
 
     async def sit_down() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
@@ -178,7 +178,7 @@ def test_the_drum_under_the_mouse_turns_and_is_taken_up() -> None:
             await person.settle()
 
             async def rolled(drum: str, way: int) -> None:
-                console.post_message(Wheeled(drum, way))
+                console.post_message(DrumScrolled(drum, way))
                 await person.settle()
 
             for drum, hands, side in (("by2", "by", 2), ("kappa1", "kappa", 1), ("bx", "bx", 1)):
@@ -206,12 +206,12 @@ def test_in_free_hand_a_click_in_the_left_picture_brings_that_place_under_the_ma
             await person.look_on()
             await person.press("down")
             at_wheels = dict(console.dials.counters)
-            console.post_message(Eyepiece.Clicked(4, 2))
+            console.post_message(EyepieceWidget.Clicked(4, 2))
             await person.settle()
             assert console.dials.counters == at_wheels
             await person.press("h")
             await person.look_on()
-            console.post_message(Eyepiece.Clicked(4, 2))
+            console.post_message(EyepieceWidget.Clicked(4, 2))
             await person.settle()
             moved = {axis: float(console.dials.counters[axis]) - float(at_wheels[axis]) for axis in "XYZ"}
             assert moved["X"] > 0.0 and moved["Z"] == 0.0
@@ -266,7 +266,7 @@ def test_what_the_instrument_refuses_is_one_sentence_and_nothing_moves() -> None
 def test_a_question_that_is_refused_does_not_break_the_conversation() -> None:
     door = with_photographs()
     port = InProcessSerial(desk=door.desk, clock=door.clock, timeout=0.1)
-    console = Console(Seat(lambda: Client(port), lambda: 0.0))
+    console = Console(ConsoleConfig(lambda: Client(port), lambda: 0.0))
 
     async def sit_down() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
@@ -295,7 +295,7 @@ def test_the_book_strikes_out_and_never_erases() -> None:
             await person.press("enter", "x", "x", "x")
             assert [entry.struck for entry in console.entries] == [True, True]
             assert person.message() == "there is nothing in the book to strike out"
-            assert str(console.query_one(Book).render()).startswith("x  1 P1")
+            assert str(console.query_one(BookPanel).render()).startswith("x  1 P1")
 
     played(sit_down())
     assert door.say("REC:COUN?;:REC:LAST?").endswith('"struck: struck out at the console"')
@@ -303,7 +303,7 @@ def test_the_book_strikes_out_and_never_erases() -> None:
 
 def test_a8_has_the_same_hands_and_says_what_it_lacks() -> None:
     akwanga = load_scenario("akwanga-a8")
-    desk = Desk(build_autograph(akwanga.instrument, {}, 7))
+    desk = SharedInstrument(build_autograph(akwanga.instrument, {}, 7))
     console = at(Door(desk))
 
     async def sit_down() -> None:
@@ -332,7 +332,7 @@ def test_eyepieces_and_counters_are_on_every_screen(size: tuple[int, int]) -> No
                 assert words in frame
             assert ("sketch 101" in frame) == (size[0] >= 100), "sketches go first"
             assert ("fittings" in frame) == (size[0] >= 100), "then the fittings"
-            assert all(eye.cells[0] % 2 and eye.cells[1] % 2 for eye in console.query(Eyepiece))
+            assert all(eye.cells[0] % 2 and eye.cells[1] % 2 for eye in console.query(EyepieceWidget))
             await person.press("tab", "tab")
             assert size[0] >= 100 or "sketch 101" in "\n".join(await person.frame())
 
@@ -352,7 +352,7 @@ def test_a_resize_in_mid_turn_only_changes_the_size() -> None:
             await pilot.resize_terminal(160, 48)
             await person.settle()
             assert console.dials.counters["X"] == "3.00"
-            assert console.sight.look.columns == console.query(Eyepiece).first().cells[0]
+            assert console.sight.look.columns == console.query(EyepieceWidget).first().cells[0]
 
     played(sit_down())
 
@@ -376,7 +376,7 @@ def test_nothing_is_drawn_when_nothing_changes() -> None:
 
 
 def test_plain_says_in_words_what_the_eyes_see() -> None:
-    console = at(with_model(), drawing=Drawing.WORDS)
+    console = at(with_model(), drawing=DrawingMode.WORDS)
 
     async def sit_down() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
@@ -395,9 +395,9 @@ def test_plain_says_in_words_what_the_eyes_see() -> None:
 def test_a_dead_link_is_a_banner_and_a_new_one_is_taken_up() -> None:
     first = Served(with_photographs().desk)
     first.__enter__()
-    second = Served(with_photographs().desk, doors=Doors(tcp=[Address("127.0.0.1", first.port)]))
+    second = Served(with_photographs().desk, doors=Endpoints(tcp=[Address("127.0.0.1", first.port)]))
     url = f"tcp://127.0.0.1:{first.port}"
-    console = Console(Seat(lambda: Client.open(url, timeout=1.0), lambda: 0.0, alone=False))
+    console = Console(ConsoleConfig(lambda: Client.open(url, timeout=1.0), lambda: 0.0, alone=False))
 
     async def sit_down() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
@@ -424,7 +424,7 @@ def test_another_theme_repaints_drums_and_mark() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.look_on()
-            elements, eye = console.query_one(Elements), console.query(Eyepiece).first()
+            elements, eye = console.query_one(ElementsPanel), console.query(EyepieceWidget).first()
 
             def colours() -> tuple[str, str]:
                 strip = eye.render_line(eye.cells[1] // 2)
@@ -501,7 +501,7 @@ def test_a_point_clicked_in_a_sketch_is_driven_to() -> None:
             person = Person(pilot)
             await person.look_on()
             before = dict(console.dials.counters)
-            console.post_message(Pointed(1, "1013"))
+            console.post_message(PointClicked(1, "1013"))
             await person.settle()
             assert person.message() == "near point 1013"
             assert dict(console.dials.counters) != before

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from a7sim.cli import main
 from a7sim.console import eyepiece
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolling_frame
-from a7sim.console.eyepiece import Drawing, Run
-from a7sim.console.hands import STEP_SIZES, Hands
+from a7sim.console.eyepiece import DrawingMode, Run
+from a7sim.console.hands import STEP_SIZES, ControlSelection
 from a7sim.console.keymap import actions_for, default_keymap, key_name, load_keymap, sample
 from a7sim.console.seat import best_drawing, speaks_utf8
 from a7sim.console.sketches import draw_points, overlay_mark
 from a7sim.console.words import describe_image, describe_parallax
 from a7sim.manual import VARIANTS
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 STAIRS = np.array([[0, 7, 8, 255], [0, 8, 8, 0]], dtype=np.uint8)
 """Two rows of pixels: one row of cells."""
@@ -55,7 +55,7 @@ def test_braille_lights_the_dots_of_the_pixels() -> None:
 def test_the_mark_has_the_middle_cell(width: int, height: int) -> None:
     columns, rows = eyepiece.window(width, height)
     assert columns % 2 and rows % 2 and width - columns <= 1 and height - rows <= 1
-    across, down = eyepiece.picture_size(Drawing.HALVES, columns, rows)
+    across, down = eyepiece.picture_size(DrawingMode.HALVES, columns, rows)
     shown = eyepiece.overlay_mark(eyepiece.half_blocks(np.zeros((down, across), dtype=np.uint8)), "o")
     assert text(shown)[rows // 2] == " " * (columns // 2) + "o" + " " * (columns // 2)
     assert sum(run.ink == eyepiece.MARK for row in shown for run in row) == 1
@@ -123,28 +123,31 @@ def test_two_eyes_say_which_image_is_higher() -> None:
 
 
 def test_the_ladder_has_ends() -> None:
-    assert Hands().stepping(-99).step == STEP_SIZES[0] and Hands().stepping(99).step == STEP_SIZES[-1]
+    assert (
+        ControlSelection().stepping(-99).step == STEP_SIZES[0]
+        and ControlSelection().stepping(99).step == STEP_SIZES[-1]
+    )
 
 
 def test_hands_say_lines_of_the_language() -> None:
-    hands = Hands("omega", 2).stepping(-1)
+    hands = ControlSelection("omega", 2).stepping(-1)
     assert hands.turned(-1) == "PROJ2:OMEG:TURN -0.1"
     assert hands.moved("X", 1, 12.0) == "WHE:X 0.1"
-    assert Hands(free=True).moved("Y", -1, 12.0) == "DRIV:Y 11.0000"
-    assert Hands().valid_for(VARIANTS["A8"]).element == "kappa1"
+    assert ControlSelection(free=True).moved("Y", -1, 12.0) == "DRIV:Y 11.0000"
+    assert ControlSelection().valid_for(VARIANTS["A8"]).element == "kappa1"
 
 
 @pytest.mark.parametrize(
     ("utf8", "no_color", "colours", "best"),
     [
-        (True, False, "truecolor", Drawing.HALVES),
-        (True, False, "256", Drawing.HALVES),
-        (True, False, "standard", Drawing.SHADES),
-        (True, True, "truecolor", Drawing.SHADES),
-        (False, False, "truecolor", Drawing.ASCII),
+        (True, False, "truecolor", DrawingMode.HALVES),
+        (True, False, "256", DrawingMode.HALVES),
+        (True, False, "standard", DrawingMode.SHADES),
+        (True, True, "truecolor", DrawingMode.SHADES),
+        (False, False, "truecolor", DrawingMode.ASCII),
     ],
 )
-def test_every_terminal_has_a_drawing(utf8: bool, no_color: bool, colours: str, best: Drawing) -> None:
+def test_every_terminal_has_a_drawing(utf8: bool, no_color: bool, colours: str, best: DrawingMode) -> None:
     assert best_drawing(utf8, no_color, colours) is best
 
 
@@ -184,7 +187,7 @@ def test_a_deed_that_a_keymap_leaves_out_keeps_its_keys(tmp_path: Path) -> None:
 def test_a_bad_keymap_is_one_sentence(content: str, words: str, tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.write_text(content, encoding="utf-8")
-    with pytest.raises(Mistake) as mistake:
+    with pytest.raises(A7SimError) as mistake:
         load_keymap(file)
     assert words in str(mistake.value) and str(mistake.value).startswith(str(file))
 
@@ -235,12 +238,12 @@ SLOPE = (np.add.outer(np.arange(8), np.arange(8)) * 18).astype(np.uint8)
 @pytest.mark.parametrize(
     ("drawing", "golden"),
     [
-        (Drawing.SHADES, ["   ░░▒░▒", "░░▒░▒▒▓▓", "░▒░▒▒▓▓▓", "▒▒▓▓▓▓██"]),
-        (Drawing.ASCII, [" ..::==+", "::--=+**", "-==++**#", "++**##%%"]),
-        (Drawing.BRAILLE, ["⠀⢄⢕⢵", "⢕⢵⢽⣽"]),
+        (DrawingMode.SHADES, ["   ░░▒░▒", "░░▒░▒▒▓▓", "░▒░▒▒▓▓▓", "▒▒▓▓▓▓██"]),
+        (DrawingMode.ASCII, [" ..::==+", "::--=+**", "-==++**#", "++**##%%"]),
+        (DrawingMode.BRAILLE, ["⠀⢄⢕⢵", "⢕⢵⢽⣽"]),
     ],
 )
-def test_a_slope_in_every_drawing_without_colours(drawing: Drawing, golden: list[str]) -> None:
+def test_a_slope_in_every_drawing_without_colours(drawing: DrawingMode, golden: list[str]) -> None:
     assert text(eyepiece.render(drawing, SLOPE)) == golden
 
 

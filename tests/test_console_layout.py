@@ -12,12 +12,12 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 
 from a7sim.console.app import Console
-from a7sim.console.drum_panels import Counter
-from a7sim.console.eyepiece import Drawing, Greys
+from a7sim.console.drum_panels import CounterPanel
+from a7sim.console.eyepiece import DrawingMode, Greys
 from a7sim.console.keymap import default_keymap
-from a7sim.console.station import Silent, Station
+from a7sim.console.station import ConnectionLost, InstrumentThread
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.scenario import load_scenario
 from tests.door import Door, with_model
 from tests.sitting_down import Person, at
@@ -36,7 +36,7 @@ def _a_terminal_with_colours_and_utf8(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True)
 def _a_test_card_in_the_eyepieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Station, "_picture", lambda _, client, look, eye: card(look.rows, look.columns))
+    monkeypatch.setattr(InstrumentThread, "_picture", lambda _, client, look, eye: card(look.rows, look.columns))
 
 
 def card(rows: int, columns: int) -> Greys:
@@ -54,7 +54,7 @@ def shown_as_before(compare: Compared, console: Console, size: tuple[int, int], 
         await person.look_on()
         if play is not None:
             await play(person)
-        await person.until(lambda: all(counter._frame >= 3 for counter in console.main.query(Counter)))
+        await person.until(lambda: all(counter._frame >= 3 for counter in console.main.query(CounterPanel)))
         for asked in console.screen.query(Input):
             asked.cursor_blink = False
 
@@ -78,7 +78,7 @@ def test_in_every_theme(snap_compare: Compared, theme: str) -> None:
 
 
 def test_an_a8(snap_compare: Compared) -> None:
-    console = at(Door(Desk(build_autograph(load_scenario("akwanga-a8").instrument, {}, 7))))
+    console = at(Door(SharedInstrument(build_autograph(load_scenario("akwanga-a8").instrument, {}, 7))))
     assert shown_as_before(snap_compare, console, USUAL)
 
 
@@ -115,13 +115,13 @@ def test_a_reading_to_be_typed_in(snap_compare: Compared) -> None:
 
 def test_a_first_visit_and_a_dead_link(snap_compare: Compared) -> None:
     async def fall_silent(person: Person) -> None:
-        person.console._lose(Silent("the line is broken"))
+        person.console._lose(ConnectionLost("the line is broken"))
 
     assert shown_as_before(snap_compare, at(with_model(), welcome=True), USUAL, fall_silent)
 
 
 def test_in_words(snap_compare: Compared) -> None:
-    console = at(with_model(), drawing=Drawing.WORDS, theme="contrast")
+    console = at(with_model(), drawing=DrawingMode.WORDS, theme="contrast")
 
     async def go(person: Person) -> None:
         await person.press("g")
@@ -132,5 +132,5 @@ def test_in_words(snap_compare: Compared) -> None:
 
 def test_without_utf8(snap_compare: Compared, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LC_ALL", "C")
-    ascii_only: dict[str, Any] = {"drawing": Drawing.ASCII}
+    ascii_only: dict[str, Any] = {"drawing": DrawingMode.ASCII}
     assert shown_as_before(snap_compare, at(with_model(), **ascii_only), (80, 24))

@@ -20,10 +20,10 @@ import pytest
 from textual.widgets import OptionList
 
 from a7sim.cli import main
-from a7sim.cli.seats import InProcess
+from a7sim.cli.seats import LocalConsole
 from a7sim.console.app import Console
-from a7sim.console.eyepiece import Drawing
-from a7sim.mistakes import Mistake
+from a7sim.console.eyepiece import DrawingMode
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
 from a7sim.session.folder import JOURNAL
 from a7sim.session.lines import read_journal
@@ -39,13 +39,13 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "data" / "a7sim"
 
 
-def place(out: Path | None = None, go_on: bool | None = None, seed: int = SEED) -> InProcess:
-    return InProcess("akwanga", load_scenario("akwanga"), seed, out, go_on)
+def place(out: Path | None = None, go_on: bool | None = None, seed: int = SEED) -> LocalConsole:
+    return LocalConsole("akwanga", load_scenario("akwanga"), seed, out, go_on)
 
 
-def sat_at(here: InProcess, sitting: Callable[[Person], Coroutine[Any, Any, None]]) -> Path:
+def sat_at(here: LocalConsole, sitting: Callable[[Person], Coroutine[Any, Any, None]]) -> Path:
     """Let a person sit at a place, and leave by the key; return the folder of the session."""
-    console = Console(replace(here.config, drawing=Drawing.HALVES))
+    console = Console(replace(here.config, drawing=DrawingMode.HALVES))
 
     async def sit_down() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
@@ -155,16 +155,16 @@ def test_a_session_that_cannot_be_gone_on_with_is_kept_and_said_so(tmp_path: Pat
         assert "begun anew, since the last session cannot be gone on with" in person.message()
         assert "the journal is damaged" in person.message()
 
-    with pytest.raises(Mistake, match=r"--go-on: expected a session of akwanga .* damaged"):
+    with pytest.raises(A7SimError, match=r"--go-on: expected a session of akwanga .* damaged"):
         place(out, go_on=True)
     assert sat_at(place(out), told) == tmp_path / "mine-2"
 
 
 def test_a_folder_of_something_else_is_not_touched(tmp_path: Path) -> None:
     (tmp_path / "letters").mkdir()
-    with pytest.raises(Mistake, match="expected a folder that does not exist yet"):
+    with pytest.raises(A7SimError, match="expected a folder that does not exist yet"):
         place(tmp_path / "letters")
-    with pytest.raises(Mistake, match=r"--go-on: expected a session of akwanga at seed 7 .* found none"):
+    with pytest.raises(A7SimError, match=r"--go-on: expected a session of akwanga at seed 7 .* found none"):
         place(go_on=True)
     assert list((tmp_path / "letters").iterdir()) == []
 

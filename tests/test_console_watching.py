@@ -12,21 +12,21 @@ from textual.widgets import Static
 from a7sim.cli.seats import is_url, playback_console, remote_console
 from a7sim.console.app import Console
 from a7sim.console.dials import parse_readouts, readouts_query
-from a7sim.console.drum_panels import Wheeled
-from a7sim.console.eyepiece import Drawing
+from a7sim.console.drum_panels import DrumScrolled
+from a7sim.console.eyepiece import DrawingMode
 from a7sim.console.sheet import JobSheet
-from a7sim.console.window import Eyepiece
+from a7sim.console.window import EyepieceWidget
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.manual import VARIANTS
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import film as film_module
 from a7sim.session import journal as journal_module
-from a7sim.session.film import Film, open_recording
+from a7sim.session.film import Recording, open_recording
 from a7sim.session.journal import Journal, make_header
 from a7sim.session.lines import read_journal
 from tests.door import with_model
@@ -52,7 +52,9 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setattr(journal_module, "EVERY", 10)
         journal = Journal()
-        desk = Desk(build_autograph(scenario.instrument, build_scene(scenario, 7).mountable, 7), journal.on_link_event)
+        desk = SharedInstrument(
+            build_autograph(scenario.instrument, build_scene(scenario, 7).mountable, 7), journal.on_link_event
+        )
         with journal.recording(folder, make_header("serve", scenario, 7), desk):
             port = InProcessSerial(desk=desk, timeout=1.0)
             for line in WORK:
@@ -62,18 +64,18 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def film(session: Path) -> Film:
+def film(session: Path) -> Recording:
     return open_recording(str(session))
 
 
-def dials_of(a_film: Film) -> Any:
+def dials_of(a_film: Recording) -> Any:
     with a_film.open_client() as client:
         client.send(readouts_query(VARIANTS["A7"]))
         return parse_readouts(VARIANTS["A7"], client.reply())
 
 
 def watched(session: str, sitting: Any, size: tuple[int, int] = (100, 30), **others: Any) -> None:
-    console = Console(replace(playback_console(session), **{"drawing": Drawing.HALVES, **others}))
+    console = Console(replace(playback_console(session), **{"drawing": DrawingMode.HALVES, **others}))
 
     async def sit_down() -> None:
         async with console.run_test(size=size) as pilot:
@@ -89,7 +91,7 @@ def progress(person: Person) -> str:
 
 
 def message_of_eye(person: Person) -> str:
-    return " ".join(run.text for row in person.console.query_one("#eye1", Eyepiece)._rows for run in row)
+    return " ".join(run.text for row in person.console.query_one("#eye1", EyepieceWidget)._rows for run in row)
 
 
 # --- the film -----------------------------------------------------------------------------------------
@@ -135,7 +137,7 @@ def test_a_film_knows_what_was_done_where(session: Path) -> None:
     assert a_film.seek(4).origins["X"] == 5000.0
     assert [a_film.find_step(words) for words in ("7", "70s", "0:01:10", "after the slip", "@2")] == [7, 7, 7, 13, 1]
     for words in ("18", "never noted", "@999", "1:00:00"):
-        with pytest.raises(Mistake, match=f"jump to {words}: expected a step up to 17, a time up to 170s"):
+        with pytest.raises(A7SimError, match=f"jump to {words}: expected a step up to 17, a time up to 170s"):
             a_film.find_step(words)
 
 
@@ -143,7 +145,7 @@ def test_what_does_not_happen_again_is_said(session: Path) -> None:
     there = read_journal(session / "session.jsonl")
     answers = next(number for number in range(2, len(there)) if there.event(number).dir == "<")
     there.lines[answers - 1] = there.lines[answers - 1].replace(b'"text":"', b'"text":"9')
-    a_film = Film(there)
+    a_film = Recording(there)
     assert a_film.seek(3).error == ""
     assert f"line {answers}: expected again client1 < 9" in a_film.seek(4).error
 
@@ -159,7 +161,7 @@ def test_a_session_in_which_nothing_was_said_is_one_sentence(tmp_path: Path) -> 
     scenario = load_scenario("akwanga")
     with Journal().recording(tmp_path, make_header("serve", scenario, 7), None):
         pass
-    with pytest.raises(Mistake, match="expected a session in which something was said, got none"):
+    with pytest.raises(A7SimError, match="expected a session in which something was said, got none"):
         open_recording(str(tmp_path))
 
 
@@ -200,7 +202,7 @@ def test_hands_are_off_in_one_sentence_and_nothing_turns(session: Path) -> None:
             console.say("")
             await person.press(key)
             assert person.message() == "hands are off: what you watch has been done; space plays and pauses", key
-        console.post_message(Wheeled("X", 1))
+        console.post_message(DrumScrolled("X", 1))
         await person.settle()
         await person.press("m", "tab")
         assert console.dials == before and console.view.magnification == 12.0
@@ -250,14 +252,14 @@ def test_a_script_is_watched_too_and_in_words(session: Path) -> None:
         await person.until(lambda: "1011: image is on the mark" in message_of_eye(person))
         assert person.message() == "1011: no y-parallax, no x-parallax"
 
-    watched("clearing", sitting, size=(80, 24), drawing=Drawing.WORDS)
+    watched("clearing", sitting, size=(80, 24), drawing=DrawingMode.WORDS)
 
 
 def test_who_watches_a_served_instrument_sees_what_another_does_and_turns_nothing() -> None:
     with Served(with_model().desk) as served:
         url = f"tcp://127.0.0.1:{served.port}"
         console = Console(
-            replace(remote_console(url, JobSheet("Akwanga"), None, watching=True), drawing=Drawing.HALVES)
+            replace(remote_console(url, JobSheet("Akwanga"), None, watching=True), drawing=DrawingMode.HALVES)
         )
 
         async def sit_down() -> None:

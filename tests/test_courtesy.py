@@ -27,13 +27,13 @@ def machine(monkeypatch):
 
 
 def test_the_processor_is_given_up_as_long_as_it_comes_back_soon(machine):
-    server = courtesy.Courtesy()
+    server = courtesy.YieldPolicy()
     assert all(server.yield_cpu() for _ in range(100))
     assert machine.given_up == 100
 
 
 def test_where_others_want_it_it_is_kept_for_a_second(machine):
-    server = courtesy.Courtesy()
+    server = courtesy.YieldPolicy()
     machine.away = 3e-3
     assert [server.yield_cpu() for _ in range(100)] == [True] * 2 + [False] * 98
     machine.now += courtesy.UNTIL_ALONE
@@ -42,7 +42,7 @@ def test_where_others_want_it_it_is_kept_for_a_second(machine):
 
 def test_being_away_once_says_nothing(machine):
     """A server that was stopped, or had to wait for a page, is not in company."""
-    server = courtesy.Courtesy()
+    server = courtesy.YieldPolicy()
     for away in [3e-3, 1e-5] * 50:
         machine.away = away
         assert server.yield_cpu()

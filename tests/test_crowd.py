@@ -3,11 +3,11 @@
 import msgspec
 import pytest
 
-from a7sim.operator import DoesNotFit, measure_models
+from a7sim.operator import OperatorGaveUp, measure_models
 from a7sim.scenario import load_scenario
 from a7sim.scenario.schema import Condition, ProjectorCondition
 from a7sim.session import open_session, run
-from a7sim.session.crowd import FleetHands, open_batch
+from a7sim.session.crowd import BatchDriver, open_batch
 from tests.sessions import read_once, tilted_flight, without_errors
 
 SEEDS = (1985, 7)
@@ -46,7 +46,7 @@ def _same(crowd, records, session, seed):
     try:
         for record in measure_models(alone.person, alone.job):
             done.append(record)
-    except DoesNotFit as trouble:
+    except OperatorGaveUp as trouble:
         why = str(trouble)
     among_others = [each.of(session) for each in records if session in each.who]
     return (
@@ -132,12 +132,12 @@ def test_a_crowd_reads_and_sets_what_each_would_alone(name):
 
 def test_a_bench_that_is_off_by_a_count_is_found_out(monkeypatch):
     """The comparison can fail: a counter of the crowd that shows a hundredth too much gives other numbers."""
-    truly = FleetHands.elements
+    truly = BatchDriver.elements
 
     def a_count_too_much(self, who, names):
         return {name: counts + 0.01 * (name == "by1") for name, counts in truly(self, who, names).items()}
 
-    monkeypatch.setattr(FleetHands, "elements", a_count_too_much)
+    monkeypatch.setattr(BatchDriver, "elements", a_count_too_much)
     scenario = read_once(SCENARIOS["as it stands"])
     assert not same_to_the_digit(msgspec.structs.replace(scenario, models=scenario.models[:1]), SEEDS[:1])
 

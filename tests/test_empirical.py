@@ -22,14 +22,14 @@ from a7sim.geometry import (
     transposed,
     turn_of,
 )
-from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit, empirical
-from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Crew
+from a7sim.mistakes import A7SimError
+from a7sim.operator import OperatorGaveUp, empirical
+from a7sim.operator.bench import Workstation
+from a7sim.operator.crew import OperatorBatch
 from a7sim.operator.empirical import clearing_steps, over_correction, over_correction_by_coefficients, perturb_elements
-from a7sim.operator.line_hands import LineHands
+from a7sim.operator.line_hands import ScpiDriver
 from a7sim.operator.work import measure_models_batch, orient_model
-from a7sim.reduction import Stand, element_corrections, orientation_by_schut, relative_orientation
+from a7sim.reduction import ProjectorPose, element_corrections, orientation_by_schut, relative_orientation
 from a7sim.reduction.hallert import REGULAR_POINTS, nine_point_corrections, regular_corrections
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session, run
@@ -59,11 +59,11 @@ def ready(scenario, seed, model=0, change=lambda job: job):
     """A bench with one model of a scenario mounted, and its session."""
     session = open_session(scenario, seed)
     job = dataclasses.replace(session.job, models=(change(session.job.models[model]),))
-    return session, made_ready(Crew.single(session.person), LineHands(session.person), job)
+    return session, made_ready(OperatorBatch.single(session.person), ScpiDriver(session.person), job)
 
 
 def made_ready(crew, hands, job):
-    bench = Bench(crew, hands, job)
+    bench = Workstation(crew, hands, job)
     with suppress(_IsReady):
         next(measure_models_batch(bench, _stop_at_relative_orientation))
     crew.begin(crew.active, job.models[0].name, "relative orientation")
@@ -313,14 +313,14 @@ def test_the_points_in_between_serve_where_the_case_has_them():
 
 @pytest.mark.parametrize("missing", ["56", "36"])
 def test_with_too_few_points_left_the_operator_says_which_are_missing(missing):
-    with pytest.raises(DoesNotFit, match=f"{missing[0]}, {missing[1]} of the standard points cannot be used"):
+    with pytest.raises(OperatorGaveUp, match=f"{missing[0]}, {missing[1]} of the standard points cannot be used"):
         orient(akwanga(), 8, 0, without(*missing))
 
 
 def test_a_point_that_is_pricked_on_one_print_only_is_done_without(monkeypatch):
-    prints = LineHands.prints
+    prints = ScpiDriver.prints
     monkeypatch.setattr(
-        LineHands,
+        ScpiDriver,
         "prints",
         lambda self, who, n: {k: v for k, v in prints(self, who, n).items() if n == 1 or k != "1025"},
     )
@@ -360,7 +360,7 @@ def test_closed_forms_are_the_least_squares_solution_on_the_pattern(count, unkno
     points = np.array([x * b + 0.0 * p, y * d + 0.0 * p, np.full_like(p, -h)])
     level = np.zeros((3, 40))
     right = level + np.array([[b], [0.0], [0.0]])
-    expected = element_corrections(p, points, Stand(level, level), Stand(right, level), unknowns)
+    expected = element_corrections(p, points, ProjectorPose(level, level), ProjectorPose(right, level), unknowns)
     values, sigmas = regular_corrections(p, np.full(40, b), np.full(40, d), np.full(40, h), unknowns)
     np.testing.assert_allclose(values, expected.unknowns, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(sigmas, expected.sigmas, rtol=1e-9)
@@ -415,7 +415,9 @@ def test_same_observations_four_methods_one_orientation(procedure, seed):
 
     def stand(n, x):
         angles = [e[f"{name}{n}"] - zero for name, zero in (("omega", 100), ("phi", 100), ("kappa", 0))]
-        return Stand(np.array([x, -e[f"by{n}"], e[f"bz{n}"]]), GON * ((np.array(angles) + 200.0) % 400.0 - 200.0))
+        return ProjectorPose(
+            np.array([x, -e[f"by{n}"], e[f"bz{n}"]]), GON * ((np.array(angles) + 200.0) % 400.0 - 200.0)
+        )
 
     by_squares = element_corrections(p, places * [[1.0], [1.0], [-1.0]], stand(1, 0.0), stand(2, bx), names)
     by_hallert, _ = regular_corrections(p, bx, abs(places[1, 2:]).mean(), places[2].mean(), names)
@@ -494,7 +496,7 @@ def test_results_and_tables_tell_how_a_model_was_cleared(capsys):
     ("key", "value"), [("plan.over_correction", "0"), ("plan.procedure", '"by guess"'), ("plan.start_off_gon", "5")]
 )
 def test_a_plan_that_cannot_be_is_a_mistake(key, value):
-    with pytest.raises(Mistake, match=key):
+    with pytest.raises(A7SimError, match=key):
         load_scenario("akwanga", {key: value})
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from a7sim.instrument.language import Desk, ErrorNumber
+from a7sim.instrument.language import ErrorNumber, SharedInstrument
 from tests.benches import benchmark
 
 
@@ -79,6 +79,6 @@ def test_a_broken_promise_is_found(fuzzing, fuzzed, spoilt):
 def test_whoever_has_not_logged_in_must_not_be_answered(fuzzing):
     desk = next(fuzzing.instruments(1))
     with fuzzing.reported() as numbers:
-        fuzzed = fuzzing.Fuzzed(Desk(desk.autograph), numbers, admitted=False)
+        fuzzed = fuzzing.Fuzzed(SharedInstrument(desk.autograph), numbers, admitted=False)
         with pytest.raises(fuzzing.Broken, match="before the login"):
             fuzzed.hears(b"*OPC?")

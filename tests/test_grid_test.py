@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from a7sim.geometry import GON, at_level, ray_of, rotation
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.manual import VARIANTS
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.operator import measure_models
-from a7sim.operator.bench import Bench
-from a7sim.operator.grid_test import GridTestOrder, level_heights, measure_grid, measure_grid_batch
+from a7sim.operator.bench import Workstation
+from a7sim.operator.grid_test import GridTestPlan, level_heights, measure_grid, measure_grid_batch
 from a7sim.reduction import Elements, Undetermined, grid_test, perspective_centre_of_levels, plate_placement
 from a7sim.reduction.grid_test import HELD_AT_ONE_LEVEL, UNKNOWNS
 from a7sim.scenario import GridPlate, ScenarioError, load_scenario
@@ -83,16 +83,16 @@ def with_faults(**overrides):
 
 
 def sheets_of(scenario, seed=1, **order):
-    document = run_grid_test(scenario, seed, GridTestOrder(scenario.camera, scenario.grid_plate, **order))
+    document = run_grid_test(scenario, seed, GridTestPlan(scenario.camera, scenario.grid_plate, **order))
     assert document["message"] == ""
     return document["projectors"]
 
 
 def sheets_of_crowd(scenario, seeds, **order):
     """The left and the right projector, each of many sessions, which test as each would at its line (see below)."""
-    order = GridTestOrder(scenario.camera, scenario.grid_plate, **order)
+    order = GridTestPlan(scenario.camera, scenario.grid_plate, **order)
     bench = open_batch(scenario, seeds).bench
-    sheets = list(measure_grid_batch(Bench(bench.crew, bench.hands, order.job), order))
+    sheets = list(measure_grid_batch(Workstation(bench.crew, bench.hands, order.job), order))
     assert all(len(sheet.sessions) == len(seeds) for sheet in sheets)
     return sheets
 
@@ -199,7 +199,7 @@ def test_a_plate_is_ruled_to_its_accuracy_and_is_the_same_whatever_is_flown():
 
 def test_a_plate_is_loaded_over_the_link_like_a_picture():
     scenario = load_scenario("akwanga")
-    door = Door(Desk(build_autograph(scenario.instrument, build_scene(scenario, 1).mountable, 1)))
+    door = Door(SharedInstrument(build_autograph(scenario.instrument, build_scene(scenario, 1).mountable, 1)))
     assert door.say("PHOT:CAT?") == '"101","102","103","grid"'
     assert door.say('PHOT1:LOAD "grid";:PROJ1:PDIS 152.68;:DRIV:X 0;Y 0;:PHOT1?') == '"grid"'
     assert all(abs(each) < 2000.0 for each in door.numbers('EYEP1? "G55"'))
@@ -233,7 +233,7 @@ def test_crosses_are_taken_evenly():
     assert list(plate.some_crosses(9)) == ["G11", "G15", "G19", "G51", "G55", "G59", "G91", "G95", "G99"]
     assert plate.some_crosses(25)["G37"] == (50.0, -50.0)
     assert list(GridPlate(lines=23, spacing_mm=10.0).crosses)[:2] == ["G0101", "G0102"]
-    with pytest.raises(Mistake, match=r"\(9, 25, 81\), got 24"):
+    with pytest.raises(A7SimError, match=r"\(9, 25, 81\), got 24"):
         plate.some_crosses(24)
 
 
@@ -308,7 +308,7 @@ def test_a_serviced_instrument_gives_four_to_seven_um():
 def test_slips_are_struck_out_and_do_not_spoil_the_test():
     scenario = with_faults(**{"observer.blunder_rate": "0.04"})
     session = open_session(scenario, 2)
-    sheets = list(measure_grid(session.person, GridTestOrder(scenario.camera, scenario.grid_plate)))
+    sheets = list(measure_grid(session.person, GridTestPlan(scenario.camera, scenario.grid_plate)))
     assert sum(bool(entry.struck) for entry in session.person.book.entries) >= 8
     for sheet, faults in zip(sheets, FAULTS.values(), strict=True):
         assert float(sheet.test.s0[0]) < 0.004
@@ -318,9 +318,9 @@ def test_slips_are_struck_out_and_do_not_spoil_the_test():
 
 def test_a_crowd_tests_its_instruments_as_each_would_at_its_line():
     scenario = with_faults()
-    order = GridTestOrder(scenario.camera, scenario.grid_plate)
+    order = GridTestPlan(scenario.camera, scenario.grid_plate)
     crowd = open_batch(scenario, [1, 2])
-    sheets = list(measure_grid_batch(Bench(crowd.bench.crew, crowd.bench.hands, order.job), order))
+    sheets = list(measure_grid_batch(Workstation(crowd.bench.crew, crowd.bench.hands, order.job), order))
     for i, seed in enumerate((1, 2)):
         session = open_session(scenario, seed)
         for sheet, alone in zip(sheets, measure_grid(session.person, order), strict=True):

@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from a7sim.reduction import Stand, element_corrections, relative_orientation
+from a7sim.reduction import ProjectorPose, element_corrections, relative_orientation
 
 B, D, H = 92.0, 92.0, 152.0
 SETS = 20_000
@@ -30,7 +30,7 @@ def spread_by_parallaxes(names):
     """Covariance of the corrections that simulated y-parallaxes of weight 1 give, in units of theirs."""
     parallaxes = PARALLAX_MM * np.random.default_rng(1956).standard_normal((6, SETS))
     one_batch = np.zeros((3, 1))
-    left, right = Stand(one_batch, one_batch), Stand(np.array([[B], [0.0], [0.0]]), one_batch)
+    left, right = ProjectorPose(one_batch, one_batch), ProjectorPose(np.array([[B], [0.0], [0.0]]), one_batch)
     found = element_corrections(parallaxes, SIX_POINTS[..., None], left, right, names)
     return np.cov(found.unknowns) / PARALLAX_MM**2
 
@@ -51,7 +51,7 @@ def spread_by_coplanarity(names):
 
 
 def propagated(names):
-    left, right = Stand(np.zeros(3), np.zeros(3)), Stand(np.array([B, 0.0, 0.0]), np.zeros(3))
+    left, right = ProjectorPose(np.zeros(3), np.zeros(3)), ProjectorPose(np.array([B, 0.0, 0.0]), np.zeros(3))
     return element_corrections(np.zeros(6), SIX_POINTS, left, right, names).cofactors
 
 

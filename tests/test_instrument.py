@@ -8,12 +8,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from a7sim.geometry import GON, at_level, ray_of, rotation
-from a7sim.instrument import Autograph, OutOfRange, SettingsConflict, build_autograph
+from a7sim.instrument import Autograph, OutOfRangeError, SettingsConflictError, build_autograph
 from a7sim.instrument.spindles import Counter, Spindle
 from a7sim.manual import A7, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Element
 from a7sim.scenario import Condition, ProjectorCondition, load_scenario
 from a7sim.scenario.schema import Camera, Fiducial
-from a7sim.scene import Marks, Photograph, build_scene
+from a7sim.scene import NamedPoints, Photograph, build_scene
 from a7sim.scene.camera import fall_off
 from a7sim.scene.emulsion import GRAIN
 
@@ -25,8 +25,8 @@ CAMERA = Camera(
 
 
 def photograph(name, points, **changes):
-    marks = Marks(tuple(points), np.array(list(points.values()), dtype=float).T)
-    fiducials = Marks(tuple(f.name for f in CAMERA.fiducials), np.array([(f.x, f.y) for f in CAMERA.fiducials]).T)
+    marks = NamedPoints(tuple(points), np.array(list(points.values()), dtype=float).T)
+    fiducials = NamedPoints(tuple(f.name for f in CAMERA.fiducials), np.array([(f.x, f.y) for f in CAMERA.fiducials]).T)
     return dataclasses.replace(Photograph(name, CAMERA, fiducials, marks, marks), **changes)
 
 
@@ -101,7 +101,7 @@ def test_everything_an_element_may_be_set_to_lies_in_its_range_and_nothing_moves
     for name, element in A7.elements.items():
         for value in (element.low - 0.01, element.high + 0.01):
             before = a7.element(name)
-            with pytest.raises(OutOfRange):
+            with pytest.raises(OutOfRangeError):
                 a7.set_element(name, value)
             assert a7.element(name) == before
 
@@ -112,7 +112,7 @@ def test_an_element_that_a_variant_lacks_is_a_conflict_from_its_data():
         A7, name="A8", elements={n: e for n, e in A7.elements.items() if not n.startswith("b") or n == "bx"}
     )
     plotter_without_by = Autograph(without_by)
-    with pytest.raises(SettingsConflict):
+    with pytest.raises(SettingsConflictError):
         plotter_without_by.set_element("by1", 1.0)
     assert plotter_without_by.pose(2)[0] == pytest.approx([0.0, 0.0, 0.0])
 
@@ -281,7 +281,7 @@ def test_a_swing_is_turned_through_its_zero_and_a_tilt_not_beyond_its_end():
     a7 = plotter()
     a7.turn_element("kappa1", -0.25)
     assert a7.element("kappa1") == 399.75
-    with pytest.raises(OutOfRange):
+    with pytest.raises(OutOfRangeError):
         a7.turn_element("phi1", 6.5)
     assert a7.element("phi1") == 100.0
 
@@ -377,7 +377,7 @@ def test_a_picture_upside_down_has_its_fiducials_far_from_their_marks():
 
 def test_the_same_photograph_does_not_lie_in_two_projectors():
     a7 = plotter()
-    with pytest.raises(SettingsConflict):
+    with pytest.raises(SettingsConflictError):
         a7.load(2, "L")
 
 
@@ -409,7 +409,7 @@ def test_rods_that_a_reset_left_too_steep_can_be_brought_back_but_not_taken_furt
     a7.drive("Z", -140.0)
     a7.drive("Y", -250.0)
     a7.reset()
-    with pytest.raises(OutOfRange):
+    with pytest.raises(OutOfRangeError):
         a7.drive("Y", -251.0)
     a7.drive("Y", -240.0)
     a7.drive("Y", 0.0)
@@ -420,6 +420,6 @@ def test_a_registration_is_struck_once_and_keeps_its_reason():
     a7 = Autograph(A7)
     a7.recorder.register("1", [("X", "0.00")])
     a7.recorder.strike(1, "wrong point")
-    with pytest.raises(SettingsConflict):
+    with pytest.raises(SettingsConflictError):
         a7.recorder.strike(1, "another reason")
     assert a7.recorder.registrations[0].struck == "wrong point"

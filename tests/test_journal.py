@@ -15,20 +15,20 @@ import msgspec
 import pytest
 
 from a7sim import __version__
-from a7sim.cli.replay import Pace
+from a7sim.cli.replay import PlaybackClock
 from a7sim.instrument.language import LinkEvent
 from a7sim.link.clock import Clock
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import find_scenario, from_data, hash_scenario, load_scenario, to_data
 from a7sim.scene import PICTURES
 from a7sim.session import combinations, durable, run
 from a7sim.session.checkpoints import read_checkpoints
-from a7sim.session.durable import DurableFile, JournalStopped
-from a7sim.session.journal import Header, Journal, Keeping, make_header, make_header_without_scenario
-from a7sim.session.lines import Chain, read_journal
+from a7sim.session.durable import AppendOnlyFile, JournalWriteError
+from a7sim.session.journal import Header, Journal, JournalOptions, make_header, make_header_without_scenario
+from a7sim.session.lines import ChecksumChain, read_journal
 from a7sim.session.replaying import Replay, replay_lines
 from a7sim.session.resuming import find_resumable
-from a7sim.session.running import Watcher
+from a7sim.session.running import ProgressCallbacks
 from a7sim.session.scripts import find_script, read_script
 from tests.processes import ANYWHERE, COMMAND, Running, a7sim, said_here
 from tests.served import Line
@@ -58,12 +58,12 @@ def copied(whole, tmp_path):
 
 def resumed(folder):
     begun = find_resumable(folder, "run")
-    return run(begun.scenario, begun.seed, folder, keeping=Keeping(resumes=True))
+    return run(begun.scenario, begun.seed, folder, keeping=JournalOptions(resumes=True))
 
 
 def forged(journalled, header=None, change=lambda number, data: data):
     """Return the lines of a journal with checksums that fit, though somebody changed them."""
-    chain = Chain()
+    chain = ChecksumChain()
     lines = []
     for number, line in enumerate(journalled.lines, start=1):
         data = json.loads(line)
@@ -126,7 +126,7 @@ def test_a_flipped_byte_is_found_and_its_line_named(whole, tmp_path):
             flipped = bytearray(short)
             flipped[start + offset] ^= 1 << offset % 8
             path.write_bytes(flipped)
-            with pytest.raises(Mistake, match=rf"session\.jsonl, line {number}: expected"):
+            with pytest.raises(A7SimError, match=rf"session\.jsonl, line {number}: expected"):
                 read_journal(path)
 
 
@@ -134,7 +134,7 @@ def test_a_lost_and_an_exchanged_line_are_found(whole, tmp_path):
     lines = (whole / "session.jsonl").read_bytes().splitlines(keepends=True)
     for damaged in ([*lines[:40], *lines[41:]], [*lines[:40], lines[41], lines[40], *lines[42:]]):
         (tmp_path / "session.jsonl").write_bytes(b"".join(damaged))
-        with pytest.raises(Mistake, match="line 41: expected the checksum"):
+        with pytest.raises(A7SimError, match="line 41: expected the checksum"):
             read_journal(tmp_path / "session.jsonl")
 
 
@@ -154,7 +154,7 @@ def test_a_flipped_last_line_end_is_no_torn_line(whole, tmp_path, flipped):
     data = bytearray((whole / "session.jsonl").read_bytes())
     data[-1] = flipped
     (tmp_path / "session.jsonl").write_bytes(data)
-    with pytest.raises(Mistake, match="expected a line end, got another byte"):
+    with pytest.raises(A7SimError, match="expected a line end, got another byte"):
         read_journal(tmp_path / "session.jsonl")
 
 
@@ -219,7 +219,7 @@ def test_a_journal_of_another_seed_is_refused_at_its_line(copied):
     header = make_header("run", load_scenario("dewitt-pair", LIGHT), 8).line
     (copied / "session.jsonl").write_bytes(forged(journalled, header))
     first = next(n for n in range(2, len(journalled)) if "FID?" in journalled.event(n).text) + 1
-    with pytest.raises(Mistake, match=rf"session\.jsonl, line {first}: expected what this session does again"):
+    with pytest.raises(A7SimError, match=rf"session\.jsonl, line {first}: expected what this session does again"):
         resumed(copied)
 
 
@@ -235,7 +235,7 @@ def test_a_journal_of_another_seed_is_refused_at_its_line(copied):
 def test_a_journal_of_something_else_is_refused_at_line_1(copied, key, value, sentence):
     journalled = read_journal(copied / "session.jsonl")
     (copied / "session.jsonl").write_bytes(forged(journalled, journalled.header | {key: value, "crc": ""}))
-    with pytest.raises(Mistake, match=sentence):
+    with pytest.raises(A7SimError, match=sentence):
         resumed(copied)
 
 
@@ -270,18 +270,20 @@ def test_a_journal_without_its_scenario_replays_with_one_that_is_named(tmp_path,
 
 def test_a_line_left_over_is_named(copied):
     with (copied / "session.jsonl").open("ab") as journal:
-        chain = Chain(read_journal(copied / "session.jsonl").crc)
+        chain = ChecksumChain(read_journal(copied / "session.jsonl").crc)
         journal.write(chain.line({"t": 99999.0, "client": "client1", "dir": ">", "text": "*IDN?"}) + b"\n")
     lines = len(read_journal(copied / "session.jsonl"))
-    with pytest.raises(Mistake, match=rf"line {lines}: expected the end of the session, got a line that is left over"):
+    with pytest.raises(
+        A7SimError, match=rf"line {lines}: expected the end of the session, got a line that is left over"
+    ):
         resumed(copied)
 
 
 def test_a_session_that_is_being_written_is_not_resumed(copied):
     journalled = read_journal(copied / "session.jsonl")
-    file = DurableFile(journalled.path, size=journalled.size)
+    file = AppendOnlyFile(journalled.path, size=journalled.size)
     try:
-        with pytest.raises(Mistake, match="expected a session that is over, got one that is being written"):
+        with pytest.raises(A7SimError, match="expected a session that is over, got one that is being written"):
             resumed(copied)
     finally:
         file.close()
@@ -302,11 +304,11 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        combinations.run_combinations(light, 1985, cut, Watcher(on_activity=interrupt))
+        combinations.run_combinations(light, 1985, cut, ProgressCallbacks(on_activity=interrupt))
     assert not (cut / "results.json").exists()
     session = find_resumable(cut, "run")
     assert session.setting("strips") == "all"
-    combinations.run_combinations(session.scenario, session.seed, cut, keeping=Keeping(resumes=True))
+    combinations.run_combinations(session.scenario, session.seed, cut, keeping=JournalOptions(resumes=True))
     assert {name: files_of(cut / name) for name in ("case-A", "case-B")} == {
         name: files_of(whole / name) for name in ("case-A", "case-B")
     }
@@ -410,7 +412,7 @@ def test_a_server_on_a_full_disk_says_so_and_acknowledges_nothing_that_is_not_wr
 
 
 def test_a_line_half_written_is_taken_back(tmp_path, monkeypatch):
-    file = DurableFile(tmp_path / "f", "none")
+    file = AppendOnlyFile(tmp_path / "f", "none")
     file.add(b"one\n")
     writes = iter([2, OSError(errno.ENOSPC, "No space left on device")])
 
@@ -423,13 +425,13 @@ def test_a_line_half_written_is_taken_back(tmp_path, monkeypatch):
     real = os.write
     monkeypatch.setattr(durable.os, "write", failing)
     with pytest.raises(
-        JournalStopped, match="f: it can no longer be written, so the session stops here: No space left"
+        JournalWriteError, match="f: it can no longer be written, so the session stops here: No space left"
     ):
         file.add(b"two\n")
     monkeypatch.setattr(durable.os, "write", real)
-    with pytest.raises(JournalStopped, match="No space left"):
+    with pytest.raises(JournalWriteError, match="No space left"):
         file.add(b"three\n")
-    with pytest.raises(JournalStopped):
+    with pytest.raises(JournalWriteError):
         file.close()
     assert (tmp_path / "f").read_bytes() == b"one\n"
 
@@ -451,7 +453,9 @@ def test_a_journal_on_a_read_only_disk_is_said_in_a_sentence(tmp_path, monkeypat
         raise OSError(errno.EROFS, "Read-only file system")
 
     monkeypatch.setattr(durable.os, call, refused)
-    with pytest.raises(Mistake, match=r"session\.jsonl: expected a journal that can be written: Read-only file system"):
+    with pytest.raises(
+        A7SimError, match=r"session\.jsonl: expected a journal that can be written: Read-only file system"
+    ):
         run(load_scenario("dewitt-pair", LIGHT), 7, tmp_path / "out")
 
 
@@ -462,7 +466,7 @@ def synced(tmp_path, monkeypatch, durability, lines, waits=False):
     """Return how often the file was brought to the disk by lines that register (True) or not, before it was closed."""
     times = []
     monkeypatch.setattr(durable, "_on_disk", lambda handle: times.append(time.monotonic()))
-    file = DurableFile(tmp_path / "f", durability)
+    file = AppendOnlyFile(tmp_path / "f", durability)
     began = time.monotonic()
     for registers in lines:
         file.add(b"line\n", registers)
@@ -492,7 +496,7 @@ def test_always_and_none_are_what_they_say(tmp_path, monkeypatch):
 )
 def test_what_registers_is_known_by_its_line(tmp_path, monkeypatch, line, registers):
     at_once = []
-    monkeypatch.setattr(DurableFile, "add", lambda self, line, now=False: at_once.append(now))
+    monkeypatch.setattr(AppendOnlyFile, "add", lambda self, line, now=False: at_once.append(now))
     journal = Journal().recording(tmp_path, Header({"schema_version": 3}), None)
     journal.on_link_event(LinkEvent(0.0, "client1", ">", line))
     assert at_once == [False, registers]
@@ -596,7 +600,7 @@ def test_lines_left_over_fail(copied, capsys):
     """A reply that the journal ends before, and one in it that nobody asked for."""
     journalled = read_journal(copied / "session.jsonl")
     last = max(n for n in range(2, len(journalled)) if journalled.event(n).dir == "<")
-    chain = Chain(int(json.loads(journalled.lines[last - 1])["crc"], 16))
+    chain = ChecksumChain(int(json.loads(journalled.lines[last - 1])["crc"], 16))
     unasked = chain.line({"t": 99999.0, "client": "client1", "dir": "<", "text": "5"})
     reply = f"client1 < {journalled.event(last).text}"
     for lines, number, of_journal, of_instrument in (
@@ -640,7 +644,7 @@ def test_a_replay_goes_at_the_speed_that_is_asked_for(monkeypatch):
     clock = Clock()
     monkeypatch.setattr(time, "monotonic", lambda: clock.now)
     monkeypatch.setattr(time, "sleep", lambda s: (slept.append(round(s, 6)), clock.advance(s)))
-    pace = Pace(10.0)
+    pace = PlaybackClock(10.0)
     for now in (100.0, 100.0, 105.0, 106.0):
         pace.until(now)
     assert slept == [0.0, 0.0, 0.5, 0.1]
@@ -698,11 +702,11 @@ def test_a_client_that_goes_needs_no_journal_that_can_be_written_and_any_other_w
     with Journal().recording(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
 
         def full(*_, **__):
-            raise JournalStopped("the disk is full")
+            raise JournalWriteError("the disk is full")
 
         monkeypatch.setattr(journal, "_write", full)
         journal.on_link_event(LinkEvent(1.0, "client1", "-", ""))
-        with pytest.raises(JournalStopped, match="the disk is full"):
+        with pytest.raises(JournalWriteError, match="the disk is full"):
             journal.on_link_event(LinkEvent(2.0, "client1", ">", "*IDN?"))
 
 

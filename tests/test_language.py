@@ -7,7 +7,7 @@ import pytest
 
 import a7sim
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import Desk, LinkEvent
+from a7sim.instrument.language import LinkEvent, SharedInstrument
 from a7sim.manual import VARIANTS
 from a7sim.scenario.schema import Condition, ProjectorCondition
 from tests.door import Door, with_model, with_photographs
@@ -960,7 +960,7 @@ def test_no_query_gives_away_a_fault_of_the_instrument():
     faulty = ProjectorCondition(phi_zero_gon=0.5, kappa_zero_gon=0.3, by_zero_mm=0.2, principal_distance_mm=0.1)
     condition = Condition(left=faulty, right=faulty, bx_zero_mm=0.4, setting_sigma_mm=0.1, backlash_mm=0.1)
     line = f"PROJ1:PHI 99;KAPP 5;BY 3;:BASE:BX 20;:DRIV:X 10;:{POSITIONS}"
-    assert Door(Desk(Autograph(VARIANTS["A7"], condition))).say(line) == Door().say(line)
+    assert Door(SharedInstrument(Autograph(VARIANTS["A7"], condition))).say(line) == Door().say(line)
 
 
 # --- recording -----------------------------------------------------------------------------------------
@@ -990,7 +990,7 @@ def test_struck_entries_stay_marked():
 
 def test_all_that_crosses_the_link_is_heard_in_order_with_its_time():
     heard: list[LinkEvent] = []
-    desk = Desk(Autograph(VARIANTS["A7"]), heard.append)
+    desk = SharedInstrument(Autograph(VARIANTS["A7"]), heard.append)
     engine = desk.open()
     engine.feed(b"NOTE 'coffee'\n*OPC?;FOO?;*TST?\n", 12.5)
     engine.feed(b"\n" + b" " * 5000 + b"\n", 13.0)

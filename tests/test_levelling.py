@@ -11,7 +11,7 @@ from a7sim.operator.levelling import MAX_ROUNDS, levelled_by_all_elements, level
 from a7sim.scenario import load_scenario
 from a7sim.session.crowd import open_batch
 from a7sim.session.tables import session_tables
-from a7sim.session.truth import Relative
+from a7sim.session.truth import RelativePose
 from tests.sessions import without_errors
 
 A_COUNT_OF_HEIGHT_M = 0.01
@@ -70,7 +70,8 @@ def test_the_relative_orientation_is_untouched_but_for_rounding(without_any_erro
     """What the counters describe, before and while level: rotation and base the same within two counts."""
     record = without_any_error[1]
     before, meanwhile = (
-        Relative.from_counters(each, record.model, A7) for each in (record.on_ground.before, record.on_ground.elements)
+        RelativePose.from_counters(each, record.model, A7)
+        for each in (record.on_ground.before, record.on_ground.elements)
     )
     assert max(before.differences_gon(meanwhile)) < 0.02
     assert record.on_ground.elements["phi1"] != record.on_ground.before["phi1"]
@@ -133,8 +134,8 @@ def test_both_projectors_and_the_base_turn_together(base, lean):
         {name: np.array([v]) for name, v in SETTINGS.items()}, model, A7, up, np.array([1.01])
     )
     after = SETTINGS | {name: float(each[0]) for name, each in turned.items()}
-    rotations, bases = Relative.from_counters(SETTINGS, model, A7).differences_gon(
-        Relative.from_counters(after, model, A7)
+    rotations, bases = RelativePose.from_counters(SETTINGS, model, A7).differences_gon(
+        RelativePose.from_counters(after, model, A7)
     )
     assert rotations < 1e-9
     assert bases < 0.002

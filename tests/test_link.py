@@ -10,8 +10,8 @@ import serial
 
 import a7sim
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import Desk
-from a7sim.link.client import Client, InstrumentRefused
+from a7sim.instrument.language import SharedInstrument
+from a7sim.link.client import Client, InstrumentError
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.manual import VARIANTS
@@ -277,7 +277,7 @@ def test_a_bad_scenario_file_is_one_line_that_names_it(tmp_path, text):
 
 
 def test_ports_at_one_desk_share_instrument_and_lock_and_a_closed_port_frees_it():
-    desk = Desk(Autograph(VARIANTS["A7"]))
+    desk = SharedInstrument(Autograph(VARIANTS["A7"]))
     first, second = InProcessSerial(desk=desk, timeout=SHORT), InProcessSerial(desk=desk, timeout=SHORT)
     assert answers(first, "BASE:BX 20;:SYST:LOCK:REQ?") == b"1\n"
     assert answers(second, "BASE:BX?;:SYST:LOCK:REQ?") == b"20.00;0\n"
@@ -288,7 +288,7 @@ def test_ports_at_one_desk_share_instrument_and_lock_and_a_closed_port_frees_it(
 def test_lines_cross_at_the_time_of_the_clock():
     heard = []
     clock = Clock()
-    port = InProcessSerial(desk=Desk(Autograph(VARIANTS["A7"]), heard.append), clock=clock, timeout=SHORT)
+    port = InProcessSerial(desk=SharedInstrument(Autograph(VARIANTS["A7"]), heard.append), clock=clock, timeout=SHORT)
     clock.advance(12.5)
     answers(port, "*OPC?")
     assert [(event.time, event.direction, event.text) for event in heard] == [
@@ -357,7 +357,7 @@ def test_a_client_sends_asks_and_reads_numbers(client):
 
 
 def test_a_client_that_gets_no_answer_says_what_the_instrument_reported(client):
-    with pytest.raises(InstrumentRefused, match="Undefined header") as raised:
+    with pytest.raises(InstrumentError, match="Undefined header") as raised:
         client.ask("FOO?")
     assert raised.value.line == "FOO?"
     assert [each.split(",")[0] for each in raised.value.errors] == ["-113"]
@@ -365,14 +365,14 @@ def test_a_client_that_gets_no_answer_says_what_the_instrument_reported(client):
 
 
 def test_a_client_that_asks_nothing_gets_no_answer(client):
-    with pytest.raises(InstrumentRefused, match="no answer"):
+    with pytest.raises(InstrumentError, match="no answer"):
         client.ask("BASE:BX 5")
 
 
 def test_a_client_checks_that_all_was_obeyed(client):
     client.check("before")
     client.send("BASE:BX 999;:FOO")
-    with pytest.raises(InstrumentRefused, match="setting the base") as raised:
+    with pytest.raises(InstrumentError, match="setting the base") as raised:
         client.check("setting the base")
     assert [each.split(",")[0] for each in raised.value.errors] == ["-222", "-113"]
     client.check("after")

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import MAX_BUFFERED_BYTES, Desk
+from a7sim.instrument.language import MAX_BUFFERED_BYTES, SharedInstrument
 from a7sim.instrument.language.desk import POLL_SECONDS
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
@@ -21,7 +21,7 @@ RATES = Rates()
 
 @pytest.fixture
 def desk():
-    return Desk(Autograph(VARIANTS["A7"]), poll_takes=0.0)
+    return SharedInstrument(Autograph(VARIANTS["A7"]), poll_takes=0.0)
 
 
 @pytest.fixture
@@ -163,7 +163,7 @@ def test_a_movement_that_came_and_went_unseen_is_an_event(desk, engine):
 @pytest.mark.parametrize("query", ["*ESR?", "*STB?", "STAT:OPER:COND?", "STAT:OPER?"])
 def test_who_waits_by_looking_at_the_status_lets_time_pass(query):
     clock = Clock()
-    with InProcessSerial(desk=Desk(Autograph(VARIANTS["A7"])), clock=clock, timeout=0.1) as port:
+    with InProcessSerial(desk=SharedInstrument(Autograph(VARIANTS["A7"])), clock=clock, timeout=0.1) as port:
         port.write(b"*CLS;DRIV:X 5;*OPC\n")
         assert clock.now == 0.0
         port.write(query.encode() + b"\n")
@@ -176,7 +176,7 @@ def test_who_waits_by_looking_at_the_status_lets_time_pass(query):
 
 def test_looking_takes_no_time_where_nothing_moves_or_the_clock_goes_by_itself(engine):
     clock = Clock()
-    with InProcessSerial(desk=Desk(Autograph(VARIANTS["A7"])), clock=clock) as port:
+    with InProcessSerial(desk=SharedInstrument(Autograph(VARIANTS["A7"])), clock=clock) as port:
         port.write(b"*ESR?;*STB?\n")
     assert clock.now == 0.0
     engine.feed(b"DRIV:X 50;*ESR?\n", 0.0)
@@ -255,7 +255,7 @@ def test_what_a_line_cannot_reply_is_not_worked_out(engine):
 )
 def test_waiting_changes_no_reply_and_loses_none(parts, size):
     flood = b";".join(parts) + b"\n"
-    patient, hasty = Door(), Desk(Autograph(VARIANTS["A7"])).open()
+    patient, hasty = Door(), SharedInstrument(Autograph(VARIANTS["A7"])).open()
     time = 0.0
     replies = b""
     for start in range(0, len(flood), size):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from a7sim.geometry import GON
-from a7sim.operator import DoesNotFit, measure_models
+from a7sim.operator import OperatorGaveUp, measure_models
 from a7sim.operator.seat import wrap_gon
 from a7sim.scenario import Observer, load_scenario
 from a7sim.session import open_session, run
@@ -275,7 +275,7 @@ WRONG = {
 def test_wrong_handling_fails_as_a_person_would_with_a_remark_that_says_what(what):
     exchanges, word = WRONG[what]
     session = tampered_session(read_once(load_scenario("akwanga")), exchanges)
-    with pytest.raises(DoesNotFit) as trouble:
+    with pytest.raises(OperatorGaveUp) as trouble:
         list(measure_models(session.person, session.job))
     assert word in str(trouble.value)
     assert session.person.book.remarks[-1] == f"does not fit: {trouble.value}"
@@ -296,7 +296,7 @@ def test_prints_that_do_not_overlap_towards_each_other_are_noticed():
         dataclasses.replace(drawer["102"], name="101"),
         dataclasses.replace(drawer["101"], name="102"),
     )
-    with pytest.raises(DoesNotFit, match="do not overlap towards each other"):
+    with pytest.raises(OperatorGaveUp, match="do not overlap towards each other"):
         list(measure_models(session.person, session.job))
 
 
@@ -305,7 +305,7 @@ def test_a_wrong_picture_under_the_right_name_and_print_is_noticed():
     session = open_session(load_scenario("akwanga"), 1)
     drawer = session.autograph._photographs
     drawer["101"] = dataclasses.replace(drawer["101"], points=drawer["103"].points)
-    with pytest.raises(DoesNotFit, match="nowhere near where the print shows it"):
+    with pytest.raises(OperatorGaveUp, match="nowhere near where the print shows it"):
         list(measure_models(session.person, session.job))
 
 

@@ -8,11 +8,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from a7sim.operator import DoesNotFit, measure_models
+from a7sim.operator import OperatorGaveUp, measure_models
 from a7sim.operator.skill import HOUR, acuity_factor, slip_factor
 from a7sim.operator.slips import neighbours, transpositions
 from a7sim.scenario import PROFILES, Observer, ScenarioError, load_scenario, observer_of_skill, scenario_schema
-from a7sim.scenario.schema import CertainSlip, Film
+from a7sim.scenario.schema import FilmDeformation, PlannedSlip
 from a7sim.session import open_session, run
 from a7sim.session.crowd import open_batch
 from tests.processes import a7sim_here
@@ -99,7 +99,7 @@ def test_the_command_line_knows_the_skills():
 @cache
 def crowd_of(skill):
     """Twelve persons of a skill on film without errors, none of whom slips."""
-    scenario = read_once(one_model(observer_of_skill(skill, **WITHOUT_SLIPS), film=Film()))
+    scenario = read_once(one_model(observer_of_skill(skill, **WITHOUT_SLIPS), film=FilmDeformation()))
     crowd = open_batch(scenario, range(12))
     (records,) = crowd.measure_models()
     return crowd, records
@@ -197,13 +197,13 @@ def planted(kind, **place):
 
     Who forgets a lever reads parallaxes three times, others once.
     """
-    slip = CertainSlip(kind=kind, model="1", **place)
+    slip = PlannedSlip(kind=kind, model="1", **place)
     observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=[slip])
     scenario = one_model(observer)
     session = open_session(scenario if kind == "forgotten lever" else read_once(scenario), 1)
     try:
         record = next(iter(measure_models(session.person, session.job)))
-    except DoesNotFit as trouble:
+    except OperatorGaveUp as trouble:
         return session.person, None, str(trouble)
     return session.person, record, ""
 
@@ -295,7 +295,7 @@ def test_a_forgotten_lever_is_found_by_what_the_eye_sees_and_put_right(lever):
 )
 def test_levers_whose_wrongs_make_a_right_are_all_found_in_the_end(levers, procedure):
     """A mirrored picture and a wheel that turns the wrong way agree with each other, but not in both eyes."""
-    slips = [CertainSlip(kind="forgotten lever", point=lever) for lever in levers]
+    slips = [PlannedSlip(kind="forgotten lever", point=lever) for lever in levers]
     observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=slips)
     scenario = one_model(observer)
     plan = msgspec.structs.replace(scenario.plan, procedure=procedure)
@@ -324,7 +324,7 @@ def test_a_planted_slip_happens_once_and_one_that_fits_nowhere_not_at_all():
 
 
 def test_slips_are_told_in_the_results_and_in_no_entry_of_book_or_journal(tmp_path):
-    slip = CertainSlip(kind="transposed digits", form="model coordinates", point="C1")
+    slip = PlannedSlip(kind="transposed digits", form="model coordinates", point="C1")
     observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=[slip])
     document = run(read_once(one_model(observer)), 1, tmp_path / "out")
     (told,) = document["truth"]["slips"]

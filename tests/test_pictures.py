@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from a7sim.geometry import image_of, length_of, ray_of
 from a7sim.scenario import load_scenario
-from a7sim.scenario.schema import Film, Water
+from a7sim.scenario.schema import FilmDeformation, Water
 from a7sim.scene import build_scene
 from a7sim.scene.camera import fall_off
 from a7sim.scene.content import SIGNAL_MM, ground_texture, signals
@@ -16,8 +16,8 @@ from a7sim.scene.coverage import within_band
 from a7sim.scene.emulsion import GRAIN, Emulsion
 from a7sim.scene.houses import houses_along
 from a7sim.scene.lines import TONE, with_lines
-from a7sim.scene.photograph import Marks
-from a7sim.scene.terrain import Ground
+from a7sim.scene.photograph import NamedPoints
+from a7sim.scene.terrain import GroundSurface
 
 FINE = 0.03
 """Size of a picture element of a close look, mm on film."""
@@ -28,7 +28,7 @@ SIGNAL_AREA = (7.0 / 4.0 - np.pi / 16.0) * SIGNAL_MM**2
 
 @pytest.fixture(scope="module")
 def scenario():
-    return msgspec.structs.replace(load_scenario("akwanga"), film=Film())
+    return msgspec.structs.replace(load_scenario("akwanga"), film=FilmDeformation())
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_an_element_without_width_lies_in_a_band_or_beside_it():
 def test_a_signal_gives_as_much_light_in_elements_of_any_size_wherever_it_lies_among_them(size):
     around = elements(2 * round(0.6 / size) + 3, size)
     for place in ((0.0, 0.0), (0.31 * size, 0.48 * size)):
-        covered = signals(Marks(("P",), np.array(place)[:, None]))(around, size)
+        covered = signals(NamedPoints(("P",), np.array(place)[:, None]))(around, size)
         assert covered.max() <= 1.0 + 1e-12
         assert covered.sum() * size**2 == pytest.approx(SIGNAL_AREA, rel=0.04)
 
@@ -114,7 +114,7 @@ def test_the_same_terrain_has_the_same_houses_and_another_has_others(scenario, s
 def test_no_house_stands_in_water_and_none_where_there_is_no_road(scenario, scene, houses):
     east, north = houses.middle[:, 0]
     shore = [(east - 30.0, north - 30.0), (east + 30.0, north - 30.0), (east + 30.0, north + 30.0), (east, north)]
-    flooded = Ground.of(msgspec.structs.replace(scenario.terrain, water=[Water(shore=shore)]))
+    flooded = GroundSurface.of(msgspec.structs.replace(scenario.terrain, water=[Water(shore=shore)]))
     assert flooded.under_water(houses.middle + 1e-3 * np.array([[1.0], [-1.0]])).any()
     dry = houses_along(scene.lines.values(), flooded, scenario.terrain.seed)
     assert not flooded.under_water(dry.middle).any()

@@ -7,10 +7,10 @@ from click.testing import CliRunner
 
 from a7sim.cli import cli
 from a7sim.manual import A7, A8
-from a7sim.mistakes import Mistake
-from a7sim.operator.preparation import Flight, choose_settings
+from a7sim.mistakes import A7SimError
+from a7sim.operator.preparation import FlightPlan, choose_settings
 
-AKWANGA = Flight.of_heights(152.676, 91.0, (430.24, 487.92), photo_scale=8000.0)
+AKWANGA = FlightPlan.of_heights(152.676, 91.0, (430.24, 487.92), photo_scale=8000.0)
 
 
 def test_the_theses_flight_is_that_of_section_3_2_3():
@@ -48,10 +48,10 @@ def test_without_a_map_the_largest_model_with_fine_heights_is_taken():
 
 def test_every_scale_that_is_left_keeps_all_ranges():
     for height in range(400, 2000, 50):
-        flight = Flight.of_heights(152.676, 91.0, (100.0, 150.0), flying_height=float(height))
+        flight = FlightPlan.of_heights(152.676, 91.0, (100.0, 150.0), flying_height=float(height))
         try:
             chosen = choose_settings(flight, A7).chosen
-        except Mistake as none:
+        except A7SimError as none:
             assert "range" in str(none)
             continue
         low, high = A7.carriages["Z"]
@@ -62,8 +62,8 @@ def test_every_scale_that_is_left_keeps_all_ranges():
 
 @pytest.mark.parametrize("flying_height", [300.0, 2000.0])
 def test_a_flight_too_low_or_too_high_is_refused(flying_height):
-    flight = Flight.of_heights(152.676, 91.0, (100.0, 110.0), flying_height=flying_height)
-    with pytest.raises(Mistake, match="needs Z"):
+    flight = FlightPlan.of_heights(152.676, 91.0, (100.0, 110.0), flying_height=flying_height)
+    with pytest.raises(A7SimError, match="needs Z"):
         choose_settings(flight, A7)
 
 
@@ -72,13 +72,13 @@ def test_a_flight_too_low_or_too_high_is_refused(flying_height):
 )
 def test_what_excludes_the_largest_model_is_named(flying_height, photo_base, said):
     """At 1:3000 and 470 mm: a base of 91 mm becomes 280.1 mm, the corners of the picture lie 354 mm off the base."""
-    flight = Flight.of_heights(152.676, photo_base, (100.0, 110.0), flying_height=flying_height)
+    flight = FlightPlan.of_heights(152.676, photo_base, (100.0, 110.0), flying_height=flying_height)
     largest = choose_settings(flight, A7).scales[0]
     assert any(each.startswith(said) for each in largest.reason_rejected)
 
 
 def test_a_map_without_a_horizontal_gear_is_refused():
-    with pytest.raises(Mistake, match="no horizontal gear to 1:4000"):
+    with pytest.raises(A7SimError, match="no horizontal gear to 1:4000"):
         choose_settings(AKWANGA, A7, map_scale=4000.0)
 
 
@@ -90,8 +90,8 @@ def test_another_plotter_has_other_ranges_and_gears():
 
 @pytest.mark.parametrize("given", [{}, {"photo_scale": 8000.0, "flying_height": 1200.0}, {"flying_height": -5.0}])
 def test_a_flight_needs_a_scale_or_a_height(given):
-    with pytest.raises(Mistake):
-        Flight.of_heights(152.676, 91.0, (430.24, 487.92), **given)
+    with pytest.raises(A7SimError):
+        FlightPlan.of_heights(152.676, 91.0, (430.24, 487.92), **given)
 
 
 def test_the_sheet_at_the_door():

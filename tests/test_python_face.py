@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import a7sim
-from a7sim import Client, InstrumentRefused, Mistake, Operator, Scenario, Study, connect
+from a7sim import Client, InstrumentError, Mistake, Operator, Scenario, Study, connect
 
 ROOT = Path(__file__).parents[1]
 TOLD = ("a7sim.scripting", "a7sim.link.client", "a7sim.scenario.schema", "a7sim.instrument.autograph", "a7sim.wording")
@@ -109,7 +109,7 @@ def test_what_cannot_be_is_one_sentence(asked, sentence):
 def test_what_the_instrument_refuses_is_told():
     with connect("akwanga") as client:
         client.send("BASE:BX 1000")
-        with pytest.raises(InstrumentRefused):
+        with pytest.raises(InstrumentError):
             client.check("BASE:BX 1000")
 
 

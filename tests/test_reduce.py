@@ -10,7 +10,7 @@ import pytest
 
 from a7sim import computing
 from a7sim.geometry import GON, rotation
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from tests.processes import a7sim_here
 
 ROOT = Path(__file__).parents[1]
@@ -172,7 +172,7 @@ def test_a_hundred_megabytes_of_noise_are_refused_unread(tmp_path):
     path = tmp_path / "noise.csv"
     with path.open("wb") as file:
         file.truncate(100_000_000)
-    with pytest.raises(Mistake, match="at most"):
+    with pytest.raises(A7SimError, match="at most"):
         computing.relative(path, 152.0, (0.0, 0.0), "dependent", 92.0)
 
 

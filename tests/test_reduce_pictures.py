@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from a7sim import computing
-from a7sim.computing.interior import Flight
+from a7sim.computing.interior import FlightHeights
 from a7sim.geometry import GON, radially_displaced, refracted, rotation
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from tests.test_reduce import pair_file, reduce, toml
 
 
@@ -81,7 +81,7 @@ def test_lens_and_refraction_are_taken_off_and_pairs_are_written(tmp_path):
             seen = radially_displaced(refracted(np.array([x + shift, y]), 152.0, 3000.0, 500.0), [2e-8, -1e-12])
             rows.append((photo, name, seen[0] + 0.02, seen[1] - 0.01))
     path = counts_file(tmp_path / "counts.csv", rows)
-    outcome = computing.interior(path, camera, corrections=("lens", "refraction"), flight=Flight(3000.0, 500.0))
+    outcome = computing.interior(path, camera, corrections=("lens", "refraction"), flight=FlightHeights(3000.0, 500.0))
     assert outcome.document["about"] == "principal point"
     computing.write_result(outcome, tmp_path / "o")
     with (tmp_path / "o" / "pairs.csv").open(encoding="utf-8") as file:
@@ -91,23 +91,23 @@ def test_lens_and_refraction_are_taken_off_and_pairs_are_written(tmp_path):
         x, y = true[row["point"]]
         seen = [float(row[column]) for column in ("xl", "yl", "xr", "yr")]
         np.testing.assert_allclose(seen, [x, y, x - 90.0, y], atol=1e-6)
-    with pytest.raises(Mistake, match="--flying-height"):
+    with pytest.raises(A7SimError, match="--flying-height"):
         computing.interior(path, camera, corrections=("curvature",))
 
 
 def test_confused_and_missing_fiducials_and_bad_cameras_are_named(tmp_path):
     camera = camera_file(tmp_path / "camera.toml", CORNERS)
     swapped = [("7", name, x, y) for name, (_, x, y) in zip("1324", CORNERS, strict=True)]
-    with pytest.raises(Mistake, match="photo 7: expected counts of the fiducials that lie as in the camera"):
+    with pytest.raises(A7SimError, match="photo 7: expected counts of the fiducials that lie as in the camera"):
         computing.interior(counts_file(tmp_path / "counts.csv", swapped), camera)
     mirrored = counts_file(tmp_path / "counts.csv", [("7", name, -x, y) for name, x, y in CORNERS])
     assert "mirrored" in computing.interior(mirrored, camera).document["warnings"][0]
     few = counts_file(tmp_path / "few.csv", [("7", *CORNERS[0]), ("7", *CORNERS[1])])
-    with pytest.raises(Mistake, match=r"few\.csv, photo 7: expected 3 fiducials"):
+    with pytest.raises(A7SimError, match=r"few\.csv, photo 7: expected 3 fiducials"):
         computing.interior(few, camera)
     for text in ("c = 'x'\n", "camera = 3\n", "c = \n", ""):
         (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
-        with pytest.raises(Mistake, match=r"^[^\n]*bad\.toml[^\n]*$"):
+        with pytest.raises(A7SimError, match=r"^[^\n]*bad\.toml[^\n]*$"):
             computing.interior(few, tmp_path / "bad.toml")
 
 
@@ -165,7 +165,7 @@ def test_all_methods_stand_side_by_side(tmp_path):
         values = [float(row[method]) for method in methods]
         assert float(row["difference"]) == pytest.approx(max(values) - min(values), rel=1e-3, abs=1e-9)
     assert float(rows["omega2"]["difference"]) < 0.01
-    with pytest.raises(Mistake, match="dependent"):
+    with pytest.raises(A7SimError, match="dependent"):
         computing.relative(path, 152.0, (0.0, 0.0), "independent", 92.0, "all")
 
 
@@ -198,7 +198,7 @@ def test_a_centre_comes_from_pointings_at_any_number_of_levels(tmp_path):
     assert [document[name] for name in ("X0", "Y0", "Z0")] == pytest.approx([4999.3, 4992.5, 7573.0], abs=1e-6)
     assert document["pointing_rms"] < 1e-9
     path.write_text("point,level,X,Y\n" + "\n".join(rows[:-1]) + "\n", encoding="utf-8")
-    with pytest.raises(Mistake, match="none of point p5 at 5200"):
+    with pytest.raises(A7SimError, match="none of point p5 at 5200"):
         computing.centres(path, method="levels")
 
 
@@ -215,7 +215,7 @@ def test_a_centre_comes_from_a_grid_plate(tmp_path):
     assert [document[name] for name in ("X0", "Y0", "Z0")] == pytest.approx(centre.tolist(), abs=1e-6)
     angles = [document["angles"][name]["value"] * GON for name in ("omega", "phi", "kappa")]
     assert angles == pytest.approx([0.01, -0.02, 0.5], abs=1e-9)
-    with pytest.raises(Mistake, match="--c"):
+    with pytest.raises(A7SimError, match="--c"):
         computing.centres(path, method="grid")
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from a7sim import computing
 from a7sim.computing.strips import PairCamera
 from a7sim.geometry import rotation
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground
 from a7sim.reduction.cards import deck_lines, read_cards
 from a7sim.reduction.strips import Model
@@ -329,7 +329,7 @@ def test_a_block_of_two_strips_comes_back_exactly(tmp_path):
     assert set(document["models"][0]["sigma"]) == {"scale", "turn_X", "turn_Y", "turn_Z", "TX", "TY", "TZ"}
     assert (tmp_path / "o" / "strip-1.crd").exists()
     assert (tmp_path / "o" / "strip-2.crd").exists()
-    with pytest.raises(Mistake, match=r"1\.csv: expected models of its own"):
+    with pytest.raises(A7SimError, match=r"1\.csv: expected models of its own"):
         computing.block([paths[0], paths[0]], known)
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.reduction import (
-    Stand,
+    ProjectorPose,
     Undetermined,
     element_corrections,
     perspective_centre,
@@ -102,7 +102,7 @@ def _six_points(b, d, h):
 
 
 def _projectors(b):
-    return Stand(np.zeros(3), np.zeros(3)), Stand(np.array([b, 0.0, 0.0]), np.zeros(3))
+    return ProjectorPose(np.zeros(3), np.zeros(3)), ProjectorPose(np.array([b, 0.0, 0.0]), np.zeros(3))
 
 
 def _closed_form(text, **values):

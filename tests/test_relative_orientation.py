@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from a7sim.geometry import image_of, mxm, rotation, transposed, turn_of
-from a7sim.reduction import Stand, Undetermined, element_corrections
+from a7sim.reduction import ProjectorPose, Undetermined, element_corrections
 from a7sim.reduction.coplanarity import relative_orientation
 from a7sim.reduction.hallert import orientation_by_parallaxes, six_point_corrections
 from a7sim.reduction.modelling import a8_model_coordinates, model_coordinates
@@ -149,7 +149,7 @@ def test_hallerts_closed_forms_are_the_least_squares_solution(parallaxes, b, d):
     h = 152.0
     plan = [(0.0, 0.0), (b, 0.0), (0.0, d), (b, d), (0.0, -d), (b, -d)]
     points = np.array([(x, y, -h) for x, y in plan]).T
-    left, right = Stand(np.zeros(3), np.zeros(3)), Stand(np.array([b, 0.0, 0.0]), np.zeros(3))
+    left, right = ProjectorPose(np.zeros(3), np.zeros(3)), ProjectorPose(np.array([b, 0.0, 0.0]), np.zeros(3))
     names = ("by2", "bz2", "kappa2", "phi2", "omega2")
     expected = element_corrections(np.array(parallaxes), points, left, right, names)
     closed, s0 = six_point_corrections(np.array(parallaxes), b, d, h)

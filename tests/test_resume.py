@@ -8,7 +8,7 @@ import pytest
 
 from a7sim.scenario import load_scenario
 from a7sim.session.bridge import INDEPENDENT, run_bridge
-from a7sim.session.journal import Keeping
+from a7sim.session.journal import JournalOptions
 from a7sim.session.resuming import find_resumable
 from tests.processes import said_here
 
@@ -86,7 +86,7 @@ def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridg
     shutil.rmtree(cut / INDEPENDENT)
     cut_off(bridged / INDEPENDENT, cut / INDEPENDENT, 0.3)
     begun = find_resumable(cut, "bridge")
-    run_bridge(begun.scenario, begun.seed, cut, keeping=Keeping(resumes=True))
+    run_bridge(begun.scenario, begun.seed, cut, keeping=JournalOptions(resumes=True))
     assert without_what_was_torn(files_of(cut)) == files_of(bridged)
 
 
@@ -101,7 +101,7 @@ def test_results_of_a_bridge_say_so_where_it_was_interrupted_among_the_independe
     begun = find_resumable(cut, "bridge")
     monkeypatch.setattr("a7sim.session.bridge.run", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        run_bridge(begun.scenario, begun.seed, cut, keeping=Keeping(resumes=True))
+        run_bridge(begun.scenario, begun.seed, cut, keeping=JournalOptions(resumes=True))
     results = msgspec.json.decode((cut / "results.json").read_bytes())
     assert results["status"] == "interrupted"
     assert results["bridged"]["strip"]
@@ -113,9 +113,9 @@ def test_what_a_folder_had_of_another_strip_is_not_gone_on_with(bridged, tmp_pat
     cut = tmp_path / "cut"
     (cut / INDEPENDENT).mkdir(parents=True)
     shutil.copy(bridged / JOURNAL, cut / INDEPENDENT)
-    Keeping().prepare(cut, force=True, parts=(INDEPENDENT,))
+    JournalOptions().prepare(cut, force=True, parts=(INDEPENDENT,))
     assert files_of(cut) == {}
-    assert Keeping(resumes=True).for_part(cut / INDEPENDENT) == Keeping(resumes=False)
+    assert JournalOptions(resumes=True).for_part(cut / INDEPENDENT) == JournalOptions(resumes=False)
 
 
 @pytest.mark.parametrize(("left", "begun"), [(None, False), (b"", False), (b'{"schema', False), (b'{}\n{"t"', True)])
@@ -123,4 +123,4 @@ def test_a_part_is_gone_on_with_where_the_header_of_its_journal_is_whole(tmp_pat
     """Cut off sooner, nothing was observed in it, and it is begun anew."""
     if left is not None:
         (tmp_path / JOURNAL).write_bytes(left)
-    assert Keeping(resumes=True).for_part(tmp_path) == Keeping(resumes=begun)
+    assert JournalOptions(resumes=True).for_part(tmp_path) == JournalOptions(resumes=begun)

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction import Ground, absolute_orientation, formed_strip, read_cards
 from a7sim.report.kept import read_session
 from a7sim.report.writing import render_report
@@ -144,7 +144,7 @@ def test_accuracy_is_of_the_order_of_the_theses_first_case(all_strips):
 
 
 def test_a_scenario_without_control_or_of_too_many_models_is_refused():
-    with pytest.raises(Mistake, match="expected ground control in the scenario, got none"):
+    with pytest.raises(A7SimError, match="expected ground control in the scenario, got none"):
         run_combinations(load_scenario("dewitt-pair"), 1)
 
 

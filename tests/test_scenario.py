@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from a7sim.files import read_rows
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import ScenarioError, build_scenario, load_scenario, scenario_schema
 from a7sim.session.ways import run_all_methods
 
@@ -241,7 +241,7 @@ def test_a_scenario_for_the_comparator_alone_needs_no_plan_and_has_none():
     scenario = load_scenario("schut-1956")
     assert scenario.work == ["comparator"]
     assert scenario.half_width == 85.0
-    with pytest.raises(Mistake, match="the scenario is not for one"):
+    with pytest.raises(A7SimError, match="the scenario is not for one"):
         _ = scenario.plan
 
 

@@ -9,15 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.geometry import GON, image_of, rotation
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
-from a7sim.scenario.schema import Air, Camera, Fiducial, Film, Measured, Terrain
+from a7sim.scenario.schema import Air, Camera, Fiducial, FilmDeformation, Measured, Terrain
 from a7sim.scene import build_scene
 from a7sim.scene.camera import distorted, lowered_by_curvature, refracted
 from a7sim.scene.measured import measured_marks
-from a7sim.scene.terrain import Ground
+from a7sim.scene.terrain import GroundSurface
 
-FAULTLESS_FILM = Film()
+FAULTLESS_FILM = FilmDeformation()
 
 
 def akwanga(**changes):
@@ -26,12 +26,12 @@ def akwanga(**changes):
 
 @given(st.integers(0, 50), st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
 def test_the_ground_stays_within_its_relief(seed, east, north):
-    ground = Ground.of(Terrain(mean_height=459.08, relief=28.84, wavelength=700.0, seed=seed))
+    ground = GroundSurface.of(Terrain(mean_height=459.08, relief=28.84, wavelength=700.0, seed=seed))
     assert abs(float(ground.height(np.array(east), np.array(north))) - 459.08) <= 28.84 + 1e-9
 
 
 def test_a_ray_meets_the_ground_on_the_ground():
-    ground = Ground.of(Terrain(mean_height=459.08, relief=28.84, wavelength=700.0, seed=6))
+    ground = GroundSurface.of(Terrain(mean_height=459.08, relief=28.84, wavelength=700.0, seed=6))
     centre = np.array([440000.0, 985000.0, 1680.0])
     direction = np.array([[30.0, -60.0, 0.0], [80.0, 10.0, 0.0], [-152.0, -152.0, -152.0]])
     met = ground.intersect(centre, direction)
@@ -63,7 +63,9 @@ def test_the_standard_points_lie_as_in_figure_4_1():
 
 def test_film_shrinks_and_its_noise_is_as_large_as_asked():
     many = [
-        build_scene(akwanga(film=Film(shrinkage_ppm=(500.0, 300.0), irregular_um=3.0, identification_um=4.0)), seed)
+        build_scene(
+            akwanga(film=FilmDeformation(shrinkage_ppm=(500.0, 300.0), irregular_um=3.0, identification_um=4.0)), seed
+        )
         for seed in range(40)
     ]
     exact = build_scene(akwanga(film=FAULTLESS_FILM), 1).photographs["102"]
@@ -152,7 +154,7 @@ def test_counts_mirrored_by_the_comparator_are_mirrored_back(tmp_path):
 def test_a_bad_file_is_named_with_line_and_column(tmp_path, content, words):
     path = tmp_path / "bad.csv"
     path.write_text(content, encoding="utf-8")
-    with pytest.raises(Mistake) as caught:
+    with pytest.raises(A7SimError) as caught:
         measured_marks(Measured(file=str(path)), "left", load_scenario("akwanga").camera)
     message = str(caught.value)
     assert "\n" not in message
@@ -174,5 +176,5 @@ def test_counts_without_their_fiducials_or_with_confused_ones_are_refused(tmp_pa
     named = [(other.get(f.name, f.name), f) for f in camera.fiducials if f.name in scale]
     rows = [f"p,{name},{1000 + 100 * f.x},{5000 + 100 * f.y}" for name, f in named] + ["p,P,3000,4000"]
     (tmp_path / "counts.csv").write_text("photo,point,x,y\n" + "\n".join(rows), encoding="utf-8")
-    with pytest.raises(Mistake, match=words):
+    with pytest.raises(A7SimError, match=words):
         measured_marks(Measured(file=str(tmp_path / "counts.csv"), units="counts"), "p", camera)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from a7sim.mistakes import Mistake
-from a7sim.session.playing import Player
-from a7sim.session.scripts import Expect, Place, find_script, read_script
+from a7sim.mistakes import A7SimError
+from a7sim.session.playing import ScriptRunner
+from a7sim.session.scripts import Expect, SourceLocation, find_script, read_script
 
 SCRIPTS = Path(__file__).parents[1] / "scenarios" / "scripts"
 FIRST = "scenario akwanga seed 7\n"
@@ -24,7 +24,7 @@ def replay(*arguments):
 def played(tmp_path, text):
     (tmp_path / "s.a7s").write_text(FIRST + text)
     heard = []
-    player = Player(read_script(tmp_path / "s.a7s"), heard.append)
+    player = ScriptRunner(read_script(tmp_path / "s.a7s"), heard.append)
     return player.run(), [event.text for event in heard if event.direction == ">"], player
 
 
@@ -32,7 +32,7 @@ def played(tmp_path, text):
 def test_the_scripts_of_the_thesis_find_all_that_they_expect(name):
     script = read_script(find_script(name))
     assert sum(isinstance(each, Expect) for each in script.statements) >= 11
-    player = Player(script)
+    player = ScriptRunner(script)
     assert player.run() is None
     assert len(player.desk.autograph.recorder.registrations) == {"interior": 0, "clearing": 12, "centres": 24}[name]
 
@@ -67,7 +67,7 @@ def test_lines_waits_and_comments_are_what_they_say(tmp_path):
 )
 def test_what_does_not_come_is_named_with_its_line(tmp_path, text, line, expected, got):
     failed, _, _ = played(tmp_path, text)
-    assert (failed.place, failed.expected) == (Place(tmp_path / "s.a7s", line), expected)
+    assert (failed.place, failed.expected) == (SourceLocation(tmp_path / "s.a7s", line), expected)
     assert failed.got.startswith(got)
 
 
@@ -96,7 +96,7 @@ def test_an_error_that_is_expected_is_none(tmp_path):
 def test_what_is_no_script_gets_one_sentence_with_file_and_line(tmp_path, text, sentence):
     (tmp_path / "other.a7s").write_text("scenario akwanga seed 8\n")
     (tmp_path / "s.a7s").write_text(text)
-    with pytest.raises(Mistake) as raised:
+    with pytest.raises(A7SimError) as raised:
         read_script(tmp_path / "s.a7s")
     assert sentence in str(raised.value)
 

@@ -12,8 +12,8 @@ import msgspec
 import pytest
 
 from a7sim.documents import as_json
-from a7sim.link.twin import BesideTwin, open_checked_port
-from a7sim.mistakes import Mistake
+from a7sim.link.twin import TwinCheckedPort, open_checked_port
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
 from a7sim.session import run
 from tests.test_cli import ROOT, a7sim
@@ -172,7 +172,7 @@ def one_model():
 def test_an_operator_at_a_served_instrument_leaves_the_same_results(one_model, kind, tmp_path):
     scenario, results = one_model
     with served(kind, new_desk(scenario)) as url, open_checked_port(url, timeout=5.0) as port:
-        run(scenario, 7, tmp_path / "out", cable=lambda twin: BesideTwin(port, twin, url))
+        run(scenario, 7, tmp_path / "out", cable=lambda twin: TwinCheckedPort(port, twin, url))
     assert (tmp_path / "out" / "results.json").read_text(encoding="utf-8") == results
 
 
@@ -190,7 +190,7 @@ def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
     scenario, _ = one_model
     read = []
 
-    class Eavesdropper(BesideTwin):
+    class Eavesdropper(TwinCheckedPort):
         def readline(self, size=-1):
             line = super().readline(size)
             read.append((line, self._served.given))
@@ -227,10 +227,10 @@ def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
 def test_an_instrument_of_another_scenario_or_seed_is_refused_in_one_sentence(one_model, scenario, seed, sentence):
     with (
         served("tcp", new_desk(scenario, seed)) as url,
-        pytest.raises(Mistake, match=f"{url}: the instrument served {sentence}"),
+        pytest.raises(A7SimError, match=f"{url}: the instrument served {sentence}"),
         open_checked_port(url, timeout=1.0) as port,
     ):
-        run(one_model[0], 7, cable=lambda twin: BesideTwin(port, twin, url))
+        run(one_model[0], 7, cable=lambda twin: TwinCheckedPort(port, twin, url))
 
 
 def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
@@ -241,8 +241,8 @@ def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
         def readline(self, size=-1):
             return b""
 
-    with pytest.raises(Mistake, match=r"url: expected an answer to \*IDN\? in time, got none"):
-        run(one_model[0], 7, cable=lambda twin: BesideTwin(Silent(), twin, "url"))
+    with pytest.raises(A7SimError, match=r"url: expected an answer to \*IDN\? in time, got none"):
+        run(one_model[0], 7, cable=lambda twin: TwinCheckedPort(Silent(), twin, "url"))
 
 
 def test_operate_holds_the_lock_and_gives_it_back():
@@ -250,7 +250,7 @@ def test_operate_holds_the_lock_and_gives_it_back():
     with served("tcp", desk) as url:
         with open_checked_port(url, timeout=1.0):
             assert desk.lock_holder is not None
-            with pytest.raises(Mistake, match="another client holds its lock"), open_checked_port(url, timeout=1.0):
+            with pytest.raises(A7SimError, match="another client holds its lock"), open_checked_port(url, timeout=1.0):
                 pytest.fail("two operators in one chair")
         assert desk.lock_holder is None
 

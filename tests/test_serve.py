@@ -11,11 +11,11 @@ import pytest
 
 import a7sim
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import MAX_LINE_LENGTH, MAX_REPLY, Desk
+from a7sim.instrument.language import MAX_LINE_LENGTH, MAX_REPLY, SharedInstrument
 from a7sim.instrument.language.status import QUEUE_LENGTH
 from a7sim.instrument.language.syntax import MAX_NUMBER_LENGTH
-from a7sim.link.conversation import Terms
-from a7sim.link.serving import MAX_REJECTION_NOTICES, Doors
+from a7sim.link.conversation import ServerLimits
+from a7sim.link.serving import MAX_REJECTION_NOTICES, Endpoints
 from a7sim.link.wires import MAX_READ, MAX_UNREAD, QUICK_ACKNOWLEDGEMENT
 from a7sim.manual import VARIANTS
 from tests.served import ANYWHERE, PATIENCE, Line, Served
@@ -83,7 +83,7 @@ def test_whatever_bytes_come_in_whatever_pieces(served, sent, replies):
 @pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
 def test_a_client_with_nagles_algorithm_waits_for_no_late_acknowledgement(kind):
     """Commands have no reply that could carry the acknowledgement, without which the client keeps its next line."""
-    with Served(doors=Doors(**{kind: [ANYWHERE]})) as served:
+    with Served(doors=Endpoints(**{kind: [ANYWHERE]})) as served:
         line = served.line()
         if kind == "rfc2217":
             line.socket.recv(64)
@@ -146,7 +146,7 @@ def test_a_client_that_goes_while_it_waits_leaves_nothing_behind():
 
 @pytest.fixture
 def guarded():
-    with Served(Desk(Autograph(VARIANTS["A7"]), token="sesame 8x")) as opened:
+    with Served(SharedInstrument(Autograph(VARIANTS["A7"]), token="sesame 8x")) as opened:
         yield opened
 
 
@@ -171,7 +171,7 @@ def test_after_the_login_the_errors_from_before_it_are_there(guarded):
 
 def test_the_journal_never_holds_a_token_right_or_wrong():
     heard = []
-    with Served(Desk(Autograph(VARIANTS["A7"]), heard.append, token="sesame")) as guarded:
+    with Served(SharedInstrument(Autograph(VARIANTS["A7"]), heard.append, token="sesame")) as guarded:
         client = guarded.line()
         client.send(b'SYST:LOG "sesam"\nsyst:version?;login  "sesame"\nSYST:LOGIN "sesame"\n')
         assert client.ask("COUN:X?;:SYST:ERR:COUN?") == "0.00;2"
@@ -234,7 +234,7 @@ def test_the_replies_to_a_line_are_bounded(served):
 
 
 def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
-    with Served(terms=Terms(max_clients=3)) as served:
+    with Served(terms=ServerLimits(max_clients=3)) as served:
         lines = [served.line() for _ in range(3)]
         assert [line.ask("*TST?") for line in lines] == ["0"] * 3
         for _ in range(2 * MAX_REJECTION_NOTICES):
@@ -246,7 +246,7 @@ def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
 
 
 def test_why_a_client_is_turned_away():
-    with Served(terms=Terms(max_clients=1)) as served:
+    with Served(terms=ServerLimits(max_clients=1)) as served:
         assert served.line().ask("*TST?") == "0"
         late = served.line()
         assert late.ask("*IDN?") == '-200,"Execution error;expected at most 1 client at a time"'
@@ -260,7 +260,7 @@ def test_64_clients_are_let_in_unless_said_otherwise(served):
 
 
 def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
-    with Served(terms=Terms(write_timeout=0.5)) as served:
+    with Served(terms=ServerLimits(write_timeout=0.5)) as served:
         other = served.line()
         assert other.ask("*TST?") == "0"
         slow = served.line()
@@ -301,7 +301,7 @@ def test_a_client_that_reads_late_gets_every_reply_in_order(served):
 
 
 def test_who_says_nothing_is_told_and_let_go_and_who_speaks_stays():
-    with Served(terms=Terms(idle_timeout=0.4)) as served:
+    with Served(terms=ServerLimits(idle_timeout=0.4)) as served:
         silent, speaking = served.line(), served.line()
         assert silent.ask("SYST:LOCK:REQ?") == "1"
         until = time.monotonic() + 0.8
@@ -357,7 +357,7 @@ def test_a_burst_starves_nobody(served):
 
 
 def test_a_hundred_clients_polling_at_once_are_all_served_alike():
-    with Served(terms=Terms(max_clients=100)) as served:
+    with Served(terms=ServerLimits(max_clients=100)) as served:
         lines = [served.line() for _ in range(100)]
         for n, line in enumerate(lines):
             assert line.ask(f"*ESE {n};*ESE?") == str(n)

@@ -12,14 +12,14 @@ import serial
 
 import a7sim
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.link.client import Client
-from a7sim.link.conversation import Terms
-from a7sim.link.faults import Cut, Faults, Noise, parse_faults
-from a7sim.link.serving import Doors
+from a7sim.link.conversation import ServerLimits
+from a7sim.link.faults import ConnectionDropped, FaultInjector, FaultRates, parse_faults
+from a7sim.link.serving import Endpoints
 from a7sim.link.wires import MAX_UNREAD
 from a7sim.manual import VARIANTS
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from tests.door import with_model
 from tests.served import ANYWHERE, PATIENCE, Served
 
@@ -33,7 +33,7 @@ def link(tmp_path):
 
 @pytest.fixture
 def terminal(link):
-    with Served(doors=Doors(pty=[link])) as served:
+    with Served(doors=Endpoints(pty=[link])) as served:
         yield served
 
 
@@ -57,7 +57,7 @@ def test_a_terminal_is_a_serial_port_in_raw_mode(terminal, link):
 def test_every_byte_of_a_block_comes_through_a_terminal(link):
     door = with_model()
     expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
-    with Served(door.desk, doors=Doors(pty=[link])) as served, at(served) as port:
+    with Served(door.desk, doors=Endpoints(pty=[link])) as served, at(served) as port:
         assert Client(port).block("EYEP1:PICT? 60,50,4") == expected
 
 
@@ -70,7 +70,7 @@ def test_clients_of_a_terminal_come_and_go(terminal):
 def test_the_link_goes_with_the_server_and_an_old_one_is_replaced(link):
     near, far = os.openpty()
     link.symlink_to(os.ttyname(far))
-    with Served(doors=Doors(pty=[link])) as served:
+    with Served(doors=Endpoints(pty=[link])) as served:
         assert str(link.readlink()) == served.opened[0]["device"] != os.ttyname(far)
     assert not link.is_symlink()
     os.close(near), os.close(far)
@@ -79,14 +79,14 @@ def test_the_link_goes_with_the_server_and_an_old_one_is_replaced(link):
 @pytest.mark.parametrize("make", [lambda path: path.write_text("mine"), Path.mkdir, lambda path: path.symlink_to("x")])
 def test_what_is_no_link_to_a_terminal_is_left_alone(link, make):
     make(link)
-    with pytest.raises(Mistake, match="expected nothing there or an old link"), Served(doors=Doors(pty=[link])):
+    with pytest.raises(A7SimError, match="expected nothing there or an old link"), Served(doors=Endpoints(pty=[link])):
         pass
     assert os.path.lexists(link)
     assert [path.name for path in link.parent.iterdir()] == ["a7"]
 
 
 def test_a_link_that_now_leads_elsewhere_is_left_alone(link):
-    with Served(doors=Doors(pty=[link])):
+    with Served(doors=Endpoints(pty=[link])):
         link.unlink()
         link.symlink_to("/dev/pts/elsewhere")
     assert str(link.readlink()) == "/dev/pts/elsewhere"
@@ -95,15 +95,15 @@ def test_a_link_that_now_leads_elsewhere_is_left_alone(link):
 def test_a_folder_that_is_not_there_is_said_and_every_other_door_is_closed_again(tmp_path):
     first = tmp_path / "first"
     with (
-        pytest.raises(Mistake, match=r"nowhere/a7: expected a place where a link can be made"),
-        Served(doors=Doors(pty=[first, tmp_path / "nowhere" / "a7"])),
+        pytest.raises(A7SimError, match=r"nowhere/a7: expected a place where a link can be made"),
+        Served(doors=Endpoints(pty=[first, tmp_path / "nowhere" / "a7"])),
     ):
         pass
     assert not first.is_symlink()
 
 
 def test_a_terminal_whose_client_does_not_read_begins_anew(link):
-    with Served(terms=Terms(write_timeout=0.2), doors=Doors(pty=[link], tcp=[ANYWHERE])) as served:
+    with Served(terms=ServerLimits(write_timeout=0.2), doors=Endpoints(pty=[link], tcp=[ANYWHERE])) as served:
         first = served.server._terminals[0]._conversation
         far = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(far)
@@ -119,7 +119,7 @@ def test_a_terminal_whose_client_does_not_read_begins_anew(link):
 def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
     """More than is kept for a client: it is heard no further until it has read, and nothing is lost."""
     count = 3 * MAX_UNREAD // len(IDENTITY)
-    with Served(doors=Doors(pty=[link])) as served, at(served) as port:
+    with Served(doors=Endpoints(pty=[link])) as served, at(served) as port:
         sender = threading.Thread(target=port.write, args=(b"*IDN?\n" * count,))
         sender.start()
         assert served.until(lambda: served.server._terminals[0]._clogged)
@@ -129,7 +129,7 @@ def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
 
 
 def test_a_terminal_long_silent_frees_its_lock_and_stays(link):
-    with Served(terms=Terms(idle_timeout=0.2), doors=Doors(pty=[link])) as served:
+    with Served(terms=ServerLimits(idle_timeout=0.2), doors=Endpoints(pty=[link])) as served:
         with at(served) as port:
             assert Client(port).ask("SYST:LOCK:REQ?") == "1"
         assert served.until(lambda: served.desk.lock_holder is None)
@@ -145,7 +145,7 @@ def test_a_port_over_rfc_2217_carries_every_byte_and_ends_lines_with_cr_as_well(
     door = with_model()
     expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
     assert expected.count(b"\xff") > 0
-    with Served(door.desk, doors=Doors(rfc2217=[ANYWHERE])) as served, at(served) as port:
+    with Served(door.desk, doors=Endpoints(rfc2217=[ANYWHERE])) as served, at(served) as port:
         client = Client(port)
         assert client.block("EYEP1:PICT? 60,50,4") == expected
         port.write(b"*TST?\r")
@@ -163,8 +163,8 @@ def test_a_port_over_rfc_2217_carries_every_byte_and_ends_lines_with_cr_as_well(
 @pytest.mark.parametrize("kind", ["tcp", "pty"])
 def test_a_paced_line_needs_ten_bits_a_byte_both_ways_and_holds_up_nobody(link, kind):
     baud, asked = 2400, 3
-    doors = Doors(tcp=[ANYWHERE], pty=[link])
-    with Served(terms=Terms(baud=baud), doors=doors) as served:
+    doors = Endpoints(tcp=[ANYWHERE], pty=[link])
+    with Served(terms=ServerLimits(baud=baud), doors=doors) as served:
         url = served.opened[0]["url"] if kind == "tcp" else str(link)
         with serial.serial_for_url(url, timeout=PATIENCE) as port:
             port.write(b"*IDN?\n")
@@ -182,7 +182,7 @@ def test_a_paced_line_needs_ten_bits_a_byte_both_ways_and_holds_up_nobody(link, 
 
 
 def test_a_paced_line_keeps_little_and_loses_nothing():
-    with Served(terms=Terms(baud=2_000_000)) as served:
+    with Served(terms=ServerLimits(baud=2_000_000)) as served:
         line = served.line()
         sender = threading.Thread(target=line.send, args=(b"COUN:X?\n" * 5000,))
         sender.start()
@@ -191,7 +191,7 @@ def test_a_paced_line_keeps_little_and_loses_nothing():
 
 
 def test_a_paced_client_that_hangs_up_its_half_is_answered_to_the_end():
-    with Served(terms=Terms(baud=19200)) as served:
+    with Served(terms=ServerLimits(baud=19200)) as served:
         line = served.line()
         line.send(b"*TST?\n" * 50)
         line.socket.shutdown(1)
@@ -203,7 +203,8 @@ def test_a_paced_client_that_hangs_up_its_half_is_answered_to_the_end():
 
 def faulty(spec, seed=1, baud=None):
     return Served(
-        Desk(Autograph(VARIANTS["A7"])), Terms(faults=parse_faults(spec), fault_seed=seed, baud=baud, max_clients=200)
+        SharedInstrument(Autograph(VARIANTS["A7"])),
+        ServerLimits(faults=parse_faults(spec), fault_seed=seed, baud=baud, max_clients=200),
     )
 
 
@@ -237,7 +238,7 @@ def test_replies_are_late_by_the_delay_and_in_order():
 
 def test_bytes_are_garbled_as_often_as_asked_and_line_ends_spared():
     reply = bytes(range(32, 127)) * 100 + b"\n"
-    noise = Noise(Faults(garble=0.02), np.random.default_rng(3))
+    noise = FaultInjector(FaultRates(garble=0.02), np.random.default_rng(3))
     came = [noise.apply(reply) for _ in range(10)]
     wrong = sum(a != b for each in came for a, b in zip(each, reply, strict=True))
     assert 0.015 < wrong / (10 * len(reply)) < 0.025
@@ -256,15 +257,15 @@ def test_a_line_that_is_cut_takes_its_client_and_nobody_else():
 
 
 def test_a_cut_is_an_end_not_a_reply():
-    with pytest.raises(Cut):
-        Noise(Faults(disconnect=1.0), np.random.default_rng(0)).apply(b"0\n")
+    with pytest.raises(ConnectionDropped):
+        FaultInjector(FaultRates(disconnect=1.0), np.random.default_rng(0)).apply(b"0\n")
 
 
 def test_faults_read_as_they_are_written():
-    assert parse_faults("drop-reply:0.01,delay:50ms,garble:0.001,disconnect:0.0005") == Faults(
+    assert parse_faults("drop-reply:0.01,delay:50ms,garble:0.001,disconnect:0.0005") == FaultRates(
         0.01, 0.001, 0.0005, 0.05
     )
-    assert parse_faults("delay:1.5s") == Faults(delay=1.5)
+    assert parse_faults("delay:1.5s") == FaultRates(delay=1.5)
 
 
 @pytest.mark.parametrize(
@@ -281,5 +282,5 @@ def test_faults_read_as_they_are_written():
     ],
 )
 def test_faults_that_cannot_be_read_are_said(spec, sentence):
-    with pytest.raises(Mistake, match=sentence.replace("(", r"\(")):
+    with pytest.raises(A7SimError, match=sentence.replace("(", r"\(")):
         parse_faults(spec)

@@ -5,25 +5,28 @@ import json
 import msgspec
 import pytest
 
-from a7sim.mistakes import Mistake
-from a7sim.operator.grid_test import GridTestOrder
+from a7sim.mistakes import A7SimError
+from a7sim.operator.grid_test import GridTestPlan
 from a7sim.scenario import load_scenario
 from a7sim.session import run
 from a7sim.session.bridge import run_bridge
-from a7sim.session.compiling import Wanted, compile_model
+from a7sim.session.compiling import CompilationRequest, compile_model
 from a7sim.session.grid_test import run_grid_test
-from a7sim.session.running import Watcher
+from a7sim.session.running import ProgressCallbacks
 
 
 def calibrated(scenario, seed, out, watcher):
-    order = GridTestOrder(scenario.camera, scenario.grid_plate, 9, 1, 1, "positive")
+    order = GridTestPlan(scenario.camera, scenario.grid_plate, 9, 1, 1, "positive")
     return run_grid_test(scenario, seed, order, out, watcher)
 
 
 WORK = {
     "run": (run, "akwanga"),
     "bridge": (run_bridge, "bridge"),
-    "compile": (lambda scenario, seed, *of: compile_model(scenario, seed, Wanted("1", interval=10.0), *of), "akwanga"),
+    "compile": (
+        lambda scenario, seed, *of: compile_model(scenario, seed, CompilationRequest("1", interval=10.0), *of),
+        "akwanga",
+    ),
     "calibrate": (calibrated, "grid-test"),
 }
 
@@ -41,7 +44,7 @@ def test_who_is_interrupted_leaves_whole_files(what, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        work(load_scenario(name), 1, out, Watcher(on_activity=interrupt))
+        work(load_scenario(name), 1, out, ProgressCallbacks(on_activity=interrupt))
     document = results_of(out)
     assert (document["status"], document["message"].split()[-2:]) == ("interrupted", ["was", "interrupted"])
     assert document["operator"]["book_entries"] == len((out / "book.csv").read_text().splitlines()) - 1
@@ -63,16 +66,16 @@ def test_who_gives_up_says_why_and_the_document_is_the_file(what, tmp_path):
 
 def test_what_fails_for_another_reason_says_so_in_the_file_and_goes_on_up(tmp_path):
     def fail(_):
-        raise Mistake("the lamp has burnt out")
+        raise A7SimError("the lamp has burnt out")
 
-    with pytest.raises(Mistake, match="burnt out"):
-        run(load_scenario("akwanga"), 1, tmp_path / "out", Watcher(on_activity=fail))
+    with pytest.raises(A7SimError, match="burnt out"):
+        run(load_scenario("akwanga"), 1, tmp_path / "out", ProgressCallbacks(on_activity=fail))
     document = results_of(tmp_path / "out")
     assert (document["status"], document["message"]) == ("failed", "the lamp has burnt out")
 
 
 def test_without_settings_of_a_plotter_nothing_is_written(tmp_path):
     scenario = msgspec.structs.replace(load_scenario("akwanga"), plotting=None)
-    with pytest.raises(Mistake, match="plan: expected the settings of a plotter"):
+    with pytest.raises(A7SimError, match="plan: expected the settings of a plotter"):
         run(scenario, 1, tmp_path / "out")
     assert not (tmp_path / "out").exists()

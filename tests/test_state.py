@@ -6,7 +6,7 @@ import random
 import pytest
 
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.link.clock import Clock
 from a7sim.link.waiting import feed_until_idle
 from a7sim.scenario import load_scenario
@@ -45,7 +45,7 @@ def line(dice, name):
 
 def worn(name, token=None):
     scenario = load_scenario(name, {"instrument.condition": '"worn"', "instrument.laying_sigma_mm": "0.3"})
-    return Desk(build_autograph(scenario.instrument, build_scene(scenario, 3).mountable, 3), token=token)
+    return SharedInstrument(build_autograph(scenario.instrument, build_scene(scenario, 3).mountable, 3), token=token)
 
 
 @pytest.mark.parametrize("name", list(LINES))

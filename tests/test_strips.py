@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from a7sim.geometry import image_of, ray_of, rotation, stereoscopic_intersection
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground, absolute_orientation, max_abs_residual, root_mean_square
 from a7sim.reduction.block import block_adjustment
 from a7sim.reduction.coplanarity import relative_orientation
@@ -398,16 +398,16 @@ def test_models_that_make_no_strip_are_refused():
     points, centres = flight(rng, photographs=5)
     models = perfect_models(rng, points, centres)
     assert [model.name for model in in_order([models[2], models[0], models[1]])] == ["2-3", "1-2", "0-1"]
-    with pytest.raises(Mistake, match="in common"):
+    with pytest.raises(A7SimError, match="in common"):
         formed_strip([models[0], models[1], models[3]])
-    with pytest.raises(Mistake, match="every model once, got model 0-1 twice"):
+    with pytest.raises(A7SimError, match="every model once, got model 0-1 twice"):
         formed_strip([models[0], models[0]])
     few = Model("few", ("1:centre", "1a", "9z"), rng.standard_normal((3, 3)))
-    with pytest.raises(Mistake, match="at least 3 common points"):
+    with pytest.raises(A7SimError, match="at least 3 common points"):
         formed_strip([models[0], few])
-    with pytest.raises(Mistake, match="got none"):
+    with pytest.raises(A7SimError, match="got none"):
         formed_strip([])
-    with pytest.raises(Mistake, match="twice"):
+    with pytest.raises(A7SimError, match="twice"):
         Model("m", ("1", "1"), np.zeros((3, 2)))
     with pytest.raises(ValueError, match="coordinates of 2 points, got 3"):
         Model("m", ("1", "2"), np.zeros((3, 3)))
@@ -436,7 +436,7 @@ def having(name, *centres):
     ids=["a branch", "a ring"],
 )
 def test_a_branch_or_a_ring_is_no_strip(models, sentence):
-    with pytest.raises(Mistake) as told:
+    with pytest.raises(A7SimError) as told:
         in_order(models)
     assert str(told.value) == sentence
 
@@ -447,7 +447,7 @@ def test_models_joined_at_a_centre_have_one_in_common_and_points_below_it():
     first, second = perfect_models(rng, points, centres)
     for method in ("centre", "heights"):
         ground_alone = first.without("1:centre")
-        with pytest.raises(Mistake, match=r"one common projection centre \(<photo>:centre\), got none"):
+        with pytest.raises(A7SimError, match=r"one common projection centre \(<photo>:centre\), got none"):
             formed_strip([ground_alone, second], method)
     places = np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, -50], [5, -10, -40]]).T
     names = ("1:centre", "1a", "1b", "1c")
@@ -551,13 +551,13 @@ def test_ground_points_the_model_has_not_are_named_and_wrong_roles_refused():
     more = {**points, "77z": np.zeros(3)}
     warnings = absolute_orientation(tilted_model(rng, points), grounded(more, lambda name: "control")).warnings
     assert warnings == ("ground points that the model has not: 77z",)
-    with pytest.raises(Mistake, match="role"):
+    with pytest.raises(A7SimError, match="role"):
         Ground(("1",), np.zeros((3, 1)), ("guess",))
-    with pytest.raises(Mistake, match="ground point 1: expected every point once, got it twice"):
+    with pytest.raises(A7SimError, match="ground point 1: expected every point once, got it twice"):
         Ground(("1", "1"), np.zeros((3, 2)), ("control", "check"))
     with pytest.raises(ValueError, match="as many names, coordinates and roles, got 1, 2, 1"):
         Ground(("1",), np.zeros((3, 2)), ("control",))
-    with pytest.raises(Mistake, match="gap"):
+    with pytest.raises(A7SimError, match="gap"):
         Ground(("1",), np.array([[np.nan], [0.0], [0.0]]), ("plan",))
 
 
@@ -656,7 +656,7 @@ def test_three_bands_of_control_do_not_carry_the_third_degree():
         strip_axis(Model("heap", names, 0.0 * places))
     with pytest.raises(Undetermined, match="at least 5"):
         strip_adjustment(model, Ground(names[:4], places[:, :4], ("control",) * 4), 2)
-    with pytest.raises(Mistake, match="degree"):
+    with pytest.raises(A7SimError, match="degree"):
         strip_adjustment(model, ground, 4)
 
 
@@ -739,9 +739,9 @@ def test_blocks_that_hang_loose_are_refused():
     heaped = Ground(("a", "b", "c"), np.zeros((3, 3)), ("control", "control", "height"))
     with pytest.raises(Undetermined, match="extent in plan"):
         block_adjustment([three], heaped)
-    with pytest.raises(Mistake, match="500"):
+    with pytest.raises(A7SimError, match="500"):
         block_adjustment([], ground)
-    with pytest.raises(Mistake, match="every model once"):
+    with pytest.raises(A7SimError, match="every model once"):
         block_adjustment([models[0], models[0]], ground)
     plan = Ground(("0_0", "3_2"), ground.among(("0_0", "3_2")).coordinates, ("control", "control"))
     with pytest.raises(Undetermined, match="three control points in height, got 2"):

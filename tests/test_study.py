@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.study.cells import make_cells
 from a7sim.study.checkpoint import save
 from a7sim.study.executors import open_executor
 from a7sim.study.loading import SEARCH_PATH, build_study, load_study
-from a7sim.study.running import Pace, _Size, run_study
+from a7sim.study.running import ChunkPolicy, _Size, run_study
 from a7sim.study.schema import Factor, Study
 from a7sim.study.tally import Tally
 
@@ -69,7 +69,7 @@ def test_every_study_that_comes_with_a7sim_can_be_laid_out(name):
 def numbers_of(laid_study, kind="process", largest_chunk=2000, tally=None):
     tally = tally or Tally.empty(len(laid_study.cells), len(laid_study.responses))
     with open_executor(kind, 2 if kind == "pool" else None) as (executor, at_once):
-        run_study(laid_study, tally, executor, at_once, pace=Pace(largest_chunk=largest_chunk))
+        run_study(laid_study, tally, executor, at_once, pace=ChunkPolicy(largest_chunk=largest_chunk))
     return tally
 
 
@@ -110,7 +110,7 @@ def test_a_study_ends_when_its_precision_is_reached_or_its_replicates_are_done(
 
 
 def test_a_response_that_the_results_do_not_have_is_a_mistake_that_names_its_place(tmp_path):
-    with pytest.raises(Mistake, match=r"at ways there are comparator, not 'A8'"):
+    with pytest.raises(A7SimError, match=r"at ways there are comparator, not 'A8'"):
         numbers_of(laid(tmp_path, responses=["ways.A8.accuracy_m.checks.plan"]))
 
 
@@ -196,7 +196,7 @@ MISTAKES = {
 def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
     changes, words = MISTAKES[name]
     (tmp_path / "study.toml").write_text('responses = ["hours"]')
-    with pytest.raises(Mistake) as told:
+    with pytest.raises(A7SimError) as told:
         laid(tmp_path, **changes) if "photos" not in changes else build_study(changes, tmp_path)
     assert words in str(told.value)
     assert str(told.value).startswith("study: ")
@@ -214,7 +214,7 @@ def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
 )
 def test_chunks_are_as_large_as_pays(opening, each, settled):
     """Rule: what costs much to open is worked long, to a limit; what costs nothing, for about twenty seconds."""
-    size = _Size(Pace())
+    size = _Size(ChunkPolicy())
     for _ in range(8):
         size.learn(size.best, opening + each * size.best)
     assert size.best in settled

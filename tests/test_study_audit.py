@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from a7sim.session import crowd
-from a7sim.session.fleet_hands import FleetHands
+from a7sim.session.fleet_hands import BatchDriver
 from a7sim.study.auditing import audit_study
 from a7sim.study.executors import InProcess
 from a7sim.study.loading import build_study
@@ -82,7 +82,7 @@ PERTURBED = {
 @pytest.mark.parametrize("name", list(PERTURBED))
 def test_a_least_count_too_much_anywhere_on_the_bench_is_found_out(worked, monkeypatch, name):
     method, perturbed = PERTURBED[name]
-    monkeypatch.setattr(FleetHands, method, perturbed(getattr(FleetHands, method)))
+    monkeypatch.setattr(BatchDriver, method, perturbed(getattr(BatchDriver, method)))
     (found,) = audit_study(*worked, 1)
     assert (found.cell, found.replicate) == (1, 1)
 

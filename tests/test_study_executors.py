@@ -14,14 +14,14 @@ from types import SimpleNamespace
 import pytest
 
 from a7sim.documents import as_json
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.study import by_mpi
 from a7sim.study.checkpoint import checkpoint_path, save
 from a7sim.study.executors import open_executor
 from a7sim.study.findings import findings_document
 from a7sim.study.folder import write_results
 from a7sim.study.loading import build_study
-from a7sim.study.running import Pace, run_study
+from a7sim.study.running import ChunkPolicy, run_study
 from a7sim.study.tally import Tally
 from tests.processes import said_here
 from tests.served import PATIENCE
@@ -37,7 +37,7 @@ def laid(tmp_path):
 
 def worked(study, tally, kind, workers, tick=lambda _: None):
     with open_executor(kind, workers) as (executor, at_once):
-        run_study(study, tally, executor, at_once, None, tick, Pace(largest_chunk=1))
+        run_study(study, tally, executor, at_once, None, tick, ChunkPolicy(largest_chunk=1))
 
 
 def left(study, tally, folder):
@@ -82,7 +82,7 @@ def test_a_study_on_dask_gives_the_same_bytes_though_a_worker_is_killed(alone, t
 
 def test_a_pool_that_lost_a_worker_says_so_and_the_study_goes_on_to_the_same_bytes(alone, tmp_path):
     study, tally = laid(tmp_path), Tally.empty(2, 2)
-    with pytest.raises(Mistake, match="a worker of the study was lost"):
+    with pytest.raises(A7SimError, match="a worker of the study was lost"):
         worked(study, tally, "pool", 1, OneLost())
     assert 0 < tally.done.sum() < 12
     worked(study, tally, "process", None)
@@ -213,7 +213,7 @@ def test_over_mpi_another_process_works_and_ends_without_a_word(monkeypatch):
 def test_a_process_that_was_started_alone_is_told_how_to_start_more(monkeypatch):
     the_world_of(monkeypatch, 1, object())
     with (
-        pytest.raises(Mistake, match=r"two processes or more \(mpiexec -n 5 .*\), got this one alone"),
+        pytest.raises(A7SimError, match=r"two processes or more \(mpiexec -n 5 .*\), got this one alone"),
         ExitStack() as stack,
     ):
         stack.enter_context(by_mpi.open_mpi_executor({"THREADS": "1"}))

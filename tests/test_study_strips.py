@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.report.drawing import standalone
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
@@ -20,8 +20,8 @@ from a7sim.study.executors import open_executor
 from a7sim.study.findings import findings_document
 from a7sim.study.loading import build_study, load_study
 from a7sim.study.page import study_markdown, study_page
-from a7sim.study.running import Pace, run_study
-from a7sim.study.schema import Claim
+from a7sim.study.running import ChunkPolicy, run_study
+from a7sim.study.schema import Hypothesis
 from a7sim.study.simulating import Task, replicate_seed
 from a7sim.study.tally import Tally
 
@@ -199,7 +199,7 @@ def test_a_task_cut_off_between_its_cells_goes_on_to_the_same_numbers(tmp_path, 
 def _numbers(study, largest_chunk, tally=None):
     tally = tally or Tally.empty(len(study.cells), len(study.responses))
     with open_executor("process") as (executor, at_once):
-        run_study(study, tally, executor, at_once, pace=Pace(largest_chunk=largest_chunk))
+        run_study(study, tally, executor, at_once, pace=ChunkPolicy(largest_chunk=largest_chunk))
     return tally
 
 
@@ -255,7 +255,7 @@ def test_the_verdict_of_a_claim_follows_from_effect_and_interval(shift, replicat
     rng = np.random.default_rng(1)
     values = rng.normal(10.0, 1.0, (3, replicates)) + np.array([0.0, 0.0, shift])[:, None]
     cells = [Cell(number, {"f": level}, {}) for number, level in enumerate("ABC", start=1)]
-    claim = Claim(says="s", about="it", factor="f", alike=["A", "B", "C"], responses=["hours"])
+    claim = Hypothesis(says="s", about="it", factor="f", alike=["A", "B", "C"], responses=["hours"])
     responses = {"hours": {"name": "hours", "unit": "h", "meaning": "hours"}}
     (found,) = claims.test_claims([claim], cells, responses, lambda _: values)
     assert found["verdict"] == verdict
@@ -284,7 +284,7 @@ MISTAKES = {
 @pytest.mark.parametrize("name", list(MISTAKES))
 def test_a_mistake_gets_one_sentence(tmp_path, name):
     changes, words = MISTAKES[name]
-    with pytest.raises(Mistake) as told:
+    with pytest.raises(A7SimError) as told:
         laid(tmp_path, **({"claim": []} | changes))
     assert words in str(told.value)
     assert len(str(told.value).splitlines()) == 1

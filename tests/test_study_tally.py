@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.study import checkpoint
 from a7sim.study.checkpoint import KINDS, checkpoint_path, load, newest_checkpoint, save
-from a7sim.study.sketch import CAPACITY, Sketch
+from a7sim.study.sketch import CAPACITY, QuantileSketch
 from a7sim.study.statistics import quantile_with_interval
 from a7sim.study.tally import Tally
 from tests.examples import examples
@@ -66,7 +66,7 @@ ORDERS = {
 def test_a_sketch_is_wrong_by_no_more_than_it_says_and_the_same_however_it_was_cut(seed, n, order, cuts):
     """Bound: every rank is within `rank_error`, which is below 0.25 % at a million values and smaller for fewer."""
     values = ORDERS[order](np.random.default_rng(seed).normal(size=n))
-    sketch, cut = Sketch(), Sketch()
+    sketch, cut = QuantileSketch(), QuantileSketch()
     sketch.add(values)
     for part in np.split(values, sorted(int(each * n) for each in cuts)):
         cut.add(part)
@@ -82,7 +82,7 @@ def test_a_sketch_is_wrong_by_no_more_than_it_says_and_the_same_however_it_was_c
 
 
 def test_the_bound_of_a_sketch_of_a_million_values_is_a_quarter_of_a_percent_and_it_keeps_few():
-    sketch = Sketch()
+    sketch = QuantileSketch()
     sketch.add(RNG.normal(size=1_000_000))
     assert sketch.rank_error < 2500
     assert sketch.values.size < 10 * CAPACITY
@@ -136,14 +136,14 @@ def test_a_tally_of_nothing_can_be_left_and_gone_on_with(tmp_path, name):
 def test_a_checkpoint_of_something_else_is_refused_in_one_sentence(tmp_path, tally, name, monkeypatch):
     path = tmp_path / name
     save(tally, path, "study")
-    with pytest.raises(Mistake, match=r"got that of another \(--force"):
+    with pytest.raises(A7SimError, match=r"got that of another \(--force"):
         load(path, "another")
     monkeypatch.setattr("a7sim.__version__", "0.0.9")
-    with pytest.raises(Mistake, match=r"expected a checkpoint of a7sim 0\.0\.9, got one of"):
+    with pytest.raises(A7SimError, match=r"expected a checkpoint of a7sim 0\.0\.9, got one of"):
         load(path, "study")
     for damaged in (b"nothing", b"", path.read_bytes()[:-300]):
         path.write_bytes(damaged)
-        with pytest.raises(Mistake, match="got a file that is none") as told:
+        with pytest.raises(A7SimError, match="got a file that is none") as told:
             load(path, "study")
         assert len(str(told.value).splitlines()) == 1
 
@@ -153,7 +153,7 @@ def test_without_pyarrow_checkpoints_are_npz_and_parquet_is_one_sentence(tmp_pat
     save(tally, tmp_path / "checkpoint.parquet", "study")
     monkeypatch.setattr(checkpoint, "find_spec", lambda name: None)
     assert checkpoint_path(tmp_path).name == "checkpoint.npz"
-    with pytest.raises(Mistake, match=r"pip install 'a7sim\[parquet\]'"):
+    with pytest.raises(A7SimError, match=r"pip install 'a7sim\[parquet\]'"):
         load(tmp_path / "checkpoint.parquet", "study")
 
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 from msgspec.structs import replace as changed
 
-from a7sim.session.lines import Chain, read_journal
+from a7sim.session.lines import ChecksumChain, read_journal
 from a7sim.training.attempts import resume_attempt, run_attempt, start_attempt, write_answers
 from a7sim.training.checking import check_exercise
-from a7sim.training.exercise import Measured, Played
+from a7sim.training.exercise import MetricSpec, PlayedRun
 from a7sim.training.grading import grade_folder
-from a7sim.training.measures import Found, make_metric
-from a7sim.training.room import Unreliable
+from a7sim.training.measures import MetricResult, make_metric
+from a7sim.training.room import UnreliableJournalError
 from a7sim.training.shelf import ExerciseError, all_exercises, find_exercise, read_exercise
 from a7sim.training.variation import attempt_seed, scenario_for
 
@@ -50,7 +50,7 @@ def parallax():
 @pytest.fixture(scope="module")
 def left_standing(parallax, tmp_path_factory):
     folder = tmp_path_factory.mktemp("attempt")
-    assert run_attempt(parallax, Played(script="faulty-by2-left.a7s"), folder, 4) == ""
+    assert run_attempt(parallax, PlayedRun(script="faulty-by2-left.a7s"), folder, 4) == ""
     return folder
 
 
@@ -70,14 +70,14 @@ def test_an_edited_reply_is_found_by_working_the_journal_again(parallax, left_st
     events[0].pop("crc")
     forged = type(there.event(number))(**{**_fields(there.event(number)), "text": "23"})
     events[number - 1] = forged
-    chain = Chain()
+    chain = ChecksumChain()
     (tmp_path / "session.jsonl").write_bytes(b"".join(chain.line(each) + b"\n" for each in events))
-    with pytest.raises(Unreliable, match=f"line {number}: expected what the instrument does again"):
+    with pytest.raises(UnreliableJournalError, match=f"line {number}: expected what the instrument does again"):
         grade_folder(parallax, 4, tmp_path)
 
 
 def test_a_journal_of_another_seed_is_another_students(parallax, left_standing):
-    with pytest.raises(Unreliable, match="expected an attempt with"):
+    with pytest.raises(UnreliableJournalError, match="expected an attempt with"):
         grade_folder(parallax, 5, left_standing)
 
 
@@ -178,12 +178,12 @@ def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
         account = room.record({"play": "0.08"})
 
         def found(name, **options):
-            return make_metric(Measured(measure=name, options=options)).evaluate(account)
+            return make_metric(MetricSpec(measure=name, options=options)).evaluate(account)
 
-        assert found("spread", handles=["by1"]) == Found(0.04, "by' at point 1 read from 0.26 to 0.30")
-        assert found("missing-readings", points=["2"]) == Found(1.0, "1 of 1 registration missing: 2")
+        assert found("spread", handles=["by1"]) == MetricResult(0.04, "by' at point 1 read from 0.26 to 0.30")
+        assert found("missing-readings", points=["2"]) == MetricResult(1.0, "1 of 1 registration missing: 2")
         assert found("wrong-approach", handles=["by1"]).value == 1.0
-        assert found("handles-moved", handles=["by1", "by2"]) == Found(1.0, "by' moved")
+        assert found("handles-moved", handles=["by1", "by2"]) == MetricResult(1.0, "by' moved")
         assert found("run-by-motor", handles=["X"]).value == 0.0
         assert found("not-opposed").value is None
         assert account.answers == {"play": "0.08", "slip": "none"}
@@ -198,7 +198,7 @@ def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parall
             for line in lines:
                 engine.feed(line + b"\n", 6.0)
             options = {"points": ["1"], "each": 4}
-            return make_metric(Measured(measure="missing-pointings", options=options)).evaluate(room.record()).value
+            return make_metric(MetricSpec(measure="missing-pointings", options=options)).evaluate(room.record()).value
 
         assert missing_after(b"DRIV:X 50", b"PROJ1:BY 0.3", b"DRIV:X 1", b'REC "1011",BY1') == 3.0
         assert missing_after(b"PROJ1:BY 0.4;:WHE:Y 0.4", b'REC "1011",BY1') == 3.0
@@ -215,29 +215,31 @@ def test_an_answer_that_is_missing_or_no_number_is_told_and_measures_nothing(par
 
     def found(name, answers, **options):
         account = replace(blank, written=answers, hidden=hidden)
-        return make_metric(Measured(measure=name, options=options)).evaluate(account)
+        return make_metric(MetricSpec(measure=name, options=options)).evaluate(account)
 
     both = {"keys": ["base", "height"]}
-    assert found("answers-off", {"base": "92", "height": "301"}, **both) == Found(
+    assert found("answers-off", {"base": "92", "height": "301"}, **both) == MetricResult(
         1.0, "height was answered 301, the furthest off"
     )
-    assert found("answers-off", {"base": "92"}, **both) == Found(None, "height: not answered")
-    assert found("answers-off", {"base": "x", "height": "1"}, **both) == Found(None, "base: expected a number, got 'x'")
-    assert found("answers-off", {"base": "92", "height": "inf"}, **both) == Found(
+    assert found("answers-off", {"base": "92"}, **both) == MetricResult(None, "height: not answered")
+    assert found("answers-off", {"base": "x", "height": "1"}, **both) == MetricResult(
+        None, "base: expected a number, got 'x'"
+    )
+    assert found("answers-off", {"base": "92", "height": "inf"}, **both) == MetricResult(
         None, "height: expected a number, got 'inf'"
     )
-    assert found("answer-off", {"base": "92"}, key="base", true="base") == Found(0.5, "base was answered 92")
-    assert found("answer-off", {}, key="base", true="base") == Found(None, "base: not answered")
-    assert found("answer-off", {"base": "x"}, key="base", true="base") == Found(
+    assert found("answer-off", {"base": "92"}, key="base", true="base") == MetricResult(0.5, "base was answered 92")
+    assert found("answer-off", {}, key="base", true="base") == MetricResult(None, "base: not answered")
+    assert found("answer-off", {"base": "x"}, key="base", true="base") == MetricResult(
         None, "base: expected a number, got 'x'"
     )
     assert found("answer-off", {"base": "1"}, key="base", true="nowhere").value is None
-    assert found("answer-wrong", {"sign": " Minus"}, keys=["sign"]) == Found(0.0, "sign: right")
-    assert found("answer-wrong", {"sign": "plus"}, keys=["sign", "base"]) == Found(
+    assert found("answer-wrong", {"sign": " Minus"}, keys=["sign"]) == MetricResult(0.0, "sign: right")
+    assert found("answer-wrong", {"sign": "plus"}, keys=["sign", "base"]) == MetricResult(
         2.0, "not answered: base; sign is not plus"
     )
     place = {"point": "1", "keys": ["x", "y"]}
-    assert found("place-by-scales", {"x": "1"}, **place) == Found(None, "expected numbers for x and y")
-    assert found("place-by-scales", {"x": "1", "y": "2"}, **place | {"point": "2"}) == Found(
+    assert found("place-by-scales", {"x": "1"}, **place) == MetricResult(None, "expected numbers for x and y")
+    assert found("place-by-scales", {"x": "1", "y": "2"}, **place | {"point": "2"}) == MetricResult(
         None, "nothing was registered at 2"
     )

@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace as changed
 
 from a7sim.training.checking import check_exercise
-from a7sim.training.exercise import Faulty, Played, Shelved, Step
+from a7sim.training.exercise import ChecklistItem, ExerciseFolder, FaultyRun, PlayedRun
 from a7sim.training.shelf import find_exercise
 
 
@@ -28,7 +28,7 @@ def faults_of(shelved):
 def test_all_that_is_missing_of_the_form_is_said_at_once_and_nothing_is_played(parallax, tmp_path):
     first, *others = parallax.exercise.criteria
     bare = wrong(
-        Shelved(parallax.exercise, tmp_path),
+        ExerciseFolder(parallax.exercise, tmp_path),
         hints=parallax.exercise.hints[:1],
         faulty=[],
         steps=[],
@@ -56,12 +56,14 @@ def test_an_exercise_that_everybody_passes_is_found_out(parallax):
         pass_points=0.0,
         criteria=[changed(each, required=False) for each in exercise.criteria],
         faulty=[
-            Faulty(script="reference.a7s", fails="at-rest", why="it does not"),
+            FaultyRun(script="reference.a7s", fails="at-rest", why="it does not"),
             changed(by2_left, fails="complete"),
         ],
         steps=[
             changed(exercise.steps[0], text="never", done=-1.0),
-            Step(text="already", measure=exercise.steps[0].measure, options=exercise.steps[0].options, done=1000.0),
+            ChecklistItem(
+                text="already", measure=exercise.steps[0].measure, options=exercise.steps[0].options, done=1000.0
+            ),
         ],
     )
     faults = faults_of(lenient)
@@ -87,7 +89,7 @@ def test_limits_below_what_the_eye_can_do_and_bands_the_wrong_way_round_are_foun
         changed(each, excellent=limits[each.id][0], passing=limits[each.id][1]) if each.id in limits else each
         for each in parallax.exercise.criteria
     ]
-    faults = faults_of(wrong(Shelved(parallax.exercise, folder), criteria=criteria))
+    faults = faults_of(wrong(ExerciseFolder(parallax.exercise, folder), criteria=criteria))
     assert len(faults) == 4
     for fault, band in zip(faults[:2], ("excellent", "pass"), strict=True):
         assert fault.startswith(f"cleared: expected {band} no better than eye and least count, ")
@@ -96,5 +98,5 @@ def test_limits_below_what_the_eye_can_do_and_bands_the_wrong_way_round_are_foun
 
 
 def test_a_reference_that_fails_is_told_with_what_it_fails(parallax):
-    (fault, *_) = faults_of(wrong(parallax, reference=Played(script="faulty-half.a7s"), faulty=[]))[1:]
+    (fault, *_) = faults_of(wrong(parallax, reference=PlayedRun(script="faulty-half.a7s"), faulty=[]))[1:]
     assert fault.startswith("reference: expected it to pass, got complete: ")

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 
 from a7sim.link.client import Client
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.training.attempts import run_attempt
-from a7sim.training.exercise import Played
+from a7sim.training.exercise import PlayedRun
 from a7sim.training.handed_in import grade_submission, grade_submissions
 from a7sim.training.progress import FILE, MIGRATIONS, Progress
 from a7sim.training.shelf import find_exercise
@@ -167,7 +167,7 @@ def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path, monkeypatch)
     for i in range(4):
         seed = attempt_seed(f"student {i}", shelved.name)
         folders.append(tmp_path / str(i))
-        assert run_attempt(shelved, Played(script="faulty-kind.a7s"), folders[-1], seed, f"student {i}") == ""
+        assert run_attempt(shelved, PlayedRun(script="faulty-kind.a7s"), folders[-1], seed, f"student {i}") == ""
     together = grade_submissions(folders, workers=2)
     assert together == [grade_submission(folder) for folder in folders]
     assert [each.student for each in together] == [f"student {i}" for i in range(4)]
@@ -285,7 +285,7 @@ def test_progress_of_a_newer_version_is_left_alone_and_an_empty_file_is_brought_
     assert database.execute("PRAGMA user_version").fetchone() == (len(MIGRATIONS),)
     database.execute("PRAGMA user_version = 99")
     database.close()
-    with pytest.raises(Mistake, match="a newer a7sim wrote it"):
+    with pytest.raises(A7SimError, match="a newer a7sim wrote it"):
         Progress(tmp_path)
 
 

@@ -4,8 +4,8 @@ import asyncio
 from pathlib import Path
 
 from a7sim.console.app import Console
-from a7sim.console.eyepiece import Drawing
-from a7sim.console.seat import Seat
+from a7sim.console.eyepiece import DrawingMode
+from a7sim.console.seat import ConsoleConfig
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.training.attempts import start_attempt
@@ -37,7 +37,9 @@ def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: 
     with start_attempt(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
         port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
         tasks = Checklist(room, attempt).lines
-        asyncio.run(sit_down(Console(Seat(lambda: Client(port), lambda: 0.0, drawing=Drawing.HALVES, tasks=tasks))))
+        asyncio.run(
+            sit_down(Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, drawing=DrawingMode.HALVES, tasks=tasks)))
+        )
         readings = room.record().readings
         assert [(each.point, each.named) for each in readings] == [("1011", ("by1",))] * 2 + [("A", ("by1",))]
 
@@ -65,5 +67,5 @@ def test_points_are_driven_to_with_a_gear_engaged_before_and_counters_preset_by_
 
     with start_attempt(shelved, 9, tmp_path, "ada", "practice") as room:
         port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
-        asyncio.run(sit_down(Console(Seat(lambda: Client(port), lambda: 0.0, drawing=Drawing.HALVES))))
+        asyncio.run(sit_down(Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, drawing=DrawingMode.HALVES))))
         assert abs(room.autograph.counter("X") - 5000.0 - 194.99) < 15.0

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from a7sim.training.exercise import Measured
+from a7sim.training.exercise import MetricSpec
 from a7sim.training.measures import make_metric
 from a7sim.training.progress import Progress
 from a7sim.training.room import open_environment
@@ -95,7 +95,7 @@ def test_fittings_are_judged_by_the_job_sheet(exam, tmp_path):
     assert ordered.base == "outside"
     with open_environment(exam, 16, tmp_path, "ada", "exam") as room:
         engine = room.desk.open("client2")
-        found = make_metric(Measured(measure="wrong-fittings", options={"by_job": True})).evaluate
+        found = make_metric(MetricSpec(measure="wrong-fittings", options={"by_job": True})).evaluate
         engine.feed(f'PHOT1:LOAD "{ordered.left}";:PHOT2:LOAD "{ordered.right}"\n'.encode(), 1.0)
         assert "the base is inside and belongs outside" in found(room.record()).reason
         assert f"{ordered.left} lies in projector 1 and {ordered.right} belongs there" in found(room.record()).reason

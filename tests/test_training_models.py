@@ -8,7 +8,7 @@ import pytest
 from a7sim.geometry import GON
 from a7sim.session.grid_test import true_errors
 from a7sim.training.attempts import run_attempt
-from a7sim.training.exercise import Played
+from a7sim.training.exercise import PlayedRun
 from a7sim.training.grading import grade_record, load_record
 from a7sim.training.handouts import make_handout
 from a7sim.training.measures.ground import element_at, last_readings
@@ -73,7 +73,7 @@ def test_the_misread_point_can_be_found_and_the_strip_comes_to_the_true_ground(s
 
 def test_who_leaves_the_misread_point_in_is_told_where_it_shows(tmp_path):
     shelved = find_exercise("12")
-    played = Played(procedure="strip by cards", options={"wanted": ["8003", "8005"], "leave_out": False})
+    played = PlayedRun(procedure="strip by cards", options={"wanted": ["8003", "8005"], "leave_out": False})
     assert run_attempt(shelved, played, tmp_path, 12) == ""
     failed = {each.id: each for each in grade_record(load_record(shelved, 12, tmp_path)).failed}
     assert set(failed) == {"plan"}
@@ -83,7 +83,7 @@ def test_who_leaves_the_misread_point_in_is_told_where_it_shows(tmp_path):
 @pytest.fixture(scope="module")
 def levelled(tmp_path_factory):
     shelved, folder = find_exercise("10"), tmp_path_factory.mktemp("levelled")
-    assert run_attempt(shelved, Played(procedure="absolute orientation", observer=PERFECT), folder, 8) == ""
+    assert run_attempt(shelved, PlayedRun(procedure="absolute orientation", observer=PERFECT), folder, 8) == ""
     return load_record(shelved, 8, folder)
 
 

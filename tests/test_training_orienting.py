@@ -7,16 +7,16 @@ from hypothesis import strategies as st
 
 from a7sim.geometry import GON, PARALLAX_ELEMENTS
 from a7sim.operator.empirical import clearing_coefficients, over_correction_by_coefficients
-from a7sim.reduction import Stand, perspective_centre
+from a7sim.reduction import ProjectorPose, perspective_centre
 from a7sim.reduction.hallert import regular_corrections
 from a7sim.scenario import load_scenario
 from a7sim.standard_points import CASES
 from a7sim.training.attempts import run_attempt
-from a7sim.training.exercise import Played
+from a7sim.training.exercise import PlayedRun
 from a7sim.training.forms import FIVE, computation_form, multipliers
 from a7sim.training.grading import grade_folder
 from a7sim.training.measures.centres import sigmas_of_centre
-from a7sim.training.measures.clearing import Turn
+from a7sim.training.measures.clearing import OmegaTurn
 from a7sim.training.shelf import find_exercise
 
 heights = st.floats(min_value=290.0, max_value=360.0)
@@ -51,7 +51,7 @@ def test_n_of_exercise_7_is_that_of_the_coefficients(z, d3, d5):
     """A / (A - B) from the heights of 1, 3 and 5 is the over-correction of the five points, verticals given."""
     b, (z2, z1, z4, z3, z5) = 195.0, z
     points = np.array([[b, 0, -z2], [0, 0, -z1], [b, d3, -z4], [0, d3, -z3], [0, -d5, -z5]]).T[..., None]
-    left, right = (Stand(np.array([[x], [0.0], [0.0]]), np.zeros((3, 1))) for x in (0.0, b))
+    left, right = (ProjectorPose(np.array([[x], [0.0], [0.0]]), np.zeros((3, 1))) for x in (0.0, b))
     rows = [PARALLAX_ELEMENTS.index(name) for name in ("kappa1", "kappa2", "phi1", "phi2", "omega1")]
     needed = over_correction_by_coefficients(clearing_coefficients(points, left, right)[rows])[0]
     by_omega = z5 + d5**2 / z5
@@ -62,7 +62,7 @@ def test_n_of_exercise_7_is_that_of_the_coefficients(z, d3, d5):
 @given(times=st.floats(0.5, 4.0), needed=st.floats(1.5, 4.0))
 def test_what_a_wrong_over_correction_leaves(times, needed):
     """|1 - n / n0| of the parallax (docs/empirical.md), whatever the drum showed."""
-    turn = Turn(None, before=98.3, cleared=98.5, left=98.3 + 0.2 * times, needed=needed)
+    turn = OmegaTurn(None, before=98.3, cleared=98.5, left=98.3 + 0.2 * times, needed=needed)
     assert turn.remains == pytest.approx(abs(1.0 - times / needed), abs=1e-9)
 
 
@@ -96,7 +96,7 @@ def test_tolerances_of_centres_rest_on_what_pointings_scatter_by(akwanga):
 
 def sheet_of(name, folder, seed, **played):
     shelved = find_exercise(name)
-    run_attempt(shelved, Played(**played), folder, seed)
+    run_attempt(shelved, PlayedRun(**played), folder, seed)
     return {each.id: each for each in grade_folder(shelved, seed, folder).marks}
 
 

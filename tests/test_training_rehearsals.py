@@ -4,7 +4,7 @@ import pytest
 
 from a7sim.training.attempts import run_attempt, seed_for
 from a7sim.training.grading import evaluate_metrics, load_record
-from a7sim.training.rehearsing import Rehearsals
+from a7sim.training.rehearsing import DryRuns
 from a7sim.training.shelf import find_exercise
 
 
@@ -21,7 +21,7 @@ def test_a_rehearsal_comes_to_what_the_journal_of_the_same_attempt_gives(number,
     """
     shelved = find_exercise(number)
     played = shelved.exercise.faulty[0]
-    rehearsals = Rehearsals(shelved)
+    rehearsals = DryRuns(shelved)
     rehearsals.run_attempt(shelved.exercise.reference)
     rehearsed, trouble = rehearsals.run_attempt(played)
     seed = seed_for(shelved, played)
@@ -33,7 +33,7 @@ def test_a_rehearsal_comes_to_what_the_journal_of_the_same_attempt_gives(number,
 
 
 def test_what_is_rehearsed_leaves_the_opening_as_it_was():
-    rehearsals = Rehearsals(find_exercise("9"))
+    rehearsals = DryRuns(find_exercise("9"))
     seed = seed_for(rehearsals.shelved, rehearsals.shelved.exercise.reference)
     before = rehearsals.run_and_leave(seed, None)
     rehearsals.run_attempt(rehearsals.shelved.exercise.reference)

@@ -9,12 +9,12 @@ import pytest
 from click.testing import CliRunner
 
 from a7sim.cli import cli
-from a7sim.operator import DoesNotFit, measure_models
-from a7sim.operator.bench import Bench
+from a7sim.operator import OperatorGaveUp, measure_models
+from a7sim.operator.bench import Workstation
 from a7sim.operator.compilation import Compilation
-from a7sim.operator.crew import Crew
+from a7sim.operator.crew import OperatorBatch
 from a7sim.operator.level_model import level_model
-from a7sim.operator.line_hands import LineHands
+from a7sim.operator.line_hands import ScpiDriver
 from a7sim.operator.map_lines import Area, Tracing
 from a7sim.operator.stereo_view import StereoView
 from a7sim.operator.work import measure_models_batch
@@ -203,7 +203,7 @@ def test_with_point_1_under_water_the_counters_are_preset_elsewhere_and_the_book
     ],
 )
 def test_too_little_left_is_one_sentence(shore, overrides, sentence):
-    with pytest.raises(DoesNotFit) as said:
+    with pytest.raises(OperatorGaveUp) as said:
         worked_alone(flooded(shore, **overrides))
     assert str(said.value).startswith(sentence)
 
@@ -212,7 +212,7 @@ def test_with_all_under_water_there_is_nowhere_to_begin():
     scenario = flooded("1")
     everywhere = [(4e5, 9e5), (5e5, 9e5), (5e5, 1.1e6), (4e5, 1.1e6)]
     terrain = msgspec.structs.replace(scenario.terrain, water=[Water(shore=everywhere)])
-    with pytest.raises(DoesNotFit, match="1: no point is pricked on both the prints of 101 and 102"):
+    with pytest.raises(OperatorGaveUp, match="1: no point is pricked on both the prints of 101 and 102"):
         worked_alone(msgspec.structs.replace(scenario, terrain=terrain))
 
 
@@ -251,7 +251,9 @@ def test_on_water_no_spot_is_set_and_no_contour_followed():
     session = open_session(scenario, 1)
     person = session.person
     person.book.set_heading("", "preparation")
-    bench = Bench(Crew.single(person), LineHands(person), replace(session.job, models=session.job.models[:1]))
+    bench = Workstation(
+        OperatorBatch.single(person), ScpiDriver(person), replace(session.job, models=session.job.models[:1])
+    )
     record = next(measure_models_batch(bench)).of(0)
     view = StereoView(bench, person)
     model = level_model(bench, view, record.points, ground_control(scenario, session.scene), 3750.0)

@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk
-from a7sim.link.serving import Doors
+from a7sim.instrument.language import SharedInstrument
+from a7sim.link.serving import Endpoints
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from tests.served import ANYWHERE, Served
@@ -14,14 +14,14 @@ from tests.served import ANYWHERE, Served
 
 def new_desk(scenario="akwanga", seed=7):
     loaded = load_scenario(scenario) if isinstance(scenario, str) else scenario
-    return Desk(build_autograph(loaded.instrument, build_scene(loaded, seed).mountable, seed))
+    return SharedInstrument(build_autograph(loaded.instrument, build_scene(loaded, seed).mountable, seed))
 
 
 @contextmanager
 def everywhere(desk):
     """Serve a desk; yield its URLs by kind."""
     with tempfile.TemporaryDirectory() as folder:
-        doors = Doors([ANYWHERE], [ANYWHERE], [Path(folder) / "pty"])
+        doors = Endpoints([ANYWHERE], [ANYWHERE], [Path(folder) / "pty"])
         with Served(desk, doors=doors) as opened:
             urls = {door["kind"]: door["url"] for door in opened.opened}
             yield urls | {"socket": urls["tcp"].replace("tcp://", "socket://")}

@@ -10,10 +10,10 @@ import numpy as np
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
-from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Crew
+from a7sim.operator.bench import Workstation
+from a7sim.operator.crew import OperatorBatch
 from a7sim.operator.empirical import over_correction
-from a7sim.operator.line_hands import LineHands
+from a7sim.operator.line_hands import ScpiDriver
 from a7sim.operator.work import measure_models_batch, orient_model
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session
@@ -40,7 +40,7 @@ def seen_at_six(n_and_seed):
     n, seed = n_and_seed
     plan = {"plan.procedure": '"empirical"', "plan.start_off_gon": "2", "plan.over_correction": n}
     session = open_session(load_scenario("akwanga", plan | {"plan.tolerated_parallax_um": "1000"}), seed)
-    bench = Bench(Crew.single(session.person), LineHands(session.person), session.job)
+    bench = Workstation(OperatorBatch.single(session.person), ScpiDriver(session.person), session.job)
     with suppress(_IsReady):
         next(measure_models_batch(bench, _stop))
     found = orient_model(bench, session.job.models[0]).of(0)

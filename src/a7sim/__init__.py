@@ -14,8 +14,8 @@ __version__ = "0.1.0"
 _HOMES = {
     "Autograph": "a7sim.instrument",
     "Client": "a7sim.link.client",
-    "InstrumentRefused": "a7sim.link.client",
-    "Mistake": "a7sim.mistakes",
+    "InstrumentError": "a7sim.link.client",
+    "A7SimError": "a7sim.mistakes",
     "Operator": "a7sim.scripting",
     "Scenario": "a7sim.scenario",
     "Study": "a7sim.scripting",
@@ -24,10 +24,10 @@ _HOMES = {
 _ROOMS = ("computing", "reduction")
 
 __all__ = [
+    "A7SimError",
     "Autograph",
     "Client",
-    "InstrumentRefused",
-    "Mistake",
+    "InstrumentError",
     "Operator",
     "Scenario",
     "Study",

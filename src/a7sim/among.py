@@ -5,14 +5,14 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-Who = npt.NDArray[np.intp]
+Indices = npt.NDArray[np.intp]
 """Indices ``(m,)`` of those that are meant, ascending, each once: as many as there are mean everybody."""
 
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
-def exclude(who: Who, others: Who) -> Who:
+def exclude(who: Indices, others: Indices) -> Indices:
     """Return those of some that are not among others, in their order."""
     if not who.size or not others.size:
         return who
@@ -21,7 +21,7 @@ def exclude(who: Who, others: Who) -> Who:
     return np.asarray(who[stays[who]])
 
 
-def take(values: npt.NDArray[Scalar], who: Who) -> npt.NDArray[Scalar]:
+def take(values: npt.NDArray[Scalar], who: Indices) -> npt.NDArray[Scalar]:
     """Return the values ``(..., m)`` of some among those ``(..., all)``, to be read at once and not written to.
 
     They are laid out as these, where indexing transposes; everybody's are not copied.
@@ -29,7 +29,7 @@ def take(values: npt.NDArray[Scalar], who: Who) -> npt.NDArray[Scalar]:
     return values if who.size == values.shape[-1] else values.take(who, axis=-1)
 
 
-def put(values: npt.NDArray[np.float64], who: Who, into: npt.NDArray[np.float64]) -> None:
+def put(values: npt.NDArray[np.float64], who: Indices, into: npt.NDArray[np.float64]) -> None:
     """Put values ``(m,)`` or ``(k, m)`` of some among those ``(all,)`` or ``(k, all)`` of all."""
     if who.size == into.shape[-1]:
         into[...] = values
@@ -40,7 +40,7 @@ def put(values: npt.NDArray[np.float64], who: Who, into: npt.NDArray[np.float64]
             row[who] = new
 
 
-def add_at(amount: float, who: Who, to: npt.NDArray[np.float64]) -> None:
+def add_at(amount: float, who: Indices, to: npt.NDArray[np.float64]) -> None:
     """Add an amount to the values of some among those ``(all,)`` of all."""
     if who.size == to.size:
         to += amount

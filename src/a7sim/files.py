@@ -18,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.wording import pluralize
 
 MAX_FILE_BYTES = 20_000_000
@@ -72,7 +72,7 @@ class Table:
         wanted = [*texts, *numbers]
         missing = [column for column in wanted if column not in self.columns]
         if missing:
-            raise Mistake(
+            raise A7SimError(
                 f"{self.path}{self.header}: expected the columns {','.join(wanted)}, "
                 f"got {_shown(','.join(self.columns))} (no {', '.join(missing)})"
             )
@@ -90,7 +90,7 @@ class Table:
         if 0 < len(cell) <= MAX_NAME_LENGTH and cell.isprintable():
             return cell
         shown = repr(cell[:40]) if cell else "nothing"
-        raise Mistake(
+        raise A7SimError(
             f"{self.path}, {self.unit} {line}, column {column}: expected a name of 1 to {MAX_NAME_LENGTH} characters, "
             f"got {shown}"
         )
@@ -103,7 +103,7 @@ class Table:
         except ValueError:
             value = math.nan
         if not abs(value) <= MAX_NUMBER or "_" in cell:
-            raise Mistake(f"{self.path}, {self.unit} {line}, column {column}: expected a number, got {cell[:40]!r}")
+            raise A7SimError(f"{self.path}, {self.unit} {line}, column {column}: expected a number, got {cell[:40]!r}")
         return value
 
 
@@ -120,16 +120,16 @@ def read_text(path: str | Path) -> str:
             content = file.read(MAX_FILE_BYTES + 1)
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
-        raise Mistake(f"{path}: expected a readable file: {why}") from error
+        raise A7SimError(f"{path}: expected a readable file: {why}") from error
     if len(content) > MAX_FILE_BYTES:
-        raise Mistake(f"{path}: expected a file of at most {MAX_FILE_BYTES} bytes, got more")
+        raise A7SimError(f"{path}: expected a file of at most {MAX_FILE_BYTES} bytes, got more")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         place = _place(content[: error.start].decode("utf-8", "replace"))
-        raise Mistake(f"{path}, {place}: expected UTF-8 text, got bytes that are none ({error.reason})") from error
+        raise A7SimError(f"{path}, {place}: expected UTF-8 text, got bytes that are none ({error.reason})") from error
     if control := _CONTROL.search(text):
-        raise Mistake(f"{path}, {_place(text[: control.start()])}: expected text, got a control byte")
+        raise A7SimError(f"{path}, {_place(text[: control.start()])}: expected text, got a control byte")
     return text
 
 
@@ -155,11 +155,11 @@ def read_table(path: str | Path, text: str | None = None) -> Table:
     path = Path(path)
     text = read_text(path) if text is None else text
     if not text.strip():
-        raise Mistake(f"{path}: expected a header line and rows, got an empty file")
+        raise A7SimError(f"{path}: expected a header line and rows, got an empty file")
     toml = path.suffix.lower() == ".toml" or (path.suffix.lower() != ".csv" and _TOML.match(first_line(text).lstrip()))
     table = _toml_table(path, text) if toml else _csv_table(path, text)
     if not table.cells:
-        raise Mistake(f"{path}: expected rows under the header, got none")
+        raise A7SimError(f"{path}: expected rows under the header, got none")
     return table
 
 
@@ -176,14 +176,16 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 def _csv_table(path: Path, text: str) -> Table:
     lines = _csv_lines(path, text)
     if not lines:
-        raise Mistake(f"{path}: expected a header line and rows, got nothing but comments")
+        raise A7SimError(f"{path}: expected a header line and rows, got nothing but comments")
     header_line, columns = lines[0]
     twice = next((column for column in columns if column and columns.count(column) > 1), None)
     if twice:
-        raise Mistake(f"{path}, line {header_line}, column {_shown(twice)}: expected every column once, got it twice")
+        raise A7SimError(
+            f"{path}, line {header_line}, column {_shown(twice)}: expected every column once, got it twice"
+        )
     for line, cells in lines[1:]:
         if len(cells) != len(columns):
-            raise Mistake(f"{path}, line {line}: expected {pluralize(len(columns), 'column')}, got {len(cells)}")
+            raise A7SimError(f"{path}, line {line}: expected {pluralize(len(columns), 'column')}, got {len(cells)}")
     cells_of = tuple((line, dict(zip(columns, cells, strict=True))) for line, cells in lines[1:])
     return Table(path, tuple(columns), cells_of, f", line {header_line}", "line")
 
@@ -197,7 +199,7 @@ def _csv_lines(path: Path, text: str) -> list[tuple[int, list[str]]]:
             if any(stripped) and not stripped[0].startswith("#"):
                 rows.append((reader.line_num, stripped))
     except csv.Error as error:
-        raise Mistake(
+        raise A7SimError(
             f"{path}, line {reader.line_num}: expected CSV, got a line that breaks its rules: {error}"
         ) from None
     return rows
@@ -208,13 +210,15 @@ def _toml(path: Path, text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         why = "tables within tables without end" if isinstance(error, RecursionError) else error
-        raise Mistake(f"{path}: expected TOML, got a file that breaks its rules: {why}") from None
+        raise A7SimError(f"{path}: expected TOML, got a file that breaks its rules: {why}") from None
 
 
 def _toml_table(path: Path, text: str) -> Table:
     rows = _toml(path, text).get("rows")
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise Mistake(f"{path}: expected an array of tables named rows ([[rows]] with the columns as keys), got none")
+        raise A7SimError(
+            f"{path}: expected an array of tables named rows ([[rows]] with the columns as keys), got none"
+        )
     columns = tuple(dict.fromkeys(column for row in rows for column in row))
     cells = tuple(
         (number, {column: _toml_cell(path, number, column, row.get(column, "")) for column in columns})
@@ -225,7 +229,7 @@ def _toml_table(path: Path, text: str) -> Table:
 
 def _toml_cell(path: Path, row: int, column: str, value: Any) -> str:
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise Mistake(
+        raise A7SimError(
             f"{path}, row {row}, column {_shown(column)}: expected a text or a number, got {_shown(str(value))}"
         )
     return value.strip() if isinstance(value, str) else repr(value)
@@ -238,7 +242,7 @@ def rows_by_key(path: str | Path, rows: Sequence[Row], *columns: str) -> dict[tu
         key = tuple(row.texts[column] for column in columns)
         if key in found:
             shown = " ".join(key)
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, {row.location}, column {columns[-1]}: expected a point of its own, "
                 f"got {shown} as in {found[key].location}"
             )
@@ -283,4 +287,4 @@ def write_files(folder: str | Path, texts: Mapping[str, str]) -> None:
                 Path(written, name).replace(folder / name)
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
-        raise Mistake(f"{folder}: expected a folder that can be written: {why}") from error
+        raise A7SimError(f"{folder}: expected a folder that can be written: {why}") from error

@@ -7,20 +7,20 @@ from typing import Self
 
 from a7sim.documents import Document
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import TIMEOUT_S
-from a7sim.link.twin import BesideTwin, open_checked_port
-from a7sim.mistakes import Mistake
+from a7sim.link.twin import TwinCheckedPort, open_checked_port
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario
-from a7sim.session import Watcher
+from a7sim.session import ProgressCallbacks
 from a7sim.session.ways import run_all_methods
 from a7sim.study.checkpoint import checkpoint_path
 from a7sim.study.executors import open_executor
 from a7sim.study.findings import findings_document
 from a7sim.study.folder import open_tally, write_results
-from a7sim.study.loading import Laid, load_study
+from a7sim.study.loading import LoadedStudy, load_study
 from a7sim.study.running import run_study
 
 Name = str | PathLike[str]
@@ -43,11 +43,13 @@ def connect(
     """
     if isinstance(to, str) and ("://" in to or Path(to).is_char_device()):
         if seed is not None:
-            raise Mistake(f"connect: expected no seed beside {to}, since that instrument has its own")
+            raise A7SimError(f"connect: expected no seed beside {to}, since that instrument has its own")
         return Client.open(to, timeout, token)
     if token is not None:
-        raise Mistake("connect: expected no token beside a scenario, since an instrument in this process asks for none")
-    desk = Desk(Autograph.from_scenario(*_chosen(to, seed)))
+        raise A7SimError(
+            "connect: expected no token beside a scenario, since an instrument in this process asks for none"
+        )
+    desk = SharedInstrument(Autograph.from_scenario(*_chosen(to, seed)))
     return Client(InProcessSerial(desk=desk, timeout=timeout))
 
 
@@ -74,7 +76,7 @@ class Operator:
         force: bool = False,
         timeout: float = TIMEOUT_S,
         token: str | None = None,
-        watcher: Watcher | None = None,
+        watcher: ProgressCallbacks | None = None,
     ) -> Document:
         """Work through the scenario and return the document of results, as `a7sim run --json` prints it.
 
@@ -87,10 +89,10 @@ class Operator:
             return run_all_methods(self.scenario, self.seed, folder, watcher, force)
         if "plotter" not in self.scenario.work:
             ways = ", ".join(self.scenario.work)
-            raise Mistake(f"{self.scenario.title}: expected work at the plotter for the operator, got {ways}")
+            raise A7SimError(f"{self.scenario.title}: expected work at the plotter for the operator, got {ways}")
         with open_checked_port(link, timeout, token) as served:
             return run_all_methods(
-                self.scenario, self.seed, folder, watcher, force, lambda twin: BesideTwin(served, twin, link)
+                self.scenario, self.seed, folder, watcher, force, lambda twin: TwinCheckedPort(served, twin, link)
             )
 
 
@@ -104,7 +106,7 @@ class Study:
     ('full', 7)
     """
 
-    loaded: Laid
+    loaded: LoadedStudy
 
     @classmethod
     def load(cls, name: Name, replicates: int | None = None) -> Self:

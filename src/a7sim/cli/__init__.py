@@ -8,36 +8,36 @@ from click.exceptions import NoArgsIsHelpError
 
 import a7sim
 from a7sim.cli.complaints import format_usage_error
-from a7sim.cli.verbs import Verb, Verbs
-from a7sim.mistakes import Mistake
+from a7sim.cli.verbs import LazyCommand, LazyGroup
+from a7sim.mistakes import A7SimError
 
 EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_DIFFERS, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 _VERBS = {
-    "run": Verb("a7sim.cli.run:command", "Let the operator work through a scenario, up to the strip."),
-    "operate": Verb("a7sim.cli.operate:command", "Let the operator work an instrument that is served."),
-    "compile": Verb("a7sim.cli.compile:command", "Let the operator draw contours and lines of a model."),
-    "calibrate": Verb("a7sim.cli.calibrate:command", "Test both projectors with a grid plate."),
-    "bridge": Verb("a7sim.cli.bridge:command", "Carry a strip on at the instrument (aeropolygon)."),
-    "prepare": Verb("a7sim.cli.prepare:command", "Choose scales, gears, projection height and bx for a flight."),
-    "reduce": Verb("a7sim.cli.reduce:command", "Compute orientations, strips and blocks from files."),
-    "scenario": Verb("a7sim.cli.scenario:command", "Check scenario files and describe them."),
-    "serve": Verb("a7sim.cli.serve:command", "Serve an instrument on TCP, RFC 2217 and ptys."),
-    "send": Verb("a7sim.cli.send:command", "Say lines to an instrument and print its replies."),
-    "console": Verb("a7sim.cli.console:command", "Sit down at the instrument yourself, on a terminal."),
-    "record": Verb("a7sim.cli.record:command", "Journal what a client and an instrument say."),
-    "replay": Verb("a7sim.cli.replay:command", "Say a session or a script again to a fresh instrument."),
-    "report": Verb("a7sim.cli.report:command", "Write the report of a session on one page."),
-    "export": Verb("a7sim.cli.export:command", "Write a session as film, book, forms or cards."),
-    "compare": Verb("a7sim.cli.compare:command", "Lay the results of sessions beside each other."),
-    "train": Verb("a7sim.cli.train:command", "Learn to work it: exercises with hints and grades."),
-    "study": Verb("a7sim.cli.study:command", "Work a scenario as often as a question needs."),
-    "doctor": Verb("a7sim.cli.doctor:command", "Say what is installed, what is missing, how to get it."),
-    "completion": Verb("a7sim.cli.completion:command", "Print the script that lets a shell complete commands."),
+    "run": LazyCommand("a7sim.cli.run:command", "Let the operator work through a scenario, up to the strip."),
+    "operate": LazyCommand("a7sim.cli.operate:command", "Let the operator work an instrument that is served."),
+    "compile": LazyCommand("a7sim.cli.compile:command", "Let the operator draw contours and lines of a model."),
+    "calibrate": LazyCommand("a7sim.cli.calibrate:command", "Test both projectors with a grid plate."),
+    "bridge": LazyCommand("a7sim.cli.bridge:command", "Carry a strip on at the instrument (aeropolygon)."),
+    "prepare": LazyCommand("a7sim.cli.prepare:command", "Choose scales, gears, projection height and bx for a flight."),
+    "reduce": LazyCommand("a7sim.cli.reduce:command", "Compute orientations, strips and blocks from files."),
+    "scenario": LazyCommand("a7sim.cli.scenario:command", "Check scenario files and describe them."),
+    "serve": LazyCommand("a7sim.cli.serve:command", "Serve an instrument on TCP, RFC 2217 and ptys."),
+    "send": LazyCommand("a7sim.cli.send:command", "Say lines to an instrument and print its replies."),
+    "console": LazyCommand("a7sim.cli.console:command", "Sit down at the instrument yourself, on a terminal."),
+    "record": LazyCommand("a7sim.cli.record:command", "Journal what a client and an instrument say."),
+    "replay": LazyCommand("a7sim.cli.replay:command", "Say a session or a script again to a fresh instrument."),
+    "report": LazyCommand("a7sim.cli.report:command", "Write the report of a session on one page."),
+    "export": LazyCommand("a7sim.cli.export:command", "Write a session as film, book, forms or cards."),
+    "compare": LazyCommand("a7sim.cli.compare:command", "Lay the results of sessions beside each other."),
+    "train": LazyCommand("a7sim.cli.train:command", "Learn to work it: exercises with hints and grades."),
+    "study": LazyCommand("a7sim.cli.study:command", "Work a scenario as often as a question needs."),
+    "doctor": LazyCommand("a7sim.cli.doctor:command", "Say what is installed, what is missing, how to get it."),
+    "completion": LazyCommand("a7sim.cli.completion:command", "Print the script that lets a shell complete commands."),
 }
 
 
-@click.group(cls=Verbs, verbs=_VERBS, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=LazyGroup, verbs=_VERBS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(a7sim.__version__, prog_name="a7sim")
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 def cli(debug: bool) -> None:
@@ -69,7 +69,7 @@ def main() -> None:
             raise
         click.echo("a7sim: interrupted", err=True)
         code = EXIT_INTERRUPTED
-    except Mistake as mistake:
+    except A7SimError as mistake:
         if debug:
             raise
         for line in str(mistake).splitlines():

@@ -4,9 +4,9 @@ import click
 
 from a7sim.cli.names import scenario_argument
 from a7sim.cli.operators import (
-    Asked,
-    Kept,
-    Told,
+    DisplayOptions,
+    OutputOptions,
+    ScenarioOptions,
     display_options,
     output_options,
     progress_bar,
@@ -24,7 +24,7 @@ _POINTS_A_MODEL = 260
 @scenario_options
 @output_options()
 @display_options
-def command(scenario: str | None, asked: Asked, kept: Kept, told: Told) -> None:
+def command(scenario: str | None, asked: ScenarioOptions, kept: OutputOptions, told: DisplayOptions) -> None:
     """Bridge the strip of SCENARIO with base in and out in turn, and work it as independent models for comparison.
 
     Example: a7sim bridge bridge --seed 7 --out runs/bridge

@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 from a7sim.cli.options import Number
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 PORT, IDLE_MIN = 8515, 30.0
 
@@ -55,7 +55,7 @@ def serve_in_browser(context: click.Context) -> bool:
     try:
         from a7sim.console.browser import serve  # only a browser's console needs the server
     except ImportError as error:
-        raise Mistake("--browser: expected textual-serve to be installed: pip install 'a7sim[browser]'") from error
+        raise A7SimError("--browser: expected textual-serve to be installed: pip install 'a7sim[browser]'") from error
     minutes = f"{context.params['idle_exit']:g} min"
 
     def told(url: str) -> None:
@@ -71,7 +71,7 @@ def serve_in_browser(context: click.Context) -> bool:
 def _refuse_without_browser(context: click.Context) -> None:
     given = [name for name in _OWN if _was_said(context, name)]
     if given:
-        raise Mistake(f"--{given[0].replace('_', '-')}: expected --browser beside it")
+        raise A7SimError(f"--{given[0].replace('_', '-')}: expected --browser beside it")
 
 
 def _was_said(context: click.Context, name: str) -> bool:

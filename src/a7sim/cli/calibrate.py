@@ -4,9 +4,9 @@ import click
 
 from a7sim.cli.names import scenario_argument
 from a7sim.cli.operators import (
-    Asked,
-    Kept,
-    Told,
+    DisplayOptions,
+    OutputOptions,
+    ScenarioOptions,
     display_options,
     output_options,
     progress_bar,
@@ -14,7 +14,7 @@ from a7sim.cli.operators import (
     scenario_options,
     show_results,
 )
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 PROJECTORS = 2
 
@@ -41,15 +41,15 @@ def command(
     points: int,
     levels: int,
     pointings: int,
-    asked: Asked,
-    kept: Kept,
-    told: Told,
+    asked: ScenarioOptions,
+    kept: OutputOptions,
+    told: DisplayOptions,
 ) -> None:
     """Test both projectors of SCENARIO's plotter with a grid plate, as at a service.
 
     Example: a7sim calibrate grid-test --points 25 --out runs/grid-test
     """
-    from a7sim.operator.grid_test import GridTestOrder
+    from a7sim.operator.grid_test import GridTestPlan
     from a7sim.session.grid_test import report_tables, run_grid_test
 
     order = resolve_request(scenario, asked, kept)
@@ -59,8 +59,8 @@ def command(
     camera, plate, polarity = order.scenario.camera, order.scenario.grid_plate, order.scenario.photos[0].polarity
     if points not in plate.even_counts:
         known = ", ".join(map(str, plate.even_counts))
-        raise Mistake(f"--points: expected as many crosses as lie evenly on the plate ({known}), got {points}")
-    test = GridTestOrder(camera, plate, points, levels, pointings, polarity)
+        raise A7SimError(f"--points: expected as many crosses as lie evenly on the plate ({known}), got {points}")
+    test = GridTestPlan(camera, plate, points, levels, pointings, polarity)
     with progress_bar(PROJECTORS * points * levels * pointings, told) as watcher:
         document = run_grid_test(order.scenario, order.seed, test, kept.folder, watcher, kept.force, kept.keeping)
     show_results(document, told, report_tables)

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 
 @click.command("compare")
@@ -24,7 +24,7 @@ def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> N
     from a7sim.report.kept import read_session
 
     if len(folders) < 2:
-        raise Mistake(f"compare: expected two folders of sessions or more, got one: {folders[0]}")
+        raise A7SimError(f"compare: expected two folders of sessions or more, got one: {folders[0]}")
     sessions = [read_session(folder) for folder in folders]
     rows = compare_sessions(sessions, everything)
     if as_document:

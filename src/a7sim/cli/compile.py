@@ -5,9 +5,9 @@ import click
 from a7sim.cli import options
 from a7sim.cli.names import scenario_argument
 from a7sim.cli.operators import (
-    Asked,
-    Kept,
-    Told,
+    DisplayOptions,
+    OutputOptions,
+    ScenarioOptions,
     display_options,
     output_options,
     progress_bar,
@@ -43,21 +43,21 @@ def command(
     lines: tuple[str, ...],
     map_scale: float | None,
     tremor: float | None,
-    asked: Asked,
-    kept: Kept,
-    told: Told,
+    asked: ScenarioOptions,
+    kept: OutputOptions,
+    told: DisplayOptions,
 ) -> None:
     """Let the operator set up a model of SCENARIO, level it, and draw contours and lines from it.
 
     Example: a7sim compile akwanga --model 1 --contour 460 --interval 10 --line road1 --out runs/sheet
     """
     from a7sim.session.compiled_tables import map_tables
-    from a7sim.session.compiling import Wanted, compile_model
+    from a7sim.session.compiling import CompilationRequest, compile_model
 
     order = resolve_request(scenario, asked, kept)
-    wanted = Wanted(name, contours, interval, lines, map_scale, tremor)
+    wanted = CompilationRequest(name, contours, interval, lines, map_scale, tremor)
     if order.begun_with is not None:
-        wanted = Wanted.from_settings(order.begun_with)
+        wanted = CompilationRequest.from_settings(order.begun_with)
     with progress_bar(_POINTS, told) as watcher:
         document = compile_model(order.scenario, order.seed, wanted, kept.folder, watcher, kept.force, kept.keeping)
     show_results(document, told, map_tables)

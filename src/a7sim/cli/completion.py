@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from click.shell_completion import get_completion_class
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 SHELLS = ("bash", "zsh", "fish")
 VARIABLE = "_A7SIM_COMPLETE"
@@ -28,8 +28,8 @@ def command(shell: str | None) -> None:
     """
     shell = shell or Path(os.environ.get("SHELL", "")).name
     if shell not in SHELLS:
-        raise Mistake(f"completion: expected one of {', '.join(SHELLS)}, got {shell or 'no shell'}")
+        raise A7SimError(f"completion: expected one of {', '.join(SHELLS)}, got {shell or 'no shell'}")
     script = get_completion_class(shell)
     if script is None:
-        raise Mistake(f"completion: expected a click that knows {shell}, got {sys.modules['click'].__name__}")
+        raise A7SimError(f"completion: expected a click that knows {shell}, got {sys.modules['click'].__name__}")
     click.echo(script(click.get_current_context().find_root().command, {}, "a7sim", VARIABLE).source())

@@ -12,9 +12,9 @@ from a7sim.cli import options
 from a7sim.cli.browser import browser_options, is_browser_child, serve_in_browser
 from a7sim.cli.names import scenario_argument
 from a7sim.cli.prompt import data_folder
-from a7sim.console.eyepiece import Drawing
+from a7sim.console.eyepiece import DrawingMode
 from a7sim.console.words import ACUITY_UM
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
 
 USUAL = "akwanga"
@@ -32,7 +32,7 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 @click.option("--theme", type=click.Choice(THEMES), help="Colours  [default: enamel]")
 @click.option(
     "--drawing",
-    type=click.Choice([each.value for each in Drawing]),
+    type=click.Choice([each.value for each in DrawingMode]),
     help="How pictures are drawn  [default: the best there is]",
 )
 @options.plain
@@ -87,7 +87,7 @@ def command(
     Example: a7sim console akwanga
     """
     _see_that_textual_is_there()
-    from a7sim.cli.seats import InProcess, is_url, playback_console, remote_console  # only who sits down
+    from a7sim.cli.seats import LocalConsole, is_url, playback_console, remote_console  # only who sits down
     from a7sim.console.app import Console
     from a7sim.console.keymap import default_keymap, load_keymap, sample
     from a7sim.console.sheet import JobSheet
@@ -99,7 +99,7 @@ def command(
         _write(keymap or usual, sample())
         return
     keys = load_keymap(keymap or usual) if keymap or usual.exists() else default_keymap()
-    here: InProcess | None = None
+    here: LocalConsole | None = None
     if watch is not None and not is_url(watch):
         _refuse_beside("--watch", watch, scenario=scenario)
         seat = playback_console(watch)
@@ -110,17 +110,19 @@ def command(
     else:
         name = scenario or USUAL
         overrides = {"instrument.variant": f'"{variant.upper()}"'} if variant else {}
-        here = InProcess(name, load_scenario(name, overrides), seed, out, go_on)
+        here = LocalConsole(name, load_scenario(name, overrides), seed, out, go_on)
         seat = here.config
     if serve_in_browser(context):
         return
     if not (is_browser_child() or (sys.stdin.isatty() and sys.stderr.isatty())):
-        raise Mistake("console: expected a terminal to sit at, got a file or a pipe (a7sim send takes lines from one)")
+        raise A7SimError(
+            "console: expected a terminal to sit at, got a file or a pipe (a7sim send takes lines from one)"
+        )
     Console(
         replace(
             seat,
             keymap=keys,
-            drawing=Drawing.WORDS if plain else Drawing(drawing) if drawing else None,
+            drawing=DrawingMode.WORDS if plain else DrawingMode(drawing) if drawing else None,
             acuity_um=acuity,
             theme=theme or ("contrast" if plain else "enamel"),
             welcome=watch is None and _first_visit(),
@@ -137,12 +139,12 @@ def _refuse_beside(option: str, given: str | None, **others: object) -> None:
         words = {"scenario": "SCENARIO", "go_on": "--go-on" if others.get("go_on") else "--anew"}
         beside = [words.get(name, f"--{name}") for name, value in others.items() if value is not None]
         if beside:
-            raise Mistake(f"{option} {given}: expected no {' and no '.join(beside)} beside it")
+            raise A7SimError(f"{option} {given}: expected no {' and no '.join(beside)} beside it")
 
 
 def _see_that_textual_is_there() -> None:
     if find_spec("textual") is None:
-        raise Mistake("console: expected textual to be installed: pip install 'a7sim[console]'")
+        raise A7SimError("console: expected textual to be installed: pip install 'a7sim[console]'")
 
 
 def _first_visit() -> bool:
@@ -160,7 +162,7 @@ def _first_visit() -> bool:
 
 def _write(path: Path, keys: str) -> None:
     if path.exists():
-        raise Mistake(f"{path}: expected to write a new file, found one that exists")
+        raise A7SimError(f"{path}: expected to write a new file, found one that exists")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(keys, encoding="utf-8")
     click.echo(path)

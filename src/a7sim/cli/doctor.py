@@ -15,7 +15,7 @@ import click
 
 import a7sim
 from a7sim.cli import options
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.shelves import Kind, bundled_names
 
 EXIT_MISSING = 1
@@ -122,7 +122,7 @@ def libraries() -> dict[str, list[Library]]:
     try:
         requirements = metadata.requires("a7sim") or []
     except metadata.PackageNotFoundError as error:
-        raise Mistake("doctor: expected a7sim to be installed (pip install .), found only its files") from error
+        raise A7SimError("doctor: expected a7sim to be installed (pip install .), found only its files") from error
     asked: dict[str, list[Library]] = {"": []}
     within: dict[str, list[str]] = {}
     for text in requirements:

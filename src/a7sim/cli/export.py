@@ -6,11 +6,11 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.report.cast import make_cast
 from a7sim.report.decks import strip_deck
 from a7sim.report.forms import forms_text
-from a7sim.report.kept import Kept, read_session
+from a7sim.report.kept import SessionFolder, read_session
 from a7sim.session.folder import BOOK, write_atomic
 
 _OPTION_OF = {"speed": "asciicast", "way": "cards"}
@@ -39,7 +39,7 @@ def command(folder: Path, kind: str, out: Path | None, speed: float | None, way:
     """
     for name, value in (("speed", speed), ("way", way)):
         if value is not None and kind != _OPTION_OF[name]:
-            raise Mistake(f"--{name}: expected only with --to {_OPTION_OF[name]}, got it with --to {kind}")
+            raise A7SimError(f"--{name}: expected only with --to {_OPTION_OF[name]}, got it with --to {kind}")
     kept = read_session(folder)
     makers: dict[str, Callable[[], str]] = {
         "asciicast": lambda: make_cast(kept, speed or 120.0),
@@ -55,7 +55,7 @@ def command(folder: Path, kind: str, out: Path | None, speed: float | None, way:
         click.echo(str(out))
 
 
-def _book(kept: Kept) -> str:
+def _book(kept: SessionFolder) -> str:
     if not kept.book:
-        raise Mistake(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
+        raise A7SimError(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
     return kept.text(BOOK)

@@ -8,7 +8,7 @@ import click
 
 from a7sim.cli.options import TOKEN_VARIABLE, Number, combine_options, token_file
 from a7sim.link.opening import TIMEOUT_S
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 MAX_TOKEN_LENGTH = 1000
 """Characters: a line of the language has room for it, even if all are quotes that have to be doubled."""
@@ -35,12 +35,12 @@ def token_from(file: Path | None) -> str | None:
     try:
         text = file.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
-        raise Mistake(f"--token-file {file}: expected a file with a token: {error.strerror}") from error
+        raise A7SimError(f"--token-file {file}: expected a file with a token: {error.strerror}") from error
     return _token(text, f"--token-file {file}")
 
 
 def _token(text: str, where: str) -> str:
     token = text.strip()
     if not _SENDABLE.fullmatch(token):
-        raise Mistake(f"{where}: expected a token of 1 to {MAX_TOKEN_LENGTH} printable ASCII characters on one line")
+        raise A7SimError(f"{where}: expected a token of 1 to {MAX_TOKEN_LENGTH} printable ASCII characters on one line")
     return token

@@ -24,7 +24,7 @@ def _scripts() -> list[str]:
     return sorted({file.stem for shelf in bundled_dirs("scenarios") for file in shelf.glob("scripts/*.a7s")})
 
 
-class OneOf(click.Choice[str]):
+class CaseInsensitiveChoice(click.Choice[str]):
     """A choice that takes small letters for capitals, and is shown and completed in its own."""
 
     def __init__(self, choices: Iterable[str]) -> None:

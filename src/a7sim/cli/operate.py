@@ -10,8 +10,8 @@ from a7sim.cli.names import scenario_argument
 from a7sim.cli.operators import (
     POINTS_A_MODEL,
     SESSION,
-    Asked,
-    Told,
+    DisplayOptions,
+    ScenarioOptions,
     display_options,
     orientation_options,
     progress_bar,
@@ -36,10 +36,10 @@ def command(
     token_file: Path | None,
     case: str | None,
     method: str | None,
-    asked: Asked,
+    asked: ScenarioOptions,
     out: Path | None,
     force: bool,
-    told: Told,
+    told: DisplayOptions,
 ) -> None:
     """Let the operator work the served instrument of SCENARIO, with the same results as `a7sim run`.
 

@@ -14,18 +14,18 @@ from click.core import ParameterSource
 
 from a7sim.cli import EXIT_DOES_NOT_FIT, options
 from a7sim.cli.complaints import parameter_label
-from a7sim.cli.names import OneOf
-from a7sim.mistakes import Mistake
-from a7sim.scenario import PROFILES, Observer, Request, Scenario, load_scenario, scenario_name, with_provenance
+from a7sim.cli.names import CaseInsensitiveChoice
+from a7sim.mistakes import A7SimError
+from a7sim.scenario import PROFILES, Observer, Provenance, Scenario, load_scenario, scenario_name, with_provenance
 from a7sim.session.durable import DURABILITIES, Durability
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from a7sim.documents import Document
-    from a7sim.session import Watcher
-    from a7sim.session.journal import Keeping
-    from a7sim.session.resuming import Begun
+    from a7sim.session import ProgressCallbacks
+    from a7sim.session.journal import JournalOptions
+    from a7sim.session.resuming import ResumableSession
 
 DURABILITY = click.option(
     "--durability",
@@ -43,7 +43,7 @@ _RESUME = click.option(
 
 
 @dataclass(frozen=True)
-class Asked:
+class ScenarioOptions:
     """What is asked for beside a scenario: seed, overrides of its values, and how good the operator is."""
 
     seed: int | None
@@ -53,7 +53,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Kept:
+class OutputOptions:
     """Where a session is left, or went on from, and when its journal is on the disk."""
 
     out: Path | None
@@ -67,15 +67,15 @@ class Kept:
         return self.resume or self.out
 
     @property
-    def keeping(self) -> "Keeping":
+    def keeping(self) -> "JournalOptions":
         """How the journal is kept."""
-        from a7sim.session.journal import Keeping
+        from a7sim.session.journal import JournalOptions
 
-        return Keeping(self.durability, self.resume is not None)
+        return JournalOptions(self.durability, self.resume is not None)
 
 
 @dataclass(frozen=True)
-class Told:
+class DisplayOptions:
     """How results are told: as tables, as a document, or not at all."""
 
     as_document: bool
@@ -84,7 +84,7 @@ class Told:
 
 scenario_options = options.group_options(
     "asked",
-    Asked,
+    ScenarioOptions,
     options.seed(),
     click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario."),
     click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
@@ -93,7 +93,7 @@ scenario_options = options.group_options(
 """--seed, --set, --skill, --perfect-observer, as `asked`."""
 
 orientation_options = options.combine_options(
-    click.option("--case", type=OneOf("ABCDE"), help="Standard points used (thesis)."),
+    click.option("--case", type=CaseInsensitiveChoice("ABCDE"), help="Standard points used (thesis)."),
     click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one."),
 )
 """--case, --method."""
@@ -103,10 +103,10 @@ SESSION = "journal, book, tables and results"
 
 def output_options(of: str = SESSION) -> options.Option[Any]:
     """Return --out, --force, --resume, --durability, as `kept`, for a folder of what `of` says."""
-    return options.group_options("kept", Kept, options.new_folder(of), _RESUME, DURABILITY)
+    return options.group_options("kept", OutputOptions, options.new_folder(of), _RESUME, DURABILITY)
 
 
-display_options = options.group_options("told", Told, options.as_document, options.quiet())
+display_options = options.group_options("told", DisplayOptions, options.as_document, options.quiet())
 """--json, --quiet, as `told`."""
 
 _NOT_OF_THE_RESULTS = {
@@ -117,7 +117,7 @@ _SAME_RESULTS_AS = {"operate": "run"}
 
 
 @dataclass(frozen=True)
-class Order:
+class RunRequest:
     """What an operator is to do: a scenario, its seed, and, where that goes on, what its journal says beside them."""
 
     scenario: Scenario
@@ -130,24 +130,24 @@ class Order:
 
 
 def resolve_request(
-    scenario: str | None, asked: Asked, kept: Kept, others: Mapping[str, str | None] | None = None
-) -> Order:
+    scenario: str | None, asked: ScenarioOptions, kept: OutputOptions, others: Mapping[str, str | None] | None = None
+) -> RunRequest:
     """Return what the options order: a new session, or with --resume the one in its folder. Raises Mistake.
 
     `others` are overrides of the scenario as texts by path.
     """
     if kept.resume is None:
-        return Order(*resolve_scenario(scenario, asked, others))
+        return RunRequest(*resolve_scenario(scenario, asked, others))
     session = resolve_resume(kept.resume)
-    return Order(session.scenario, session.seed, session.settings)
+    return RunRequest(session.scenario, session.seed, session.settings)
 
 
 def resolve_scenario(
-    scenario: str | None, asked: Asked, others: Mapping[str, str | None] | None = None
+    scenario: str | None, asked: ScenarioOptions, others: Mapping[str, str | None] | None = None
 ) -> tuple[Scenario, int]:
     """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
     if scenario is None:
-        raise Mistake(f"{click.get_current_context().info_name}: expected SCENARIO or --resume DIR, got none")
+        raise A7SimError(f"{click.get_current_context().info_name}: expected SCENARIO or --resume DIR, got none")
     overrides = _overrides(asked.settings, {**(others or {}), "observer.skill": asked.skill})
     loaded = load_scenario(scenario, overrides)
     if asked.perfect_observer:
@@ -155,7 +155,7 @@ def resolve_scenario(
         overrides["observer"] = "perfect"
     seed = loaded.seed if asked.seed is None else asked.seed
     return with_provenance(
-        loaded, Request(command_line=_command_line(scenario_name(scenario), seed), settings=overrides)
+        loaded, Provenance(command_line=_command_line(scenario_name(scenario), seed), settings=overrides)
     ), seed
 
 
@@ -180,12 +180,12 @@ def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> di
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not equals or not key:
-            raise Mistake(f"--set: expected PATH=VALUE such as plan.bx=190.0, got {setting!r}")
+            raise A7SimError(f"--set: expected PATH=VALUE such as plan.bx=190.0, got {setting!r}")
         overrides[key] = value
     return overrides | {key: f'"{value}"' for key, value in texts.items() if value is not None}
 
 
-def resolve_resume(folder: Path, *beside: str) -> "Begun":
+def resolve_resume(folder: Path, *beside: str) -> "ResumableSession":
     """Return the session of the command under way that --resume goes on with.
 
     Raises Mistake where anything but what is named stands `beside` it, since the journal says what was asked for.
@@ -202,7 +202,7 @@ def _see_that_resume_stands_alone(beside: tuple[str, ...]) -> None:
     for name in ctx.params:
         if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             said = next(each for each in ctx.command.params if each.name == name)
-            raise Mistake(
+            raise A7SimError(
                 f"--resume: expected no {parameter_label(said)} beside it, since the journal says what was asked for"
             )
 
@@ -212,24 +212,24 @@ POINTS_A_MODEL = 130
 
 
 @contextmanager
-def progress_bar(points: int, told: Told) -> "Iterator[Watcher]":
+def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbacks]":
     """Show on a terminal how the operator gets on with about so many points."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from a7sim.session import Watcher
+    from a7sim.session import ProgressCallbacks
 
     columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
     unwatched = told.quiet or told.as_document or not sys.stderr.isatty()
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
         task = progress.add_task("sitting down", total=points)
-        yield Watcher(
+        yield ProgressCallbacks(
             lambda activity: progress.update(task, description=activity),
             lambda: progress.advance(task),
         )
 
 
-def show_results(document: "Document", told: Told, tables: "Callable[[Document], RenderableType]") -> None:
+def show_results(document: "Document", told: DisplayOptions, tables: "Callable[[Document], RenderableType]") -> None:
     """Show the results, and end with exit code 1 where the operator gave up."""
     from rich.console import Console
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-from a7sim.cli.names import OneOf, scenario_argument
+from a7sim.cli.names import CaseInsensitiveChoice, scenario_argument
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Option = Callable[[Command], Command]
@@ -123,7 +123,9 @@ def quiet(but: str = "") -> Option[Any]:
 def variant(default: str | None = None) -> Option[Any]:
     """Return --variant, which is that of the scenario where there is no default."""
     told = option_help("Which plotter", None if default else "the scenario's")
-    return click.option("--variant", type=OneOf(PLOTTERS), default=default, show_default=default is not None, help=told)
+    return click.option(
+        "--variant", type=CaseInsensitiveChoice(PLOTTERS), default=default, show_default=default is not None, help=told
+    )
 
 
 instrument_of = click.option(

@@ -10,7 +10,7 @@ from rich.text import Text
 from a7sim.cli import options
 from a7sim.documents import as_json, document_header
 from a7sim.manual import VARIANTS
-from a7sim.operator.preparation import Flight, ModelScale, Preparation, choose_settings
+from a7sim.operator.preparation import FlightPlan, FlightSettings, ModelScale, choose_settings
 from a7sim.sheets import text_table
 
 
@@ -41,7 +41,7 @@ def command(
 
     Example: a7sim prepare --c 152.676 --photo-scale 8000 --photo-base 91 --heights 430.24 487.92 --map-scale 2500
     """
-    flight = Flight.of_heights(c, photo_base, heights, photo_scale, flying_height)
+    flight = FlightPlan.of_heights(c, photo_base, heights, photo_scale, flying_height)
     found = choose_settings(flight, VARIANTS[variant], map_scale)
     if as_document:
         click.echo(as_json(_document(found, variant)), nl=False)
@@ -49,7 +49,7 @@ def command(
         Console().print(_sheet(found, variant, map_scale))
 
 
-def _document(found: Preparation, variant: str) -> dict[str, Any]:
+def _document(found: FlightSettings, variant: str) -> dict[str, Any]:
     flight = found.flight
     return (
         document_header("prepare")
@@ -74,7 +74,7 @@ def _of_scale(scale: ModelScale) -> dict[str, Any]:
     return rounded | {"against": list(scale.reason_rejected)}
 
 
-def _sheet(found: Preparation, variant: str, map_scale: float | None) -> RenderableType:
+def _sheet(found: FlightSettings, variant: str, map_scale: float | None) -> RenderableType:
     flight, chosen = found.flight, found.chosen
     table = text_table("model scale", "gear", "last digit, m", "plan", "Z, mm", "bx, mm", "", left=(0, 6), fold=(6,))
     for scale in found.scales:

@@ -11,14 +11,14 @@ from a7sim.cli import options
 from a7sim.cli.operators import DURABILITY
 from a7sim.documents import as_json, document_header
 from a7sim.link.addresses import Address, parse_address
-from a7sim.link.between import Between
+from a7sim.link.between import RecordingProxy
 from a7sim.link.clock import WallClock
 from a7sim.link.opening import open_port
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
 from a7sim.session.durable import Durability
 from a7sim.session.folder import prepare_folder
-from a7sim.session.journal import Header, Journal, Keeping, make_header, make_header_without_scenario
+from a7sim.session.journal import Header, Journal, JournalOptions, make_header, make_header_without_scenario
 
 _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
@@ -51,13 +51,13 @@ def command(
     open_port(url).close()
     address = parse_address(tcp, "--tcp")
     if not address.loopback:
-        raise Mistake(f"--tcp {address}: expected an address of this machine alone")
+        raise A7SimError(f"--tcp {address}: expected an address of this machine alone")
     stop = threading.Event()
     for name in _STOPPING:
         signal.signal(getattr(signal, name), lambda *_: stop.set())
     with _door(address) as door:
         prepare_folder(out, force)
-        with Journal(Keeping(durability)).recording(out, header, None) as journal:
+        with Journal(JournalOptions(durability)).recording(out, header, None) as journal:
             host, port = door.getsockname()[:2]
             where = f"tcp://{Address(host, port)}"
             click.echo(
@@ -65,13 +65,13 @@ def command(
                 nl=False,
             )
             click.echo("" if as_document else "\nready")
-            Between(url, journal.on_link_event, WallClock(), stop).serve(door)
+            RecordingProxy(url, journal.on_link_event, WallClock(), stop).serve(door)
 
 
 def _header(url: str, scenario: str | None, seed: int | None) -> Header:
     if scenario is None:
         if seed is not None:
-            raise Mistake("--seed: expected a --scenario beside it, got none")
+            raise A7SimError("--seed: expected a --scenario beside it, got none")
         return make_header_without_scenario("record", instrument=url)
     loaded = load_scenario(scenario)
     return make_header("record", loaded, loaded.seed if seed is None else seed, instrument=url)
@@ -81,4 +81,4 @@ def _door(address: Address) -> socket.socket:
     try:
         return socket.create_server((address.host, address.port), backlog=1)
     except OSError as error:
-        raise Mistake(f"--tcp {address}: expected an address to listen on: {error.strerror}") from error
+        raise A7SimError(f"--tcp {address}: expected an address to listen on: {error.strerror}") from error

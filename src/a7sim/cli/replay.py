@@ -9,15 +9,15 @@ import click
 from a7sim.cli import EXIT_DIFFERS, options
 from a7sim.cli.names import session_argument
 from a7sim.documents import as_json, document_header
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
-from a7sim.session.checkpoints import Differing
-from a7sim.session.conversation import Told, format_event
+from a7sim.session.checkpoints import StateDifference
+from a7sim.session.conversation import TranscriptListener, format_event
 from a7sim.session.folder import JOURNAL, prepare_folder
 from a7sim.session.journal import Journal, make_header
-from a7sim.session.lines import Journalled, read_journal
-from a7sim.session.playing import Player
-from a7sim.session.replaying import Difference, Replay, knows_scenario, replay_lines
+from a7sim.session.lines import JournalFile, read_journal
+from a7sim.session.playing import ScriptRunner
+from a7sim.session.replaying import Replay, ReplayDifference, knows_scenario, replay_lines
 from a7sim.session.scripts import SUFFIX, find_script, read_script
 from a7sim.session.seeking import find_line
 from a7sim.wording import pluralize
@@ -60,17 +60,17 @@ def command(
 
     Example: a7sim replay runs/akwanga --verify --quiet
     """
-    pace = Pace(float("inf") if speed == "max" else float(speed))
+    pace = PlaybackClock(float("inf") if speed == "max" else float(speed))
     silent = quiet or as_document
     if _is_script(session):
         if begin is not None:
-            raise Mistake("--from: expected a journal to seek in, got a script")
+            raise A7SimError("--from: expected a journal to seek in, got a script")
         if scenario is not None:
-            raise Mistake("--scenario: expected a journal, got a script, which says its own")
+            raise A7SimError("--scenario: expected a journal, got a script, which says its own")
         play_script(session, pace, out, force, silent, as_document)
         return
     if out is not None:
-        raise Mistake("--out: expected a script, whose journal it keeps; a journal there is already")
+        raise A7SimError("--out: expected a script, whose journal it keeps; a journal there is already")
     path = Path(session)
     journalled = read_journal(path / JOURNAL if path.is_dir() else path)
     first = 2 if begin is None else _line(journalled, begin)
@@ -81,7 +81,7 @@ def command(
         _replayed(replay, first, verify, pace, silent, as_document)
 
 
-class Pace:
+class PlaybackClock:
     """The wall's time beside the session's: what is told waits until it is due."""
 
     def __init__(self, speed: float) -> None:
@@ -101,15 +101,15 @@ def _is_script(session: str) -> bool:
     return session.endswith(SUFFIX) or ("/" not in session and not Path(session).exists())
 
 
-def _line(journalled: Journalled, begin: str) -> int:
+def _line(journalled: JournalFile, begin: str) -> int:
     """Return the first line that is to be told. Raises Mistake where there is none."""
     found = find_line(journalled, begin)
     if found is None:
-        raise Mistake(f"--from {begin}: expected a time, @LINE or the text of a note within {journalled.path}")
+        raise A7SimError(f"--from {begin}: expected a time, @LINE or the text of a note within {journalled.path}")
     return found
 
 
-def _told(journalled: Journalled, first: int, pace: Pace, silent: bool, as_document: bool) -> None:
+def _told(journalled: JournalFile, first: int, pace: PlaybackClock, silent: bool, as_document: bool) -> None:
     """Tell a conversation with an instrument that nobody can build again."""
     for number in range(first, len(journalled) + 1):
         event = journalled.event(number)
@@ -119,12 +119,12 @@ def _told(journalled: Journalled, first: int, pace: Pace, silent: bool, as_docum
     _ended(journalled, 0, None, 0, as_document, silent)
 
 
-def _replayed(replay: Replay, first: int, verify: bool, pace: Pace, silent: bool, as_document: bool) -> None:
+def _replayed(replay: Replay, first: int, verify: bool, pace: PlaybackClock, silent: bool, as_document: bool) -> None:
     journalled = replay.journalled
     begins = replay.seek(first) if first > 2 else 2
     known = len(replay.checkpoints)
     differing = 0
-    difference: Difference | None = None
+    difference: ReplayDifference | None = None
     for number, event, differs in replay_lines(replay, begins):
         if number >= first:
             pace.until(event.t)
@@ -148,7 +148,7 @@ def _replayed(replay: Replay, first: int, verify: bool, pace: Pace, silent: bool
         raise click.exceptions.Exit(EXIT_DIFFERS)
 
 
-def _tell(journalled: Journalled, difference: Difference, parts: tuple[Differing, ...]) -> None:
+def _tell(journalled: JournalFile, difference: ReplayDifference, parts: tuple[StateDifference, ...]) -> None:
     click.echo(f"a7sim: {journalled.location(difference.line)}: the first difference", err=True)
     click.echo(f"a7sim: the journal has      {difference.journalled or 'nothing'}", err=True)
     click.echo(f"a7sim: the instrument says  {difference.replayed or 'nothing'}", err=True)
@@ -157,9 +157,9 @@ def _tell(journalled: Journalled, difference: Difference, parts: tuple[Differing
 
 
 def _ended(
-    journalled: Journalled,
+    journalled: JournalFile,
     differing: int,
-    difference: Difference | None,
+    difference: ReplayDifference | None,
     checkpoints: int,
     as_document: bool,
     silent: bool,
@@ -185,12 +185,14 @@ def _ended(
         click.echo(f"{pluralize(lines, 'line')}, {pluralize(checkpoints, 'checkpoint')}: {came}{rest}")
 
 
-def play_script(session: str, pace: Pace, out: Path | None, force: bool, silent: bool, as_document: bool) -> None:
+def play_script(
+    session: str, pace: PlaybackClock, out: Path | None, force: bool, silent: bool, as_document: bool
+) -> None:
     """Play a script, and end with exit code 3 where it and the instrument part."""
     script = read_script(find_script(session))
     journal = Journal()
-    told = Told(lambda text: None if silent else click.echo(text), pace.until, journal.on_link_event)
-    player = Player(script, told.on_link_event)
+    told = TranscriptListener(lambda text: None if silent else click.echo(text), pace.until, journal.on_link_event)
+    player = ScriptRunner(script, told.on_link_event)
     if out is not None:
         prepare_folder(out, force)
     header = make_header("replay", script.scenario, script.seed, script=script.file.name)

@@ -5,9 +5,9 @@ import click
 from a7sim.cli.names import scenario_argument
 from a7sim.cli.operators import (
     POINTS_A_MODEL,
-    Asked,
-    Kept,
-    Told,
+    DisplayOptions,
+    OutputOptions,
+    ScenarioOptions,
     display_options,
     orientation_options,
     output_options,
@@ -16,7 +16,7 @@ from a7sim.cli.operators import (
     scenario_options,
     show_results,
 )
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.standard_points import CASES
 
 
@@ -38,9 +38,9 @@ def command(
     case: str | None,
     method: str | None,
     strips: str,
-    asked: Asked,
-    kept: Kept,
-    told: Told,
+    asked: ScenarioOptions,
+    kept: OutputOptions,
+    told: DisplayOptions,
 ) -> None:
     """Let the operator set up the models of SCENARIO, a file or the name of one that comes with a7sim.
 
@@ -53,7 +53,7 @@ def command(
     order = resolve_request(scenario, asked, kept, {"plan.case": case, "plan.method": method})
     every_case = order.setting("strips", strips) == "all"
     if every_case and case is not None:
-        raise Mistake("--strips all: expected no --case beside it, since every case is worked")
+        raise A7SimError("--strips all: expected no --case beside it, since every case is worked")
     work = run_combinations if every_case else run_all_methods
     sessions = len(CASES) if every_case else 1
     with progress_bar(POINTS_A_MODEL * sessions * len(order.scenario.models), told) as watcher:

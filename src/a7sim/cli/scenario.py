@@ -5,7 +5,7 @@ import click
 from a7sim.cli import EXIT_MISTAKE, options
 from a7sim.cli.names import scenario_argument
 from a7sim.documents import as_json, document_header
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import ScenarioError, load_scenario, scenario_schema
 from a7sim.scene import build_scene
 from a7sim.wording import pluralize
@@ -33,7 +33,7 @@ def validate(file: str, as_document: bool) -> None:
         mistakes = []
     except ScenarioError as error:
         mistakes = error.mistakes
-    except Mistake as mistake:
+    except A7SimError as mistake:
         mistakes = str(mistake).splitlines()
     if as_document:
         click.echo(as_json(document_header("scenario validate") | {"file": file, "mistakes": mistakes}), nl=False)

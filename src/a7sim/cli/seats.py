@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING
 from a7sim.cli.links import token_from
 from a7sim.cli.prompt import data_folder
 from a7sim.console.margins import format_elapsed
-from a7sim.console.recalling import Said
-from a7sim.console.seat import Resumable, Seat
+from a7sim.console.recalling import LoggedLine
+from a7sim.console.seat import ConsoleConfig, ResumeOffer
 from a7sim.console.sheet import JobSheet
 from a7sim.link.client import Client
 from a7sim.link.clock import Clock, WallClock
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario, scenario_name
 
 if TYPE_CHECKING:
-    from a7sim.session.chair import Chair
-    from a7sim.session.shelf import Left
+    from a7sim.session.chair import InteractiveSession
+    from a7sim.session.shelf import SavedSession
 
 SESSIONS_FOLDER = "sessions"
 
 
-class InProcess:
+class LocalConsole:
     """A seat at the instrument of a scenario in this process. What imports the instrument waits for the screen."""
 
     def __init__(self, name: str, scenario: Scenario, seed: int | None, out: Path | None, go_on: bool | None) -> None:
@@ -32,8 +32,8 @@ class InProcess:
         self._folder = out or data_folder() / SESSIONS_FOLDER / scenario_name(name)
         self._go_on = go_on
         self._clock, self._wall = Clock(), WallClock()
-        self._left: Left | None = None
-        self._chair: Chair | None = None
+        self._left: SavedSession | None = None
+        self._chair: InteractiveSession | None = None
         self._greeting = ""
         if go_on is not None or (out is not None and out.exists()):
             self._answered_beforehand(out)
@@ -43,20 +43,20 @@ class InProcess:
         if self._go_on:
             if last is None or last.begun is None:
                 found = last.trouble if last else "found none"
-                raise Mistake(
+                raise A7SimError(
                     f"--go-on: expected a session of {self._name} at seed {self._seed} in {self._folder}: {found}"
                 )
             self._decide(last, True)
         elif last is None and out is not None and out.exists():
-            raise Mistake(
+            raise A7SimError(
                 f"{out}: expected a folder that does not exist yet, or that of a session of {self._name} at seed "
                 f"{self._seed}, got another"
             )
 
     @property
-    def config(self) -> Seat:
+    def config(self) -> ConsoleConfig:
         """The seat, as it is before anybody has sat down."""
-        return Seat(
+        return ConsoleConfig(
             self._opened,
             self._time,
             where=self._name,
@@ -66,14 +66,14 @@ class InProcess:
             history=self._past,
         )
 
-    def _last(self) -> "Left | None":
+    def _last(self) -> "SavedSession | None":
         if not self._folder.exists():
             return None
         from a7sim.session.shelf import last_session  # only where there may be one
 
         return last_session(self._folder, self._scenario, self._seed)
 
-    def _resumable(self) -> Resumable | None:
+    def _resumable(self) -> ResumeOffer | None:
         if self._go_on is not None:
             return None
         last = self._last()
@@ -88,9 +88,9 @@ class InProcess:
             return None
         when = datetime.fromtimestamp(last.last_activity).strftime("%Y-%m-%d %H:%M")  # as the person's clock shows it
         about = f"{format_elapsed(last.ended_at_s)} at the instrument, left {when}, kept in {last.folder}"
-        return Resumable(about, lambda goes_on: self._decide(last, goes_on))
+        return ResumeOffer(about, lambda goes_on: self._decide(last, goes_on))
 
-    def _decide(self, last: "Left", goes_on: bool) -> None:
+    def _decide(self, last: "SavedSession", goes_on: bool) -> None:
         if goes_on:
             self._left = last
             self._wall = WallClock(now=last.ended_at_s)
@@ -99,14 +99,14 @@ class InProcess:
     def _opened(self) -> Client:
         """Sit down in the chair, which is built when the instrument is first spoken to."""
         if self._chair is None:
-            from a7sim.session.chair import Chair  # beside the first paint of the screen
+            from a7sim.session.chair import InteractiveSession  # beside the first paint of the screen
 
             begun = self._left.begun if self._left else None
-            self._chair = Chair(self._scenario, self._seed, self._folder, self._clock, begun)
+            self._chair = InteractiveSession(self._scenario, self._seed, self._folder, self._clock, begun)
         return self._chair.open()
 
-    def _past(self) -> Iterable[Said]:
-        return (Said(each.text, each.dir == "<") for each in self._chair.history()) if self._chair else ()
+    def _past(self) -> Iterable[LoggedLine]:
+        return (LoggedLine(each.text, each.dir == "<") for each in self._chair.history()) if self._chair else ()
 
     def _time(self) -> float:
         self._clock.advance_to(self._wall.now)
@@ -120,12 +120,12 @@ class InProcess:
         return self._chair.folder
 
 
-def remote_console(url: str, sheet: JobSheet, token_file: Path | None, watching: bool = False) -> Seat:
+def remote_console(url: str, sheet: JobSheet, token_file: Path | None, watching: bool = False) -> ConsoleConfig:
     """Return a seat at a served instrument. Raises Mistake where nobody answers there."""
     token = token_from(token_file)
     Client.open(url, token=token).close()
     wall = WallClock()
-    return Seat(
+    return ConsoleConfig(
         lambda: Client.open(url, token=token),
         lambda: wall.now,
         alone=False,
@@ -140,13 +140,13 @@ def _watching_now(url: str) -> Callable[[], str]:
     return lambda: f"watching {url}; ? is help"
 
 
-def playback_console(session: str) -> Seat:
+def playback_console(session: str) -> ConsoleConfig:
     """Return a seat from which a session that is over is watched. Raises Mistake where there is none."""
     from a7sim.session.film import open_recording  # only for who watches one
 
     film = open_recording(session)
     title = str(film.journalled.header.get("title", ""))
-    return Seat(
+    return ConsoleConfig(
         film.open_client,
         lambda: film.frame.time,
         where=session,

@@ -12,23 +12,30 @@ import click
 from a7sim.cli import options
 from a7sim.cli.links import token_from
 from a7sim.cli.names import scenario_argument
-from a7sim.cli.operators import Asked, Kept, output_options, resolve_resume, resolve_scenario, scenario_options
+from a7sim.cli.operators import (
+    OutputOptions,
+    ScenarioOptions,
+    output_options,
+    resolve_resume,
+    resolve_scenario,
+    scenario_options,
+)
 from a7sim.cli.options import TOKEN_VARIABLE
 from a7sim.documents import Document, as_json, document_header
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.instrument.language.desk import POLL_SECONDS
 from a7sim.link.addresses import Address, parse_address
 from a7sim.link.clock import Clock, WallClock
-from a7sim.link.conversation import Terms
+from a7sim.link.conversation import ServerLimits
 from a7sim.link.faults import EXAMPLE, parse_faults
 from a7sim.link.loops import run
-from a7sim.link.serving import Doors, Server
-from a7sim.mistakes import Mistake
+from a7sim.link.serving import Endpoints, Server
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario
-from a7sim.session.durable import JournalStopped
-from a7sim.session.journal import Journal, Keeping, make_header
-from a7sim.session.resuming import Begun, restore_instrument
+from a7sim.session.durable import JournalWriteError
+from a7sim.session.journal import Journal, JournalOptions, make_header
+from a7sim.session.resuming import ResumableSession, restore_instrument
 
 USUAL = Address("127.0.0.1", 5025)
 
@@ -79,8 +86,8 @@ def command(
     idle: float,
     fault: str | None,
     fault_seed: int,
-    asked: Asked,
-    kept: Kept,
+    asked: ScenarioOptions,
+    kept: OutputOptions,
     as_document: bool,
     quiet: bool,
 ) -> None:
@@ -93,7 +100,9 @@ def command(
     doors = _doors(tcp, rfc2217, pty)
     token = token_from(token_file)
     _refuse_open_doors(doors, listen_anyway, token)
-    terms = Terms(baud, parse_faults(fault) if fault is not None else None, fault_seed, idle, max_clients=clients)
+    terms = ServerLimits(
+        baud, parse_faults(fault) if fault is not None else None, fault_seed, idle, max_clients=clients
+    )
     if kept.resume is not None:
         served = _served_again(resolve_resume(kept.resume, *_OF_THE_DOOR), token, kept.keeping)
     else:
@@ -101,52 +110,56 @@ def command(
         kept.keeping.prepare(kept.out, kept.force)
         served = _served_anew(loaded, seed, token, realtime, kept)
     with served.journal:
-        run(serve(served, doors, terms, Announcements(served.head, as_document, quiet)))
+        run(serve(served, doors, terms, StartupMessages(served.head, as_document, quiet)))
 
 
 @dataclass(frozen=True)
-class Served:
+class ServedInstrument:
     """What is served: a desk, the time at it, and the journal of what is said there."""
 
     head: Document
-    desk: Desk
+    desk: SharedInstrument
     clock: Clock | WallClock
     journal: Journal
 
 
-def _served_anew(scenario: Scenario, seed: int, token: str | None, realtime: bool, kept: Kept) -> Served:
+def _served_anew(
+    scenario: Scenario, seed: int, token: str | None, realtime: bool, kept: OutputOptions
+) -> ServedInstrument:
     autograph = Autograph.from_scenario(scenario, seed)
     journal = Journal(kept.keeping)
-    desk = Desk(autograph, journal.on_link_event if kept.out else None, token, 0.0 if realtime else POLL_SECONDS)
+    desk = SharedInstrument(
+        autograph, journal.on_link_event if kept.out else None, token, 0.0 if realtime else POLL_SECONDS
+    )
     header = make_header("serve", scenario, seed, realtime=realtime, login=token is not None)
-    return Served(_head(scenario, seed), desk, _clock(realtime), journal.recording(kept.out, header, desk))
+    return ServedInstrument(_head(scenario, seed), desk, _clock(realtime), journal.recording(kept.out, header, desk))
 
 
-def _served_again(begun: Begun, token: str | None, keeping: Keeping) -> Served:
+def _served_again(begun: ResumableSession, token: str | None, keeping: JournalOptions) -> ServedInstrument:
     if begun.setting("login") != (token is not None):
         asked, given = ("a", "none") if token is None else ("no", "one")
-        raise Mistake(
+        raise A7SimError(
             f"{begun.journalled.location(1)}: expected {asked} token, as the session was begun with, got {given}"
         )
     journal = Journal(keeping)
     desk, now, _ = restore_instrument(begun, journal)
     desk.token = token
-    return Served(_head(begun.scenario, begun.seed), desk, _clock(begun.setting("realtime"), now), journal)
+    return ServedInstrument(_head(begun.scenario, begun.seed), desk, _clock(begun.setting("realtime"), now), journal)
 
 
 def _clock(realtime: bool, now: float = 0.0) -> Clock | WallClock:
     return WallClock(now=now) if realtime else Clock(now)
 
 
-async def serve(served: Served, doors: Doors, terms: Terms, told: "Announcements") -> None:
+async def serve(served: ServedInstrument, doors: Endpoints, terms: ServerLimits, told: "StartupMessages") -> None:
     """Serve an instrument until the process is told to stop. Raises JournalStopped where nothing can be written."""
     stopped = asyncio.Event()
-    broken: list[JournalStopped] = []
+    broken: list[JournalWriteError] = []
     loop = asyncio.get_running_loop()
 
     def fail(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         error = context.get("exception")
-        if isinstance(error, JournalStopped):
+        if isinstance(error, JournalWriteError):
             broken.append(error)
             stopped.set()
         else:
@@ -167,7 +180,7 @@ async def serve(served: Served, doors: Doors, terms: Terms, told: "Announcements
 
 
 @dataclass(frozen=True)
-class Announcements:
+class StartupMessages:
     """What is printed once every door is open."""
 
     head: Document
@@ -189,21 +202,23 @@ def _head(scenario: Scenario, seed: int) -> Document:
     return document_header("serve") | {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
 
 
-def _doors(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]) -> Doors:
+def _doors(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]) -> Endpoints:
     sockets = [parse_address(text, "--tcp") for text in tcp]
     if not (tcp or rfc2217 or pty):
         sockets = [USUAL]
     if len({path.absolute() for path in pty}) < len(pty):
-        raise Mistake(f"--pty: expected a path of its own for each, got {', '.join(map(str, pty))}")
-    return Doors(sockets, [parse_address(text, "--rfc2217") for text in rfc2217], pty)
+        raise A7SimError(f"--pty: expected a path of its own for each, got {', '.join(map(str, pty))}")
+    return Endpoints(sockets, [parse_address(text, "--rfc2217") for text in rfc2217], pty)
 
 
-def _refuse_open_doors(doors: Doors, listen_anyway: bool, token: str | None) -> None:
+def _refuse_open_doors(doors: Endpoints, listen_anyway: bool, token: str | None) -> None:
     asked = [("--tcp", each) for each in doors.tcp] + [("--rfc2217", each) for each in doors.rfc2217]
     for option, address in asked:
         if not address.loopback and not listen_anyway:
-            raise Mistake(
+            raise A7SimError(
                 f"{option} {address}: expected an address of this machine alone (--listen-anyway lets others in)"
             )
     if listen_anyway and token is None:
-        raise Mistake(f"--listen-anyway: expected a token, from --token-file or in the environment as {TOKEN_VARIABLE}")
+        raise A7SimError(
+            f"--listen-anyway: expected a token, from --token-file or in the environment as {TOKEN_VARIABLE}"
+        )

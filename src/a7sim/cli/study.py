@@ -22,13 +22,13 @@ from rich.text import Text
 from a7sim.cli import EXIT_DIFFERS, options
 from a7sim.cli.names import study_argument
 from a7sim.documents import Document, as_json
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.study.auditing import audit_study
 from a7sim.study.checkpoint import checkpoint_path
 from a7sim.study.executors import KINDS, Kind, open_executor
 from a7sim.study.findings import findings_document
 from a7sim.study.folder import open_tally, write_page, write_results
-from a7sim.study.loading import Laid, load_study
+from a7sim.study.loading import LoadedStudy, load_study
 from a7sim.study.running import run_study
 from a7sim.study.tables import study_tables
 from a7sim.study.tally import Tally
@@ -96,11 +96,11 @@ def _leave_page(out: Path, document: Document) -> None:
     """Leave the page; without matplotlib all else is there nevertheless."""
     try:
         write_page(out, document)
-    except Mistake as missing:
+    except A7SimError as missing:
         click.echo(f"a7sim: {missing}", err=True)
 
 
-def _audit(laid: Laid, tally: Tally, picks: int, silent: bool) -> None:
+def _audit(laid: LoadedStudy, tally: Tally, picks: int, silent: bool) -> None:
     differences = audit_study(laid, tally, picks)
     worked = pluralize(min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells)))), "session")
     if differences:
@@ -119,7 +119,7 @@ class _Rate(ProgressColumn):
 
 
 @contextmanager
-def _watched(laid: Laid, tally: Tally, silent: bool) -> Iterator[tuple[Progress, TaskID]]:
+def _watched(laid: LoadedStudy, tally: Tally, silent: bool) -> Iterator[tuple[Progress, TaskID]]:
     """Show on a terminal how many sessions are done, at what rate, and how long it will take."""
     title = TextColumn(laid.study.title, markup=False)
     columns = (title, BarColumn(), MofNCompleteColumn(), _Rate(), TimeRemainingColumn())

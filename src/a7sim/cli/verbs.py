@@ -8,17 +8,17 @@ import click
 from click.shell_completion import CompletionItem
 
 
-class Verb(NamedTuple):
+class LazyCommand(NamedTuple):
     """Where a command stands, as `module:name`, and what a list of commands says of it."""
 
     import_path: str
     short_help: str
 
 
-class Verbs(click.Group):
+class LazyGroup(click.Group):
     """A group whose commands are imported when they are asked for; to list them nothing is imported."""
 
-    def __init__(self, *args: Any, verbs: Mapping[str, Verb], **kwargs: Any) -> None:
+    def __init__(self, *args: Any, verbs: Mapping[str, LazyCommand], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._verbs = verbs
 

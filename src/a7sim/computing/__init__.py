@@ -6,7 +6,7 @@ The sums themselves are in `a7sim.reduction`.
 from a7sim.computing.blocks import block
 from a7sim.computing.centres import CENTRE_METHODS, CentreMethod, centres
 from a7sim.computing.interior import CORRECTIONS, interior
-from a7sim.computing.outcome import Outcome, write_result
+from a7sim.computing.outcome import ProcessingResult, write_result
 from a7sim.computing.pairs import RELATIVE_METHODS, RelativeMethod, relative
 from a7sim.computing.similarities import SIMILARITY_METHODS, SimilarityMethod, similarity
 from a7sim.computing.strips import absolute, connect, strip
@@ -17,7 +17,7 @@ __all__ = [
     "RELATIVE_METHODS",
     "SIMILARITY_METHODS",
     "CentreMethod",
-    "Outcome",
+    "ProcessingResult",
     "RelativeMethod",
     "SimilarityMethod",
     "absolute",

@@ -9,7 +9,7 @@ import numpy as np
 from a7sim.computing.comparing import compare_to_reference as compared_with
 from a7sim.computing.comparing import comparison_csv
 from a7sim.computing.outcome import (
-    Outcome,
+    ProcessingResult,
     errors_for,
     free_format,
     models_csv,
@@ -28,7 +28,9 @@ SIGMAS = ("scale", "turn_X", "turn_Y", "turn_Z", "TX", "TY", "TZ")
 """Of every model, turns in gon, translation at the model's middle."""
 
 
-def block(paths: Sequence[Path], ground_path: Path, height_weight: float = 1.0, against: Path | None = None) -> Outcome:
+def block(
+    paths: Sequence[Path], ground_path: Path, height_weight: float = 1.0, against: Path | None = None
+) -> ProcessingResult:
     """Return the models of all files adjusted to the ground as one block. Raises Mistake."""
     models = read_models(paths)
     ground = read_ground(ground_path)
@@ -50,7 +52,7 @@ def block(paths: Sequence[Path], ground_path: Path, height_weight: float = 1.0, 
     if against:
         document["compare"] = compared = compared_with(against, found.points, found.coordinates)
         files["compare.csv"] = lambda: comparison_csv(compared)
-    return Outcome(document, files)
+    return ProcessingResult(document, files)
 
 
 def _of_models(found: BlockAdjustment) -> list[Document]:

@@ -7,7 +7,7 @@ from a7sim.computing.reading import point_columns, point_names, read_points
 from a7sim.documents import Document, points_as_rows
 from a7sim.files import to_csv
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import max_abs_residual, root_mean_square
 
 Quantities = Mapping[tuple[str, str], Mapping[str, float]]
@@ -43,7 +43,7 @@ def compare_to_reference(path: Path, points: Sequence[str], coordinates: Array) 
     place = {name: i for i, name in enumerate(points)}
     rows = [row for row in read_points(path, "XYZ", gaps="XYZ") if row.texts["point"] in place]
     if not rows:
-        raise Mistake(f"{path}, column point: expected points that were computed, got none of them")
+        raise A7SimError(f"{path}, column point: expected points that were computed, got none of them")
     names, given = point_names(rows), point_columns(rows, "XYZ")
     differences = coordinates[:, [place[name] for name in names]] - given
     return {

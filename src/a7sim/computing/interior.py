@@ -8,12 +8,12 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from a7sim.computing.outcome import Outcome, errors_for
+from a7sim.computing.outcome import ProcessingResult, errors_for
 from a7sim.computing.reading import group_rows, point_columns, point_names
 from a7sim.documents import Document, document_header, points_as_rows, statistics_document
 from a7sim.files import Row, natural_sort_key, read_table, read_toml, to_csv
 from a7sim.geometry import GON, Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.corrections import corrected_image
 from a7sim.reduction.interior import PlaneFit, plane_fit, principal_distance_for_film
 from a7sim.scenario import Camera
@@ -27,7 +27,7 @@ MAX_FIDUCIAL_MM = 5.0
 
 
 @dataclass(frozen=True)
-class Flight:
+class FlightHeights:
     """Heights above the sea in m of the camera and of the mean ground."""
 
     flying_height: float
@@ -51,8 +51,8 @@ def interior(
     kind: str = "affine",
     count_mm: float | None = None,
     corrections: Sequence[str] = (),
-    flight: Flight | None = None,
-) -> Outcome:
+    flight: FlightHeights | None = None,
+) -> ProcessingResult:
     """Return the interior orientation of every photograph in a file of counts, and its image points refined.
 
     `count_mm` is the size of a count, by which the change of the film's size is known. Raises Mistake.
@@ -77,7 +77,7 @@ def interior(
     }
     if len(pictures) > 1:
         files["pairs.csv"] = lambda: to_csv(("model", "point", "xl", "yl", "xr", "yr"), _pair_rows(pictures))
-    return Outcome(document, files)
+    return ProcessingResult(document, files)
 
 
 def read_camera(path: Path) -> Camera:
@@ -86,7 +86,7 @@ def read_camera(path: Path) -> Camera:
     raw = raw.get("camera", raw)
     wrong = next(schema_errors(raw, msgspec.inspect.type_info(Camera), "camera"), None)
     if wrong:
-        raise Mistake(f"{path}: {wrong}")
+        raise A7SimError(f"{path}: {wrong}")
     return msgspec.convert(raw, Camera)
 
 
@@ -97,7 +97,7 @@ def _picture(
     camera: Camera,
     kind: str,
     corrections: Sequence[str],
-    flight: Flight | None,
+    flight: FlightHeights | None,
 ) -> _Picture:
     calibrated = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in camera.fiducials}
     fiducials = [row for row in rows if row.texts["point"] in calibrated]
@@ -117,15 +117,15 @@ def _refuse_confused(fit: PlaneFit, names: Sequence[str]) -> None:
     off = np.hypot(*fit.residuals)
     worst = int(np.argmax(off))
     if off[worst] > MAX_FIDUCIAL_MM:
-        raise Mistake(
+        raise A7SimError(
             f"expected counts of the fiducials that lie as in the camera, got {names[worst]} {off[worst]:.1f} mm from "
             "its place (are two confused, or the axes mirrored?)"
         )
 
 
-def _corrected(image: Array, camera: Camera, corrections: Sequence[str], flight: Flight | None) -> Array:
+def _corrected(image: Array, camera: Camera, corrections: Sequence[str], flight: FlightHeights | None) -> Array:
     if flight is None and set(corrections) & {"refraction", "curvature"}:
-        raise Mistake("expected --flying-height for the corrections of refraction and curvature, got none")
+        raise A7SimError("expected --flying-height for the corrections of refraction and curvature, got none")
     return corrected_image(
         image,
         camera.c,

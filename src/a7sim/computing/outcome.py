@@ -10,7 +10,7 @@ import numpy as np
 from a7sim.documents import Document, as_json
 from a7sim.files import to_csv, write_files
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import GroundFit
 from a7sim.reduction.cards import free_format_lines, output_lines
 from a7sim.reduction.least_squares import Undetermined
@@ -22,7 +22,7 @@ RESIDUAL_COLUMNS = ("point", "role", "X", "Y", "Z")
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ProcessingResult:
     """A document, and the texts of files by name, each made when it is written."""
 
     document: Document
@@ -35,11 +35,11 @@ def errors_for(path: Path | str, what: str = "") -> Iterator[None]:
     try:
         with np.errstate(all="ignore"):
             yield
-    except (Undetermined, Mistake) as refusal:
-        raise Mistake(f"{path}{f', {what}' if what else ''}: {refusal}") from refusal
+    except (Undetermined, A7SimError) as refusal:
+        raise A7SimError(f"{path}{f', {what}' if what else ''}: {refusal}") from refusal
 
 
-def write_result(outcome: Outcome, folder: Path) -> Document:
+def write_result(outcome: ProcessingResult, folder: Path) -> Document:
     """Write `results.json` and the files of an outcome into a folder and return the document as written.
 
     What does not fit the form of a file (a name of letters on a card) keeps that file from being written, and the
@@ -49,7 +49,7 @@ def write_result(outcome: Outcome, folder: Path) -> Document:
     for name, text in outcome.files.items():
         try:
             texts[name] = text()
-        except Mistake as mistake:
+        except A7SimError as mistake:
             refused[name] = str(mistake)
     document = outcome.document | ({"not_written": refused} if refused else {})
     write_files(folder, texts | {"results.json": as_json(document)})

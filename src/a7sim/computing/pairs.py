@@ -7,12 +7,12 @@ from typing import Literal
 import numpy as np
 
 from a7sim.computing.comparing import compare_methods, methods_csv
-from a7sim.computing.outcome import Outcome, errors_for, models_csv
-from a7sim.computing.reading import Pair, model_photographs, read_pairs
+from a7sim.computing.outcome import ProcessingResult, errors_for, models_csv
+from a7sim.computing.reading import StereoPair, model_photographs, read_pairs
 from a7sim.documents import Document, document_header, elements_document, points_as_rows, statistics_document
 from a7sim.files import read_table, to_csv
 from a7sim.geometry import Array, ray_of, stereoscopic_intersection
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, relative_orientation
 from a7sim.reduction.hallert import orientation_by_parallaxes
 from a7sim.reduction.modelling import model_coordinates
@@ -35,13 +35,13 @@ def relative(
     unknowns: Unknowns,
     bx: float,
     method: RelativeMethod = "coplanarity",
-) -> Outcome:
+) -> ProcessingResult:
     """Return the relative orientation of a pair file; with all methods, by coplanarity and the others beside it.
 
     Raises Mistake.
     """
     if method in ("schut", "all") and unknowns != "dependent":
-        raise Mistake(f"--method {method}: expected dependent unknowns, got {unknowns}")
+        raise A7SimError(f"--method {method}: expected dependent unknowns, got {unknowns}")
     pair = _only_pair(path, principal_point)
     methods = [each for each in RELATIVE_METHODS if each != "all"] if method == "all" else [method]
     found: dict[str, RelativeOrientation | SnoopedOrientation] = {}
@@ -60,18 +60,20 @@ def relative(
         document["compare"] = compared = _compared(pair, found, c, bx)
         document["robust"] = _of_snooping(found["robust"])
         files["compare.csv"] = lambda: methods_csv(compared)
-    return Outcome(document, files)
+    return ProcessingResult(document, files)
 
 
-def _only_pair(path: Path, principal_point: tuple[float, float]) -> Pair:
+def _only_pair(path: Path, principal_point: tuple[float, float]) -> StereoPair:
     pairs = read_pairs(read_table(path), principal_point, may_be_one=True)
     if len(pairs) > 1:
         shown = ", ".join(pair.name for pair in pairs)[:80]
-        raise Mistake(f"{path}, column model: expected one pair, got {len(pairs)} ({shown}); `reduce strip` takes more")
+        raise A7SimError(
+            f"{path}, column model: expected one pair, got {len(pairs)} ({shown}); `reduce strip` takes more"
+        )
     return pairs[0]
 
 
-def pair_document(pair: Pair, found: RelativeOrientation | SnoopedOrientation, c: float, bx: float) -> Document:
+def pair_document(pair: StereoPair, found: RelativeOrientation | SnoopedOrientation, c: float, bx: float) -> Document:
     """Return an oriented pair with its model, a base of length `bx` in the left photograph's frame."""
     orientation = _orientation(found)
     oriented_on = found.points if isinstance(found, SnoopedOrientation) else pair.points
@@ -91,7 +93,9 @@ def pair_document(pair: Pair, found: RelativeOrientation | SnoopedOrientation, c
     return document | _of_snooping(found)
 
 
-def add_centres(pair: Pair, orientation: RelativeOrientation, c: float, bx: float, photos: tuple[str, str]) -> Model:
+def add_centres(
+    pair: StereoPair, orientation: RelativeOrientation, c: float, bx: float, photos: tuple[str, str]
+) -> Model:
     """Return the model of a pair, its centres among the points."""
     points = model_points(pair, orientation, c, bx)
     ends = np.array([np.zeros(3), orientation.base * bx]).T
@@ -99,7 +103,7 @@ def add_centres(pair: Pair, orientation: RelativeOrientation, c: float, bx: floa
     return Model(pair.name, names, np.concatenate([points, ends], axis=1))
 
 
-def model_points(pair: Pair, orientation: RelativeOrientation, c: float, length: float) -> Array:
+def model_points(pair: StereoPair, orientation: RelativeOrientation, c: float, length: float) -> Array:
     """Return model points ``(3, n)``: where x-parallax vanishes in the left photograph's frame, Y the rays' mean.
 
     Only a base that points elsewhere than along X is first turned onto it.
@@ -112,7 +116,7 @@ def model_points(pair: Pair, orientation: RelativeOrientation, c: float, length:
 
 
 def _oriented(
-    pair: Pair, c: float, unknowns: Unknowns, bx: float, method: str
+    pair: StereoPair, c: float, unknowns: Unknowns, bx: float, method: str
 ) -> RelativeOrientation | SnoopedOrientation:
     if method == "robust":
         return snooped_orientation(pair.left, pair.right, c, c, pair.points, unknowns=unknowns, bx=bx)
@@ -122,11 +126,11 @@ def _oriented(
     return by(pair.left, pair.right, c, c, unknowns, bx=bx)
 
 
-def _without_blunders(pair: Pair, found: RelativeOrientation | SnoopedOrientation) -> Pair:
+def _without_blunders(pair: StereoPair, found: RelativeOrientation | SnoopedOrientation) -> StereoPair:
     if not isinstance(found, SnoopedOrientation):
         return pair
     kept = [i for i, name in enumerate(pair.points) if name in found.points]
-    return Pair(pair.name, found.points, pair.left[:, kept], pair.right[:, kept])
+    return StereoPair(pair.name, found.points, pair.left[:, kept], pair.right[:, kept])
 
 
 def _orientation(found: RelativeOrientation | SnoopedOrientation) -> RelativeOrientation:
@@ -152,7 +156,9 @@ def _of_snooping(found: RelativeOrientation | SnoopedOrientation) -> Document:
     }
 
 
-def _compared(pair: Pair, found: dict[str, RelativeOrientation | SnoopedOrientation], c: float, bx: float) -> Document:
+def _compared(
+    pair: StereoPair, found: dict[str, RelativeOrientation | SnoopedOrientation], c: float, bx: float
+) -> Document:
     """Return elements, precision and model coordinates of several methods side by side."""
     orientations = {name: _orientation(each) for name, each in found.items()}
     elements = {name: elements_document(each.elements, each.sigmas) for name, each in orientations.items()}
@@ -171,7 +177,7 @@ def _compared(pair: Pair, found: dict[str, RelativeOrientation | SnoopedOrientat
     return compare_methods(rows)
 
 
-def photographs_of_pairs(pairs: Sequence[Pair]) -> list[tuple[str, str]]:
+def photographs_of_pairs(pairs: Sequence[StereoPair]) -> list[tuple[str, str]]:
     """Return the photographs of each pair: those in its name (`321-320`), else by its place in the file."""
     return [
         model_photographs(pair.name) or (f"photo{place}", f"photo{place + 1}")

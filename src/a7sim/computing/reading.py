@@ -11,7 +11,7 @@ import numpy as np
 
 from a7sim.files import Row, Table, natural_sort_key, read_table, read_text, rows_by_key
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import ROLES, Ground
 from a7sim.reduction.cards import is_deck, read_cards
 from a7sim.reduction.strips import CENTRE, Model, in_order
@@ -22,7 +22,7 @@ _NEEDED = {"control": "XYZ", "plan": "XY", "height": "Z", "check": ""}
 
 
 @dataclass(frozen=True)
-class Pair:
+class StereoPair:
     """Image coordinates ``(2, n)`` in mm of points seen in two photographs, about the principal point."""
 
     name: str
@@ -67,13 +67,13 @@ def group_rows(table: Table, group: str, numbers: Sequence[str], may_be_one: boo
     return {name: sorted(rows, key=lambda row: natural_sort_key(row.texts["point"])) for name, rows in found.items()}
 
 
-def read_pairs(table: Table, principal_point: tuple[float, float], may_be_one: bool = False) -> list[Pair]:
+def read_pairs(table: Table, principal_point: tuple[float, float], may_be_one: bool = False) -> list[StereoPair]:
     """Return the pairs of a table as they first stand in it. Raises Mistake."""
     shift = np.array(principal_point)[:, None]
     pairs = []
     for name, rows in group_rows(table, "model", PAIR_COLUMNS, may_be_one).items():
         measured = point_columns(rows, PAIR_COLUMNS)
-        pairs.append(Pair(name, point_names(rows), measured[:2] - shift, measured[2:] - shift))
+        pairs.append(StereoPair(name, point_names(rows), measured[:2] - shift, measured[2:] - shift))
     return pairs
 
 
@@ -101,7 +101,7 @@ def read_models(paths: Sequence[Path], may_be_one: bool = False) -> list[Model]:
         )
         for model in here:
             if model.name in found:
-                raise Mistake(f"{path}: expected models of its own, got {model.name} as in {found[model.name][0]}")
+                raise A7SimError(f"{path}: expected models of its own, got {model.name} as in {found[model.name][0]}")
             found[model.name] = path, model
     return sorted((model for _, model in found.values()), key=lambda model: natural_sort_key(model.name))
 
@@ -117,13 +117,13 @@ def read_ground(path: Path) -> Ground:
     for row in rows:
         role = row.texts["role"]
         if role not in ROLES:
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, {row.location}, column role: expected control, plan, height or check, got {role[:40]!r}"
             )
         empty = [axis for axis in "XYZ" if np.isnan(row.numbers[axis])]
         missing = [axis for axis in _NEEDED[role] if axis in empty] or (empty if len(empty) == 3 else [])
         if missing:
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, {row.location}, column {missing[0]}: expected a number at a {role} point, got nothing"
             )
     ordered = sorted(rows, key=lambda row: natural_sort_key(row.texts["point"]))

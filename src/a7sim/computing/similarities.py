@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 from a7sim.computing.comparing import compare_methods, methods_csv
-from a7sim.computing.outcome import Outcome, errors_for
+from a7sim.computing.outcome import ProcessingResult, errors_for
 from a7sim.computing.reading import point_columns, point_names, read_points
 from a7sim.documents import Document, document_header, points_as_rows, similarity_document, statistics_document
 from a7sim.files import to_csv
@@ -20,7 +20,7 @@ ANGLES, SHIFTS = ("omega", "phi", "kappa"), ("Tx", "Ty", "Tz")
 _BY = {"iteration": similarity_by_iteration, "quaternion": similarity_by_quaternion}
 
 
-def similarity(path: Path, method: SimilarityMethod = "iteration") -> Outcome:
+def similarity(path: Path, method: SimilarityMethod = "iteration") -> ProcessingResult:
     """Return the similarity of a file of common points; with both methods, by iteration and the other beside it.
 
     Raises Mistake.
@@ -39,7 +39,7 @@ def similarity(path: Path, method: SimilarityMethod = "iteration") -> Outcome:
     if method == "both":
         document["compare"] = compared = compare_methods(_quantities(found))
         files["compare.csv"] = lambda: methods_csv(compared)
-    return Outcome(document, files)
+    return ProcessingResult(document, files)
 
 
 def common_points_document(found: Similarity, points: tuple[str, ...]) -> Document:

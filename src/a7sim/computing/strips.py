@@ -7,7 +7,7 @@ from pathlib import Path
 from a7sim.computing.comparing import compare_to_reference as compared_with
 from a7sim.computing.comparing import comparison_csv
 from a7sim.computing.outcome import (
-    Outcome,
+    ProcessingResult,
     errors_for,
     free_format,
     models_csv,
@@ -35,7 +35,7 @@ from a7sim.documents import (
     statistics_document,
 )
 from a7sim.files import Table, read_table, read_text
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import AbsoluteOrientation, Ground, GroundFit, absolute_orientation
 from a7sim.reduction.cards import Deck, is_deck, read_cards
 from a7sim.reduction.coplanarity import relative_orientation
@@ -64,12 +64,12 @@ class _Input:
     ground: Ground | None = None
 
 
-def connect(paths: Sequence[Path], method: JoinMethod = "points") -> Outcome:
+def connect(paths: Sequence[Path], method: JoinMethod = "points") -> ProcessingResult:
     """Return the models of all files joined into one, in the system of the first along the strip. Raises Mistake."""
     models = read_models(paths)
     with errors_for(short_list(paths)):
         if len(models) < 2:
-            raise Mistake(f"expected two models or more, got {len(models)}")
+            raise A7SimError(f"expected two models or more, got {len(models)}")
         formed = formed_strip(sort_along_strip(models), method)
     document = document_header("reduce connect") | {
         "method": method,
@@ -78,14 +78,14 @@ def connect(paths: Sequence[Path], method: JoinMethod = "points") -> Outcome:
         "joins": _of_closed_joins(formed),
         "points": points_as_rows(formed.points, formed.coordinates),
     }
-    return Outcome(document, _model_files(formed.models, formed.as_model))
+    return ProcessingResult(document, _model_files(formed.models, formed.as_model))
 
 
-def absolute(path: Path, ground_path: Path, against: Path | None = None) -> Outcome:
+def absolute(path: Path, ground_path: Path, against: Path | None = None) -> ProcessingResult:
     """Return one model or strip oriented to the ground. Raises Mistake."""
     models = read_models([path], may_be_one=True)
     if len(models) > 1:
-        raise Mistake(f"{path}, column model: expected one model, got {len(models)}; `reduce strip` joins them")
+        raise A7SimError(f"{path}, column model: expected one model, got {len(models)}; `reduce strip` joins them")
     ground = read_ground(ground_path)
     with errors_for(path, f"ground {ground_path}"):
         oriented = absolute_orientation(models[0], ground)
@@ -93,7 +93,7 @@ def absolute(path: Path, ground_path: Path, against: Path | None = None) -> Outc
     document["points"] = points_as_rows(oriented.model.points, oriented.model.coordinates)
     files = _model_files([oriented.model], oriented.model)
     files["residuals.csv"] = lambda: residuals_csv(oriented.fit)
-    return _with_comparison(Outcome(document, files), oriented.model, against)
+    return _with_comparison(ProcessingResult(document, files), oriented.model, against)
 
 
 def strip(
@@ -103,7 +103,7 @@ def strip(
     method: JoinMethod = "points",
     degree: Degree | None = None,
     against: Path | None = None,
-) -> Outcome:
+) -> ProcessingResult:
     """Return the strip of a file of pairs, models or cards with its absolute orientation and adjustment.
 
     Pairs need the camera; their models have the photo base without a bx. Only cards bring ground with them, which
@@ -113,7 +113,7 @@ def strip(
     given = _strip_input(path, camera)
     ground = own_ground or given.ground
     if ground is None:
-        raise Mistake(f"{path}: expected ground points (--ground), which only cards bring with them, got none")
+        raise A7SimError(f"{path}: expected ground points (--ground), which only cards bring with them, got none")
     with errors_for(path):
         formed = formed_strip(given.models, method)
     with errors_for(path, f"ground {ground_path}" if ground_path else ""):
@@ -132,7 +132,9 @@ def strip(
     document["points"] = points_as_rows(final.points, final.coordinates)
     models = _in_ground(formed, oriented, adjusted)
     fit = adjusted.fit if adjusted else oriented.fit
-    return _with_comparison(Outcome(document, _model_files(models, final) | ground_files(models, fit)), final, against)
+    return _with_comparison(
+        ProcessingResult(document, _model_files(models, final) | ground_files(models, fit)), final, against
+    )
 
 
 def orientation_document(oriented: AbsoluteOrientation) -> Document:
@@ -178,7 +180,7 @@ def _strip_input(path: Path, camera: PairCamera | None) -> _Input:
     if not is_pair_table(table):
         return _of_models(path, "models", read_models_table(table))
     if camera is None:
-        raise Mistake(f"{path}: expected the principal distance (--c) of the pairs, got none")
+        raise A7SimError(f"{path}: expected the principal distance (--c) of the pairs, got none")
     return _of_pairs(path, table, camera)
 
 
@@ -202,7 +204,7 @@ def _of_pairs(path: Path, table: Table, camera: PairCamera) -> _Input:
         base = float((pair.left[0] - pair.right[0]).mean()) if camera.bx is None else camera.bx
         with errors_for(path, f"model {pair.name}"):
             if not base > 0.0:
-                raise Mistake(
+                raise A7SimError(
                     f"expected the points of the left photograph further right than in the other, "
                     f"got a mean x-parallax of {base:.3f} mm (is the pair given right to left?)"
                 )
@@ -271,10 +273,10 @@ def _model_files(models: Sequence[Model], whole: Model) -> dict[str, Callable[[]
     }
 
 
-def _with_comparison(outcome: Outcome, final: Model, path: Path | None) -> Outcome:
+def _with_comparison(outcome: ProcessingResult, final: Model, path: Path | None) -> ProcessingResult:
     if path is None:
         return outcome
     compared = compared_with(path, final.points, final.coordinates)
-    return Outcome(
+    return ProcessingResult(
         outcome.document | {"compare": compared}, {**outcome.files, "compare.csv": lambda: comparison_csv(compared)}
     )

@@ -10,26 +10,26 @@ from textual.app import App, SystemCommand
 from textual.filter import ANSIToTruecolor, LineFilter
 from textual.screen import Screen
 
-from a7sim.console.binocular import Binocular, View
-from a7sim.console.book import Entry
-from a7sim.console.deeds import ACTIONS_WHILE_DISCONNECTED, Deeds
+from a7sim.console.binocular import Binocular, ViewSettings
+from a7sim.console.book import RecordedEntry
+from a7sim.console.deeds import ACTIONS_WHILE_DISCONNECTED, Actions
 from a7sim.console.dialogs import Choose
-from a7sim.console.dials import Dials
-from a7sim.console.drum_panels import Wheeled
-from a7sim.console.front import WELCOME, Front
-from a7sim.console.hands import Hands
-from a7sim.console.hearing import Hearing
+from a7sim.console.dials import Readouts
+from a7sim.console.drum_panels import DrumScrolled
+from a7sim.console.front import WELCOME, MainScreen
+from a7sim.console.hands import ControlSelection
+from a7sim.console.hearing import MessageHandlers
 from a7sim.console.keymap import actions_by_key, actions_for, key_display, key_name
 from a7sim.console.margins import header_text, hints, hints_to_watch, key_labels
-from a7sim.console.news import Met, Sight, Silent
+from a7sim.console.news import Connected, ConnectionLost, ViewResult
 from a7sim.console.playback import Playback
-from a7sim.console.prints import Pointed
-from a7sim.console.reaching import Presets, print_position
-from a7sim.console.seat import Resumable, Seat, best_drawing, speaks_utf8
+from a7sim.console.prints import PointClicked
+from a7sim.console.reaching import CounterOrigins, print_position
+from a7sim.console.seat import ConsoleConfig, ResumeOffer, best_drawing, speaks_utf8
 from a7sim.console.sketches import Place
-from a7sim.console.station import Station
+from a7sim.console.station import InstrumentThread
 from a7sim.console.themes import DRUMS, THEMES
-from a7sim.console.window import Eyepiece
+from a7sim.console.window import EyepieceWidget
 
 SETTLING_S = 0.02
 """Between two keys for a dialog, where they were pressed before anything answered."""
@@ -37,7 +37,7 @@ SETTLING_S = 0.02
 GO_ON = (("go_on", "go on where it stood"), ("anew", "begin anew; the old session is kept"))
 
 
-class Console(Hearing, Deeds, App[None]):
+class Console(MessageHandlers, Actions, App[None]):
     """The instrument for a person."""
 
     CSS_PATH = "app.tcss"
@@ -45,27 +45,27 @@ class Console(Hearing, Deeds, App[None]):
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (100, "-usual"), (140, "-wide")]  # noqa: RUF012 # as the library declares it
     VERTICAL_BREAKPOINTS = [(0, "-low"), (28, "-tall"), (44, "-high")]  # noqa: RUF012
 
-    def __init__(self, seat: Seat) -> None:
+    def __init__(self, seat: ConsoleConfig) -> None:
         super().__init__()
         self.seat = seat
         self.utf8 = speaks_utf8()
         drawing = seat.drawing or best_drawing(self.utf8, self.no_color, self.console.color_system)
-        self.binocular = Binocular(View(drawing), "•" if self.utf8 else "o")
-        self.hands = Hands()
-        self.entries: tuple[Entry, ...] = ()
-        self.presets = Presets()
+        self.binocular = Binocular(ViewSettings(drawing), "•" if self.utf8 else "o")
+        self.hands = ControlSelection()
+        self.entries: tuple[RecordedEntry, ...] = ()
+        self.presets = CounterOrigins()
         self.sketches: dict[int, dict[str, Place]] = {1: {}, 2: {}}
         self.principal_distances: dict[int, float] = {}
         self.point: str | None = None
-        self.met: Met | None = None
-        self.dials: Dials | None = None
-        self.sight: Sight | None = None
-        self.silent: Silent | None = None
-        self.station = Station(seat.connect, self._tell, seat.alone)
+        self.met: Connected | None = None
+        self.dials: Readouts | None = None
+        self.sight: ViewResult | None = None
+        self.silent: ConnectionLost | None = None
+        self.station = InstrumentThread(seat.connect, self._tell, seat.alone)
         self.playback = Playback(seat.film, self.ask, self.show_frame) if seat.film else None
         self._by_key = actions_by_key(seat.keymap, seat.watching)
         self._early: deque[events.Key] | None = deque()
-        self.main = Front(
+        self.main = MainScreen(
             self.binocular, self.key_pressed, self.utf8, seat.exercise_goal or WELCOME * seat.welcome, seat.tasks
         )
         for theme in THEMES:
@@ -86,7 +86,7 @@ class Console(Hearing, Deeds, App[None]):
         """Return the colours that themes of the library do not have."""
         return dict(DRUMS)
 
-    def on_front_laid(self) -> None:
+    def on_main_screen_laid(self) -> None:
         """Sit down, at the session that was left if that is wanted."""
         self.say(f"sitting down at {self.seat.where or 'the instrument'} ...")
         self.call_after_refresh(self._sit_down)
@@ -99,7 +99,7 @@ class Console(Hearing, Deeds, App[None]):
         else:
             self.push_screen(Choose("the last session", GO_ON, resumable.about), partial(self._decided, resumable))
 
-    def _decided(self, resumable: Resumable, answer: str | None) -> None:
+    def _decided(self, resumable: ResumeOffer, answer: str | None) -> None:
         if answer is None:
             self.exit()
         else:
@@ -198,22 +198,22 @@ class Console(Hearing, Deeds, App[None]):
 
     # --- what widgets tell ---------------------------------------------------------------------------
 
-    @on(Eyepiece.Resized)
+    @on(EyepieceWidget.Resized)
     def _resized(self) -> None:
         self.look()
         self.refresh_panels()
 
-    @on(Wheeled)
-    def _wheeled(self, event: Wheeled) -> None:
+    @on(DrumScrolled)
+    def _wheeled(self, event: DrumScrolled) -> None:
         if not self.reject_if_watching():
             self.wheel(event.drum, event.way)
 
-    @on(Pointed)
-    def _pointed(self, event: Pointed) -> None:
+    @on(PointClicked)
+    def _pointed(self, event: PointClicked) -> None:
         if not self.reject_if_watching():
             self.approach_point(event.projector, event.point)
 
-    @on(Eyepiece.Clicked)
-    def _clicked(self, event: Eyepiece.Clicked) -> None:
+    @on(EyepieceWidget.Clicked)
+    def _clicked(self, event: EyepieceWidget.Clicked) -> None:
         if not self.reject_if_watching():
             self.clicked(event.across, event.up)

@@ -7,13 +7,13 @@ from typing import Any
 from a7sim.console.dialogs import Ask, Choose
 from a7sim.console.hands import element_label
 from a7sim.console.panels import FITTING_ROWS
-from a7sim.console.sheet import Centred, centre_picture
-from a7sim.console.sitting import PROJECTORS, Sitting
+from a7sim.console.sheet import CentringResult, centre_picture
+from a7sim.console.sitting import PROJECTORS, ActionBase
 from a7sim.link.headers import FITTING_NODES, quote_text, short_form
 from a7sim.manual import POSITIONS_OF
 
 
-class BenchDeeds(Sitting):
+class SetupActions(ActionBase):
     """The deeds of the bench."""
 
     def do_bench(self) -> None:
@@ -77,7 +77,7 @@ class BenchDeeds(Sitting):
     def _centre(self, projector: int) -> None:
         console = self._console
 
-        def centred(lie: Centred) -> None:
+        def centred(lie: CentringResult) -> None:
             if lie.principal_distance is not None:
                 console.principal_distances[projector] = lie.principal_distance
             console.say(f"{PROJECTORS[projector]} picture: {lie.words}")

@@ -7,9 +7,17 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal
 from textual.timer import Timer
 
-from a7sim.console.eyepiece import Drawing, anaglyph, apply_vignette, is_drawn_as, overlay_mark, picture_size, render
-from a7sim.console.news import Look, Sight
-from a7sim.console.window import Eyepiece
+from a7sim.console.eyepiece import (
+    DrawingMode,
+    anaglyph,
+    apply_vignette,
+    is_drawn_as,
+    overlay_mark,
+    picture_size,
+    render,
+)
+from a7sim.console.news import ViewRequest, ViewResult
+from a7sim.console.window import EyepieceWidget
 
 FLICKER_S = 0.25
 
@@ -17,10 +25,10 @@ NAMES = {1: "left eye", 2: "right eye"}
 
 
 @dataclass(frozen=True)
-class View:
+class ViewSettings:
     """How the eyepieces show what they see."""
 
-    drawing: Drawing
+    drawing: DrawingMode
     magnification: float = 8.0
     eyes: tuple[int, ...] = (1, 2)
     merged: str = "side by side"
@@ -28,18 +36,18 @@ class View:
     @property
     def is_merged(self) -> bool:
         """Whether both pictures are shown in one eyepiece."""
-        return self.merged != "side by side" and self.drawing is Drawing.HALVES
+        return self.merged != "side by side" and self.drawing is DrawingMode.HALVES
 
 
 class Binocular(Horizontal):
     """Both eyepieces."""
 
-    def __init__(self, view: View, mark: str) -> None:
+    def __init__(self, view: ViewSettings, mark: str) -> None:
         super().__init__(id="eyes")
         self.view = view
         self._mark = mark
-        self._eyes = {eye: Eyepiece(eye, name) for eye, name in NAMES.items()}
-        self._sight: Sight | None = None
+        self._eyes = {eye: EyepieceWidget(eye, name) for eye, name in NAMES.items()}
+        self._sight: ViewResult | None = None
         self._flicker: Timer | None = None
         self._flicker_eye = 1
 
@@ -70,16 +78,18 @@ class Binocular(Horizontal):
             eyepiece.border_title = view.merged if view.is_merged else NAMES[eye]
             eyepiece.border_subtitle = f"x{view.magnification:g}"
 
-    def look(self, point: str | None) -> Look:
+    def look(self, point: str | None) -> ViewRequest:
         """Return what the open eyepieces have room for; of a point where the view is in words."""
         view = self.view
         open_ones = [each for each in self._eyes.values() if not each.has_class("-closed")]
         cells = min((each.cells for each in open_ones), default=(0, 0))
         columns, rows = picture_size(view.drawing, *cells)
         eyes = (1, 2) if view.is_merged else view.eyes
-        return Look(columns, rows, view.magnification, eyes, point if view.drawing is Drawing.WORDS else None)
+        return ViewRequest(
+            columns, rows, view.magnification, eyes, point if view.drawing is DrawingMode.WORDS else None
+        )
 
-    def draw(self, sight: Sight) -> None:
+    def draw(self, sight: ViewResult) -> None:
         """Draw the pictures that the eyes see, unless they were asked for before the drawing was another."""
         self._sight = sight
         view = self.view
@@ -101,5 +111,5 @@ class Binocular(Horizontal):
 
     def _other_eye(self) -> None:
         self._flicker_eye = 3 - self._flicker_eye
-        if self._sight is not None and self.view.drawing is not Drawing.WORDS:
+        if self._sight is not None and self.view.drawing is not DrawingMode.WORDS:
             self.draw(self._sight)

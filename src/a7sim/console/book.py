@@ -17,7 +17,7 @@ COUNTERS = 5
 
 
 @dataclass(frozen=True)
-class Entry:
+class RecordedEntry:
     """A registration as the recorder keeps it."""
 
     number: int
@@ -28,7 +28,7 @@ class Entry:
     struck: bool = False
 
     @classmethod
-    def read(cls, values: Sequence[str]) -> "Entry":
+    def read(cls, values: Sequence[str]) -> "RecordedEntry":
         """Return the entry that the values of `REC:LAST?` show."""
         number, point, *counters = values[:COUNTERS]
         rest = [each for each in values[COUNTERS:] if not each.startswith("struck:")]
@@ -41,7 +41,7 @@ class Entry:
         elements = "".join(f"  {word} {reading}" for word, reading in self.elements)
         return f"{'x' if self.struck else ' '}{self.number:>3} {self.point:<5}{readings}{elements}"
 
-    def struck_out(self) -> "Entry":
+    def struck_out(self) -> "RecordedEntry":
         """Return the entry struck out; it stays."""
         return replace(self, struck=True)
 
@@ -50,13 +50,13 @@ BATCH_SIZE = 40
 """Registrations that are asked for in a line."""
 
 
-def read_book(client: Client, records: int) -> tuple[Entry, ...]:
+def read_book(client: Client, records: int) -> tuple[RecordedEntry, ...]:
     """Return so many registrations of the recorder, from the first, as they stand now."""
-    entries: list[Entry] = []
+    entries: list[RecordedEntry] = []
     for first in range(1, records + 1, BATCH_SIZE):
         numbers = range(first, min(first + BATCH_SIZE, records + 1))
         client.send(";".join(f"REC? {number}" for number in numbers))
-        entries += [Entry.read(values(part_as_text(part))) for part in client.reply() or ()]
+        entries += [RecordedEntry.read(values(part_as_text(part))) for part in client.reply() or ()]
     return tuple(entries)
 
 
@@ -64,8 +64,8 @@ def _title(word: str) -> str:
     return next((element_label(element) for element in ELEMENTS if registration_word(element) == word), word)
 
 
-def record(client: Client, point: str, elements: Sequence[str]) -> Entry | None:
+def record(client: Client, point: str, elements: Sequence[str]) -> RecordedEntry | None:
     """Register the counters and elements under a point; return the entry, None where the instrument refused."""
     words = "".join(f",{word}" for word in elements)
     before, after = client.numbers(f"REC:COUN?;:REC {quote_text(point)}{words};:REC:COUN?")
-    return Entry.read(client.fields("REC:LAST?")) if after > before else None
+    return RecordedEntry.read(client.fields("REC:LAST?")) if after > before else None

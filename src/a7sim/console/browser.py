@@ -19,7 +19,7 @@ from aiohttp import web
 from textual_serve.app_service import AppService
 from textual_serve.server import Server, to_int
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 LOOPBACK = "127.0.0.1"
 OWN_NAMES = (LOOPBACK, "localhost")
@@ -36,7 +36,7 @@ _POLICY = (
 
 
 @dataclass
-class Visitors:
+class OpenPages:
     """Who looks on: pages that are open, and a call when there has been none for some seconds."""
 
     idle_s: float
@@ -65,7 +65,7 @@ class Visitors:
 class BrowserServer(Server):
     """Serves a command that draws a console to browsers of this machine."""
 
-    def __init__(self, command: Sequence[str], port: int, visitors: Visitors) -> None:
+    def __init__(self, command: Sequence[str], port: int, visitors: OpenPages) -> None:
         super().__init__(shlex.join(command), LOOPBACK, port, TITLE, templates_path=PAGE)
         self._visitors = visitors
 
@@ -115,7 +115,7 @@ def serve(command: Sequence[str], port: int, idle_s: float, told: Callable[[str]
     try:
         door = socket.create_server((LOOPBACK, port))
     except OSError as error:
-        raise Mistake(f"--port {port}: expected a port that is free: {os.strerror(error.errno or 0)}") from error
+        raise A7SimError(f"--port {port}: expected a port that is free: {os.strerror(error.errno or 0)}") from error
     with door:
         return asyncio.run(_serving(command, door, idle_s, told))
 
@@ -130,7 +130,7 @@ async def _serving(command: Sequence[str], door: socket.socket, idle_s: float, t
         ended.set()
 
     port = door.getsockname()[1]
-    visitors = Visitors(idle_s, left_alone)
+    visitors = OpenPages(idle_s, left_alone)
     runner = web.AppRunner(
         await BrowserServer(command, port, visitors).application(), access_log=None, shutdown_timeout=CLOSING_S
     )

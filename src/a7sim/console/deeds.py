@@ -3,14 +3,14 @@
 from functools import partial
 from typing import Any
 
-from a7sim.console.bench import BenchDeeds
+from a7sim.console.bench import SetupActions
 from a7sim.console.dialogs import Ask, Choose, HelpPage
-from a7sim.console.looking import LookingDeeds
-from a7sim.console.reaching import Reach
+from a7sim.console.looking import ViewActions
+from a7sim.console.reaching import PointNavigator
 from a7sim.console.recalling import update_presets
-from a7sim.console.recording import RecordingDeeds
-from a7sim.console.turning import TurningDeeds
-from a7sim.console.watching import WatchingDeeds
+from a7sim.console.recording import BookActions
+from a7sim.console.turning import ControlActions
+from a7sim.console.watching import PlaybackActions
 from a7sim.link.exchange import send_line
 
 _TURNS = {
@@ -25,7 +25,7 @@ _TAKEN = ("kappa", "phi", "omega", "by", "bz", "c", "bx", "common_phi")
 ACTIONS_WHILE_DISCONNECTED = ("quit", "help")
 
 
-class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeeds):
+class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackActions):
     """The deeds of a console."""
 
     def run_by_name(self, name: str) -> None:
@@ -62,7 +62,7 @@ class Deeds(TurningDeeds, BenchDeeds, RecordingDeeds, LookingDeeds, WatchingDeed
         """Drive near a point of the sketch of what lies in a projector."""
         console = self._console
         variant, dials = self._at()
-        reach = Reach(variant, dials, console.presets, projector, console.sketches[projector])
+        reach = PointNavigator(variant, dials, console.presets, projector, console.sketches[projector])
         console.point = point
 
         def arrived(there: bool) -> None:

@@ -10,7 +10,7 @@ from a7sim.manual import POSITIONS_OF, Variant
 
 
 @dataclass(frozen=True)
-class Dials:
+class Readouts:
     """Everything that can be read at the instrument, as it shows it."""
 
     counters: Mapping[str, str]
@@ -49,14 +49,14 @@ def readouts_query(variant: Variant) -> str:
     )
 
 
-def parse_readouts(variant: Variant, reply: Sequence[Part]) -> Dials:
+def parse_readouts(variant: Variant, reply: Sequence[Part]) -> Readouts:
     """Return the dials that a reply to `question` shows. Raises ValueError for a reply to something else."""
     texts = [part if isinstance(part, str) else "" for part in reply]
     counters, *rest = texts
     elements, rest = rest[: len(variant.elements)], rest[len(variant.elements) :]
     fittings, rest = rest[: len(variant.fittings)], rest[len(variant.fittings) :]
     mode, height, plan, left, right, records, struck, errors = rest
-    return Dials(
+    return Readouts(
         dict(zip("XYZ", counters.split(","), strict=True)),
         dict(zip(variant.elements, elements, strict=True)),
         {name: _word(POSITIONS_OF[name], shown) for name, shown in zip(variant.fittings, fittings, strict=True)},

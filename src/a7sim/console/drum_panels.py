@@ -12,7 +12,7 @@ from textual.strip import Strip
 from textual.timer import Timer
 
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolling_frame
-from a7sim.console.hands import SIDELESS_ELEMENTS, Hands
+from a7sim.console.hands import SIDELESS_ELEMENTS, ControlSelection
 from a7sim.console.panels import Panel
 from a7sim.manual import Variant
 
@@ -23,7 +23,7 @@ HURRIED_S = 0.15
 """A drum that is turned again so soon does not roll."""
 
 
-class Wheeled(Message):
+class DrumScrolled(Message):
     """The mouse wheel was turned over a drum: of an element or of X, Y, Z; forward or back."""
 
     def __init__(self, drum: str, way: int) -> None:
@@ -32,7 +32,7 @@ class Wheeled(Message):
         self.way = way
 
 
-class Counter(Panel):
+class CounterPanel(Panel):
     """X, Y or Z as drum digits that roll."""
 
     def __init__(self, axis: str) -> None:
@@ -77,17 +77,17 @@ class Counter(Panel):
 
     def on_mouse_scroll_up(self) -> None:
         """Turn forward."""
-        self.post_message(Wheeled(self.axis, 1))
+        self.post_message(DrumScrolled(self.axis, 1))
 
     def on_mouse_scroll_down(self) -> None:
         """Turn back."""
-        self.post_message(Wheeled(self.axis, -1))
+        self.post_message(DrumScrolled(self.axis, -1))
 
 
 ROWS = ("kappa", "phi", "omega", "by", "bz", "c", "bx", "common_phi")
 
 
-class Elements(Panel):
+class ElementsPanel(Panel):
     """The elements of both projectors as drums; the one in hand is lit."""
 
     def __init__(self) -> None:
@@ -97,9 +97,9 @@ class Elements(Panel):
         self.plain = False
         self._variant: Variant | None = None
         self._readings: Mapping[str, str] = {}
-        self._hands: Hands | None = None
+        self._hands: ControlSelection | None = None
 
-    def show(self, variant: Variant, readings: Mapping[str, str], hands: Hands | None) -> None:
+    def show(self, variant: Variant, readings: Mapping[str, str], hands: ControlSelection | None) -> None:
         """Show readings, and what is in hand, None where hands are off."""
         if (variant, readings, hands) != (self._variant, self._readings, self._hands):
             anew = self._variant is not variant
@@ -173,4 +173,4 @@ class Elements(Panel):
     def _wheeled(self, event: events.MouseEvent, way: int) -> None:
         element = self._under(event)
         if element is not None:
-            self.post_message(Wheeled(element, way))
+            self.post_message(DrumScrolled(element, way))

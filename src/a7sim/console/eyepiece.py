@@ -27,7 +27,7 @@ _CORNER = 0.45
 """Share of the light that an eyepiece loses in the corners of its window."""
 
 
-class Drawing(StrEnum):
+class DrawingMode(StrEnum):
     """Ways to draw grey on a terminal."""
 
     HALVES = "halves"
@@ -37,7 +37,12 @@ class Drawing(StrEnum):
     WORDS = "words"
 
 
-_CELLS = {Drawing.HALVES: (1, 2), Drawing.SHADES: (1, 2), Drawing.BRAILLE: (2, 4), Drawing.ASCII: (1, 2)}
+_CELLS = {
+    DrawingMode.HALVES: (1, 2),
+    DrawingMode.SHADES: (1, 2),
+    DrawingMode.BRAILLE: (2, 4),
+    DrawingMode.ASCII: (1, 2),
+}
 
 
 class Run(NamedTuple):
@@ -53,13 +58,13 @@ def window(width: int, height: int) -> tuple[int, int]:
     return max(1, width - (width + 1) % 2), max(1, height - (height + 1) % 2)
 
 
-def picture_size(drawing: Drawing, columns: int, rows: int) -> tuple[int, int]:
+def picture_size(drawing: DrawingMode, columns: int, rows: int) -> tuple[int, int]:
     """Return columns and rows of the picture that fills so many cells; (0, 0) where nothing is drawn."""
     across, down = _CELLS.get(drawing, (0, 0))
     return columns * across, rows * down
 
 
-def is_drawn_as(drawing: Drawing, greys: Greys) -> bool:
+def is_drawn_as(drawing: DrawingMode, greys: Greys) -> bool:
     """Return whether a picture fills whole cells in a drawing, as one that was asked for another way may not."""
     (rows, columns), (across, down) = greys.shape, _CELLS[drawing]
     return bool(columns % across == 0 and rows % down == 0)
@@ -129,13 +134,13 @@ def braille(greys: Greys) -> list[list[Run]]:
     return [[Run("".join(map(chr, row)))] for row in codes.tolist()]
 
 
-def render(drawing: Drawing, greys: Greys) -> list[list[Run]]:
+def render(drawing: DrawingMode, greys: Greys) -> list[list[Run]]:
     """Return the rows of runs that show a picture of `picture_size`."""
-    if drawing is Drawing.HALVES:
+    if drawing is DrawingMode.HALVES:
         return half_blocks(greys)
-    if drawing is Drawing.BRAILLE:
+    if drawing is DrawingMode.BRAILLE:
         return braille(greys)
-    return ascii_shades(greys) if drawing is Drawing.ASCII else shades(greys)
+    return ascii_shades(greys) if drawing is DrawingMode.ASCII else shades(greys)
 
 
 def overlay_mark(rows: list[list[Run]], mark: str) -> list[list[Run]]:

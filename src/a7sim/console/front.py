@@ -10,13 +10,13 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 from a7sim.console.binocular import Binocular
-from a7sim.console.book import Entry
-from a7sim.console.dials import Dials
-from a7sim.console.drum_panels import Counter, Elements
-from a7sim.console.eyepiece import Drawing
-from a7sim.console.hands import Hands
+from a7sim.console.book import RecordedEntry
+from a7sim.console.dials import Readouts
+from a7sim.console.drum_panels import CounterPanel, ElementsPanel
+from a7sim.console.eyepiece import DrawingMode
+from a7sim.console.hands import ControlSelection
 from a7sim.console.margins import Hints, hints_line
-from a7sim.console.panels import Book, Fittings
+from a7sim.console.panels import BookPanel, FittingsPanel
 from a7sim.console.prints import SketchPanel
 from a7sim.console.sketches import Place
 from a7sim.manual import Variant
@@ -30,7 +30,7 @@ PANELS = ("elements", "fittings", "side1", "side2")
 """What a narrow screen shows at its right, one at a time."""
 
 
-class Front(Screen[None]):
+class MainScreen(Screen[None]):
     """The main screen; every key goes to the hands."""
 
     class Laid(Message):
@@ -50,7 +50,7 @@ class Front(Screen[None]):
         self._utf8 = utf8
         self._welcome = welcome
         self._tasks = tasks
-        self._counters = [Counter(axis) for axis in "XYZ"]
+        self._counters = [CounterPanel(axis) for axis in "XYZ"]
         self._sketches = [SketchPanel(n, f"{where}{n}") for where in ("side", "sketch") for n in (1, 2)]
         self._hinted: Hints = ()
 
@@ -63,12 +63,12 @@ class Front(Screen[None]):
                 with Horizontal(id="counters"):
                     yield from self._counters
             with Vertical(id="right"):
-                yield Elements()
-                yield Fittings()
+                yield ElementsPanel()
+                yield FittingsPanel()
                 yield from self._sketches[:2]
         with Horizontal(id="lower"):
             yield from self._sketches[2:]
-            yield Book()
+            yield BookPanel()
         if self._tasks is not None:
             yield Static(id="tasks", markup=False)
         yield Static(id="progress", markup=False)
@@ -81,8 +81,8 @@ class Front(Screen[None]):
     def on_mount(self) -> None:
         """Fit the panels to the terminal."""
         for counter in self._counters:
-            counter.rolling = self._binocular.view.drawing is not Drawing.WORDS
-        self.query_one(Elements).plain = not self._utf8
+            counter.rolling = self._binocular.view.drawing is not DrawingMode.WORDS
+        self.query_one(ElementsPanel).plain = not self._utf8
         for sketch in self._sketches:
             sketch.dot = "·" if self._utf8 else "."
         if self._tasks is not None:
@@ -147,13 +147,15 @@ class Front(Screen[None]):
         for index, name in enumerate(PANELS):
             self.query_one(f"#{name}").set_class(index == (at + 1) % len(PANELS), "-chosen")
 
-    def show(self, variant: Variant, dials: Dials, hands: Hands | None, entries: tuple[Entry, ...]) -> None:
+    def show(
+        self, variant: Variant, dials: Readouts, hands: ControlSelection | None, entries: tuple[RecordedEntry, ...]
+    ) -> None:
         """Show the dials, the hands unless they are off, and the book."""
         for counter in self._counters:
             counter.turn_to(dials.counters[counter.axis])
-        self.query_one(Elements).show(variant, dials.elements, hands)
-        self.query_one(Fittings).show(variant, dials)
-        self.query_one(Book).show(entries)
+        self.query_one(ElementsPanel).show(variant, dials.elements, hands)
+        self.query_one(FittingsPanel).show(variant, dials)
+        self.query_one(BookPanel).show(entries)
 
     def show_sketch(
         self,

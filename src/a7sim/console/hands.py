@@ -16,7 +16,7 @@ SIDES = {1: "'", 2: '"'}
 
 
 @dataclass(frozen=True)
-class Hands:
+class ControlSelection:
     """What is in hand: an element, a side, a rung of the ladder; and whether X and Y are moved free of the wheels."""
 
     name: str = "by"
@@ -34,11 +34,11 @@ class Hands:
         """The element in hand, such as by1 or bx."""
         return self.name if self.name in SIDELESS_ELEMENTS else f"{self.name}{self.side}"
 
-    def valid_for(self, variant: Variant) -> "Hands":
+    def valid_for(self, variant: Variant) -> "ControlSelection":
         """Return the hands at a plotter that may not have what they held."""
         return self if self.element in variant.elements else replace(self, name="kappa")
 
-    def stepping(self, rungs: int) -> "Hands":
+    def stepping(self, rungs: int) -> "ControlSelection":
         """Return the hands with a larger or smaller step."""
         return replace(self, step_index=min(max(self.step_index + rungs, 0), len(STEP_SIZES) - 1))
 

@@ -6,27 +6,27 @@ from typing import Any
 
 from textual.message import Message
 
-from a7sim.console.book import Entry, read_book
-from a7sim.console.dials import Dials, unquote
-from a7sim.console.news import Met, News, Refused, Sight, Silent
+from a7sim.console.book import RecordedEntry, read_book
+from a7sim.console.dials import Readouts, unquote
+from a7sim.console.news import CommandsRejected, Connected, ConnectionLost, StationMessage, ViewResult
 from a7sim.console.playback import TICK_S
-from a7sim.console.reaching import Presets, fetch_sketch
+from a7sim.console.reaching import CounterOrigins, fetch_sketch
 from a7sim.console.recalling import recover_presets
-from a7sim.console.sitting import Sitting
+from a7sim.console.sitting import ActionBase
 from a7sim.console.sketches import Place
 from a7sim.console.words import describe_error
 from a7sim.link.client import Client
 
 
-class Told(Message):
+class StationUpdate(Message):
     """The station tells something."""
 
-    def __init__(self, news: News) -> None:
+    def __init__(self, news: StationMessage) -> None:
         super().__init__()
         self.news = news
 
 
-class Done(Message):
+class AnswerReady(Message):
     """Something that was asked has been answered: what is to be done with it."""
 
     def __init__(self, then: Callable[[], None]) -> None:
@@ -34,7 +34,7 @@ class Done(Message):
         self.then = then
 
 
-class Hearing(Sitting):
+class MessageHandlers(ActionBase):
     """What is asked of the station, and told by it."""
 
     def ask(self, work: Callable[[Client], Any], then: Callable[[Any], None]) -> None:
@@ -43,7 +43,7 @@ class Hearing(Sitting):
 
         def order(client: Client) -> None:
             answer = work(client)
-            console.post_message(Done(partial(then, answer)))
+            console.post_message(AnswerReady(partial(then, answer)))
 
         console.station.submit(order)
 
@@ -51,33 +51,33 @@ class Hearing(Sitting):
         """Go on when all that was ordered so far is said, and what came of it is known."""
         self.ask(lambda _: None, lambda _: then())
 
-    def _tell(self, news: News) -> None:
-        self._console.post_message(Told(news))
+    def _tell(self, news: StationMessage) -> None:
+        self._console.post_message(StationUpdate(news))
 
-    def on_done(self, done: Done) -> None:
+    def on_answer_ready(self, done: AnswerReady) -> None:
         """Go on with an answer, unless the screen is gone."""
         if self._console.main.is_there:
             done.then()
 
-    def on_told(self, told: Told) -> None:
+    def on_station_update(self, told: StationUpdate) -> None:
         """Show what the station tells, unless the screen is gone."""
         console = self._console
         if not console.main.is_there:
             return
         match told.news:
-            case Met():
+            case Connected():
                 self._meet(told.news)
-            case Dials():
+            case Readouts():
                 self._read(told.news)
-            case Sight():
+            case ViewResult():
                 console.sight = told.news
                 console.draw()
-            case Refused():
+            case CommandsRejected():
                 console.say(" · ".join(describe_error(error) for error in told.news.errors), refused=True)
-            case Silent():
+            case ConnectionLost():
                 self._lose(told.news)
 
-    def _meet(self, met: Met) -> None:
+    def _meet(self, met: Connected) -> None:
         console = self._console
         first = console.met is None
         console.met = met
@@ -92,7 +92,7 @@ class Hearing(Sitting):
         console.main.warn(None)
         console.call_after_refresh(console.look)
 
-    def _begin(self, met: Met) -> None:
+    def _begin(self, met: Connected) -> None:
         """Take up what was there before anybody sat down here."""
         console = self._console
         past = console.seat.history
@@ -105,11 +105,11 @@ class Hearing(Sitting):
             console.playback.go_to(0)
             console.set_interval(TICK_S, console.playback.tick)
 
-    def _recall(self, presets: Presets) -> None:
-        if presets != Presets():
+    def _recall(self, presets: CounterOrigins) -> None:
+        if presets != CounterOrigins():
             self._console.presets = presets
 
-    def _lose(self, silent: Silent) -> None:
+    def _lose(self, silent: ConnectionLost) -> None:
         console = self._console
         if silent != console.silent:
             console.silent = silent
@@ -118,7 +118,7 @@ class Hearing(Sitting):
                 console.playback.interrupted()
             console.main.warn(f"The instrument does not answer: {silent.why}. Trying again every second; q leaves.")
 
-    def _read(self, dials: Dials) -> None:
+    def _read(self, dials: Readouts) -> None:
         console = self._console
         before, console.dials = console.dials, dials
         for projector, picture in enumerate(dials.pictures, start=1):
@@ -130,13 +130,13 @@ class Hearing(Sitting):
         if before is None:
             console.press_early_keys()
 
-    def _keep_book(self, dials: Dials) -> None:
+    def _keep_book(self, dials: Readouts) -> None:
         """Have the book as the recorder has it."""
         console = self._console
         if (dials.records, dials.struck) != (len(console.entries), sum(entry.struck for entry in console.entries)):
             self.ask(partial(read_book, records=dials.records), self._open_book)
 
-    def _open_book(self, entries: tuple[Entry, ...]) -> None:
+    def _open_book(self, entries: tuple[RecordedEntry, ...]) -> None:
         console = self._console
         console.entries = entries
         console.refresh_panels()

@@ -7,7 +7,7 @@ from pathlib import Path
 from textual.keys import Keys
 
 from a7sim.files import read_toml
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 Keymap = Mapping[str, tuple[str, ...]]
 """Names of keys, by deed."""
@@ -16,7 +16,7 @@ MODIFIERS = ("ctrl", "alt", "shift")
 
 
 @dataclass(frozen=True, slots=True)
-class Deed:
+class Action:
     """Something that a key does: its name, the keys it has by default, what it does, and where help lists it."""
 
     name: str
@@ -32,57 +32,57 @@ VIEW_ACTIONS = ("eyes", "screen")
 """The groups of what is done at the instrument and while one watches."""
 
 ACTIONS = (
-    Deed("x_up", ("right",), "X handwheel, forward", "hands"),
-    Deed("x_down", ("left",), "X handwheel, back", "hands"),
-    Deed("y_up", ("up",), "Y handwheel, forward", "hands"),
-    Deed("y_down", ("down",), "Y handwheel, back", "hands"),
-    Deed("z_up", ("pageup",), "foot disc, mark up", "hands"),
-    Deed("z_down", ("pagedown",), "foot disc, mark down", "hands"),
-    Deed("turn_up", ("+", "="), "turn the element in hand, forward", "hands"),
-    Deed("turn_down", ("-",), "turn the element in hand, back", "hands"),
-    Deed("finer", ("[",), "a smaller step", "hands"),
-    Deed("coarser", ("]",), "a larger step", "hands"),
-    Deed("free_hand", ("h",), "free hand on and off", "hands"),
-    Deed("left_side", ("'",), "the left projector's element", "elements"),
-    Deed("right_side", ('"',), "the right projector's element", "elements"),
-    Deed("kappa", ("k",), "take up kappa", "elements"),
-    Deed("phi", ("f",), "take up phi", "elements"),
-    Deed("omega", ("w",), "take up omega", "elements"),
-    Deed("by", ("y",), "take up by", "elements"),
-    Deed("bz", ("z",), "take up bz", "elements"),
-    Deed("c", ("c",), "take up the principal distance", "elements"),
-    Deed("bx", ("b",), "take up bx", "elements"),
-    Deed("common_phi", ("p",), "take up the common phi", "elements"),
-    Deed("set", ("s",), "set the element in hand to a reading", "elements"),
-    Deed("drive", ("d",), "run X, Y or Z to a reading", "bench"),
-    Deed("go_to", ("g",), "drive near a point of the sketch", "bench"),
-    Deed("bench", ("l",), "pictures, base, fittings, gears", "bench"),
-    Deed("say", (":",), "say a line of the command language", "bench"),
-    Deed("play", ("space",), "play and pause", PLAYBACK_ACTIONS),
-    Deed("step_on", (".",), "on by a line that is said", PLAYBACK_ACTIONS),
-    Deed("step_back", (",",), "back by a line that is said", PLAYBACK_ACTIONS),
-    Deed("next_record", (">",), "on to the next registration", PLAYBACK_ACTIONS),
-    Deed("last_record", ("<",), "back to the registration before", PLAYBACK_ACTIONS),
-    Deed("faster", ("]",), "play faster", PLAYBACK_ACTIONS),
-    Deed("slower", ("[",), "play slower", PLAYBACK_ACTIONS),
-    Deed("jump", ("g",), "to a step, a time, or a note", PLAYBACK_ACTIONS),
-    Deed("magnify", ("m",), "magnify more", "eyes"),
-    Deed("reduce", ("M",), "magnify less", "eyes"),
-    Deed("eyes", ("e",), "both eyes, left, right", "eyes"),
-    Deed("merge", ("a",), "side by side, anaglyph, flicker", "eyes"),
-    Deed("drawing", ("v",), "half-blocks, shades, braille, words", "eyes"),
-    Deed("record", ("enter",), "record a reading", "book"),
-    Deed("record_as", ("r",), "record under another name", "book"),
-    Deed("strike", ("x", "backspace"), "strike the last reading out", "book"),
-    Deed("note", ("n",), "a remark into the journal", "book"),
-    Deed("panel", ("tab",), "the next panel at the right", "screen"),
-    Deed("help", ("?",), "help", "screen"),
-    Deed("quit", ("q",), "leave", "screen"),
+    Action("x_up", ("right",), "X handwheel, forward", "hands"),
+    Action("x_down", ("left",), "X handwheel, back", "hands"),
+    Action("y_up", ("up",), "Y handwheel, forward", "hands"),
+    Action("y_down", ("down",), "Y handwheel, back", "hands"),
+    Action("z_up", ("pageup",), "foot disc, mark up", "hands"),
+    Action("z_down", ("pagedown",), "foot disc, mark down", "hands"),
+    Action("turn_up", ("+", "="), "turn the element in hand, forward", "hands"),
+    Action("turn_down", ("-",), "turn the element in hand, back", "hands"),
+    Action("finer", ("[",), "a smaller step", "hands"),
+    Action("coarser", ("]",), "a larger step", "hands"),
+    Action("free_hand", ("h",), "free hand on and off", "hands"),
+    Action("left_side", ("'",), "the left projector's element", "elements"),
+    Action("right_side", ('"',), "the right projector's element", "elements"),
+    Action("kappa", ("k",), "take up kappa", "elements"),
+    Action("phi", ("f",), "take up phi", "elements"),
+    Action("omega", ("w",), "take up omega", "elements"),
+    Action("by", ("y",), "take up by", "elements"),
+    Action("bz", ("z",), "take up bz", "elements"),
+    Action("c", ("c",), "take up the principal distance", "elements"),
+    Action("bx", ("b",), "take up bx", "elements"),
+    Action("common_phi", ("p",), "take up the common phi", "elements"),
+    Action("set", ("s",), "set the element in hand to a reading", "elements"),
+    Action("drive", ("d",), "run X, Y or Z to a reading", "bench"),
+    Action("go_to", ("g",), "drive near a point of the sketch", "bench"),
+    Action("bench", ("l",), "pictures, base, fittings, gears", "bench"),
+    Action("say", (":",), "say a line of the command language", "bench"),
+    Action("play", ("space",), "play and pause", PLAYBACK_ACTIONS),
+    Action("step_on", (".",), "on by a line that is said", PLAYBACK_ACTIONS),
+    Action("step_back", (",",), "back by a line that is said", PLAYBACK_ACTIONS),
+    Action("next_record", (">",), "on to the next registration", PLAYBACK_ACTIONS),
+    Action("last_record", ("<",), "back to the registration before", PLAYBACK_ACTIONS),
+    Action("faster", ("]",), "play faster", PLAYBACK_ACTIONS),
+    Action("slower", ("[",), "play slower", PLAYBACK_ACTIONS),
+    Action("jump", ("g",), "to a step, a time, or a note", PLAYBACK_ACTIONS),
+    Action("magnify", ("m",), "magnify more", "eyes"),
+    Action("reduce", ("M",), "magnify less", "eyes"),
+    Action("eyes", ("e",), "both eyes, left, right", "eyes"),
+    Action("merge", ("a",), "side by side, anaglyph, flicker", "eyes"),
+    Action("drawing", ("v",), "half-blocks, shades, braille, words", "eyes"),
+    Action("record", ("enter",), "record a reading", "book"),
+    Action("record_as", ("r",), "record under another name", "book"),
+    Action("strike", ("x", "backspace"), "strike the last reading out", "book"),
+    Action("note", ("n",), "a remark into the journal", "book"),
+    Action("panel", ("tab",), "the next panel at the right", "screen"),
+    Action("help", ("?",), "help", "screen"),
+    Action("quit", ("q",), "leave", "screen"),
 )
 """All that keys do. Same keys on every plotter that has the part."""
 
 
-def actions_for(watching: bool, film: bool = True) -> tuple[Deed, ...]:
+def actions_for(watching: bool, film: bool = True) -> tuple[Action, ...]:
     """Return what keys do at the instrument, or while one watches, be it a film or what is done now."""
     played = {PLAYBACK_ACTIONS} if film else set()
     return tuple(
@@ -113,7 +113,9 @@ def load_keymap(path: Path) -> Keymap:
     unknown = sorted(set(content) - {"keys"})
     table = content.get("keys", {})
     if unknown or not isinstance(table, dict):
-        raise Mistake(f"{path}: expected one table [keys], got {', '.join(unknown) or 'something else of that name'}")
+        raise A7SimError(
+            f"{path}: expected one table [keys], got {', '.join(unknown) or 'something else of that name'}"
+        )
     keymap = {**default_keymap(), **{name: _keys(path, name, given) for name, given in table.items()}}
     _refuse_shared(path, keymap)
     return keymap
@@ -121,13 +123,13 @@ def load_keymap(path: Path) -> Keymap:
 
 def _keys(path: Path, name: str, given: object) -> tuple[str, ...]:
     if name not in default_keymap():
-        raise Mistake(f"{path}: keys.{name}: expected one of {', '.join(default_keymap())}")
+        raise A7SimError(f"{path}: keys.{name}: expected one of {', '.join(default_keymap())}")
     keys = [given] if isinstance(given, str) else given
     if not (isinstance(keys, list) and keys and all(isinstance(key, str) for key in keys)):
-        raise Mistake(f"{path}: keys.{name}: expected a key or a list of keys, got {given!r}")
+        raise A7SimError(f"{path}: keys.{name}: expected a key or a list of keys, got {given!r}")
     for key in keys:
         if not _is_key(key):
-            raise Mistake(f"{path}: keys.{name}: expected a key such as k, +, pageup, f5 or ctrl+k, got {key!r}")
+            raise A7SimError(f"{path}: keys.{name}: expected a key such as k, +, pageup, f5 or ctrl+k, got {key!r}")
     return tuple(keys)
 
 
@@ -145,7 +147,7 @@ def _refuse_shared(path: Path, keymap: Keymap) -> None:
             for key in keymap[deed.name]:
                 other = deeds.setdefault(key, deed.name)
                 if other != deed.name:
-                    raise Mistake(f"{path}: expected every key once, got {key!r} for both {other} and {deed.name}")
+                    raise A7SimError(f"{path}: expected every key once, got {key!r} for both {other} and {deed.name}")
 
 
 def actions_by_key(keymap: Keymap, watching: bool = False) -> dict[str, str]:

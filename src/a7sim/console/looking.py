@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from a7sim.console.binocular import View
-from a7sim.console.eyepiece import Drawing
-from a7sim.console.news import Sight
-from a7sim.console.sitting import Sitting
+from a7sim.console.binocular import ViewSettings
+from a7sim.console.eyepiece import DrawingMode
+from a7sim.console.news import ViewResult
+from a7sim.console.sitting import ActionBase
 from a7sim.console.words import describe_image, describe_parallax
 
 MAGNIFICATIONS = (1.0, 2.0, 4.0, 8.0, 12.0, 20.0, 40.0)
@@ -13,11 +13,11 @@ EYES = ((1, 2), (1,), (2,))
 MERGED = ("side by side", "anaglyph", "flicker")
 
 
-class LookingDeeds(Sitting):
+class ViewActions(ActionBase):
     """The deeds of the eyes."""
 
     @property
-    def view(self) -> View:
+    def view(self) -> ViewSettings:
         """How the eyepieces show what they see."""
         return self._console.binocular.view
 
@@ -34,12 +34,12 @@ class LookingDeeds(Sitting):
         console = self._console
         if console.sight is None or not console.main.is_there:
             return
-        if self.view.drawing is Drawing.WORDS:
+        if self.view.drawing is DrawingMode.WORDS:
             self._say_what_is_seen(console.sight)
         else:
             console.binocular.draw(console.sight)
 
-    def _say_what_is_seen(self, sight: Sight) -> None:
+    def _say_what_is_seen(self, sight: ViewResult) -> None:
         console = self._console
         point, acuity = console.point, console.seat.acuity_um
         if not point:
@@ -85,7 +85,7 @@ class LookingDeeds(Sitting):
     def do_drawing(self) -> None:
         """Draw the pictures another way."""
         console = self._console
-        ways = tuple(Drawing) if console.utf8 else (Drawing.ASCII, Drawing.WORDS)
+        ways = tuple(DrawingMode) if console.utf8 else (DrawingMode.ASCII, DrawingMode.WORDS)
         self.set_view(drawing=_next(ways, self.view.drawing))
         console.say(f"eyepieces in {self.view.drawing}")
 

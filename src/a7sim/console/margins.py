@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 
 from rich.text import Text
 
-from a7sim.console.dials import Dials
-from a7sim.console.hands import Hands, element_label
+from a7sim.console.dials import Readouts
+from a7sim.console.hands import ControlSelection, element_label
 from a7sim.console.keymap import Keymap, key_display
 from a7sim.link.client import Identity
 
@@ -16,7 +16,7 @@ Hints = tuple[tuple[str, str], ...]
 """Keys as help writes them, and what they do."""
 
 
-def header_text(identity: Identity, dials: Dials | None, job: str, seconds: float, width: int) -> str:
+def header_text(identity: Identity, dials: Readouts | None, job: str, seconds: float, width: int) -> str:
     """Return the line that says which instrument this is, what lies in it, and how late it is there."""
     parts = [
         f"Wild {identity.model}  no. {identity.serial}",
@@ -41,7 +41,12 @@ def key_labels(keymap: Keymap, plain: bool) -> Mapping[str, str]:
 
 
 def hints(
-    keys: Mapping[str, str], hands: Hands, magnification: float, point: str | None, pricked: bool, unstruck: bool
+    keys: Mapping[str, str],
+    hands: ControlSelection,
+    magnification: float,
+    point: str | None,
+    pricked: bool,
+    unstruck: bool,
 ) -> Hints:
     """Return the keys that do something now: `pricked` where there is a sketch, `unstruck` where there is a reading."""
     arrows = keys["x_down"] + keys["x_up"] + keys["y_down"] + keys["y_up"]

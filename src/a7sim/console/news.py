@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass, field
 
-from a7sim.console.dials import Dials
+from a7sim.console.dials import Readouts
 from a7sim.console.eyepiece import Greys
 from a7sim.link.client import Identity
 from a7sim.manual import Variant
 
 
 @dataclass(frozen=True)
-class Look:
+class ViewRequest:
     """What the eyepieces are to show: pictures of so many columns and rows; none of 0 columns."""
 
     columns: int = 0
@@ -21,10 +21,10 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Sight:
+class ViewResult:
     """What the eyepieces show."""
 
-    look: Look
+    look: ViewRequest
     pictures: dict[int, Greys] = field(default_factory=dict)
     """Greys ``(rows, columns)`` by eye."""
     seen: dict[int, tuple[float, float] | None] = field(default_factory=dict)
@@ -32,7 +32,7 @@ class Sight:
 
 
 @dataclass(frozen=True)
-class Met:
+class Connected:
     """An instrument answers."""
 
     identity: Identity
@@ -40,18 +40,18 @@ class Met:
 
 
 @dataclass(frozen=True)
-class Refused:
+class CommandsRejected:
     """The instrument has refused something: what it said."""
 
     errors: tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Silent:
+class ConnectionLost:
     """The instrument does not answer any more, and why."""
 
     why: str
 
 
-News = Met | Dials | Sight | Refused | Silent
+StationMessage = Connected | Readouts | ViewResult | CommandsRejected | ConnectionLost
 """What the station tells the screen."""

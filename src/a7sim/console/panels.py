@@ -7,8 +7,8 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
-from a7sim.console.book import Entry
-from a7sim.console.dials import Dials
+from a7sim.console.book import RecordedEntry
+from a7sim.console.dials import Readouts
 from a7sim.manual import POSITIONS_OF, Variant
 
 
@@ -51,7 +51,7 @@ FITTING_ROWS = {
 }
 
 
-class Fittings(Panel):
+class FittingsPanel(Panel):
     """The fittings as levers with their words, the Zeiss parallelogram and the gears."""
 
     def __init__(self) -> None:
@@ -59,9 +59,9 @@ class Fittings(Panel):
         self.border_title = "fittings"
         self.tooltip = "Levers, base and gears; l puts them over."
         self._variant: Variant | None = None
-        self._dials: Dials | None = None
+        self._dials: Readouts | None = None
 
-    def show(self, variant: Variant, dials: Dials) -> None:
+    def show(self, variant: Variant, dials: Readouts) -> None:
         """Show how everything is fitted."""
         before = self._dials
         self._variant, self._dials = variant, dials
@@ -86,20 +86,20 @@ class Fittings(Panel):
         return text
 
 
-def _fitted(dials: Dials) -> tuple[object, ...]:
+def _fitted(dials: Readouts) -> tuple[object, ...]:
     return dials.fittings, dials.base, dials.height_gear, dials.plan_gear
 
 
-class Book(Panel):
+class BookPanel(Panel):
     """The readings that were recorded here, the last at the bottom."""
 
     def __init__(self) -> None:
         super().__init__(id="book")
         self.border_title = "book"
         self.tooltip = "Recorded readings. Enter records, x strikes the last one out, n notes."
-        self._entries: tuple[Entry, ...] = ()
+        self._entries: tuple[RecordedEntry, ...] = ()
 
-    def show(self, entries: tuple[Entry, ...]) -> None:
+    def show(self, entries: tuple[RecordedEntry, ...]) -> None:
         """Show the entries that there is room for."""
         if entries != self._entries:
             self._entries = entries

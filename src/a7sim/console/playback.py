@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Protocol
 
 from a7sim.console.margins import format_elapsed
 from a7sim.link.client import Client
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 if TYPE_CHECKING:
-    from a7sim.session.film import Film, Frame
+    from a7sim.session.film import Frame, Recording
 
 SPEEDS = (1.0, 10.0, 60.0, math.inf)
 """How many times as fast as it happened; the last as fast as it can be worked."""
@@ -22,7 +22,7 @@ RUN_S = 0.05
 """How long a film runs on between two pictures where it runs as fast as it can."""
 
 
-class Asks(Protocol):
+class RequestRunner(Protocol):
     """Has work done in the station's thread, and what comes of it taken up in the screen's."""
 
     def __call__(self, work: "Callable[[Client], Frame]", then: "Callable[[Frame], None]") -> None:
@@ -32,7 +32,7 @@ class Asks(Protocol):
 class Playback:
     """A film, and how it is played. `shown` is called with every frame that it comes to."""
 
-    def __init__(self, film: "Film", asks: Asks, shown: "Callable[[Frame], None]") -> None:
+    def __init__(self, film: "Recording", asks: RequestRunner, shown: "Callable[[Frame], None]") -> None:
         self.film = film
         self.frame = film.frame
         self.playing = False
@@ -132,6 +132,6 @@ def jump_with_message(playback: Playback, words: str) -> str | None:
     """Jump, and return what is to be said where there is no such place."""
     try:
         playback.jump(words)
-    except Mistake as mistake:
+    except A7SimError as mistake:
         return str(mistake)
     return None

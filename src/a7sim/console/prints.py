@@ -7,10 +7,10 @@ from textual import events
 from textual.message import Message
 
 from a7sim.console.panels import Panel
-from a7sim.console.sketches import Place, Sketch, draw_points, overlay_mark
+from a7sim.console.sketches import Place, SketchGrid, draw_points, overlay_mark
 
 
-class Pointed(Message):
+class PointClicked(Message):
     """A point of a sketch was clicked."""
 
     def __init__(self, projector: int, point: str) -> None:
@@ -31,8 +31,8 @@ class SketchPanel(Panel):
         self._given: tuple[Mapping[str, Place], Place | None] = ({}, None)
         self._going_to: str | None = None
         self._title = ""
-        self._sketch = Sketch([], None, {})
-        self._pricked: tuple[object, Sketch] = (None, self._sketch)
+        self._sketch = SketchGrid([], None, {})
+        self._pricked: tuple[object, SketchGrid] = (None, self._sketch)
 
     def show(self, picture: str, points: Mapping[str, Place], mark: Place | None, going_to: str | None) -> None:
         """Show a print's points, where the mark stands, and which point is worked at."""
@@ -79,4 +79,4 @@ class SketchPanel(Panel):
         offset = event.get_content_offset(self)
         point = self._sketch.nearest(offset.x, offset.y) if offset is not None else None
         if point is not None:
-            self.post_message(Pointed(self.projector, point))
+            self.post_message(PointClicked(self.projector, point))

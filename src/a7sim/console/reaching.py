@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from a7sim.console.dials import Dials
+from a7sim.console.dials import Readouts
 from a7sim.console.sketches import Place
 from a7sim.console.station import view_point
 from a7sim.geometry import GON, Array, at_level, image_of, mxm, mxv, ray_of, rotation
@@ -24,13 +24,13 @@ NEAR_MM = 0.5
 
 
 @dataclass
-class Presets:
+class CounterOrigins:
     """What each counter shows in the origin of the frame, and its units a mm there."""
 
     origins: dict[str, float] = field(default_factory=dict)
     units: dict[str, float] = field(default_factory=dict)
 
-    def frame(self, variant: Variant, dials: Dials) -> Array:
+    def frame(self, variant: Variant, dials: Readouts) -> Array:
         """Return where the mark stands in the frame ``(3,)``, mm, as the counters show it."""
         return np.array(
             [(dials.counter(axis) - self.origin(variant, axis)) / self.unit(variant, axis) for axis in "XYZ"]
@@ -44,20 +44,20 @@ class Presets:
         """Return the units a mm of a counter."""
         return self.units.get(axis, variant.scales[axis].units_per_mm)
 
-    def preset(self, variant: Variant, dials: Dials, axis: str, reading: float) -> None:
+    def preset(self, variant: Variant, dials: Readouts, axis: str, reading: float) -> None:
         """Take note that a counter is made to show a reading where it stands, if it is one that can be."""
         if not variant.scales[axis].preset:
             return
         self.origins[axis] = self.origin(variant, axis) + reading - dials.counter(axis)
 
-    def regeared(self, variant: Variant, dials: Dials, units: float) -> None:
+    def regeared(self, variant: Variant, dials: Readouts, units: float) -> None:
         """Take note of another height gear: the Z reading stays as it is and goes on from there."""
         height = self.frame(variant, dials)[2]
         self.units["Z"] = units
         self.origins["Z"] = dials.counter("Z") - height * units
 
 
-def displayed_pose(variant: Variant, dials: Dials, projector: int) -> tuple[Array, Array]:
+def displayed_pose(variant: Variant, dials: Readouts, projector: int) -> tuple[Array, Array]:
     """Return centre ``(3,)`` and rotation ``(3, 3)`` of a projector as its counters show them."""
     show = {name: float(dials.elements.get(name, "0")) for name in (*variant.elements, "by1", "by2", "bz1", "bz2")}
     counts = {name: np.asarray(reading) for name, reading in show.items()}
@@ -71,14 +71,16 @@ def displayed_pose(variant: Variant, dials: Dials, projector: int) -> tuple[Arra
     return centre, turned
 
 
-def print_position(variant: Variant, dials: Dials, presets: Presets, projector: int) -> Place:
+def print_position(variant: Variant, dials: Readouts, presets: CounterOrigins, projector: int) -> Place:
     """Return about where on the print in a projector the mark stands, mm."""
     centre, turned = displayed_pose(variant, dials, projector)
     x, y = image_of(presets.frame(variant, dials), centre, turned, dials.element(f"c{projector}"))
     return float(x), float(y)
 
 
-def readings_over(variant: Variant, dials: Dials, presets: Presets, projector: int, place: Place) -> dict[str, float]:
+def readings_over(
+    variant: Variant, dials: Readouts, presets: CounterOrigins, projector: int, place: Place
+) -> dict[str, float]:
     """Return the X and Y readings that bring the mark over a place of the print, at its present height."""
     centre, turned = displayed_pose(variant, dials, projector)
     ray = ray_of(np.array(place), turned, dials.element(f"c{projector}"))
@@ -90,12 +92,12 @@ def readings_over(variant: Variant, dials: Dials, presets: Presets, projector: i
 
 
 @dataclass(frozen=True)
-class Reach:
+class PointNavigator:
     """A way to a point of the sketch of what lies in a projector."""
 
     variant: Variant
-    dials: Dials
-    presets: Presets
+    dials: Readouts
+    presets: CounterOrigins
     projector: int
     sketch: Mapping[str, Place]
 

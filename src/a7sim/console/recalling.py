@@ -4,14 +4,14 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from a7sim.console.dials import Dials, parse_readouts, readouts_query, unquote
-from a7sim.console.reaching import Presets
+from a7sim.console.dials import Readouts, parse_readouts, readouts_query, unquote
+from a7sim.console.reaching import CounterOrigins
 from a7sim.link.replies import parse_reply
 from a7sim.manual import Variant
 
 
 @dataclass(frozen=True)
-class Said:
+class LoggedLine:
     """A line as it crossed the link, to the instrument or from it."""
 
     text: str
@@ -22,14 +22,14 @@ _PRESET = re.compile(r":?COUN(?:TER)?:([XYZ]):PRES(?:ET)? ([-+.\d]+)", re.IGNORE
 _GEARED = re.compile(r":?GEAR:HEIG(?:HT)? (.+)", re.IGNORECASE)
 
 
-def recover_presets(variant: Variant, past: Iterable[Said], gear: str = "") -> Presets:
+def recover_presets(variant: Variant, past: Iterable[LoggedLine], gear: str = "") -> CounterOrigins:
     """Return the presets that were made before, by what this console said and what it was told of the counters.
 
     `gear` is the height gear that is engaged now. Where nobody is known to have engaged it, the counter of Z is taken
     to have stood at its zero then.
     """
-    presets = Presets()
-    dials: Dials | None = None
+    presets = CounterOrigins()
+    dials: Readouts | None = None
     asked, asks = readouts_query(variant), False
     for said in past:
         if asks and said.answers:
@@ -49,7 +49,7 @@ def gear_units(variant: Variant, gear: str) -> float:
     return known.units_per_mm if known else float(gear)
 
 
-def update_presets(presets: Presets, variant: Variant, dials: Dials, line: str) -> None:
+def update_presets(presets: CounterOrigins, variant: Variant, dials: Readouts, line: str) -> None:
     """Take note of what a line presets or engages, where that is what it does; the dials are those before it."""
     for unit in line.split(";"):
         if preset := _PRESET.fullmatch(unit):

@@ -1,14 +1,14 @@
 """What is written down: readings recorded and struck out, remarks."""
 
-from a7sim.console.book import Entry, record
+from a7sim.console.book import RecordedEntry, record
 from a7sim.console.dialogs import Ask
-from a7sim.console.sitting import Sitting
+from a7sim.console.sitting import ActionBase
 from a7sim.link.headers import quote_text, registration_word
 
 STRIKE_REASON = "struck out at the console"
 
 
-class RecordingDeeds(Sitting):
+class BookActions(ActionBase):
     """The deeds of the book."""
 
     def do_record(self) -> None:
@@ -30,7 +30,7 @@ class RecordingDeeds(Sitting):
             elements = [registration_word(console.hands.element)]
             console.ask(lambda client: record(client, point, elements), self._recorded)
 
-    def _recorded(self, entry: Entry | None) -> None:
+    def _recorded(self, entry: RecordedEntry | None) -> None:
         console = self._console
         if entry is not None:
             console.entries = (*console.entries, entry)

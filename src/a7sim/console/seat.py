@@ -5,19 +5,19 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from a7sim.console.eyepiece import Drawing
+from a7sim.console.eyepiece import DrawingMode
 from a7sim.console.keymap import Keymap, default_keymap
-from a7sim.console.recalling import Said
+from a7sim.console.recalling import LoggedLine
 from a7sim.console.sheet import JobSheet
 from a7sim.console.words import ACUITY_UM
 from a7sim.link.client import Client
 
 if TYPE_CHECKING:
-    from a7sim.session.film import Film
+    from a7sim.session.film import Recording
 
 
 @dataclass(frozen=True)
-class Resumable:
+class ResumeOffer:
     """A session that was left or cut off: what it is, and what is called with whether to go on with it."""
 
     about: str
@@ -25,7 +25,7 @@ class Resumable:
 
 
 @dataclass(frozen=True)
-class Seat:
+class ConsoleConfig:
     """Everything that a console is made of."""
 
     connect: Callable[[], Client]
@@ -37,7 +37,7 @@ class Seat:
     """The scenario or the address, as errors name it."""
     sheet: JobSheet = field(default_factory=JobSheet)
     keymap: Keymap = field(default_factory=default_keymap)
-    drawing: Drawing | None = None
+    drawing: DrawingMode | None = None
     """How pictures are drawn; None for the best that the terminal can."""
     acuity_um: float = ACUITY_UM
     theme: str = "enamel"
@@ -47,15 +47,15 @@ class Seat:
     """What is to be reached, told over the eyepieces until the first key."""
     welcome: bool = False
     """Whether to tell a first-time visitor what there is."""
-    resumable: Callable[[], Resumable | None] = lambda: None
+    resumable: Callable[[], ResumeOffer | None] = lambda: None
     """Looks for a session to go on with, once the screen is there."""
     greeting: Callable[[], str] = lambda: ""
     """What is to be said when the instrument first answers."""
-    history: Callable[[], Iterable[Said]] = tuple
+    history: Callable[[], Iterable[LoggedLine]] = tuple
     """What was said in the session that is gone on with."""
     watching: bool = False
     """Whether somebody else turns and this console only shows it."""
-    film: "Film | None" = None
+    film: "Recording | None" = None
     """The session that is watched, where it is over."""
 
 
@@ -65,10 +65,10 @@ def speaks_utf8(environment: Mapping[str, str] = os.environ) -> bool:
     return "utf" in named.lower()
 
 
-def best_drawing(utf8: bool, no_color: bool, colour_system: str | None) -> Drawing:
+def best_drawing(utf8: bool, no_color: bool, colour_system: str | None) -> DrawingMode:
     """Return the best drawing for a terminal: without UTF-8 in ASCII, with 16 colours or none in shades."""
     if not utf8:
-        return Drawing.ASCII
+        return DrawingMode.ASCII
     if no_color or colour_system in (None, "standard", "windows"):
-        return Drawing.SHADES
-    return Drawing.HALVES
+        return DrawingMode.SHADES
+    return DrawingMode.HALVES

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, cast
 
 from a7sim.console.dialogs import Ask
-from a7sim.console.dials import Dials
-from a7sim.console.hands import Hands
+from a7sim.console.dials import Readouts
+from a7sim.console.hands import ControlSelection
 from a7sim.manual import Variant
 
 if TYPE_CHECKING:
@@ -17,19 +17,19 @@ PROJECTORS = {1: "left", 2: "right"}
 _READING = r"([XYZ])\s*=?\s*([-+]?[0-9]*\.?[0-9]+)"
 
 
-class Sitting:
+class ActionBase:
     """Somebody at a console, the only class that has these deeds."""
 
     @property
     def _console(self) -> "Console":
         return cast("Console", self)
 
-    def _at(self) -> tuple[Variant, Dials]:
+    def _at(self) -> tuple[Variant, Readouts]:
         console = self._console
         assert console.met is not None and console.dials is not None
         return console.met.variant, console.dials
 
-    def _hold(self, hands: Hands) -> None:
+    def _hold(self, hands: ControlSelection) -> None:
         console = self._console
         console.hands = hands
         console.refresh_panels()

@@ -14,7 +14,7 @@ Cell = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Sketch:
+class SketchGrid:
     """Rows of characters, and in which cells stand the mark (None where it is off the print) and the points."""
 
     rows: list[str]
@@ -30,7 +30,7 @@ class Sketch:
         )
 
 
-def draw_points(points: Mapping[str, Place], width: int, height: int, dot: str = "·") -> Sketch:
+def draw_points(points: Mapping[str, Place], width: int, height: int, dot: str = "·") -> SketchGrid:
     """Return the sketch of named places in so many columns and rows, without the mark.
 
     Names are written where there is room.
@@ -41,10 +41,10 @@ def draw_points(points: Mapping[str, Place], width: int, height: int, dot: str =
         rows[row][column] = dot
     for name, (column, row) in cells.items():
         _write(rows[row], column, name)
-    return Sketch(["".join(row) for row in rows], None, cells)
+    return SketchGrid(["".join(row) for row in rows], None, cells)
 
 
-def overlay_mark(sketch: Sketch, mark: Place | None, width: int, height: int) -> Sketch:
+def overlay_mark(sketch: SketchGrid, mark: Place | None, width: int, height: int) -> SketchGrid:
     """Return a sketch of so many columns and rows with the mark on it."""
     at = _cell(mark, width, height) if mark is not None else None
     if at is None:
@@ -52,7 +52,7 @@ def overlay_mark(sketch: Sketch, mark: Place | None, width: int, height: int) ->
     column, row = at
     rows = list(sketch.rows)
     rows[row] = f"{rows[row][:column]}+{rows[row][column + 1 :]}"
-    return Sketch(rows, at, sketch.points)
+    return SketchGrid(rows, at, sketch.points)
 
 
 def _cell(place: Place, width: int, height: int) -> Cell | None:

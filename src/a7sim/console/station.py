@@ -11,12 +11,12 @@ from collections.abc import Callable
 import numpy as np
 from serial import SerialException
 
-from a7sim.console.dials import Dials, parse_readouts, readouts_query
+from a7sim.console.dials import Readouts, parse_readouts, readouts_query
 from a7sim.console.eyepiece import Greys
-from a7sim.console.news import Look, Met, News, Refused, Sight, Silent
-from a7sim.link.client import Client, InstrumentRefused
+from a7sim.console.news import CommandsRejected, Connected, ConnectionLost, StationMessage, ViewRequest, ViewResult
+from a7sim.link.client import Client, InstrumentError
 from a7sim.manual import VARIANTS, Variant
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 POLL_S = 0.5
 """How often a served instrument is looked at while nobody turns anything here: another may."""
@@ -27,24 +27,26 @@ RETRY_S = 1.0
 SLOW_S = 0.05
 """Pictures that take longer are not waited for with the dials."""
 
-Order = Callable[[Client], None]
+InstrumentRequest = Callable[[Client], None]
 """Something to say to the instrument."""
 
 
-class Lost(Exception):
+class ConnectionLostError(Exception):
     """The instrument does not answer."""
 
 
-class Station:
+class InstrumentThread:
     """One conversation. `tell` is called in the thread of the station."""
 
-    def __init__(self, connect: Callable[[], Client], tell: Callable[[News], None], alone: bool = True) -> None:
+    def __init__(
+        self, connect: Callable[[], Client], tell: Callable[[StationMessage], None], alone: bool = True
+    ) -> None:
         self._connect = connect
         self._tell = tell
         self._poll_s = None if alone else POLL_S
-        self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
-        self._look = Look()
-        self._shown: tuple[Dials, Look] | None = None
+        self._orders: queue.SimpleQueue[InstrumentRequest | None] = queue.SimpleQueue()
+        self._look = ViewRequest()
+        self._shown: tuple[Readouts, ViewRequest] | None = None
         self._sight_took_s = 0.0
         self._leaving = threading.Event()
         self._at_rest = threading.Event()
@@ -63,7 +65,7 @@ class Station:
         if self._thread.is_alive():
             self._thread.join(timeout=2.0)
 
-    def submit(self, order: Order) -> None:
+    def submit(self, order: InstrumentRequest) -> None:
         """Have something said; the dials are read afterwards."""
         with self._counting:
             self._waiting += 1
@@ -79,7 +81,7 @@ class Station:
 
         self.submit(said)
 
-    def look(self, look: Look) -> None:
+    def look(self, look: ViewRequest) -> None:
         """Change what the eyepieces are to show."""
         if look != self._look:
             self._look = look
@@ -99,9 +101,9 @@ class Station:
             try:
                 with self._connect() as client:
                     self._converse(client)
-            except (Mistake, SerialException, OSError, Lost, InstrumentRefused, ValueError) as broken:
+            except (A7SimError, SerialException, OSError, ConnectionLostError, InstrumentError, ValueError) as broken:
                 self._forget_orders()
-                self._tell(Silent(" ".join(str(broken).split()) or type(broken).__name__))
+                self._tell(ConnectionLost(" ".join(str(broken).split()) or type(broken).__name__))
                 self._leaving.wait(RETRY_S)
 
     def _forget_orders(self) -> None:
@@ -116,9 +118,11 @@ class Station:
         identity = client.identity
         variant = VARIANTS.get(identity.model)
         if variant is None:
-            raise Lost(f"expected an A7 or A8, got {identity.model or 'an instrument that does not say what it is'}")
+            raise ConnectionLostError(
+                f"expected an A7 or A8, got {identity.model or 'an instrument that does not say what it is'}"
+            )
         self._forget_orders()
-        self._tell(Met(identity, variant))
+        self._tell(Connected(identity, variant))
         self._shown = None
         asked = readouts_query(variant)
         self._refresh(client, variant, asked, 0)
@@ -143,32 +147,32 @@ class Station:
             except queue.Empty:
                 return obeyed
 
-    def _obey(self, client: Client, order: Order) -> None:
+    def _obey(self, client: Client, order: InstrumentRequest) -> None:
         """Say one thing; what the instrument refuses to answer is told, and only silence breaks the conversation."""
         try:
             order(client)
-        except InstrumentRefused as refused:
+        except InstrumentError as refused:
             if not refused.errors:
                 raise
-            self._tell(Refused(tuple(refused.errors)))
+            self._tell(CommandsRejected(tuple(refused.errors)))
 
     def _refresh(self, client: Client, variant: Variant, asked: str, obeyed: int) -> None:
         look = self._look
         client.send(asked)
         reply = client.reply()
         if reply is None:
-            raise Lost("no answer")
+            raise ConnectionLostError("no answer")
         dials = parse_readouts(variant, reply)
         if obeyed or (dials, look) != self._shown:
             self._show(client, dials, look)
         if dials.errors:
-            self._tell(Refused(tuple(client.errors())))
+            self._tell(CommandsRejected(tuple(client.errors())))
         with self._counting:
             self._waiting = max(0, self._waiting - obeyed)
             if self._waiting == 0:
                 self._at_rest.set()
 
-    def _show(self, client: Client, dials: Dials, look: Look) -> None:
+    def _show(self, client: Client, dials: Readouts, look: ViewRequest) -> None:
         """Tell dials and pictures in one go where pictures come quickly, else the dials before the pictures."""
         changed = self._shown is None or dials != self._shown[0]
         self._shown = dials, look
@@ -182,12 +186,12 @@ class Station:
             self._tell(dials)
         self._tell(sight)
 
-    def _sight(self, client: Client, look: Look) -> Sight:
+    def _sight(self, client: Client, look: ViewRequest) -> ViewResult:
         pictures = {eye: self._picture(client, look, eye) for eye in look.eyes if look.columns and look.rows}
         seen = {eye: view_point(client, eye, look.point) for eye in (1, 2)} if look.point else {}
-        return Sight(look, pictures, seen)
+        return ViewResult(look, pictures, seen)
 
-    def _picture(self, client: Client, look: Look, eye: int) -> Greys:
+    def _picture(self, client: Client, look: ViewRequest, eye: int) -> Greys:
         block = client.block(f"EYEP{eye}:PICT? {look.columns},{look.rows},{look.magnification:g}")
         return np.frombuffer(block, dtype=np.uint8).reshape(look.rows, look.columns)
 

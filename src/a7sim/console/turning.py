@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 from a7sim.console.hands import element_label, unit
-from a7sim.console.sitting import Sitting
+from a7sim.console.sitting import ActionBase
 from a7sim.link.client import Client
 from a7sim.link.headers import header
 
 
-class TurningDeeds(Sitting):
+class ControlActions(ActionBase):
     """The deeds of the hands."""
 
     def move(self, axis: str, way: int) -> None:

@@ -6,8 +6,8 @@ from a7sim.console.dialogs import Ask
 from a7sim.console.keymap import PLAYBACK_ACTIONS, VIEW_ACTIONS, actions_for
 from a7sim.console.margins import key_labels
 from a7sim.console.playback import Playback, jump_with_message
-from a7sim.console.reaching import Presets
-from a7sim.console.sitting import Sitting
+from a7sim.console.reaching import CounterOrigins
+from a7sim.console.sitting import ActionBase
 
 if TYPE_CHECKING:
     from a7sim.session.film import Frame
@@ -16,7 +16,7 @@ _PLAYED = {deed.name for deed in actions_for(watching=True) if deed.group == PLA
 _LOOKED = {deed.name for deed in actions_for(watching=True) if deed.group in VIEW_ACTIONS}
 
 
-class WatchingDeeds(Sitting):
+class PlaybackActions(ActionBase):
     """The deeds of who watches."""
 
     def reject_if_watching(self, deed: str = "") -> bool:
@@ -36,7 +36,7 @@ class WatchingDeeds(Sitting):
         """Show how far the film is, and take from it what a person there would know."""
         console = self._console
         playback = self._playback()
-        console.presets = Presets(dict(frame.origins), dict(frame.units))
+        console.presets = CounterOrigins(dict(frame.origins), dict(frame.units))
         if frame.point != console.point:
             console.point = frame.point
             console.look()

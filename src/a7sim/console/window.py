@@ -55,7 +55,7 @@ def _strip_of(row: list[Run], width: int, in_colours: bool, dark: Style, mark: S
     return Strip(segments, max(width, drawn))
 
 
-class Eyepiece(Widget):
+class EyepieceWidget(Widget):
     """What one eye sees: the picture about the floating mark, which never leaves the middle."""
 
     COMPONENT_CLASSES: ClassVar[set[str]] = {"eyepiece--mark"}

@@ -13,10 +13,10 @@ from a7sim.geometry import GON, Array, length_of, mxv, transposed
 from a7sim.instrument.carriers import Carrier
 from a7sim.instrument.condition import INSTRUMENT_STREAM, draw_condition, local_coefficients, zero_error
 from a7sim.instrument.optics import effective_fittings, handwheel_senses, projector_in_view, view_matrix
-from a7sim.instrument.projection import Turned, attitude_from_angles, place_on_carrier, pose, projection_centre
+from a7sim.instrument.projection import CameraAttitude, attitude_from_angles, place_on_carrier, pose, projection_centre
 from a7sim.instrument.recorder import Recorder, Registration
-from a7sim.instrument.refusals import OutOfRange, SettingsConflict, UnknownName
-from a7sim.instrument.spindles import Counter, Runout, Spindle
+from a7sim.instrument.refusals import OutOfRangeError, SettingsConflictError, UnknownNameError
+from a7sim.instrument.spindles import Counter, PeriodicError, Spindle
 from a7sim.manual import LEAST_COUNT, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Element, Fittings, Gear, Variant
 from a7sim.scenario.schema import FORMAT_MM, Condition, Instrument, ProjectorCondition, Scenario
 from a7sim.scene import build_scene
@@ -156,7 +156,7 @@ class Autograph:
 
     def _spindle(self, name: str) -> Spindle:
         if name not in self._spindles:
-            raise SettingsConflict(f"an {self.variant.name} has no {name}")
+            raise SettingsConflictError(f"an {self.variant.name} has no {name}")
         return self._spindles[name]
 
     def element_data(self, name: str) -> Element:
@@ -167,7 +167,7 @@ class Autograph:
     def set_base_mode(self, mode: str) -> None:
         """Set the Zeiss parallelogram to base 'inside' or 'outside'."""
         if mode not in self.variant.base_modes:
-            raise SettingsConflict(f"an {self.variant.name} has no base {mode}")
+            raise SettingsConflictError(f"an {self.variant.name} has no base {mode}")
         self._refuse_if_rods_cannot(base_mode=mode)
         if mode != self.base_mode:
             self._takes("base mode", self.variant.rates.lever)
@@ -177,14 +177,14 @@ class Autograph:
     def fitting(self, name: str) -> str:
         """Return the position of a fitting. Raises SettingsConflict if the variant has none such."""
         if name not in self.variant.fittings:
-            raise SettingsConflict(f"an {self.variant.name} has no fitting {name}")
+            raise SettingsConflictError(f"an {self.variant.name} has no fitting {name}")
         return self.fittings.as_words()[name]
 
     def set_fitting(self, name: str, position: str) -> None:
         """Put a fitting into one of its two positions."""
         self.fitting(name)
         if position not in POSITIONS_OF[name]:
-            raise UnknownName(f"expected {' or '.join(POSITIONS_OF[name])}, got {position}")
+            raise UnknownNameError(f"expected {' or '.join(POSITIONS_OF[name])}, got {position}")
         self._fit(replace(self.fittings, **{name: position}))
 
     def _fit(self, fittings: Fittings) -> None:
@@ -304,7 +304,7 @@ class Autograph:
         Raises SettingsConflict if the variant reads a scale there that is not to be shifted.
         """
         if not self.variant.scales[axis].preset:
-            raise SettingsConflict(f"an {self.variant.name} reads {axis} on a fixed scale")
+            raise SettingsConflictError(f"an {self.variant.name} reads {axis} on a fixed scale")
         self._counters[axis].preset(reading, self._carriages[axis].at)
 
     def drive(self, axis: str, reading: float) -> None:
@@ -312,7 +312,7 @@ class Autograph:
         counter = self._counters[axis]
         self._move(axis, counter.position(reading))
         if counter.slip_share and abs(counter.position(reading) - self._carriages[axis].at) > counter.half_count:
-            with suppress(OutOfRange):
+            with suppress(OutOfRangeError):
                 self._move(axis, counter.position(reading))
 
     def turn_handwheel(self, axis: str, amount: float) -> None:
@@ -330,7 +330,7 @@ class Autograph:
         if not spindle.within_range(position):
             low, high = self.counter_limits(axis)
             got = self._counters[axis].reading(position)
-            raise OutOfRange(f"{axis} expected {low:.2f} to {high:.2f} on its counter, got {got:.10g}")
+            raise OutOfRangeError(f"{axis} expected {low:.2f} to {high:.2f} on its counter, got {got:.10g}")
         self._refuse_if_rods_cannot(carriages={axis: position})
         before = spindle.at
         spindle.turn_to(position)
@@ -343,11 +343,11 @@ class Autograph:
         if isinstance(gear, str):
             if gear not in self.variant.height_gears:
                 known = ", ".join(self.variant.height_gears)
-                raise UnknownName(f"expected one of the combinations {known}, got {gear}")
+                raise UnknownNameError(f"expected one of the combinations {known}, got {gear}")
             engaged, name = self.variant.height_gears[gear], gear
         else:
             if not 0.0 < gear <= 100.0:
-                raise OutOfRange(f"expected more than 0 to 100 units a mm, got {gear:.10g}")
+                raise OutOfRangeError(f"expected more than 0 to 100 units a mm, got {gear:.10g}")
             engaged, name = Gear(gear), f"{gear:.10g}"
         if name != self.height_gear:
             self._takes("height gear", self.variant.rates.gear)
@@ -368,7 +368,7 @@ class Autograph:
             if inclination <= self.variant.rod_limit_gon:
                 continue
             if inclination > self._rod_inclination(projector, here, {}, self.base_mode):
-                raise OutOfRange(
+                raise OutOfRangeError(
                     f"expected space rods within {self.variant.rod_limit_gon:.0f} gon of the plumb line, "
                     f"got {inclination:.0f} gon at projector {projector}"
                 )
@@ -418,10 +418,10 @@ class Autograph:
     def load(self, projector: int, name: str) -> None:
         """Put a photograph on a carrier, by hand, in place of any that lies there."""
         if name not in self._photographs:
-            raise UnknownName(f"expected one of {', '.join(self.catalogue)}, got {name}")
+            raise UnknownNameError(f"expected one of {', '.join(self.catalogue)}, got {name}")
         other = self._carriers.get(3 - projector)
         if other is not None and other.photograph.name == name:
-            raise SettingsConflict(f"picture {name} lies in projector {3 - projector}")
+            raise SettingsConflictError(f"picture {name} lies in projector {3 - projector}")
         photograph = self._photographs[name]
         shift, turn = self._laying_sigmas
         dx, dy, dkappa = self._rng.standard_normal(3) * (shift, shift, turn)
@@ -443,7 +443,7 @@ class Autograph:
     def carrier(self, projector: int) -> Carrier:
         """Return a carrier that holds a picture. Raises SettingsConflict when there is none in it."""
         if projector not in self._carriers:
-            raise SettingsConflict(f"there is no picture in projector {projector}")
+            raise SettingsConflictError(f"there is no picture in projector {projector}")
         return self._carriers[projector]
 
     def centre_picture(self, projector: int, dx: float, dy: float, dkappa: float) -> None:
@@ -451,7 +451,7 @@ class Autograph:
         limits = (self.variant.centring_mm, self.variant.centring_mm, self.variant.centring_gon)
         for value, limit in zip((dx, dy, dkappa), limits, strict=True):
             if not abs(value) <= limit:
-                raise OutOfRange(f"expected a shift or turn of -{limit:g} to {limit:g}, got {value:.10g}")
+                raise OutOfRangeError(f"expected a shift or turn of -{limit:g} to {limit:g}, got {value:.10g}")
         carrier = self.carrier(projector)
         x, y, kappa = (abs(new - old) for new, old in zip((dx, dy, dkappa), carrier.centring, strict=True))
         rates = self.variant.rates
@@ -592,17 +592,19 @@ class Autograph:
 
 
 @lru_cache(maxsize=CAMERA_CACHE_SIZE)
-def _camera(omega: float, phi: float, kappa: float, missed: tuple[float, ...]) -> Turned:
+def _camera(omega: float, phi: float, kappa: float, missed: tuple[float, ...]) -> CameraAttitude:
     """Return a camera turned by angles in radians; not to write."""
     camera = attitude_from_angles(omega, phi, kappa, np.array(missed))
     camera.rotation.flags.writeable = False
     return camera
 
 
-def _runout_of(condition: Condition, axis: str, lead: float) -> Runout | None:
+def _runout_of(condition: Condition, axis: str, lead: float) -> PeriodicError | None:
     place = "XYZ".index(axis)
     amplitude = condition.carriage_periodic_um[place]
-    return Runout(1e-3 * amplitude, lead, condition.carriage_periodic_phase_gon[place] * GON) if amplitude else None
+    return (
+        PeriodicError(1e-3 * amplitude, lead, condition.carriage_periodic_phase_gon[place] * GON) if amplitude else None
+    )
 
 
 def guide_matrix(condition: Condition) -> Array:

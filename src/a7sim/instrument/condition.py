@@ -10,7 +10,7 @@ import numpy as np
 
 from a7sim.geometry import Array
 from a7sim.instrument.local_errors import smooth_local_errors
-from a7sim.scenario.schema import Condition, Instrument, ProjectorCondition, Upkeep
+from a7sim.scenario.schema import Condition, Instrument, MaintenanceClass, ProjectorCondition
 
 INSTRUMENT_STREAM = 3
 """Spawn key of the instrument's random numbers; the scene's come before, the operator's after."""
@@ -22,7 +22,7 @@ _PATTERNS = 2**31
 
 
 @dataclass(frozen=True)
-class Faults:
+class FaultSigmas:
     """How large the faults of a class are: standard deviations, but for what is said to be a size."""
 
     local_um: tuple[float, float]
@@ -46,9 +46,9 @@ class Faults:
     counter_slip_share: float
 
 
-FAULT_SIGMAS: Mapping[Upkeep, Faults] = MappingProxyType(
+FAULT_SIGMAS: Mapping[MaintenanceClass, FaultSigmas] = MappingProxyType(
     {
-        "new": Faults(
+        "new": FaultSigmas(
             local_um=(1.9, 3.8),
             principal_distance_mm=0.005,
             principal_point_um=5.0,
@@ -66,7 +66,7 @@ FAULT_SIGMAS: Mapping[Upkeep, Faults] = MappingProxyType(
             carriage_backlash_mm=0.002,
             counter_slip_share=0.0,
         ),
-        "serviced": Faults(
+        "serviced": FaultSigmas(
             local_um=(4.2, 6.0),
             principal_distance_mm=0.01,
             principal_point_um=10.0,
@@ -84,7 +84,7 @@ FAULT_SIGMAS: Mapping[Upkeep, Faults] = MappingProxyType(
             carriage_backlash_mm=0.004,
             counter_slip_share=0.0,
         ),
-        "worn": Faults(
+        "worn": FaultSigmas(
             local_um=(8.5, 11.5),
             principal_distance_mm=0.03,
             principal_point_um=30.0,
@@ -150,7 +150,7 @@ def _with_pattern(projector: ProjectorCondition, rng: np.random.Generator) -> Pr
     return msgspec.structs.replace(projector, local_pattern=pattern)
 
 
-def _drawn(faults: Faults, rng: np.random.Generator) -> Condition:
+def _drawn(faults: FaultSigmas, rng: np.random.Generator) -> Condition:
     def three(sigma: float) -> tuple[float, float, float]:
         x, y, z = sigma * rng.standard_normal(3)
         return float(x), float(y), float(z)

@@ -12,11 +12,11 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, put, take
+from a7sim.among import Indices, put, take
 from a7sim.geometry import GON, Array, length_of, mxm, mxv, plane_rotation, rotation
 from a7sim.instrument.autograph import COUNTED_FROM_ZERO, MOVE_CENTRES, guide_matrix
 from a7sim.instrument.condition import INSTRUMENT_STREAM, draw_condition, local_coefficients, zero_error
-from a7sim.instrument.fleet_parts import AXES, Carriages, Carriers, Drums, Runouts, Truths, round_like_counter
+from a7sim.instrument.fleet_parts import AXES, BoolArray, Carriages, Carriers, Drums, PeriodicErrors, round_like_counter
 from a7sim.instrument.projection import place_on_carrier, projection_centre
 from a7sim.instrument.spindles import UNITS_A_DRUM
 from a7sim.manual import COUNTER_DECIMALS, LEAST_COUNT, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Variant
@@ -35,10 +35,10 @@ _RIGHT = {
 
 
 @dataclass(frozen=True)
-class Levers:
+class FittingEffects:
     """What base, levers, prisms and collars of every instrument come to."""
 
-    uncrossed: Truths
+    uncrossed: BoolArray
     """Where the left eye sees the left picture ``(instruments,)``."""
     signs: Mapping[int, Array]
     """Of what is seen of the picture in a projector ``(2, instruments)``, in um for a mm."""
@@ -50,7 +50,7 @@ _OF_A_BUNDLE = 19
 """Numbers that make the bundle of a projector."""
 
 
-class Bundles:
+class ProjectorBundles:
     """The bundles of the projectors of many instruments, in rows of one array, so that a look picks them out once."""
 
     def __init__(self, rows: Array) -> None:
@@ -63,12 +63,12 @@ class Bundles:
         self.principal_point = rows[16:18]
         self.c = rows[18]
 
-    def take(self, who: Who) -> "Bundles":
+    def take(self, who: Indices) -> "ProjectorBundles":
         """Return those of some, to be read at once and not written to."""
-        return self if who.size == self.c.size else Bundles(take(self._rows, who))
+        return self if who.size == self.c.size else ProjectorBundles(take(self._rows, who))
 
 
-class Fleet:
+class AutographBatch:
     """Plotters worked by their handles, all together. Lengths in mm, angles in gon, as the counters count them."""
 
     def __init__(
@@ -103,9 +103,9 @@ class Fleet:
         self._carriers: dict[int, Carriers] = {}
         self._base_inside = np.ones(self.instruments, dtype=bool)
         self._fittings = {name: np.zeros(self.instruments, dtype=np.intp) for name in POSITIONS_OF}
-        self._levers: Levers | None = None
+        self._levers: FittingEffects | None = None
         self._put_right_fittings(everywhere)
-        self._bundles = {n: Bundles(np.zeros((_OF_A_BUNDLE, self.instruments))) for n in (1, 2)}
+        self._bundles = {n: ProjectorBundles(np.zeros((_OF_A_BUNDLE, self.instruments))) for n in (1, 2)}
         for n, each in self._bundles.items():
             each.principal_point[:] = 1e-3 * self._of_projectors(n, lambda projector: projector.principal_point_um)
         self._missed = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
@@ -134,10 +134,10 @@ class Fleet:
     def _where_any(self, values: Array) -> Array | None:
         return values if values.any() else None
 
-    def _carriage_runouts(self) -> Runouts | None:
+    def _carriage_runouts(self) -> PeriodicErrors | None:
         amplitude = 1e-3 * np.array([condition.carriage_periodic_um for condition in self._conditions]).T.copy()
         phase = GON * np.array([condition.carriage_periodic_phase_gon for condition in self._conditions]).T.copy()
-        return Runouts(amplitude, self.variant.carriage_lead_mm, phase) if amplitude.any() else None
+        return PeriodicErrors(amplitude, self.variant.carriage_lead_mm, phase) if amplitude.any() else None
 
     def _element_drums(self, name: str) -> Drums:
         element = self.variant.elements[name]
@@ -149,31 +149,31 @@ class Fleet:
 
     # --- refusals -------------------------------------------------------------------------------------
 
-    def pop_errors(self, who: Who) -> dict[int, list[str]]:
+    def pop_errors(self, who: Indices) -> dict[int, list[str]]:
         """Return what was refused since the last asking, by instrument."""
         return {int(each): self._refusals.pop(int(each)) for each in who if int(each) in self._refusals}
 
-    def _refuse(self, who: Who, why: str, number: int = -222) -> None:
+    def _refuse(self, who: Indices, why: str, number: int = -222) -> None:
         for each in who:
             self._refusals.setdefault(int(each), []).append(f'{number},"{why}"')
 
     # --- elements -------------------------------------------------------------------------------------
 
-    def elements(self, who: Who, names: Sequence[str]) -> dict[str, Array]:
+    def elements(self, who: Indices, names: Sequence[str]) -> dict[str, Array]:
         """Return what the counters of elements show ``(m,)``."""
         return {name: self._drums[name].shown(who) for name in names}
 
-    def set_element(self, who: Who, name: str, values: Array) -> None:
+    def set_element(self, who: Indices, name: str, values: Array) -> None:
         """Set an element through its counters to values ``(m,)``, to the least count."""
         self._run_element(who, name, np.round(values / LEAST_COUNT) * LEAST_COUNT, self._rngs)
 
-    def turn_element(self, who: Who, name: str, amounts: Array) -> None:
+    def turn_element(self, who: Indices, name: str, amounts: Array) -> None:
         """Turn the drums of an element by so much ``(m,)``, to wherever between two counts that is."""
         self._run_element(
             who, name, self._drums[name].value_after_turn(who, amounts) if name in self._drums else amounts
         )
 
-    def _run_element(self, who: Who, name: str, targets: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
+    def _run_element(self, who: Indices, name: str, targets: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
         if name not in self._drums:
             self._refuse(who, f"an {self.variant.name} has no {name}", -221)
             return
@@ -195,7 +195,7 @@ class Fleet:
             else:
                 self._stand(who, n)
 
-    def set_base_mode(self, who: Who, mode: str) -> None:
+    def set_base_mode(self, who: Indices, mode: str) -> None:
         """Set base inside or outside."""
         inside = mode == "inside"
         base_inside = np.full(who.size, inside)
@@ -206,16 +206,16 @@ class Fleet:
         for n in (1, 2):
             self._stand(who, n)
 
-    def fitting(self, who: Who, name: str) -> npt.NDArray[np.str_]:
+    def fitting(self, who: Indices, name: str) -> npt.NDArray[np.str_]:
         """Return the positions ``(m,)`` in which a fitting stands."""
         return np.array(POSITIONS_OF[name])[self._fittings[name][who]]
 
-    def set_fitting(self, who: Who, name: str, position: str) -> None:
+    def set_fitting(self, who: Indices, name: str, position: str) -> None:
         """Put a fitting into one of its two positions."""
         self._fittings[name][who] = POSITIONS_OF[name].index(position)
         self._levers = None
 
-    def reset(self, who: Who) -> None:
+    def reset(self, who: Indices) -> None:
         """Run every element that has a counter zero to it, base inside, fittings for a positive, presets off."""
         for name, drums in self._drums.items():
             if name not in ("c1", "c2"):
@@ -226,22 +226,22 @@ class Fleet:
         for n in (1, 2):
             self._stand(who, n)
 
-    def _reset_offsets(self, who: Who) -> None:
+    def _reset_offsets(self, who: Indices) -> None:
         for axis, scale in self.variant.scales.items():
             self._offsets[AXES.index(axis), who] = scale.at_origin
 
-    def _put_right_fittings(self, who: Who) -> None:
+    def _put_right_fittings(self, who: Indices) -> None:
         for name, position in REQUIRED_FITTINGS["positive", "inside"].as_words().items():
             self.set_fitting(who, name, position)
 
     # --- carriages, counters, gears -------------------------------------------------------------------
 
-    def counter(self, who: Who, axis: str) -> Array:
+    def counter(self, who: Indices, axis: str) -> Array:
         """Return what the X, Y or Z counters show ``(m,)``."""
         row = AXES.index(axis)
         return round_like_counter(self._unrounded(who, row, self._carriages.at[row][who]), self._decimals[row])
 
-    def counters(self, who: Who) -> Array:
+    def counters(self, who: Indices) -> Array:
         """Return what the X, Y and Z counters show ``(3, m)``."""
         readings = take(self._offsets, who) + self._units[:, None] * take(self._carriages.at, who)
         if len(set(self._decimals)) == 1:
@@ -250,16 +250,16 @@ class Fleet:
             [round_like_counter(each, decimals) for each, decimals in zip(readings, self._decimals, strict=True)]
         )
 
-    def _unrounded(self, who: Who, row: int, position: Array) -> Array:
+    def _unrounded(self, who: Indices, row: int, position: Array) -> Array:
         return np.asarray(self._offsets[row][who] + self._units[row] * position)
 
-    def preset(self, who: Who, axis: str, reading: float) -> None:
+    def preset(self, who: Indices, axis: str, reading: float) -> None:
         """Make the counters show a reading where their carriages stand."""
         row = AXES.index(axis)
         shown = round(reading, self._decimals[row])
         self._offsets[row, who] = shown - self._units[row] * self._carriages.at[row][who]
 
-    def set_height_gear(self, who: Who, gear: str | float) -> None:
+    def set_height_gear(self, who: Indices, gear: str | float) -> None:
         """Engage a height gear; all instruments have the same."""
         units, decimals = float(gear) if not isinstance(gear, str) else 0.0, COUNTER_DECIMALS
         if isinstance(gear, str):
@@ -271,7 +271,7 @@ class Fleet:
         self._units[row], self._decimals[row] = units, decimals
         self._offsets[row, who] = round_like_counter(reading, decimals) - units * position
 
-    def drive(self, who: Who, axis: str, readings: Array) -> Truths:
+    def drive(self, who: Indices, axis: str, readings: Array) -> BoolArray:
         """Run carriages until their counters show readings ``(m,)``; return which went."""
         row = AXES.index(axis)
         wanted = round_like_counter(readings, self._decimals[row])
@@ -286,7 +286,7 @@ class Fleet:
     def _half_a_count(self, row: int) -> float:
         return float(0.5000001 * 10.0 ** -self._decimals[row] / self._units[row])
 
-    def turn_handwheels(self, who: Who, amounts: Array) -> None:
+    def turn_handwheels(self, who: Indices, amounts: Array) -> None:
         """Turn the handwheels X, Y and, where there is a third, Z by so many counter units ``(k, m)``, in that order.
 
         Their collars decide which way the carriages go.
@@ -303,7 +303,7 @@ class Fleet:
         for row, each in enumerate(after):
             self._move(who, row, each)
 
-    def _move(self, who: Who, row: int, positions: Array, silently: bool = False) -> Truths:
+    def _move(self, who: Indices, row: int, positions: Array, silently: bool = False) -> BoolArray:
         positions = self._carriages.snap_to_end(row, positions, self._half_a_count(row))
         before = self._carriages.at[row, who]
         mark = take(self._carriages.at, who).copy()
@@ -316,7 +316,7 @@ class Fleet:
         self._carriages.move_to(who, row, positions[None])
         return np.asarray(allowed)
 
-    def _slip(self, who: Who, row: int, before: Array, after: Array) -> None:
+    def _slip(self, who: Indices, row: int, before: Array, after: Array) -> None:
         """Let counters miss carries on the way from one position ``(m,)`` to another (see `Counter.passed`)."""
         if self._no_slips:
             return
@@ -330,7 +330,9 @@ class Fleet:
                 missed = self._rngs[each].binomial(abs(last - first), self._slip_shares[each])
                 self._offsets[row, each] -= math.copysign(missed * UNITS_A_DRUM, last - first)
 
-    def _rods_can(self, who: Who, centres: Mapping[int, Array] | None = None, mark: Array | None = None) -> Truths:
+    def _rods_can(
+        self, who: Indices, centres: Mapping[int, Array] | None = None, mark: Array | None = None
+    ) -> BoolArray:
         """Return where no rod comes beyond its limit, nor further beyond it, with other centres or marks ``(3, m)``."""
         now = take(self._carriages.at, who)
         mark = now if mark is None else mark
@@ -345,7 +347,7 @@ class Fleet:
                 able &= ~beyond | (then <= np.arctan2(*_reach(take(self._told[n], who), now)) / GON)
         return able
 
-    def _rods_surely_can(self, who: Who, before: Array, low: Array, high: Array) -> bool:
+    def _rods_surely_can(self, who: Indices, before: Array, low: Array, high: Array) -> bool:
         """Return whether all carriages can go from marks ``(3, m)`` to between others ``(k,)``, one axis after another.
 
         Looks at the box that holds all marks, seen from that which holds all centres.
@@ -368,10 +370,10 @@ class Fleet:
 
     def _centres_told(
         self,
-        who: Who,
+        who: Indices,
         n: int,
         elements: Mapping[str, Array] = MappingProxyType({}),
-        base_inside: Truths | None = None,
+        base_inside: BoolArray | None = None,
     ) -> Array:
         """Return where the drums say ``(3, m)`` that centres stand, or would with other elements or another base."""
 
@@ -387,14 +389,14 @@ class Fleet:
             x, z = x * np.cos(tilt) + z * np.sin(tilt), z * np.cos(tilt) - x * np.sin(tilt)
         return np.array([x, y, z])
 
-    def _shares(self, n: int, inside: Truths) -> Array:
+    def _shares(self, n: int, inside: BoolArray) -> Array:
         """Return where projectors stand along X ``(m,)``, as shares of bx."""
         left, right = self.variant.centres_on_base
         return np.where(inside == (n == 1), left, right)
 
     # --- pictures -------------------------------------------------------------------------------------
 
-    def load(self, who: Who, projector: int, name: str) -> None:
+    def load(self, who: Indices, projector: int, name: str) -> None:
         """Put a photograph on the carriers of a projector, by hand."""
         photographs = [each[name] for each in self._photographs]
         laid = np.zeros((3, self.instruments))
@@ -405,7 +407,7 @@ class Fleet:
         self._carriers[projector] = Carriers(photographs, laid)
         self._levers = None
 
-    def unload(self, who: Who, projector: int) -> None:
+    def unload(self, who: Indices, projector: int) -> None:
         """Take the photographs off the carriers of a projector."""
         del self._carriers[projector]
         self._levers = None
@@ -421,7 +423,7 @@ class Fleet:
 
     # --- the space rods and the view ------------------------------------------------------------------
 
-    def _stand(self, who: Who, n: int) -> None:
+    def _stand(self, who: Indices, n: int) -> None:
         """Put the projectors where their elements, the base and their faults bring them."""
         omega, phi, kappa = (self._really(who, f"{name}{n}") * GON for name in ("omega", "phi", "kappa"))
         turned = rotation(omega, phi, kappa)
@@ -436,7 +438,7 @@ class Fleet:
         put(self._drums[f"c{n}"].position(who), who, bundles.c)
         self._shift(who, n, self._centres_told(who, n))
 
-    def _shift(self, who: Who, n: int, told: Array) -> None:
+    def _shift(self, who: Indices, n: int, told: Array) -> None:
         """Put the projectors, turned as they stand, where base, by and bz bring them and these are told ``(3, m)``."""
         base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
         place = projection_centre(self._shares(n, take(self._base_inside, who)), *base)
@@ -446,29 +448,29 @@ class Fleet:
         put(centre, who, self._bundles[n].centre)
         put(told, who, self._told[n])
 
-    def _really(self, who: Who, name: str) -> Array:
+    def _really(self, who: Indices, name: str) -> Array:
         if name not in self._drums:
             return np.zeros(who.size)
         position = self._drums[name].position(who)
         return position - self.variant.elements[name].zero if name in COUNTED_FROM_ZERO else position
 
-    def pose(self, who: Who, projector: int) -> tuple[Array, Array]:
+    def pose(self, who: Indices, projector: int) -> tuple[Array, Array]:
         """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
         bundles = self._bundles[projector].take(who)
         return bundles.centre, bundles.turned
 
-    def readings_at(self, who: Who, place: Array) -> dict[str, Array]:
+    def readings_at(self, who: Indices, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
         guides = np.moveaxis(self._guides[:, :, who], -1, 0)
         carriage = np.asarray(np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T, dtype=float)
         free = self._carriages.position_without_periodic_error(who, carriage)
         return {axis: self._unrounded(who, row, free[row]) for row, axis in enumerate(AXES)}
 
-    def mark(self, who: Who) -> Array:
+    def mark(self, who: Indices) -> Array:
         """Return where the floating marks really stand ``(3, m)``."""
         return mxv(take(self._guides, who), self._carriages.position(who))
 
-    def _mark_on_carrier(self, who: Who, projector: int, bundles: Bundles, mark: Array) -> Array:
+    def _mark_on_carrier(self, who: Indices, projector: int, bundles: ProjectorBundles, mark: Array) -> Array:
         """Return the places ``(2, m)`` in mm on carriers where the space rods bring floating marks ``(3, m)``."""
         local, rods = self._local[projector], self._rods[projector]
         return place_on_carrier(
@@ -481,16 +483,16 @@ class Fleet:
             None if rods is None else take(rods, who),
         )
 
-    def eyepiece(self, who: Who, eye: int, name: str) -> Array:
+    def eyepiece(self, who: Indices, eye: int, name: str) -> Array:
         """Return dx, dy ``(2, m)`` in um at photo scale of an image point from the mark, nan outside the field."""
         return self._in_eyepiece(who, eye, name, self.mark(who))
 
-    def both_eyepieces(self, who: Who, name: str) -> Array:
+    def both_eyepieces(self, who: Indices, name: str) -> Array:
         """Return dx, dy in the left eyepiece and dx, dy in the right one ``(4, m)``, as `eyepiece` does."""
         mark = self.mark(who)
         return np.concatenate([self._in_eyepiece(who, eye, name, mark) for eye in (1, 2)])
 
-    def _in_eyepiece(self, who: Who, eye: int, name: str, mark: Array) -> Array:
+    def _in_eyepiece(self, who: Indices, eye: int, name: str, mark: Array) -> Array:
         straight = take(self._levers_stand.uncrossed, who)
         ways = ((eye, straight), (3 - eye, ~straight))
         for projector, looking in ways:
@@ -502,7 +504,7 @@ class Fleet:
                 seen[:, looking] = self._seen_in(who[looking], projector, name, mark[:, looking])
         return seen
 
-    def _seen_in(self, who: Who, projector: int, name: str, mark: Array) -> Array:
+    def _seen_in(self, who: Indices, projector: int, name: str, mark: Array) -> Array:
         bundles = self._bundles[projector].take(who)
         displacement = self._carriers[projector].point(who, name) - self._mark_on_carrier(who, projector, bundles, mark)
         turned = mxv(bundles.swung, displacement)
@@ -512,13 +514,15 @@ class Fleet:
     # --- levers, prisms, collars ----------------------------------------------------------------------
 
     @property
-    def _levers_stand(self) -> Levers:
+    def _levers_stand(self) -> FittingEffects:
         if self._levers is None:
             signs = {n: 1e3 * self._mirrored(carriers.polarity) for n, carriers in self._carriers.items()}
-            self._levers = Levers(self._straight(), signs, np.array([self._wheel_senses(axis) for axis in AXES]))
+            self._levers = FittingEffects(
+                self._straight(), signs, np.array([self._wheel_senses(axis) for axis in AXES])
+            )
         return self._levers
 
-    def _straight(self) -> Truths:
+    def _straight(self) -> BoolArray:
         if "triangulation" in self.variant.fittings:
             return np.asarray(self._fittings["triangulation"] == POSITIONS_OF["triangulation"].index("back"))
         return self._base_inside.copy()
@@ -545,10 +549,12 @@ def _reach(centre: Array, mark: Array) -> tuple[Array, Array]:
     return np.hypot(mark[0] - centre[0], mark[1] - centre[1]), centre[2] - mark[2]
 
 
-def build_batch(instrument: Instrument, photographs: Sequence[Mapping[str, Photograph]], seeds: Sequence[int]) -> Fleet:
+def build_batch(
+    instrument: Instrument, photographs: Sequence[Mapping[str, Photograph]], seeds: Sequence[int]
+) -> AutographBatch:
     """Return the instruments of a scenario, one a seed, with their photographs in their drawers."""
     rngs = [np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM,))) for seed in seeds]
-    return Fleet(
+    return AutographBatch(
         VARIANTS[instrument.variant],
         [draw_condition(instrument, seed) for seed in seeds],
         photographs,

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, put, take
+from a7sim.among import Indices, put, take
 from a7sim.geometry import GON, Array, mxv, plane_rotation
 from a7sim.instrument.spindles import APPROXIMATIONS
 from a7sim.manual import COUNTER_DECIMALS, Variant
 from a7sim.scene.camera import fiducial_places
-from a7sim.scene.photograph import Marks, Photograph
+from a7sim.scene.photograph import NamedPoints, Photograph
 
-Truths = npt.NDArray[np.bool_]
+BoolArray = npt.NDArray[np.bool_]
 
 AXES = "XYZ"
 
@@ -41,14 +41,14 @@ def round_like_counter(values: Array, decimals: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Runouts:
+class PeriodicErrors:
     """The errors of screws that repeat with every turn: amplitudes and phases ``(3, instruments)``, lead; mm."""
 
     amplitude: Array
     lead: float
     phase: Array
 
-    def at(self, who: Who, position: Array) -> Array:
+    def at(self, who: Indices, position: Array) -> Array:
         """Return by how much the nuts have gone further ``(3, m)`` than the turns say, mm."""
         turns = 2.0 * math.pi * position / self.lead
         return np.asarray(take(self.amplitude, who) * np.sin(turns + take(self.phase, who)))
@@ -57,19 +57,19 @@ class Runouts:
 class Carriages:
     """The carriages X, Y and Z of every instrument: where their spindles stand and where these bring them with play."""
 
-    def __init__(self, variant: Variant, play: Array, runouts: Runouts | None) -> None:
+    def __init__(self, variant: Variant, play: Array, runouts: PeriodicErrors | None) -> None:
         self._low, self._high = np.array([variant.carriages[axis] for axis in AXES]).T
         self.at = np.repeat(np.array([[variant.carriages_at_rest[axis]] for axis in AXES]), play.size, axis=1)
         self._shaft = self.at.copy()
         self._half_play = play / 2.0
         self._runouts = runouts
 
-    def position(self, who: Who) -> Array:
+    def position(self, who: Indices) -> Array:
         """Return where they really stand ``(3, m)``."""
         position = take(self._shaft, who)
         return position if self._runouts is None else position + self._runouts.at(who, position)
 
-    def position_without_periodic_error(self, who: Who, place: Array) -> Array:
+    def position_without_periodic_error(self, who: Indices, place: Array) -> Array:
         """Return where they would stand ``(3, m)`` without the errors that the turns of their screws repeat."""
         position = place
         if self._runouts is not None:
@@ -82,7 +82,7 @@ class Carriages:
         at_end = np.clip(places, self._low[axis], self._high[axis])
         return np.where(np.abs(at_end - places) <= within, at_end, places)
 
-    def within_range(self, axis: int, places: Array) -> Truths:
+    def within_range(self, axis: int, places: Array) -> BoolArray:
         """Return to which places ``(m,)`` a carriage can be run."""
         return np.asarray((places >= self._low[axis] - 1e-9) & (places <= self._high[axis] + 1e-9))
 
@@ -91,7 +91,7 @@ class Carriages:
         k = len(low)
         return bool(((low >= self._low[:k]) & (high <= self._high[:k])).all())
 
-    def move_to(self, who: Who, first: int, places: Array) -> None:
+    def move_to(self, who: Indices, first: int, places: Array) -> None:
         """Run carriages, from a first one on, to places ``(k, m)`` that they allow."""
         rows = slice(first, first + len(places))
         half = take(self._half_play, who)
@@ -118,25 +118,25 @@ class Drums:
         self._error = np.zeros(fault.shape)
         self._half_play, self._sigma, self._fault = play / 2.0, sigma, fault
 
-    def position(self, who: Who) -> Array:
+    def position(self, who: Indices) -> Array:
         """Return where the shafts really stand ``(m,)``."""
         return np.asarray(take(self._shaft, who) + take(self._error, who) + take(self._fault, who))
 
-    def shown(self, who: Who) -> Array:
+    def shown(self, who: Indices) -> Array:
         """Return what the counters show ``(m,)``."""
         shown = round_like_counter(take(self.at, who), COUNTER_DECIMALS)
         return round_like_counter(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
 
-    def within_range(self, values: Array) -> Truths:
+    def within_range(self, values: Array) -> BoolArray:
         """Return which values the drum can be turned to."""
         return np.asarray((values >= self.low - 1e-9) & (values <= self.high + 1e-9))
 
-    def value_after_turn(self, who: Who, amounts: Array) -> Array:
+    def value_after_turn(self, who: Indices, amounts: Array) -> Array:
         """Return to what values ``(m,)`` the drums come when they are turned by so much."""
         values = take(self.at, who) + amounts
         return np.asarray(values % self.high if self.endless else values)
 
-    def turn_to(self, who: Who, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
+    def turn_to(self, who: Indices, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
         """Turn the drums to values ``(m,)`` that they allow; with dice, by their counters (see `Spindle.turn_to`)."""
         if self.endless:
             values = values + self.high * np.round((take(self.at, who) - values) / self.high)
@@ -162,7 +162,7 @@ class Carriers:
         self._placed: dict[str, Array] = {}
         self.centre(np.arange(laid.shape[1]), self.centring)
 
-    def centre(self, who: Who, values: Array) -> None:
+    def centre(self, who: Indices, values: Array) -> None:
         """Shift and turn the pictures ``(3, m)``, mm and gon, from where they were laid."""
         self.centring[:, who] = values
         dx, dy, turn = self.laid[:, who] + values
@@ -170,7 +170,7 @@ class Carriers:
         self._shift[:, who] = dx, dy
         self._placed.clear()
 
-    def point(self, who: Who, name: str) -> Array:
+    def point(self, who: Indices, name: str) -> Array:
         """Return where an image point lies on the carriers ``(2, m)``, nan where a picture has none such."""
         placed = self._placed.get(name)
         if placed is None:
@@ -182,7 +182,7 @@ class Carriers:
         nowhere = np.full((2, len(self.photographs)), np.nan)
         return self._films.get(name, nowhere)
 
-    def fiducial_displacements(self, who: Who) -> tuple[tuple[str, ...], Array]:
+    def fiducial_displacements(self, who: Indices) -> tuple[tuple[str, ...], Array]:
         """Return names and displacements ``(2, n, m)`` of the fiducials from their collimating marks."""
         fiducials = self.photographs[0].fiducials
         names, calibrated = fiducial_places(self.photographs[0].camera)
@@ -191,12 +191,12 @@ class Carriers:
         placed = np.einsum("ijm,jnm->inm", self._turn[:, :, who], film) + self._shift[:, None, who]
         return fiducials.names, np.asarray(placed - marks[:, :, None])
 
-    def sketch(self, who: Who) -> dict[str, Array]:
+    def sketch(self, who: Indices) -> dict[str, Array]:
         """Return the places ``(2, m)`` of points on the paper prints, nan where a print has it not."""
         return _places_of([self.photographs[session].sketch for session in who])
 
 
-def _places_of(prints: Sequence[Marks]) -> dict[str, Array]:
+def _places_of(prints: Sequence[NamedPoints]) -> dict[str, Array]:
     """Return the places ``(2, m)`` of marks on many photographs by name, nan where one has it not."""
     alike: dict[tuple[str, ...], list[int]] = {}
     for i, each in enumerate(prints):

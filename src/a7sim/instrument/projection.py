@@ -26,7 +26,7 @@ def apply_common_tilt(place: Array, common_phi: npt.ArrayLike) -> Array:
     return mxv(rotation(0.0, common_phi, 0.0), place)
 
 
-class Turned(NamedTuple):
+class CameraAttitude(NamedTuple):
     """A camera turned about its axes, wherever they meet."""
 
     rotation: Array
@@ -37,13 +37,15 @@ class Turned(NamedTuple):
     """The same in the frame's axes: it goes round with the camera."""
 
 
-def attitude_from_angles(omega: npt.ArrayLike, phi: npt.ArrayLike, kappa: npt.ArrayLike, missed: Array) -> Turned:
+def attitude_from_angles(
+    omega: npt.ArrayLike, phi: npt.ArrayLike, kappa: npt.ArrayLike, missed: Array
+) -> CameraAttitude:
     """Return a camera with these tilts whose axes miss the projection centre by so much ``(3, ...)`` in mm."""
     turned = rotation(omega, phi, kappa)
-    return Turned(turned, missed, mxv(turned, missed))
+    return CameraAttitude(turned, missed, mxv(turned, missed))
 
 
-def pose(camera: Turned, place: Array, common_phi: npt.ArrayLike | None = None) -> tuple[Array, Array]:
+def pose(camera: CameraAttitude, place: Array, common_phi: npt.ArrayLike | None = None) -> tuple[Array, Array]:
     """Return centre ``(3, ...)`` and rotation ``(3, 3, ...)`` of a camera whose axes meet at a place of the frame.
 
     The common Phi turns the frame with all that stands on it, `Ry(Phi) R`.

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from a7sim.instrument.refusals import OutOfRange, SettingsConflict
+from a7sim.instrument.refusals import OutOfRangeError, SettingsConflictError
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class Recorder:
         """
         registration = self.by_number(number)
         if registration.struck is not None:
-            raise SettingsConflict(f"registration {number} is struck out already")
+            raise SettingsConflictError(f"registration {number} is struck out already")
         self.apply(replace(registration, struck=why))
 
     def by_number(self, number: int) -> Registration:
         """Return a registration as it stands. Raises OutOfRange for a number that is not there."""
         if not 1 <= number <= len(self.registrations):
-            raise OutOfRange(f"expected a registration 1 to {len(self.registrations)}, got {number}")
+            raise OutOfRangeError(f"expected a registration 1 to {len(self.registrations)}, got {number}")
         return self.registrations[number - 1]

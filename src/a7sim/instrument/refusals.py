@@ -1,17 +1,17 @@
 """Why the instrument does not do what it is asked."""
 
 
-class Refusal(Exception):
+class AutographError(Exception):
     """Something the instrument does not do; nothing has moved."""
 
 
-class OutOfRange(Refusal):
+class OutOfRangeError(AutographError):
     """Beyond an element's, a carriage's or a space rod's range."""
 
 
-class SettingsConflict(Refusal):
+class SettingsConflictError(AutographError):
     """Not allowed by the fittings, the base, the pictures mounted or the variant."""
 
 
-class UnknownName(Refusal):
+class UnknownNameError(AutographError):
     """A name that this instrument has no use for."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.instrument.refusals import OutOfRange
+from a7sim.instrument.refusals import OutOfRangeError
 from a7sim.manual import COUNTER_DECIMALS, Element
 
 APPROXIMATIONS = 20
@@ -16,7 +16,7 @@ UNITS_A_DRUM = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Runout:
+class PeriodicError:
     """The error of a screw that repeats with every turn."""
 
     amplitude: float
@@ -44,7 +44,7 @@ class Spindle:
     setting_sigma: float = 0.0
     zero_error: float = 0.0
     """Zero error: the shaft stands that much further than the drum says."""
-    periodic_error: Runout | None = None
+    periodic_error: PeriodicError | None = None
 
     def __post_init__(self) -> None:
         self._shaft = self.at
@@ -97,7 +97,7 @@ class Spindle:
         Raises OutOfRange; then nothing has moved.
         """
         if not self.within_range(value):
-            raise OutOfRange(f"expected {self.low:.2f} to {self.high:.2f}, got {value:.10g}")
+            raise OutOfRangeError(f"expected {self.low:.2f} to {self.high:.2f}, got {value:.10g}")
         if self.endless:
             value += self.high * round((self.at - value) / self.high)
         self.at = value

@@ -4,7 +4,7 @@ import ipaddress
 import re
 from dataclasses import dataclass
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 _ADDRESS = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([^\s:\[\]]+)):(\d{1,5})")
 
@@ -34,5 +34,5 @@ def parse_address(text: str, option: str) -> Address:
     """Return the address that a text such as 127.0.0.1:5025 or [::1]:5025 names. Raises Mistake."""
     found = _ADDRESS.fullmatch(text)
     if found is None or int(found[3]) > 65535:
-        raise Mistake(f"{option}: expected HOST:PORT such as 127.0.0.1:5025, got {text!r}")
+        raise A7SimError(f"{option}: expected HOST:PORT such as 127.0.0.1:5025, got {text!r}")
     return Address(found[1] or found[2], int(found[3]))

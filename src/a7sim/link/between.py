@@ -8,8 +8,8 @@ from typing import Any
 from a7sim.instrument.language import MAX_LINE_LENGTH, LinkEvent, Listener, loggable_reply, redact_token
 from a7sim.link.clock import WallClock
 from a7sim.link.opening import open_port, port_errors
-from a7sim.link.replies import NotAReply, Part, parse_reply
-from a7sim.mistakes import Mistake
+from a7sim.link.replies import MalformedReplyError, Part, parse_reply
+from a7sim.mistakes import A7SimError
 
 POLL_INTERVAL_S = 0.1
 """How often somebody who waits looks whether to stop."""
@@ -17,7 +17,7 @@ POLL_INTERVAL_S = 0.1
 _AT_ONCE = 65536
 
 
-class Between:
+class RecordingProxy:
     """A door with an instrument behind it, to which one client at a time is let through.
 
     What the listener raises ends it: neither line nor reply goes on that was not heard.
@@ -30,7 +30,7 @@ class Between:
         self._stop = stop
         self._one_at_a_time = threading.Lock()
         self._clients = 0
-        self._trouble: Mistake | None = None
+        self._trouble: A7SimError | None = None
 
     def serve(self, door: socket.socket) -> None:
         """Let clients through until it is told to stop. Raises Mistake where the instrument or the listener fails."""
@@ -68,11 +68,11 @@ class Between:
     def _until_gone(self, gone: threading.Event, carry: Callable[..., None], *between: Any) -> None:
         try:
             carry(*between)
-        except Mistake as mistake:
+        except A7SimError as mistake:
             self._trouble = mistake
         except OSError:
             if not gone.is_set() and carry == self._replies:
-                self._trouble = Mistake(f"{self._url}: the line to the instrument broke")
+                self._trouble = A7SimError(f"{self._url}: the line to the instrument broke")
         finally:
             gone.set()
 
@@ -119,7 +119,7 @@ def _taken(come: bytearray) -> tuple[str, int] | None:
     """Return the text of the first whole reply and how many bytes it is."""
     try:
         taken = parse_reply(come)
-    except NotAReply:
+    except MalformedReplyError:
         end = come.find(b"\n") + 1
         return (come[: end - 1].decode("latin-1"), end) if end else None
     return None if taken is None else (";".join(map(_heard, taken.parts)), taken.length)

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Protocol, Self
 
 from a7sim.link.opening import TIMEOUT_S, open_port
-from a7sim.link.replies import NotAReply, Part, parse_reply
+from a7sim.link.replies import MalformedReplyError, Part, parse_reply
 
 
 class Port(Protocol):
@@ -20,7 +20,7 @@ class Port(Protocol):
         """Return a line, or what came before the timeout."""
 
 
-class InstrumentRefused(Exception):
+class InstrumentError(Exception):
     """The instrument reported errors: `errors` are the entries of its queue."""
 
     def __init__(self, line: str, errors: list[str]) -> None:
@@ -91,7 +91,7 @@ class Client:
     def lock(self) -> Iterator[Self]:
         """Hold the lock, so that this client alone turns. Raises InstrumentRefused while another holds it."""
         if self.ask("SYST:LOCK:REQ?") != "1":
-            raise InstrumentRefused("SYST:LOCK:REQ?", ["another client holds the lock"])
+            raise InstrumentError("SYST:LOCK:REQ?", ["another client holds the lock"])
         try:
             yield self
         finally:
@@ -110,7 +110,7 @@ class Client:
         self.send(line)
         reply = self._port.readline()
         if not reply.endswith(b"\n"):
-            raise InstrumentRefused(line, self.errors())
+            raise InstrumentError(line, self.errors())
         return reply[:-1].decode("ascii")
 
     def fields(self, line: str) -> list[str]:
@@ -129,7 +129,7 @@ class Client:
         self.send(line)
         parts = self.reply()
         if parts is None or not isinstance(parts[0], bytes):
-            raise InstrumentRefused(line, self.errors())
+            raise InstrumentError(line, self.errors())
         return parts[0]
 
     def reply(self) -> tuple[Part, ...] | None:
@@ -140,7 +140,7 @@ class Client:
             received += more
             try:
                 taken = parse_reply(received)
-            except NotAReply:
+            except MalformedReplyError:
                 return None
             if taken is not None:
                 return taken.parts
@@ -161,4 +161,4 @@ class Client:
         """Raise InstrumentRefused if the instrument has reported anything since the last look."""
         found = self.errors()
         if found:
-            raise InstrumentRefused(about, found)
+            raise InstrumentError(about, found)

@@ -6,10 +6,10 @@ from typing import Protocol
 
 import numpy as np
 
-from a7sim.instrument.language import Desk, ErrorNumber, format_entry
+from a7sim.instrument.language import ErrorNumber, SharedInstrument, format_entry
 from a7sim.link.clock import Clock, WallClock
-from a7sim.link.faults import Cut, Faults, Noise
-from a7sim.link.pacing import Pace
+from a7sim.link.faults import ConnectionDropped, FaultInjector, FaultRates
+from a7sim.link.pacing import BaudLimiter
 
 CHUNK_BYTES = 512
 """Bytes of input, some dozens of lines, that are obeyed before the others have their turn."""
@@ -19,12 +19,12 @@ MAX_PACED_BYTES = 4096
 
 
 @dataclass(frozen=True, slots=True)
-class Terms:
+class ServerLimits:
     """What every client is granted."""
 
     baud: int | None = None
     """Bits/s of every line, None where bytes need no time."""
-    faults: Faults | None = None
+    faults: FaultRates | None = None
     fault_seed: int = 0
     idle_timeout: float = 3600.0
     """s without a byte after which a client is dropped."""
@@ -33,7 +33,7 @@ class Terms:
     max_clients: int = 64
 
 
-class Wire(Protocol):
+class Transport(Protocol):
     """What carries the bytes of one client, and tells the conversation what is received and how the line stands."""
 
     def write(self, data: bytes) -> None:
@@ -52,11 +52,17 @@ class Wire(Protocol):
         """Hang up at once."""
 
 
-class Conversation:
+class ClientSession:
     """A client at its wire."""
 
     def __init__(
-        self, desk: Desk, clock: Clock | WallClock, terms: Terms, wire: Wire, number: int, serial: bool
+        self,
+        desk: SharedInstrument,
+        clock: Clock | WallClock,
+        terms: ServerLimits,
+        wire: Transport,
+        number: int,
+        serial: bool,
     ) -> None:
         loop = self._loop = asyncio.get_running_loop()
         self._desk = desk
@@ -68,10 +74,10 @@ class Conversation:
         self._reading = self._open = True
         self._clogged = self._ended = False
         faults = terms.faults
-        self._noise = Noise(faults, _generator(terms.fault_seed, number)) if faults else None
+        self._noise = FaultInjector(faults, _generator(terms.fault_seed, number)) if faults else None
         delay = faults.delay if faults else 0.0
-        self._incoming = Pace(loop, self._arrived, terms.baud) if terms.baud else None
-        self._outgoing = Pace(loop, self._carried, terms.baud, delay) if terms.baud or delay else None
+        self._incoming = BaudLimiter(loop, self._arrived, terms.baud) if terms.baud else None
+        self._outgoing = BaudLimiter(loop, self._carried, terms.baud, delay) if terms.baud or delay else None
         self._plain = self._incoming is None and self._outgoing is None and self._noise is None
         """Whether bytes go straight to the engine and from it, as long as nothing holds them back."""
         self._next: asyncio.Handle | None = None
@@ -196,7 +202,7 @@ class Conversation:
         if self._noise is not None:
             try:
                 reply = self._noise.apply(reply)
-            except Cut:
+            except ConnectionDropped:
                 self._wire.abort()
                 return
         if self._outgoing is not None:

@@ -7,7 +7,7 @@ BRIEFLY, UNTIL_ALONE = 0.5e-3, 1.0
 """s; who twice in a row gets the processor back later than this has company, and keeps it for a while."""
 
 
-class Courtesy:
+class YieldPolicy:
     """Giving up the processor between two looks, which is quicker than to sleep and be woken.
 
     Where others want the processor it would be theirs for milliseconds, so there it is kept.

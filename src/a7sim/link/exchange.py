@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from a7sim.link.client import Client
 from a7sim.link.replies import Part, part_as_text
 from a7sim.manual import SCPI_VERSION
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 _MARKER = ":SYST:ERR:COUN?;:SYST:VERS?"
 """Sent behind every line: what it answers shows that the line had no reply, or that its reply is whole."""
@@ -41,7 +41,7 @@ def send_line(client: Client, line: str) -> Exchange:
 def _marker(client: Client, line: str) -> tuple[Part, ...]:
     marker = _expected(client, line)
     if not _is_marker(marker):
-        raise Mistake(f"{line}: expected one reply to a line, got another: {';'.join(map(part_as_text, marker))}")
+        raise A7SimError(f"{line}: expected one reply to a line, got another: {';'.join(map(part_as_text, marker))}")
     return marker
 
 
@@ -51,9 +51,9 @@ def _expected(client: Client, line: str) -> tuple[Part, ...]:
         return reply
     client.send("*IDN?")
     if client.reply() is None:
-        raise Mistake(f"{line}: expected an answer in time, got none")
+        raise A7SimError(f"{line}: expected an answer in time, got none")
     why = "the server asks for a token, or another than was given, or lost the reply"
-    raise Mistake(f"{line}: expected an answer, got none but to *IDN?: {why}")
+    raise A7SimError(f"{line}: expected an answer, got none but to *IDN?: {why}")
 
 
 def _errors(client: Client, marker: tuple[Part, ...]) -> tuple[str, ...]:

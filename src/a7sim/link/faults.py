@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 EXAMPLE = "drop-reply:0.01,delay:50ms,garble:0.001,disconnect:0.0005"
 
@@ -17,7 +17,7 @@ _DELAY = re.compile(r"(\d+(?:\.\d+)?)(ms|s)")
 
 
 @dataclass(frozen=True, slots=True)
-class Faults:
+class FaultRates:
     """How often a line fails its client, and how late it is."""
 
     drop_reply: float = 0.0
@@ -30,18 +30,18 @@ class Faults:
     """s by which every reply is late."""
 
 
-def parse_faults(text: str) -> Faults:
+def parse_faults(text: str) -> FaultRates:
     """Return the faults that a text such as EXAMPLE names. Raises Mistake."""
     found: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = part.strip().partition(":")
         key = name.replace("-", "_")
         if name not in ("drop-reply", "garble", "disconnect", "delay"):
-            raise Mistake(f"--fault: expected drop-reply, delay, garble or disconnect as in {EXAMPLE}, got {part!r}")
+            raise A7SimError(f"--fault: expected drop-reply, delay, garble or disconnect as in {EXAMPLE}, got {part!r}")
         if key in found:
-            raise Mistake(f"--fault: expected {name} once, got it twice in {text!r}")
+            raise A7SimError(f"--fault: expected {name} once, got it twice in {text!r}")
         found[key] = _delay(value) if name == "delay" else _probability(name, value)
-    return Faults(**found)
+    return FaultRates(**found)
 
 
 def _probability(name: str, text: str) -> float:
@@ -50,7 +50,7 @@ def _probability(name: str, text: str) -> float:
     except ValueError:
         value = math.nan
     if not 0.0 <= value <= 1.0:
-        raise Mistake(f"--fault {name}: expected a probability from 0 to 1, got {text!r}")
+        raise A7SimError(f"--fault {name}: expected a probability from 0 to 1, got {text!r}")
     return value
 
 
@@ -58,18 +58,18 @@ def _delay(text: str) -> float:
     found = _DELAY.fullmatch(text)
     seconds = float(found[1]) * (1e-3 if found[2] == "ms" else 1.0) if found else math.inf
     if seconds > MAX_DELAY:
-        raise Mistake(f"--fault delay: expected up to {MAX_DELAY:g}s, such as 50ms or 1.5s, got {text!r}")
+        raise A7SimError(f"--fault delay: expected up to {MAX_DELAY:g}s, such as 50ms or 1.5s, got {text!r}")
     return seconds
 
 
-class Cut(Exception):
+class ConnectionDropped(Exception):
     """The line is cut."""
 
 
-class Noise:
+class FaultInjector:
     """What one line does to the replies that it carries, drawn from a generator of its own."""
 
-    def __init__(self, faults: Faults, rng: np.random.Generator) -> None:
+    def __init__(self, faults: FaultRates, rng: np.random.Generator) -> None:
         self._faults = faults
         self._rng = rng
 
@@ -77,7 +77,7 @@ class Noise:
         """Return what arrives of a reply, nothing where it is lost. Raises Cut."""
         cut, dropped = self._rng.random(2)
         if cut < self._faults.disconnect:
-            raise Cut
+            raise ConnectionDropped
         if dropped < self._faults.drop_reply:
             return b""
         return self._garbled(reply) if self._faults.garble else reply

@@ -5,7 +5,7 @@ from typing import Any
 
 from serial import PortNotOpenError, SerialBase, SerialException, to_bytes
 
-from a7sim.instrument.language import MAX_BUFFERED_BYTES, Desk, Engine
+from a7sim.instrument.language import MAX_BUFFERED_BYTES, Engine, SharedInstrument
 from a7sim.link.clock import Clock
 from a7sim.link.waiting import feed_until_idle
 
@@ -25,7 +25,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         self,
         port: str | None = None,
         *args: Any,
-        desk: Desk | None = None,
+        desk: SharedInstrument | None = None,
         clock: Clock | None = None,
         client: str | None = None,
         **kwargs: Any,
@@ -40,7 +40,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         self._cancelled = False
         super().__init__("in process" if port is None and desk is not None else port, *args, **kwargs)
 
-    def _connect(self) -> Desk:
+    def _connect(self) -> SharedInstrument:
         if self._desk is None:
             raise SerialException("expected a desk to connect the port to, got none")
         return self._desk

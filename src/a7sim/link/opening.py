@@ -7,7 +7,7 @@ from typing import Any
 
 import serial
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 URL_FORMS = "a7sim://SCENARIO?seed=N, tcp://HOST:PORT, rfc2217://HOST:PORT, or the path of a device or pty"
 
@@ -28,12 +28,12 @@ def open_port(url: str, timeout: float = TIMEOUT_S) -> Any:
     `socket://` is pyserial's name of `tcp://`. Raises Mistake in one sentence where it cannot be opened.
     """
     if not _is_named(url):
-        raise Mistake(f"expected {URL_FORMS}, got {url!r}")
+        raise A7SimError(f"expected {URL_FORMS}, got {url!r}")
     named = re.sub("^socket://", "tcp://", url, flags=re.IGNORECASE)
     try:
         return serial.serial_for_url(named, timeout=timeout)
     except (OSError, ValueError) as error:
-        raise Mistake(f"{url}: expected an instrument to answer there: {_reason(error)}") from error
+        raise A7SimError(f"{url}: expected an instrument to answer there: {_reason(error)}") from error
 
 
 @contextmanager
@@ -42,7 +42,7 @@ def port_errors(url: str) -> Iterator[None]:
     try:
         yield
     except serial.SerialException as error:
-        raise Mistake(f"{url}: the line broke: {_reason(error)}") from error
+        raise A7SimError(f"{url}: the line broke: {_reason(error)}") from error
 
 
 def _is_named(url: str) -> bool:

@@ -11,7 +11,7 @@ SLICE = 0.01
 """s of the line that are handed on at once."""
 
 
-class Pace:
+class BaudLimiter:
     """Hands bytes on, in order, when a line of a baud rate (None: at once) that is late by a delay in s would."""
 
     def __init__(

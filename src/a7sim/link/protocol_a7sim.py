@@ -11,9 +11,9 @@ from urllib.parse import unquote
 from serial import SerialException
 
 from a7sim.instrument import Autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
 
 _EXAMPLE = "a7sim://scenarios/akwanga.toml?seed=7"
@@ -26,22 +26,22 @@ class Serial(InProcessSerial):
 
     _connected_to: str | None = None
 
-    def _connect(self) -> Desk:
+    def _connect(self) -> SharedInstrument:
         url = str(self.port)
         if self._desk is None or self._connected_to != url:
             self._desk, self._connected_to = _described_by(url), url
         return self._desk
 
 
-def _described_by(url: str) -> Desk:
+def _described_by(url: str) -> SharedInstrument:
     scenario_name, seed = _taken_apart(url)
     try:
         scenario = load_scenario(scenario_name)
         chosen = scenario.seed if seed is None else seed
         autograph = Autograph.from_scenario(scenario, chosen)
-    except (Mistake, OSError) as mistake:
+    except (A7SimError, OSError) as mistake:
         raise SerialException("; ".join(str(mistake).splitlines())) from mistake
-    return Desk(autograph)
+    return SharedInstrument(autograph)
 
 
 def _taken_apart(url: str) -> tuple[str, int | None]:

@@ -7,10 +7,10 @@ import termios
 import tty
 from pathlib import Path
 
-from a7sim.link.conversation import Conversation
-from a7sim.link.courtesy import Courtesy
+from a7sim.link.conversation import ClientSession
+from a7sim.link.courtesy import YieldPolicy
 from a7sim.link.wires import MAX_UNREAD, Host
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 POLLS_BEFORE_SLEEP = 8
 """A client that was answered mostly asks again at once: so often the wire looks before it sleeps until it is woken."""
@@ -22,7 +22,7 @@ PTY_DIRECTORY = "/dev/pts/"
 """Where the links lead that may be overwritten."""
 
 
-class PtyWire:
+class PtyConnection:
     """The instrument's end of a pseudo-terminal, and the link to the other end.
 
     It keeps the other end open itself, so that clients may come and go. Like a cable of three wires it cannot tell
@@ -36,7 +36,7 @@ class PtyWire:
         self._unsent = bytearray()
         self._clogged = False
         self._reading = False
-        self._courtesy = Courtesy()
+        self._courtesy = YieldPolicy()
         self._loop = asyncio.get_running_loop()
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
@@ -51,10 +51,12 @@ class PtyWire:
         self._conversation = self._welcomed()
         self.resume_reading()
 
-    def _welcomed(self) -> Conversation:
+    def _welcomed(self) -> ClientSession:
         welcomed = self._host.accept(self, serial=True)
         if isinstance(welcomed, bytes):
-            raise Mistake(f"--pty: expected fewer lines than clients are allowed: {welcomed.decode('ascii').strip()}")
+            raise A7SimError(
+                f"--pty: expected fewer lines than clients are allowed: {welcomed.decode('ascii').strip()}"
+            )
         return welcomed
 
     def remove(self) -> None:
@@ -143,15 +145,17 @@ def _make_link(link: Path, device: str) -> None:
     temporary = link.with_name(f".{link.name}.{os.getpid()}")
     try:
         if os.path.lexists(link) and not (link.is_symlink() and str(link.readlink()).startswith(PTY_DIRECTORY)):
-            raise Mistake(f"--pty {link}: expected nothing there or an old link to a terminal, got something else")
+            raise A7SimError(f"--pty {link}: expected nothing there or an old link to a terminal, got something else")
         if _is_served(link):
-            raise Mistake(f"--pty {link}: expected a path of its own, got that of another instrument, which is served")
+            raise A7SimError(
+                f"--pty {link}: expected a path of its own, got that of another instrument, which is served"
+            )
         temporary.unlink(missing_ok=True)
         temporary.symlink_to(device)
         temporary.replace(link)
     except OSError as error:
         temporary.unlink(missing_ok=True)
-        raise Mistake(f"--pty {link}: expected a place where a link can be made: {error.strerror}") from error
+        raise A7SimError(f"--pty {link}: expected a place where a link can be made: {error.strerror}") from error
 
 
 def _is_served(link: Path) -> bool:

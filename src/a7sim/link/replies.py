@@ -8,19 +8,19 @@ Part = str | bytes
 """What one query answered: text, or the bytes of a block."""
 
 
-class NotAReply(Exception):
+class MalformedReplyError(Exception):
     """Bytes that no instrument of this language sends."""
 
 
 @dataclass(frozen=True, slots=True)
-class Taken:
+class ParsedReply:
     """A reply and how many bytes it took, its end with them."""
 
     parts: tuple[Part, ...]
     length: int
 
 
-def parse_reply(received: bytes | bytearray) -> Taken | None:
+def parse_reply(received: bytes | bytearray) -> ParsedReply | None:
     """Return the reply at the beginning of what was received, None while it is not whole. Raises NotAReply."""
     parts: list[Part] = []
     at = 0
@@ -31,9 +31,9 @@ def parse_reply(received: bytes | bytearray) -> Taken | None:
         part, at = found
         parts.append(part)
         if received[at] == _END:
-            return Taken(tuple(parts), at + 1)
+            return ParsedReply(tuple(parts), at + 1)
         if received[at] != _SEMICOLON:
-            raise NotAReply(f"expected ; or a line end behind a block, got byte {received[at]}")
+            raise MalformedReplyError(f"expected ; or a line end behind a block, got byte {received[at]}")
         at += 1
 
 
@@ -52,13 +52,13 @@ def _block(received: bytes | bytearray, start: int) -> tuple[bytes, int] | None:
     if not digits:
         return None
     if digits not in b"123456789":
-        raise NotAReply(f"expected a block of definite length, got #{digits.decode('latin-1')}")
+        raise MalformedReplyError(f"expected a block of definite length, got #{digits.decode('latin-1')}")
     begins = start + 2 + int(digits)
     size = bytes(received[start + 2 : begins])
     if len(size) < int(digits):
         return None
     if not size.isdigit():
-        raise NotAReply(f"expected the size of a block, got {size.decode('latin-1')}")
+        raise MalformedReplyError(f"expected the size of a block, got {size.decode('latin-1')}")
     ends = begins + int(size)
     return (bytes(received[begins:ends]), ends) if len(received) >= ends else None
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from a7sim.instrument.language import Desk, ErrorNumber, format_entry
+from a7sim.instrument.language import ErrorNumber, SharedInstrument, format_entry
 from a7sim.link.addresses import Address
 from a7sim.link.clock import Clock, WallClock
-from a7sim.link.conversation import Conversation, Terms, Wire
-from a7sim.link.pty_wire import PtyWire
-from a7sim.link.wires import MAX_READ, TcpWire, TelnetWire
-from a7sim.mistakes import Mistake
+from a7sim.link.conversation import ClientSession, ServerLimits, Transport
+from a7sim.link.pty_wire import PtyConnection
+from a7sim.link.wires import MAX_READ, TcpConnection, TelnetConnection
+from a7sim.mistakes import A7SimError
 from a7sim.wording import pluralize
 
 MAX_REJECTION_NOTICES = 64
@@ -24,7 +24,7 @@ LISTEN_BACKLOG = 512
 
 
 @dataclass(frozen=True)
-class Doors:
+class Endpoints:
     """Where the instrument is to be reached."""
 
     tcp: Sequence[Address] = ()
@@ -35,41 +35,41 @@ class Doors:
 class Server:
     """An instrument that is served, from `open` to `close`."""
 
-    def __init__(self, desk: Desk, clock: Clock | WallClock, terms: Terms) -> None:
+    def __init__(self, desk: SharedInstrument, clock: Clock | WallClock, terms: ServerLimits) -> None:
         self.desk = desk
         self._clock = clock
         self._terms = terms
         self._buffer = memoryview(bytearray(MAX_READ))
-        self._wires: set[Wire] = set()
-        self._turned_away: set[Wire] = set()
+        self._wires: set[Transport] = set()
+        self._turned_away: set[Transport] = set()
         self._listeners: list[asyncio.Server] = []
-        self._terminals: list[PtyWire] = []
+        self._terminals: list[PtyConnection] = []
 
-    async def open(self, doors: Doors) -> list[dict[str, Any]]:
+    async def open(self, doors: Endpoints) -> list[dict[str, Any]]:
         """Open all doors and return what each is, as a document. Raises Mistake, and then none is open."""
         try:
-            opened = [await self._listen("tcp", TcpWire, address) for address in doors.tcp]
-            opened += [await self._listen("rfc2217", TelnetWire, address) for address in doors.rfc2217]
+            opened = [await self._listen("tcp", TcpConnection, address) for address in doors.tcp]
+            opened += [await self._listen("rfc2217", TelnetConnection, address) for address in doors.rfc2217]
             opened += [self._lay(path) for path in doors.pty]
         except BaseException:
             await self.close()
             raise
         return opened
 
-    async def _listen(self, kind: str, wire: type[TcpWire], address: Address) -> dict[str, Any]:
+    async def _listen(self, kind: str, wire: type[TcpConnection], address: Address) -> dict[str, Any]:
         loop = asyncio.get_running_loop()
         try:
             listener = await loop.create_server(
                 lambda: wire(self, self._buffer), address.host, address.port, backlog=LISTEN_BACKLOG
             )
         except OSError as error:
-            raise Mistake(f"--{kind} {address}: expected an address to listen on: {_reason(error)}") from error
+            raise A7SimError(f"--{kind} {address}: expected an address to listen on: {_reason(error)}") from error
         self._listeners.append(listener)
         host, port = listener.sockets[0].getsockname()[:2]
         return {"kind": kind, "host": host, "port": port, "url": f"{kind}://{Address(host, port)}"}
 
     def _lay(self, path: Path) -> dict[str, Any]:
-        terminal = PtyWire(self, path)
+        terminal = PtyConnection(self, path)
         self._terminals.append(terminal)
         return {"kind": "pty", "path": str(path), "device": terminal.device, "url": str(path)}
 
@@ -90,7 +90,7 @@ class Server:
         """How many there are, each terminal counted as one."""
         return len(self._wires)
 
-    def accept(self, wire: Wire, serial: bool) -> Conversation | bytes:
+    def accept(self, wire: Transport, serial: bool) -> ClientSession | bytes:
         """Return a conversation for a wire, or why there is none, as a line."""
         most = self._terms.max_clients
         if len(self._wires) >= most:
@@ -100,9 +100,9 @@ class Server:
             text = format_entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {pluralize(most, 'client')} at a time")
             return f"{text}\n".encode("ascii")
         self._wires.add(wire)
-        return Conversation(self.desk, self._clock, self._terms, wire, self.desk.client_count + 1, serial)
+        return ClientSession(self.desk, self._clock, self._terms, wire, self.desk.client_count + 1, serial)
 
-    def release(self, wire: Wire) -> None:
+    def release(self, wire: Transport) -> None:
         """Take note that a wire is no more."""
         self._wires.discard(wire)
         self._turned_away.discard(wire)

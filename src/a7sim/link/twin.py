@@ -8,10 +8,10 @@ from a7sim.link.client import Client, Port
 from a7sim.link.exchange import send_line
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import open_port, port_errors
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 
-class BesideTwin:
+class TwinCheckedPort:
     """A port whose replies are the served instrument's, checked against those of its twin.
 
     Whoever holds it gets only what was served; the twin says whether a reply is due, and what the scenario makes of
@@ -37,7 +37,7 @@ class BesideTwin:
         due = self._twin.readline(size)
         served = self._served.readline(size)
         if served != due:
-            raise Mistake(f"{self._url}: {_difference(self._sent, served, due)}")
+            raise A7SimError(f"{self._url}: {_difference(self._sent, served, due)}")
         return served
 
 
@@ -70,7 +70,7 @@ def open_checked_port(url: str, timeout: float, token: str | None = None) -> Ite
             if token is not None:
                 client.log_in(token)
             if send_line(client, "SYST:LOCK:REQ?").shown != "1":
-                raise Mistake(f"{url}: expected the instrument to be free, but another client holds its lock")
+                raise A7SimError(f"{url}: expected the instrument to be free, but another client holds its lock")
             yield port
             client.send("SYST:LOCK:REL;*OPC?")
             client.reply()

@@ -5,7 +5,7 @@ import socket
 from contextlib import suppress
 from typing import Protocol, cast
 
-from a7sim.link.conversation import Conversation, Wire
+from a7sim.link.conversation import ClientSession, Transport
 from a7sim.link.telnet import Telnet
 
 MAX_READ = 16 * 1024
@@ -24,14 +24,14 @@ FAREWELL = 1.0
 class Host(Protocol):
     """Who opens a conversation for every wire."""
 
-    def accept(self, wire: Wire, serial: bool) -> Conversation | bytes:
+    def accept(self, wire: Transport, serial: bool) -> ClientSession | bytes:
         """Return a conversation, or why there is none, as a line."""
 
-    def release(self, wire: Wire) -> None:
+    def release(self, wire: Transport) -> None:
         """Take note that a wire is no more."""
 
 
-class TcpWire(asyncio.BufferedProtocol):
+class TcpConnection(asyncio.BufferedProtocol):
     """A TCP connection. All share one buffer, since what is read is taken out of it at once."""
 
     serial = False
@@ -40,7 +40,7 @@ class TcpWire(asyncio.BufferedProtocol):
         self._host = host
         self._buffer = buffer
         self._transport: asyncio.Transport
-        self._conversation: Conversation | None = None
+        self._conversation: ClientSession | None = None
         self._answered = False
 
     # --- what asyncio tells ---------------------------------------------------------------------------
@@ -51,7 +51,7 @@ class TcpWire(asyncio.BufferedProtocol):
         self._socket = self._transport.get_extra_info("socket")
         self._transport.set_write_buffer_limits(high=MAX_UNREAD)
         welcomed = self._host.accept(self, self.serial)
-        if isinstance(welcomed, Conversation):
+        if isinstance(welcomed, ClientSession):
             self._conversation = welcomed
         else:
             self._turn_away(welcomed)
@@ -136,7 +136,7 @@ class TcpWire(asyncio.BufferedProtocol):
         self._transport.abort()
 
 
-class TelnetWire(TcpWire):
+class TelnetConnection(TcpConnection):
     """A TCP connection that passes for a serial port (RFC 2217)."""
 
     serial = True

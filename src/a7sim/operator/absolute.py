@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.among import Who
+from a7sim.among import Indices
 from a7sim.geometry import Array, length_of
-from a7sim.operator.bench import Bench
+from a7sim.operator.bench import Workstation
 from a7sim.operator.job import ModelJob
 from a7sim.operator.levelling import MAX_ROUNDS, Control, Fit, Levelling, LevellingRound, Settings
 from a7sim.operator.seat import counter_value
@@ -18,7 +18,7 @@ TOLERATED_SHARE = 2e-4
 
 
 @dataclass(frozen=True)
-class OnGround:
+class GroundOrientation:
     """A model in the system of the ground, as a session left it."""
 
     scale_number: float
@@ -44,14 +44,14 @@ class OnGround:
 
 
 def absolute_orientation_at(
-    bench: Bench, model: ModelJob, control: Mapping[str, tuple[float, float, float]]
-) -> dict[int, OnGround]:
+    bench: Workstation, model: ModelJob, control: Mapping[str, tuple[float, float, float]]
+) -> dict[int, GroundOrientation]:
     """Level and scale a model, read it with heights in metres, and set the instruments back to how they stood.
 
     `control` is X, Y, Z in m, nan for what is not known of a point. What comes back is by session; those whose models
     do not show two points of control in plan and three in height remark so and do nothing.
     """
-    found: dict[int, OnGround] = {}
+    found: dict[int, GroundOrientation] = {}
     crew = bench.crew
     for who, names in bench.group_by_points(crew.active, [*control]):
         known = Control(tuple(names), np.array([control[name] for name in names]).reshape(-1, 3).T)
@@ -71,7 +71,7 @@ def absolute_orientation_at(
     return found
 
 
-def _gear(bench: Bench, metres: float) -> str:
+def _gear(bench: Workstation, metres: float) -> str:
     """Return the planned height gear, or that which counts metres at the scale nearest to the model as it stands."""
     planned, gears = bench.job.plan.height_gear, bench.seat.manual.height_gears
     if isinstance(planned, str):
@@ -88,7 +88,7 @@ class _InMetres:
         self.gear = gear
         self.number = 1e3 * self.seat.manual.height_gears[gear].units_per_mm
 
-    def done(self, who: Who, fit: Fit, before: Settings, start: Array) -> dict[int, OnGround]:
+    def done(self, who: Indices, fit: Fit, before: Settings, start: Array) -> dict[int, GroundOrientation]:
         """Level, read and set back to settings and readings of Z ``(sessions,)``."""
         self.seat.drive(who, {"Z": start[who]})
         self.seat.set_height_gear(who, self.gear)
@@ -102,7 +102,7 @@ class _InMetres:
         self._set_back(who, before, start, shift)
         return found
 
-    def _index_set(self, who: Who) -> Array:
+    def _index_set(self, who: Indices) -> Array:
         """Make the Z counter read heights, on the mean of the control; return how much more it reads ``(m,)``."""
         names = [self.control.names[i] for i in self.control.with_height]
         self.bench.begin_round(who, MAX_ROUNDS + 1)
@@ -110,7 +110,7 @@ class _InMetres:
         more = np.mean(self.control.ground[2, self.control.with_height][:, None] - readings, axis=0)
         return self.seat.shift_counter(who, "Z", more)
 
-    def _read(self, who: Who) -> dict[str, Array]:
+    def _read(self, who: Indices) -> dict[str, Array]:
         """Measure control and all other points that are shown; X, Y in mm and Z in m ``(3, sessions)``."""
         self.bench.begin_round(who, MAX_ROUNDS + 2)
         wanted = dict.fromkeys([*self.control.names, *self.seat.model.other_points])
@@ -119,18 +119,18 @@ class _InMetres:
 
     def _concluded(
         self,
-        who: Who,
+        who: Indices,
         rounds: Mapping[int, Sequence[LevellingRound]],
         before: Settings,
         elements: Settings,
         readings: Settings,
-    ) -> dict[int, OnGround]:
+    ) -> dict[int, GroundOrientation]:
         names, (first, last) = self.control.names, self.control.ends
         mm = 1.0 / self.seat.manual.scales["X"].units_per_mm
         read = 1e-3 * self.number * mm * length_of((readings[names[last]] - readings[names[first]])[:2])
         distance = read - length_of(self.control.between(first, last)[:2])
         return {
-            int(s): OnGround(
+            int(s): GroundOrientation(
                 self.number,
                 self.gear,
                 rounds[int(s)],
@@ -147,7 +147,7 @@ class _InMetres:
             for s in who
         }
 
-    def _set_back(self, who: Who, before: Settings, start: Array, shift: Array) -> None:
+    def _set_back(self, who: Indices, before: Settings, start: Array, shift: Array) -> None:
         """Set elements, index and gear as they were before."""
         if who.size:
             self.seat.shift_counter(who, "Z", -shift[who])

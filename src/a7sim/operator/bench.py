@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, exclude
+from a7sim.among import Indices, exclude
 from a7sim.geometry import Array
-from a7sim.operator.crew import Crew
-from a7sim.operator.eyes import Eyes
-from a7sim.operator.floating_mark import Clearing, FloatingMark, Judgement
-from a7sim.operator.hands import Hands, Truths
+from a7sim.operator.crew import OperatorBatch
+from a7sim.operator.eyes import Pointing
+from a7sim.operator.floating_mark import Clearing, FloatingMark, SettingErrors
+from a7sim.operator.hands import BoolArray, InstrumentDriver
 from a7sim.operator.job import Job, ModelJob
-from a7sim.operator.seat import Seat, side_name, wrap_gon
+from a7sim.operator.seat import Controls, side_name, wrap_gon
 from a7sim.operator.slips import neighbours
 
 MAX_POINTINGS = 12
@@ -42,19 +42,19 @@ class Parallaxes:
     places: Array
     disagreement: npt.NDArray[np.object_]
 
-    def disagrees(self, who: Who) -> Who:
+    def disagrees(self, who: Indices) -> Indices:
         """Return those for whom the images of a point could not be brought together."""
         parted = np.array([self.disagreement[session] is not None for session in who], dtype=bool)
         return np.asarray(who[parted])
 
 
 @dataclass(frozen=True)
-class Cleared:
+class ClearedPoint:
     """What clearing a y-parallax with an element came to; arrays ``(sessions,)``, zero for those not in `who`."""
 
-    sessions: Who
+    sessions: Indices
     """Those who found it clear, or cleared it."""
-    disagreement: Who
+    disagreement: Indices
     """Those to whom the two images did not come together."""
     arrival_parallax_mm: Array
     """The y-parallax in mm as it seemed on arriving."""
@@ -64,15 +64,17 @@ class Cleared:
     """The turn that cleared the point, gon or mm, as it is written down."""
 
 
-class Bench:
+class Workstation:
     """A crew at work."""
 
-    def __init__(self, crew: Crew, hands: Hands, job: Job, tick: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self, crew: OperatorBatch, hands: InstrumentDriver, job: Job, tick: Callable[[], None] = lambda: None
+    ) -> None:
         self.crew = crew
         self.job = job
         self.hands = hands
-        self.seat = Seat(crew, hands, job)
-        self.eyes = Eyes(self.seat)
+        self.seat = Controls(crew, hands, job)
+        self.eyes = Pointing(self.seat)
         self.mark = FloatingMark(self.eyes)
         self._tick = tick
         self._prints: Mapping[int, Mapping[str, Array]] = {}
@@ -80,14 +82,14 @@ class Bench:
 
     # --- setting up -----------------------------------------------------------------------------------
 
-    def begin(self, who: Who, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> None:
+    def begin(self, who: Indices, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> None:
         """Take up a model whose pictures are mounted; `prints` by hand (1 left, 2 right), places ``(2, sessions)``."""
         self.eyes.set_prints(prints)
         self._prints = prints
         self._entries.clear()
         self.seat.begin(who, model)
 
-    def preset(self, who: Who, point: str) -> None:
+    def preset(self, who: Indices, point: str) -> None:
         """Point at a point in the left-hand photograph and make the counters show the plan's numbers there."""
         plan = self.job.plan
         self.seat.drive_z_to(who, np.full(who.size, -plan.projection_height))
@@ -96,17 +98,17 @@ class Bench:
         self.eyes.bisect(self.crew.remaining(who), 1, point, errors)
         self.seat.preset(self.crew.remaining(who), plan.preset)
 
-    def begin_round(self, who: Who, number: int) -> None:
+    def begin_round(self, who: Indices, number: int) -> None:
         """Begin a round of a procedure: what is read now is entered under its number."""
         self.crew.begin_round(who, number)
         if self.crew.person is not None:
             self.hands.note(who, f"{self.seat.model.name}: {self.crew.person.book.form}, round {number}")
 
-    def compute(self, who: Who) -> None:
+    def compute(self, who: Indices) -> None:
         """Spend the time of one computation."""
         self.crew.spend(who, self.crew.observer.seconds_to_compute, "computing")
 
-    def has_point(self, who: Who, point: str, hands: Sequence[int] = (1, 2)) -> Truths:
+    def has_point(self, who: Indices, point: str, hands: Sequence[int] = (1, 2)) -> BoolArray:
         """Return which of those who act find a point pricked on both prints, or on that of one photograph."""
         prints = [self._prints[hand].get(point) for hand in hands]
         if any(each is None for each in prints):
@@ -114,8 +116,8 @@ class Bench:
         return np.asarray(~np.isnan([each[0, who] for each in prints if each is not None]).any(axis=0))
 
     def group_by_points(
-        self, who: Who, points: Sequence[str], hands: Sequence[int] = (1, 2)
-    ) -> Iterator[tuple[Who, list[str]]]:
+        self, who: Indices, points: Sequence[str], hands: Sequence[int] = (1, 2)
+    ) -> Iterator[tuple[Indices, list[str]]]:
         """Yield those who find the same of some points pricked, on the prints of these photographs, and what they find.
 
         Everybody who acts comes once, the list in the order of `points` and perhaps empty.
@@ -128,14 +130,14 @@ class Bench:
             them = who[(shown == pattern[:, None]).all(axis=0)]
             yield them, [point for point, there in zip(points, pattern, strict=True) if there]
 
-    def _come_to(self, who: Who, point: str) -> None:
+    def _come_to(self, who: Indices, point: str) -> None:
         """Go to a point, or by mistake to a standard point near it."""
         near = neighbours(self.seat.model.standard_points, point) if self.crew.may_mistake_points else []
         self.crew.select_point(who, point, {name: self.has_point(who, name) for name in near})
 
     # --- monocular pointing ---------------------------------------------------------------------------
 
-    def point_monocularly(self, who: Who, hand: int, points: Sequence[str], level: float) -> Array:
+    def point_monocularly(self, who: Indices, hand: int, points: Sequence[str], level: float) -> Array:
         """Point with the eye of photograph 1 (left-hand) or 2 at a Z reading; X, Y readings ``(2, n, sessions)``."""
         crew = self.crew
         errors = crew.draw_setting_errors(who, crew.observer.monocular_um, (2, len(points)))
@@ -148,7 +150,7 @@ class Bench:
             self._point_once(who, hand, point, level, errors[:, i], slips[:, i], readings[:, i])
         return readings
 
-    def repeat_pointing(self, who: Who, hand: int, point: str, level: float, why: str) -> Array:
+    def repeat_pointing(self, who: Indices, hand: int, point: str, level: float, why: str) -> Array:
         """Strike out a pointing and make it once more; X, Y ``(2, sessions)``."""
         crew = self.crew
         for numbers in self._entries[hand, point, level]:
@@ -161,12 +163,12 @@ class Bench:
         self._point_once(who, hand, point, level, errors, slips, readings)
         return readings
 
-    def _drive_to_level(self, who: Who, level: float) -> None:
+    def _drive_to_level(self, who: Indices, level: float) -> None:
         self.seat.drive(who, {"Z": np.full(who.size, level)})
         self.seat.give_up_on_errors(who, f"driving Z to {level:.2f}")
 
     def _point_once(
-        self, who: Who, hand: int, point: str, level: float, errors: Array, slips: Array, readings: Array
+        self, who: Indices, hand: int, point: str, level: float, errors: Array, slips: Array, readings: Array
     ) -> None:
         crew = self.crew
         self.eyes.bring_into_view(who, hand, point)
@@ -180,7 +182,7 @@ class Bench:
         self._entries[hand, point, level] = (numbers[0], numbers[1])
         self._tick()
 
-    def _read(self, who: Who, point: str, item: str, slips: Array) -> Array:
+    def _read(self, who: Indices, point: str, item: str, slips: Array) -> Array:
         """Read the counter ``(m,)`` that an item begins with, with what is misread ``(sessions,)``."""
         self.crew.spend(who, self.crew.observer.seconds_to_read, "reading")
         return self.crew.transcribe(who, point, item, self.hands.counter(who, item[0]), slips)
@@ -188,7 +190,7 @@ class Bench:
     # --- y-parallaxes ---------------------------------------------------------------------------------
 
     def parallaxes(
-        self, who: Who, points: Sequence[str], readings: int, projectors: Sequence[int] = (1, 2)
+        self, who: Indices, points: Sequence[str], readings: int, projectors: Sequence[int] = (1, 2)
     ) -> Parallaxes:
         """Measure y-parallaxes with by' or by" or both, so many readings of each."""
         crew, observer, n = self.crew, self.crew.observer, len(points)
@@ -202,7 +204,7 @@ class Bench:
         measuring = who
         for i, point in enumerate(points):
             self._come_to(measuring, point)
-            judgement = Judgement(plan_errors[:, i], height_errors[i])
+            judgement = SettingErrors(plan_errors[:, i], height_errors[i])
             fused = self.mark.fuse(measuring, point, judgement)
             readings_there = self.seat.counters(fused) if fused.size else np.zeros((3, 0))
             places[:, i, fused] = self.seat.model_position(fused, readings_there)
@@ -220,28 +222,28 @@ class Bench:
             self.seat.give_up_on_errors(measuring, f"{self.seat.model.name}: measuring y-parallaxes")
         return Parallaxes(p, places, apart)
 
-    def _at_rest(self, who: Who) -> dict[str, Array]:
+    def _at_rest(self, who: Indices) -> dict[str, Array]:
         rest = {name: np.zeros(self.crew.size) for name in ("by1", "by2")}
         for name, counts in self.seat.elements(who, ["by1", "by2"]).items():
             rest[name][who] = counts
         return rest
 
-    def _turn_back(self, who: Who, names: Sequence[str], rest: Mapping[str, Array]) -> None:
+    def _turn_back(self, who: Indices, names: Sequence[str], rest: Mapping[str, Array]) -> None:
         self.crew.spend(who, self.crew.observer.seconds_to_turn, "turning")
         for name in names:
             self.seat.run_element(who, name, rest[name][who])
 
     def _parallax(
         self,
-        who: Who,
+        who: Indices,
         point: str,
-        judgement: Judgement,
+        judgement: SettingErrors,
         projectors: Sequence[int],
         rest: Mapping[str, Array],
         errors: Array,
         slips: Array,
         into: Array,
-    ) -> Who:
+    ) -> Indices:
         """Clear the parallax of a point with by of projectors; put the mean readings ``(sessions,)`` into place."""
         values = np.zeros(errors.shape)
         numbers = np.zeros(errors.shape, dtype=np.intp)
@@ -258,16 +260,16 @@ class Bench:
 
     def _clear_with_by(
         self,
-        who: Who,
+        who: Indices,
         projector: int,
         point: str,
-        judgement: Judgement,
+        judgement: SettingErrors,
         errors: Array,
         slips: Array,
         rest: Mapping[str, Array],
         values: Array,
         numbers: Numbers,
-    ) -> Who:
+    ) -> Indices:
         if not who.size:
             return who
         by, sense = f"by{projector}", self._sense_of_by(projector)
@@ -284,14 +286,14 @@ class Bench:
 
     def _without_slips(
         self,
-        who: Who,
+        who: Indices,
         point: str,
-        judgement: Judgement,
+        judgement: SettingErrors,
         projectors: Sequence[int],
         rest: Mapping[str, Array],
         values: Array,
         numbers: Numbers,
-    ) -> Who:
+    ) -> Indices:
         """Strike out readings that their fellows contradict and make them again, in place.
 
         Of two that contradict each other nobody knows which is wrong: they are made again in turn.
@@ -331,12 +333,12 @@ class Bench:
 
     def clear_parallax(
         self,
-        who: Who,
+        who: Indices,
         point: str,
         element: str,
-        gain_at: Callable[[Who, Array], Array],
+        gain_at: Callable[[Indices, Array], Array],
         unless_within: float = 0.0,
-    ) -> Cleared:
+    ) -> ClearedPoint:
         """Clear the y-parallax of a point by turning an element, unless it seems to be within so many mm already.
 
         `gain_at` tells what one unit of the element's counter adds to the parallax ``(m,)`` in mm at places
@@ -349,14 +351,14 @@ class Bench:
         fused = self._arrive(who, point, judgement, error, place, found)
         apart = exclude(crew.remaining(who), fused)
         if not fused.size:
-            return Cleared(fused, apart, found, place, turn)
+            return ClearedPoint(fused, apart, found, place, turn)
         gain[fused] = gain_at(fused, place[:, fused])
         turning = fused[np.abs(found[fused]) > unless_within]
         turned = self._turn_until_clear(turning, point, judgement, Clearing(element, gain, error), turn)
         self._tick()
-        return Cleared(exclude(fused, exclude(turning, turned)), apart, found, place, turn)
+        return ClearedPoint(exclude(fused, exclude(turning, turned)), apart, found, place, turn)
 
-    def look_at_parallaxes(self, who: Who, points: Sequence[str]) -> Parallaxes:
+    def look_at_parallaxes(self, who: Indices, points: Sequence[str]) -> Parallaxes:
         """Look at what y-parallax is left at points, without turning anything but the handwheels."""
         crew = self.crew
         p, places = np.zeros((len(points), crew.size)), np.zeros((3, len(points), crew.size))
@@ -371,14 +373,16 @@ class Bench:
             self._tick()
         return Parallaxes(p, places, apart)
 
-    def _judgement(self, who: Who) -> tuple[Judgement, Array]:
+    def _judgement(self, who: Indices) -> tuple[SettingErrors, Array]:
         """Draw by how much one arrival at a point is misjudged, and its y-parallax ``(sessions,)`` in um."""
         observer = self.crew.observer
         x, y, height, parallax = self.crew.draw_setting_errors(who, 1.0, (4,))
         plan = observer.stereo_um * np.array([x, y])
-        return Judgement(plan, observer.height_um * height), observer.parallax_um * parallax
+        return SettingErrors(plan, observer.height_um * height), observer.parallax_um * parallax
 
-    def _arrive(self, who: Who, point: str, judgement: Judgement, error: Array, place: Array, found: Array) -> Who:
+    def _arrive(
+        self, who: Indices, point: str, judgement: SettingErrors, error: Array, place: Array, found: Array
+    ) -> Indices:
         """Set the mark on a point; put into place where it is and what y-parallax it seems to have, and enter that."""
         seat = self.seat
         self._come_to(who, point)
@@ -391,12 +395,14 @@ class Bench:
             self.crew.enter(fused, point, "parallax seen", found[fused])
         return fused
 
-    def _seen_parallax(self, who: Who, point: str, error: Array) -> Array:
+    def _seen_parallax(self, who: Indices, point: str, error: Array) -> Array:
         """Return the y-parallax ``(m,)`` in mm as it seems."""
         seen = self.mark.view(who, point)[3] + error[who]
         return np.asarray(1e-3 * seen * self.seat.z[who] / self.seat.c)
 
-    def _turn_until_clear(self, who: Who, point: str, judgement: Judgement, clearing: Clearing, turn: Array) -> Who:
+    def _turn_until_clear(
+        self, who: Indices, point: str, judgement: SettingErrors, clearing: Clearing, turn: Array
+    ) -> Indices:
         """Turn an element until a point is clear, enter what it shows, and put the turn into place."""
         crew, seat, element = self.crew, self.seat, clearing.element
         slips = crew.draw_misreadings(who, (1,))[0]
@@ -417,7 +423,7 @@ class Bench:
 
     # --- model coordinates ----------------------------------------------------------------------------
 
-    def measure_points(self, who: Who, points: Sequence[str]) -> Array:
+    def measure_points(self, who: Indices, points: Sequence[str]) -> Array:
         """Measure model points stereoscopically, two pointings that agree; X, Y, Z readings ``(3, n, sessions)``.
 
         A point whose images cannot be fused is remarked upon and comes out as nan.
@@ -435,7 +441,7 @@ class Bench:
         self.seat.give_up_on_errors(who, f"{self.seat.model.name}: measuring model coordinates")
         return measured
 
-    def _measure(self, who: Who, point: str, at_point: Array, anew: Array, slips: Array, into: Array) -> None:
+    def _measure(self, who: Indices, point: str, at_point: Array, anew: Array, slips: Array, into: Array) -> None:
         """Put the mean of two pointings that agree into place, or else the median of all."""
         crew, observer = self.crew, self.crew.observer
         sigmas = np.array([observer.stereo_um, observer.stereo_um, observer.height_um])[:, None]
@@ -465,9 +471,11 @@ class Bench:
             into[:, repeating] = np.median([each[:, repeating] for each in pointings], axis=0)
         crew.remark(repeating, f"point {point}: no two of {MAX_POINTINGS} pointings agree, median taken")
 
-    def _pointing(self, who: Who, point: str, error: Array, slips: Array, readings: Array) -> tuple[Who, Numbers]:
+    def _pointing(
+        self, who: Indices, point: str, error: Array, slips: Array, readings: Array
+    ) -> tuple[Indices, Numbers]:
         crew = self.crew
-        who = self.mark.fuse(who, point, Judgement(error[:2], error[2]))
+        who = self.mark.fuse(who, point, SettingErrors(error[:2], error[2]))
         numbers = np.zeros((3, crew.size), dtype=np.intp)
         if who.size:
             for axis, name in enumerate("XYZ"):
@@ -481,6 +489,6 @@ class Bench:
         difference = np.abs(first - second) / self.seat.counter_units_per_mm[:, None]
         return np.asarray((difference <= AGREEMENT_MM + 1e-9).all(axis=0))
 
-    def _strike(self, who: Who, numbers: Numbers) -> None:
+    def _strike(self, who: Indices, numbers: Numbers) -> None:
         for each in numbers:
             self.crew.strike(who, each, "two pointings differ by more than 0.01 mm")

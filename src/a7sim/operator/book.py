@@ -9,7 +9,7 @@ COLUMNS = ("number", "time_s", "model", "form", "round", "point", "item", "readi
 
 
 @dataclass(frozen=True)
-class Entry:
+class BookEntry:
     """A line of the book; `reading` is the text of a counter, `struck` why it was struck out."""
 
     number: int
@@ -25,14 +25,14 @@ class Entry:
 
 
 @dataclass
-class Book:
+class ObservationBook:
     """The entries, and the heading under which the next ones go."""
 
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[BookEntry] = field(default_factory=list)
     model: str = ""
     form: str = ""
     round: int = 0
-    listener: Callable[[Entry], None] | None = None
+    listener: Callable[[BookEntry], None] | None = None
     """Is told of every entry as it is written, and again as it is struck out."""
 
     def set_heading(self, model: str, form: str, round: int = 0) -> None:
@@ -42,7 +42,7 @@ class Book:
     def add(self, time: float, point: str, item: str, reading: str, remark: str = "") -> int:
         """Enter a reading and return its number."""
         number = len(self.entries) + 1
-        entry = Entry(number, time, self.model, self.form, self.round, point, item, reading, remark)
+        entry = BookEntry(number, time, self.model, self.form, self.round, point, item, reading, remark)
         self.entries.append(entry)
         self._tell(entry)
         return number
@@ -53,7 +53,7 @@ class Book:
         self.entries[number - 1] = struck
         self._tell(struck)
 
-    def _tell(self, entry: Entry) -> None:
+    def _tell(self, entry: BookEntry) -> None:
         if self.listener is not None:
             self.listener(entry)
 

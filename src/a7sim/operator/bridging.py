@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.among import Who, exclude
+from a7sim.among import Indices, exclude
 from a7sim.geometry import Array
-from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Crew, NobodyGoesOn
-from a7sim.operator.interior import InteriorOrientations
+from a7sim.operator.bench import Workstation
+from a7sim.operator.crew import AllGaveUpError, OperatorBatch
+from a7sim.operator.interior import InteriorOrientationBatch
 from a7sim.operator.job import Job, ModelJob
-from a7sim.operator.line_hands import LineHands
+from a7sim.operator.line_hands import ScpiDriver
 from a7sim.operator.person import Person
 from a7sim.operator.relative import (
-    RelativeOrientations,
+    OrientationRecordBatch,
     assess_residuals,
     compute_corrections,
     expand_to_batch,
@@ -50,8 +50,8 @@ class BridgedModels:
     """A model in a crew's strips; arrays have all sessions as their last axis."""
 
     model: ModelJob
-    sessions: Who
-    orientation: RelativeOrientations
+    sessions: Indices
+    orientation: OrientationRecordBatch
     points: Mapping[str, Array]
     """Readings X, Y, Z ``(3, sessions)`` that go on from the first model, nan where a point was not measured."""
     common: Mapping[str, Array]
@@ -76,23 +76,23 @@ def bridge_strip(
 ) -> Iterator[BridgedModels]:
     """Yield the models of a strip as a person bridges it. Raises DoesNotFit when one cannot be set up."""
     person.book.set_heading("", "preparation")
-    yield from bridge_strip_batch(Bench(Crew.single(person), LineHands(person), job, tick), begins)
+    yield from bridge_strip_batch(Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick), begins)
 
 
-def bridge_strip_batch(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[BridgedModels]:
+def bridge_strip_batch(bench: Workstation, begins: Callable[[str], None] = lambda _: None) -> Iterator[BridgedModels]:
     """Yield the models of a strip as a crew bridges it, each session at its own instrument.
 
     Every model must have the photograph of the one before it as its left-hand one and the other base; give up if not.
     """
     try:
         yield from _bridged(bench, begins)
-    except NobodyGoesOn:
+    except AllGaveUpError:
         return
 
 
-def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedModels]:
+def _bridged(bench: Workstation, begins: Callable[[str], None]) -> Iterator[BridgedModels]:
     crew, seat, job = bench.crew, bench.seat, bench.job
-    interior: dict[str, InteriorOrientations] = {}
+    interior: dict[str, InteriorOrientationBatch] = {}
     seat.prepare(crew.active)
     before: dict[str, Array] = {}
     last: ModelJob | None = None
@@ -127,7 +127,7 @@ def _bridged(bench: Bench, begins: Callable[[str], None]) -> Iterator[BridgedMod
         before, last = points, model
 
 
-def _see_that_it_follows(bench: Bench, last: ModelJob, model: ModelJob) -> None:
+def _see_that_it_follows(bench: Workstation, last: ModelJob, model: ModelJob) -> None:
     if model.left != last.right or model.left_projector != last.right_projector:
         bench.crew.give_up(
             bench.crew.active,
@@ -140,7 +140,7 @@ def _see_that_it_follows(bench: Bench, last: ModelJob, model: ModelJob) -> None:
 # --- from one model to the next ---------------------------------------------------------------------------------------
 
 
-def extend_strip(bench: Bench, model: ModelJob) -> None:
+def extend_strip(bench: Workstation, model: ModelJob) -> None:
     """Preset X for the oriented photograph's new place on the left, and Y and Z where its by and bz run out.
 
     With the base changed over, its centre comes from X = bx to X = 0: what stands in X = 0 has to read bx more.
@@ -156,7 +156,7 @@ def extend_strip(bench: Bench, model: ModelJob) -> None:
             seat.set_elements(who[far], {name: np.full(int(far.sum()), element.zero)})
 
 
-def copy_common_photo_orientation(bench: Bench, model: ModelJob) -> None:
+def copy_common_photo_orientation(bench: Workstation, model: ModelJob) -> None:
     """Start the new photograph from the tilts and the by and bz of the oriented one, and bx from the plan."""
     seat, who = bench.seat, bench.crew.active
     left, right = model.left_projector, model.right_projector
@@ -169,7 +169,7 @@ def copy_common_photo_orientation(bench: Bench, model: ModelJob) -> None:
     seat.set_elements(who, {"bx": np.full(who.size, bench.job.plan.bx)} | within)
 
 
-def _oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
+def _oriented(bench: Workstation, model: ModelJob) -> OrientationRecordBatch:
     plan, who, tolerated = bench.job.plan, bench.crew.active, bench.job.tolerated_parallax_mm
     return relative_orientation(bench, who, model, "dependent", plan.case, plan.parallax_readings, plan.bx, tolerated)
 
@@ -177,7 +177,7 @@ def _oriented(bench: Bench, model: ModelJob) -> RelativeOrientations:
 # --- scale ------------------------------------------------------------------------------------------------------------
 
 
-def transfer_scale(bench: Bench, who: Who, model: ModelJob, before: Mapping[str, Array]) -> Array:
+def transfer_scale(bench: Workstation, who: Indices, model: ModelJob, before: Mapping[str, Array]) -> Array:
     """Change the base until common points read the heights that they had; return the factor ``(sessions,)``.
 
     by and bz of the new photograph follow, so that the base keeps its direction and the parallaxes stay cleared.
@@ -220,7 +220,7 @@ def transfer_scale(bench: Bench, who: Who, model: ModelJob, before: Mapping[str,
 # --- refinement -------------------------------------------------------------------------------------------------------
 
 
-def _refined(bench: Bench, model: ModelJob, found: RelativeOrientations) -> RelativeOrientations:
+def _refined(bench: Workstation, model: ModelJob, found: OrientationRecordBatch) -> OrientationRecordBatch:
     """Look at what is left at all standard points and correct the new photograph while it falls.
 
     The eye sees finer than by counts, and a drum turns finer than it shows; the settings with the smallest residual

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who
+from a7sim.among import Indices
 from a7sim.geometry import Array
 from a7sim.manual import LEAST_COUNT
-from a7sim.operator.bench import Bench
+from a7sim.operator.bench import Workstation
 from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import ModelJob
 from a7sim.operator.plate import Crosses, cross_positions, locate_plate, point_at_crosses, sketch_positions
 from a7sim.operator.seat import side_name
 from a7sim.reduction import (
     PerspectiveCentre,
-    PlateLie,
+    PlatePlacement,
     Resection,
     grid_plate_centre,
     perspective_centre,
@@ -47,7 +47,7 @@ Levels = npt.NDArray[np.float64]
 _PARTS = attrgetter(*(field.name for field in fields(PerspectiveCentre)))
 
 
-def observe_centre(bench: Bench, who: Who, model: ModelJob, hand: int) -> PerspectiveCentre:
+def observe_centre(bench: Workstation, who: Indices, model: ModelJob, hand: int) -> PerspectiveCentre:
     """Return the centres ``(sessions,)`` of one photograph in counter units, by the method of the plan.
 
     hand is 1 for the left-hand photograph, 2 for the right-hand one. Those for whom the rms is beyond the tolerated
@@ -80,7 +80,7 @@ def centre_of(centres: PerspectiveCentre, session: int) -> PerspectiveCentre:
     return PerspectiveCentre(*parts)
 
 
-def _among_all(centres: PerspectiveCentre, who: Who, sessions: int) -> PerspectiveCentre:
+def _among_all(centres: PerspectiveCentre, who: Indices, sessions: int) -> PerspectiveCentre:
     def spread(values: Array) -> Array:
         every = np.full((*values.shape[:-1], sessions), np.nan)
         every[..., who] = values
@@ -95,12 +95,12 @@ def _nowhere(sessions: int) -> PerspectiveCentre:
     return PerspectiveCentre(**values | {"residuals": np.full((3, 0, sessions), np.nan)})
 
 
-def _each(found: PerspectiveCentre | PlateLie, change: Callable[[Array], Array]) -> list[Any]:
+def _each(found: PerspectiveCentre | PlatePlacement, change: Callable[[Array], Array]) -> list[Any]:
     values = (getattr(found, field.name) for field in fields(found))
     return [None if each is None else change(each) for each in values]
 
 
-def _by_scales(bench: Bench, who: Who, hand: int, levels: Sequence[float]) -> PerspectiveCentre:
+def _by_scales(bench: Workstation, who: Indices, hand: int, levels: Sequence[float]) -> PerspectiveCentre:
     """Return where base, by, bz and the scales put the centres ``(sessions,)``, as P 3.1 and 3.2 take them.
 
     Their standard deviations are those of the rounding to the last digit.
@@ -127,7 +127,7 @@ def _by_scales(bench: Bench, who: Who, hand: int, levels: Sequence[float]) -> Pe
 # --- levels of Z --------------------------------------------------------------------------------------
 
 
-def _by_levels(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Levels) -> PerspectiveCentre:
+def _by_levels(bench: Workstation, who: Indices, model: ModelJob, hand: int, levels: Levels) -> PerspectiveCentre:
     """Point monocularly at points 1 to 6 at every level and compute the centres ``(sessions,)``.
 
     Those that the print does not show are done without; with fewer than three of them all standard points serve, and
@@ -152,7 +152,7 @@ def _by_levels(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Level
     return _gathered(groups, crew.size)
 
 
-def _gathered(groups: Sequence[tuple[Who, Sequence[str], PerspectiveCentre]], sessions: int) -> PerspectiveCentre:
+def _gathered(groups: Sequence[tuple[Indices, Sequence[str], PerspectiveCentre]], sessions: int) -> PerspectiveCentre:
     """Return the centres of groups, each from points of its own, among all sessions, nan where there is nothing."""
     points = list(dict.fromkeys(name for _, names, _ in groups for name in names))
     every: dict[str, Array] = {}
@@ -168,7 +168,7 @@ def _gathered(groups: Sequence[tuple[Who, Sequence[str], PerspectiveCentre]], se
 
 
 def _of_points(
-    bench: Bench, who: Who, model: ModelJob, hand: int, points: Sequence[str], levels: Levels
+    bench: Workstation, who: Indices, model: ModelJob, hand: int, points: Sequence[str], levels: Levels
 ) -> PerspectiveCentre:
     """Return the centres ``(m,)`` of those who go on, from points at every level.
 
@@ -198,7 +198,7 @@ def _rms(pointings: Array, levels: Levels) -> Array:
     return _centre(pointings, levels).rms
 
 
-def _one_set(bench: Bench, who: Who, hand: int, points: Sequence[str], levels: Levels) -> Array:
+def _one_set(bench: Workstation, who: Indices, hand: int, points: Sequence[str], levels: Levels) -> Array:
     """Return pointings ``(2, k, n, sessions)`` at k levels."""
     crew = bench.crew
     pointings = np.stack(
@@ -233,7 +233,7 @@ def _misread_points(pointings: Array, levels: Levels) -> npt.NDArray[np.intp]:
 # --- a grid plate -------------------------------------------------------------------------------------
 
 
-def _by_grid_plate(bench: Bench, who: Who, model: ModelJob, hand: int, levels: Levels) -> PerspectiveCentre:
+def _by_grid_plate(bench: Workstation, who: Indices, model: ModelJob, hand: int, levels: Levels) -> PerspectiveCentre:
     """Put the grid plate in the picture's place, point at its crosses at every level, and put the picture back.
 
     The elements stay as they are. Both are centred anew, each as well as a fiducial is registered.
@@ -256,7 +256,7 @@ def _by_grid_plate(bench: Bench, who: Who, model: ModelJob, hand: int, levels: L
     who = crew.remaining(who)
     bench.compute(who)
     c = bench.seat.elements(who, [f"c{projector}"])[f"c{projector}"]
-    its_lie = PlateLie(*_each(lie, lambda values: values[who]))
+    its_lie = PlatePlacement(*_each(lie, lambda values: values[who]))
     found = _resected(bench, crosses, pointings[..., who], levels, c, its_lie)
     centres = _among_all(found, who, crew.size)
     centre_picture(bench, who, projector, picture, job.certificate)
@@ -265,7 +265,7 @@ def _by_grid_plate(bench: Bench, who: Who, model: ModelJob, hand: int, levels: L
     return centres
 
 
-def _crosses_in_model(bench: Bench, who: Who, hand: int, levels: Levels) -> Crosses:
+def _crosses_in_model(bench: Workstation, who: Indices, hand: int, levels: Levels) -> Crosses:
     """Return crosses that lie within the model in every session, or none where they are too few."""
     seat, plate = bench.seat, bench.job.grid_plate
     bx = np.abs(seat.bx(who))
@@ -286,7 +286,7 @@ def _crosses_in_model(bench: Bench, who: Who, hand: int, levels: Levels) -> Cros
 
 
 def _resected(
-    bench: Bench, crosses: Crosses, pointings: Array, levels: Levels, c: Array, lie: PlateLie
+    bench: Workstation, crosses: Crosses, pointings: Array, levels: Levels, c: Array, lie: PlatePlacement
 ) -> PerspectiveCentre:
     """Return the centres ``(m,)`` from pointings ``(2, k, n, m)`` at crosses, in counter units."""
     k, n = pointings.shape[1:3]
@@ -297,7 +297,9 @@ def _resected(
     return _in_counter_units(found, levels, units, c, lie)
 
 
-def _in_counter_units(found: Resection, levels: Levels, units: float, c: Array, lie: PlateLie) -> PerspectiveCentre:
+def _in_counter_units(
+    found: Resection, levels: Levels, units: float, c: Array, lie: PlatePlacement
+) -> PerspectiveCentre:
     """Return a resected centre as one of levels: residuals in X and Y at the mean level, T0 from the first to the last.
 
     How well the plate's lie is known goes into the standard deviations of X0 and Y0.

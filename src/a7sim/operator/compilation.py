@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array, length_of
-from a7sim.operator.bench import Bench
+from a7sim.operator.bench import Workstation
 from a7sim.operator.level_model import LevelModel
 from a7sim.operator.map_lines import (
     CONTOUR,
     Area,
     Ending,
-    Errand,
-    Spots,
-    Traced,
+    LineTarget,
+    SpotHeights,
+    TracedLine,
     Tracing,
     as_polyline,
     distance_to,
@@ -28,7 +28,15 @@ from a7sim.operator.map_lines import (
     length_along,
 )
 from a7sim.operator.person import Person
-from a7sim.operator.stereo_view import COARSE_MM, FINE_MM, MIDDLING_MM, Look, StereoView, Surface, rectify
+from a7sim.operator.stereo_view import (
+    COARSE_MM,
+    FINE_MM,
+    MIDDLING_MM,
+    PerceivedSurface,
+    StereoPatch,
+    StereoView,
+    rectify,
+)
 from a7sim.wording import pluralize
 
 MAX_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
@@ -80,14 +88,14 @@ class _Vertex:
 
     place: Array
     heading: Array
-    surface: Surface
+    surface: PerceivedSurface
 
 
 class Compilation:
     """One person compiling a level model."""
 
     def __init__(
-        self, bench: Bench, person: Person, view: StereoView, model: LevelModel, area: Area, tracing: Tracing
+        self, bench: Workstation, person: Person, view: StereoView, model: LevelModel, area: Area, tracing: Tracing
     ) -> None:
         self._bench = bench
         self._person = person
@@ -119,8 +127,8 @@ class Compilation:
         return np.array(fields[2:5], dtype=float)
 
     def _seen(
-        self, expected: Surface | None = None, looks: Sequence[tuple[float, float]] = _CLOSELY
-    ) -> tuple[Look, Surface] | None:
+        self, expected: PerceivedSurface | None = None, looks: Sequence[tuple[float, float]] = _CLOSELY
+    ) -> tuple[StereoPatch, PerceivedSurface] | None:
         """Look at the ground, more and more widely until it fuses; None if it does not."""
         look = None
         for pitch, reach in looks:
@@ -131,7 +139,7 @@ class Compilation:
                 return look, surface
         return None
 
-    def _tremor(self, look: Look) -> tuple[Array, float]:
+    def _tremor(self, look: StereoPatch) -> tuple[Array, float]:
         """Draw tremor along and across ``(2,)``, and how much too high the ground seems to be, in mm."""
         along, across, height = self._bench.crew.draw_setting_errors(self._who, 1.0, (3,))[:, 0]
         tremor = 1e-3 * self._tracing.tremor_um * look.enlargement * np.array([along, across])
@@ -139,7 +147,7 @@ class Compilation:
 
     # --- spot heights ---------------------------------------------------------------------------------
 
-    def spot_heights(self, spacing: float = SPOTS_MM) -> Spots:
+    def spot_heights(self, spacing: float = SPOTS_MM) -> SpotHeights:
         """Measure heights on a grid over the area."""
         xs, ys = self.area.grid(spacing)
         readings = np.full((3, xs.size, ys.size), np.nan)
@@ -154,7 +162,7 @@ class Compilation:
                     z = found[2]
         if np.isnan(readings).all():
             self._bench.crew.give_up(self._who, f"{self._bench.seat.model.name}: the ground is nowhere seen in relief")
-        return Spots(readings, np.asarray(self.model.on_ground(readings)[2]))
+        return SpotHeights(readings, np.asarray(self.model.on_ground(readings)[2]))
 
     def _spot(self) -> Array | None:
         observer = self._bench.crew.observer
@@ -174,10 +182,10 @@ class Compilation:
 
     # --- contours -------------------------------------------------------------------------------------
 
-    def contour(self, height: float, spots: Spots) -> list[Traced]:
+    def contour(self, height: float, spots: SpotHeights) -> list[TracedLine]:
         """Follow all contours of a height in m that pass between spot heights."""
         name = f"contour {height:g}"
-        lines: list[Traced] = []
+        lines: list[TracedLine] = []
         for guess, begin, end in spots.crossings(height):
             if any(intersects(line.readings[:2], begin, end) for line in lines):
                 continue
@@ -197,15 +205,15 @@ class Compilation:
                 lines.append(found)
         return lines
 
-    def _both_ways(self, name: str, height: float, start: _Vertex, z: float, drawn: Sequence[Traced]) -> Traced:
+    def _both_ways(self, name: str, height: float, start: _Vertex, z: float, drawn: Sequence[TracedLine]) -> TracedLine:
         there, ending = self._followed(name, start, drawn)
         if ending == "closed":
-            return Traced(name, CONTOUR, height, as_polyline([*there, there[0]]), ("closed", "closed"))
+            return TracedLine(name, CONTOUR, height, as_polyline([*there, there[0]]), ("closed", "closed"))
         self._drive(start.place, z)
         back, other = self._followed(name, _Vertex(start.place, -start.heading, start.surface), drawn)
-        return Traced(name, CONTOUR, height, as_polyline([*back[::-1], *there]), (other, ending))
+        return TracedLine(name, CONTOUR, height, as_polyline([*back[::-1], *there]), (other, ending))
 
-    def _followed(self, name: str, start: _Vertex, drawn: Sequence[Traced]) -> tuple[list[Array], Ending]:
+    def _followed(self, name: str, start: _Vertex, drawn: Sequence[TracedLine]) -> tuple[list[Array], Ending]:
         """Follow a contour from a place on it; return its vertices and how it ended."""
         vertices: list[Array] = []
         at, step, bend = start, FIRST_STEP_MM, 0.0
@@ -244,7 +252,7 @@ class Compilation:
         into: list[Array] | None = None,
     ) -> _Vertex | None:
         """Bring the mark onto the contour at its height; with `into`, register it there with the hand's tremor."""
-        expected = None if before is None else Surface(0.0, before.surface.slope, 0.0, 1.0)
+        expected = None if before is None else PerceivedSurface(0.0, before.surface.slope, 0.0, 1.0)
         for number in range(_MAX_LOOKS):
             seen = self._seen(expected, _CLOSELY if number or before is not None else _WIDELY)
             if seen is None:
@@ -255,7 +263,7 @@ class Compilation:
                 return None
             back = -surface.height * surface.slope / steepness
             far = float(length_of(back))
-            expected = Surface(0.0, surface.slope, 0.0, 1.0)
+            expected = PerceivedSurface(0.0, surface.slope, 0.0, 1.0)
             if far > _NEAR_ENOUGH_MM or look.pitch > MIDDLING_MM:
                 self._turn(back * min(1.0, _MAX_CORRECTION_MM / far))
                 continue
@@ -276,7 +284,7 @@ class Compilation:
 
     # --- lines ----------------------------------------------------------------------------------------
 
-    def line(self, errand: Errand, spots: Spots) -> Traced:
+    def line(self, errand: LineTarget, spots: SpotHeights) -> TracedLine:
         """Follow a road or track by its middle. Gives up where none is seen at its start."""
         start, towards, end = (self._readings_in_plan(each) for each in (errand.start, errand.towards, errand.end))
         heading = (towards - start) / length_of(towards - start)
@@ -289,7 +297,7 @@ class Compilation:
             raise AssertionError
         vertices, ending = self._line_followed(errand.name, found, end)
         readings = np.array(vertices).reshape(-1, 3).T
-        return Traced(errand.name, errand.kind, None, readings, ("end", ending))
+        return TracedLine(errand.name, errand.kind, None, readings, ("end", ending))
 
     def _readings_in_plan(self, plan: tuple[float, float]) -> Array:
         level = self.model.on_ground(np.array([*self._place(), self._bench.seat.counters(self._who)[2, 0]]))
@@ -323,10 +331,10 @@ class Compilation:
         return vertices, "lost"
 
     def _road_at(
-        self, heading: Array, within: float, widths: Sequence[float], expected: Surface | None = None
+        self, heading: Array, within: float, widths: Sequence[float], expected: PerceivedSurface | None = None
     ) -> "_Road | None":
         """Look for a light band near the mark that goes about a direction ``(2,)``, `within` so many radians."""
-        slope = None if expected is None else Surface(0.0, expected.slope, 0.0, 1.0)
+        slope = None if expected is None else PerceivedSurface(0.0, expected.slope, 0.0, 1.0)
         seen = self._seen(slope, _ON_ROADS)
         if seen is not None and seen[0].pitch != ROAD_MM:
             self._turn(np.zeros(2), seen[1].height)
@@ -343,15 +351,15 @@ class Compilation:
 class _Road:
     """A road near the mark: how far its middle lies ``(2,)``, which way it goes ``(2,)``, how wide it is."""
 
-    look: Look
-    surface: Surface
+    look: StereoPatch
+    surface: PerceivedSurface
     offset: Array
     heading: Array
     width: float
 
 
 def _band(
-    look: Look, surface: Surface, light: float, heading: Array, within: float, width: float
+    look: StereoPatch, surface: PerceivedSurface, light: float, heading: Array, within: float, width: float
 ) -> tuple[float, Array, Array, float]:
     """Return correlation, middle ``(2,)``, direction ``(2,)`` and width of the light band that fits best."""
     inside, grey, plan = rectify(look, surface, _ROAD_SIDE)

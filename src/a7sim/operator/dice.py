@@ -13,7 +13,7 @@ _GROSS_SLIPS = np.array([-1.0, -0.5, -0.1, 0.1, 0.5, 1.0])
 """A digit read wrong further up, in counter units."""
 
 
-class Dice:
+class OperatorRandom:
     """The random numbers of one session's operator.
 
     Errors come in blocks, one draw for each setting that a step of the procedure makes, so that the same

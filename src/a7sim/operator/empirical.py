@@ -14,20 +14,20 @@ from functools import partial
 
 import numpy as np
 
-from a7sim.among import Who, exclude
+from a7sim.among import Indices, exclude
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, parallax_coefficients, rotation
-from a7sim.operator.bench import Bench
+from a7sim.operator.bench import Workstation
 from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import (
-    RelativeOrientations,
-    Rounds,
+    OrientationRecordBatch,
+    RoundBatch,
     assess_residuals,
     expand_to_batch,
     merge_groups,
     projector_pose,
     unknown_elements,
 )
-from a7sim.reduction import Stand
+from a7sim.reduction import ProjectorPose
 from a7sim.standard_points import CASES, FIGURE_4_1, PLACES, POSITIONS
 
 MAX_ROUNDS = 15
@@ -48,7 +48,7 @@ TRIES = 4
 
 
 @dataclass(frozen=True)
-class Step:
+class ClearingStep:
     """A position (thesis fig. 4.1) and the element with which its parallax is cleared."""
 
     position: str
@@ -80,7 +80,7 @@ def over_correction_by_coefficients(coefficients: Array) -> Array:
     return np.asarray(np.where(determined & (left != 0.0), own / np.where(left == 0.0, 1.0, left), np.nan))
 
 
-def clearing_coefficients(points: Array, left: Stand, right: Stand) -> Array:
+def clearing_coefficients(points: Array, left: ProjectorPose, right: ProjectorPose) -> Array:
     """Return what the ten elements add to the y-parallax at points ``(3, n, m)``, in the order of PARALLAX_ELEMENTS.
 
     mm a radian or mm a mm, for any tilt, of the parallax that is seen when the mark has followed in height: that of
@@ -106,7 +106,7 @@ def clearing_coefficients(points: Array, left: Stand, right: Stand) -> Array:
     return np.array([rows[name] for name in PARALLAX_ELEMENTS])
 
 
-def clearing_steps(method: str, model: ModelJob, usable: Sequence[str]) -> tuple[Step, ...] | None:
+def clearing_steps(method: str, model: ModelJob, usable: Sequence[str]) -> tuple[ClearingStep, ...] | None:
     """Return where to clear with what, given the positions that can be seen; none where they do not suffice.
 
     Two points on the base line, two in one outer row and one in the other, as near the corners as there are any: with
@@ -119,15 +119,19 @@ def clearing_steps(method: str, model: ModelJob, usable: Sequence[str]) -> tuple
     left, right, n = model.left_projector, model.right_projector, model.right_projector
     if method == "dependent":
         return (
-            Step(base[1], f"by{n}"),
-            Step(base[0], f"kappa{n}"),
-            Step(pair[1], f"bz{n}"),
-            Step(pair[0], f"phi{n}"),
-            Step(last[1], f"omega{n}"),
+            ClearingStep(base[1], f"by{n}"),
+            ClearingStep(base[0], f"kappa{n}"),
+            ClearingStep(pair[1], f"bz{n}"),
+            ClearingStep(pair[0], f"phi{n}"),
+            ClearingStep(last[1], f"omega{n}"),
         )
-    first = sorted([Step(base[1], f"kappa{left}"), Step(base[0], f"kappa{right}")], key=lambda step: step.element)
-    second = sorted([Step(pair[1], f"phi{left}"), Step(pair[0], f"phi{right}")], key=lambda step: step.element)
-    return (*first, *second, Step(last[1], "omega1"))
+    first = sorted(
+        [ClearingStep(base[1], f"kappa{left}"), ClearingStep(base[0], f"kappa{right}")], key=lambda step: step.element
+    )
+    second = sorted(
+        [ClearingStep(pair[1], f"phi{left}"), ClearingStep(pair[0], f"phi{right}")], key=lambda step: step.element
+    )
+    return (*first, *second, ClearingStep(last[1], "omega1"))
 
 
 def _ends(row: str, usable: Sequence[str]) -> tuple[str, str] | None:
@@ -140,7 +144,7 @@ def _apart(ends: tuple[str, str] | None) -> bool:
     return ends is not None and PLACES[ends[1]][0] - PLACES[ends[0]][0] >= 0.5
 
 
-def perturb_elements(bench: Bench, who: Who, model: ModelJob, method: str, most: float) -> None:
+def perturb_elements(bench: Workstation, who: Indices, model: ModelJob, method: str, most: float) -> None:
     """Set the elements that a method turns off by anything up to so many gon, alike on both sides.
 
     A component of the base by as much as tilts the base by that angle.
@@ -160,15 +164,15 @@ def perturb_elements(bench: Bench, who: Who, model: ModelJob, method: str, most:
 
 
 def empirical_orientation(
-    bench: Bench,
-    who: Who,
+    bench: Workstation,
+    who: Indices,
     model: ModelJob,
     method: str,
     case: str,
     over_corrected: str | float,
     readings: int,
     tolerated_rms: float,
-) -> RelativeOrientations:
+) -> OrientationRecordBatch:
     """Clear the y-parallaxes of a model point by point, in rounds, until the last point stays clear.
 
     In a round the first four points are cleared until they are seen to be clear; then omega is turned at the last one
@@ -180,7 +184,7 @@ def empirical_orientation(
     crew = bench.crew
     labels = model.points_of_case(case)
     waiting = _with_pricked(bench, who, model, labels)
-    done: list[tuple[Who, RelativeOrientations]] = []
+    done: list[tuple[Indices, OrientationRecordBatch]] = []
     while waiting:
         missing, group = waiting.popitem()
         usable = [label for label in labels if label not in missing]
@@ -192,25 +196,25 @@ def empirical_orientation(
         ended = clearing.run(group)
         for lost, label in clearing.lost:
             waiting[missing | {label}] = np.union1d(waiting.get(missing | {label}, lost), lost)
-        found = RelativeOrientations(method, case, clearing.rounds, clearing.rough, {}, {}, {}, "empirical")
+        found = OrientationRecordBatch(method, case, clearing.rounds, clearing.rough, {}, {}, {}, "empirical")
         done.append((ended, _assessed(bench, ended, model, found, missing, readings, tolerated_rms)))
     return merge_groups(done, method, case, crew.size, "empirical")
 
 
-def _checks(usable: Sequence[str], steps: Sequence[Step]) -> list[str]:
+def _checks(usable: Sequence[str], steps: Sequence[ClearingStep]) -> list[str]:
     """Return the positions of case A that are not needed."""
     return [label for label in usable if label in CASES["A"] and label not in {step.position for step in steps}]
 
 
 def _assessed(
-    bench: Bench,
-    who: Who,
+    bench: Workstation,
+    who: Indices,
     model: ModelJob,
-    found: RelativeOrientations,
+    found: OrientationRecordBatch,
     missing: frozenset[str],
     readings: int,
     tolerated_rms: float,
-) -> RelativeOrientations:
+) -> OrientationRecordBatch:
     if not who.size:
         return found
     bench.begin_round(who, len(found.rounds) + 1)
@@ -219,7 +223,9 @@ def _assessed(
     return assess_residuals(bench, who, model, found, there, readings, tolerated_rms)
 
 
-def _with_pricked(bench: Bench, who: Who, model: ModelJob, labels: Sequence[str]) -> dict[frozenset[str], Who]:
+def _with_pricked(
+    bench: Workstation, who: Indices, model: ModelJob, labels: Sequence[str]
+) -> dict[frozenset[str], Indices]:
     """Return the sessions by what positions are not in their model, or not pricked on both their prints."""
     absent = frozenset(CASES["A"]) - frozenset(labels)
     pricked = {label: bench.has_point(who, model.standard_points[label]) for label in labels}
@@ -241,16 +247,21 @@ class _Clearing:
     """The rounds of those sessions that clear with the same elements at the same points."""
 
     def __init__(
-        self, bench: Bench, model: ModelJob, steps: Sequence[Step], checks: Sequence[str], over_corrected: str | float
+        self,
+        bench: Workstation,
+        model: ModelJob,
+        steps: Sequence[ClearingStep],
+        checks: Sequence[str],
+        over_corrected: str | float,
     ) -> None:
         self.bench = bench
         self.crew = bench.crew
         self.model = model
         self.steps = steps
         self.checks = checks
-        self.rounds: list[Rounds] = []
+        self.rounds: list[RoundBatch] = []
         self.rough = np.zeros(self.crew.size, dtype=np.intp)
-        self.lost: list[tuple[Who, str]] = []
+        self.lost: list[tuple[Indices, str]] = []
         """Who could not bring the images together, and at which position."""
         self._over_corrected = over_corrected
         self._found = {label: np.full(self.crew.size, np.nan) for label in self._labels()}
@@ -258,7 +269,7 @@ class _Clearing:
         acuity = 1e-3 * self.crew.observer.parallax_um * bench.job.plan.projection_height / bench.seat.c
         self._visible = max(acuity, bench.eyes.finest_mm)
 
-    def run(self, who: Who) -> Who:
+    def run(self, who: Indices) -> Indices:
         """Go round until the last point is found clear; return those who came to an end."""
         ended = who[:0]
         while who.size:
@@ -284,7 +295,7 @@ class _Clearing:
     def _elements(self) -> list[str]:
         return [step.element for step in self.steps]
 
-    def _going(self, who: Who) -> Who:
+    def _going(self, who: Indices) -> Indices:
         who = self.crew.remaining(np.asarray(who, dtype=np.intp))
         for lost, _ in self.lost:
             who = exclude(who, lost)
@@ -292,7 +303,7 @@ class _Clearing:
 
     # --- a round --------------------------------------------------------------------------------------
 
-    def _clear_first_four(self, who: Who) -> Who:
+    def _clear_first_four(self, who: Indices) -> Indices:
         """Clear them over and over until on arriving each is seen to be clear."""
         clearing = who
         for _ in range(MAX_PASSES):
@@ -306,7 +317,7 @@ class _Clearing:
                 break
         return self._going(who)
 
-    def _over_correct(self, who: Who) -> tuple[Who, Who, Array]:
+    def _over_correct(self, who: Indices) -> tuple[Indices, Indices, Array]:
         """Turn omega n times as far as clears the last point; return who is there, who had to turn, and n."""
         seat, step, threshold = self.bench.seat, self.steps[-1], VISIBLE_SIGMAS_AT_LAST * self._visible
         turn, n = np.zeros((2, self.crew.size))
@@ -319,7 +330,7 @@ class _Clearing:
             seat.turn_elements(turning, {step.element: stands + ((n - 1.0) * turn)[turning]})
         return self._going(who), self._going(turning), n
 
-    def _times(self, who: Who) -> Array:
+    def _times(self, who: Indices) -> Array:
         """Return the over-correction ``(m,)``: as given, or from the places of the five points."""
         if not isinstance(self._over_corrected, str):
             return np.full(who.size, float(self._over_corrected))
@@ -332,7 +343,7 @@ class _Clearing:
         )
         return np.where(hopeless, 0.0, n)
 
-    def _look_at_checks(self, who: Who) -> None:
+    def _look_at_checks(self, who: Indices) -> None:
         for label in self.checks:
             seen = self.bench.look_at_parallaxes(who, [self.model.standard_points[label]])
             together = self.crew.remaining(who)
@@ -340,16 +351,18 @@ class _Clearing:
             self._found[label][together] = seen.parallax_mm[0, together]
             self._found[label][apart] = np.nan
 
-    def _close_round(self, who: Who, turning: Who, settings: Mapping[str, Array], n: Array) -> None:
+    def _close_round(self, who: Indices, turning: Indices, settings: Mapping[str, Array], n: Array) -> None:
         parallaxes = {label: p.copy() for label, p in self._found.items()}
         squares = np.square(list(parallaxes.values()))
         rms = np.sqrt(np.nansum(squares, axis=0) / np.maximum(1, (~np.isnan(squares)).sum(axis=0)))
         nothing = np.zeros(self.crew.size)
-        self.rounds.append(Rounds(who, settings, parallaxes, nothing, rms, turning, {}, n))
+        self.rounds.append(RoundBatch(who, settings, parallaxes, nothing, rms, turning, {}, n))
 
     # --- a point --------------------------------------------------------------------------------------
 
-    def _clear(self, who: Who, place: int, step: Step, unless_within: float = 0.0, turn: Array | None = None) -> Who:
+    def _clear(
+        self, who: Indices, place: int, step: ClearingStep, unless_within: float = 0.0, turn: Array | None = None
+    ) -> Indices:
         """Clear a point, its images brought together first where they are too far apart; return who did.
 
         Put the turns that did it into place.
@@ -380,7 +393,7 @@ class _Clearing:
             self.lost.append((who, step.position))
         return self.crew.remaining(np.asarray(cleared, dtype=np.intp))
 
-    def _bring_together(self, one: Who, point: str, step: Step) -> None:
+    def _bring_together(self, one: Indices, point: str, step: ClearingStep) -> None:
         """Turn an element by what the Y readings of each eye alone differ by."""
         bench, seat, element = self.bench, self.bench.seat, step.element
         self.rough[one] += 1
@@ -404,7 +417,7 @@ class _Clearing:
     def _by_hand(self, element: str) -> str:
         return f"{element[:-1]}{self.model.side_of(int(element[-1]))}"
 
-    def _gain(self, element: str, who: Who, place: Array) -> Array:
+    def _gain(self, element: str, who: Indices, place: Array) -> Array:
         """Return what one unit of an element's counter adds to the parallax ``(m,)`` at places ``(3, m)``, mm.
 
         While it is turned, that is, and the mark is still to follow in height.
@@ -415,12 +428,12 @@ class _Clearing:
         coefficients = parallax_coefficients(point, point, left.centre, right.centre, left.angles, right.angles)[row]
         return np.asarray(coefficients * (1.0 if element.startswith("b") else GON))
 
-    def _coefficients(self, who: Who) -> Array:
+    def _coefficients(self, who: Indices) -> Array:
         """Return those of the five elements at the five points ``(5, 5, m)``, mm a radian or mm a mm."""
         rows = [PARALLAX_ELEMENTS.index(self._by_hand(name)) for name in self._elements()]
         return clearing_coefficients(_in_frame(self._places[:, :, who]), *self._stands(who))[rows]
 
-    def _stands(self, who: Who) -> tuple[Stand, Stand]:
+    def _stands(self, who: Indices) -> tuple[ProjectorPose, ProjectorPose]:
         model = self.model
         return (
             projector_pose(self.bench, who, model.left_projector, np.zeros(who.size)),

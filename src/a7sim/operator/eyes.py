@@ -4,11 +4,11 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from a7sim.among import Who, exclude, put, take
+from a7sim.among import Indices, exclude, put, take
 from a7sim.geometry import Array
-from a7sim.operator.hands import Truths
+from a7sim.operator.hands import BoolArray
 from a7sim.operator.levers import correct_fittings
-from a7sim.operator.seat import Seat, side_name
+from a7sim.operator.seat import Controls, side_name
 
 MAX_LOOKS = 40
 """At one setting of the mark."""
@@ -28,10 +28,10 @@ DIVERGENCE_LOOKS = 3
 """What grows in so many looks in a row, though it is turned down, runs away."""
 
 
-class Eyes:
+class Pointing:
     """The eyes of a crew, each looking at its own photograph."""
 
-    def __init__(self, seat: Seat) -> None:
+    def __init__(self, seat: Controls) -> None:
         self.seat = seat
         self.crew = seat.crew
         observer = seat.crew.observer
@@ -47,7 +47,7 @@ class Eyes:
         self._prints = prints
         self._strayed[:] = 0.0
 
-    def bring_into_view(self, who: Who, hand: int, point: str) -> None:
+    def bring_into_view(self, who: Indices, hand: int, point: str) -> None:
         """Drive to where the print shows a point and look around until it is in the field of view."""
         seat = self.seat
         printed = self.crew.print_position(self._prints[hand], point)
@@ -88,22 +88,22 @@ class Eyes:
         """Return what is not turned any more after so many looks, mm."""
         return self.finest_mm if looks < PATIENT_LOOKS else max(self.finest_mm, IMPATIENT_MM)
 
-    def measure_drift(self, who: Who, hand: int, point: str, readings: Array) -> None:
+    def measure_drift(self, who: Indices, hand: int, point: str, readings: Array) -> None:
         """Bear in mind how far from where the print showed it a point was found, by its readings ``(2 or 3, m)``."""
         seat = self.seat
         expected = seat.rotate_by_swing(who, hand, self.crew.print_position(self._prints[hand], point)[:, who])
         away = seat.to_mm(readings[:2] - seat.under_centre(who, hand))
         self._strayed[hand][:, who] = away * seat.c / seat.z[who] - expected
 
-    def view_point(self, who: Who, hand: int, point: str) -> Array:
+    def view_point(self, who: Indices, hand: int, point: str) -> Array:
         """Look: where the image stands from the mark ``(2, m)`` in um, nan where it is not in the field of view."""
         self.crew.spend(who, self.crew.observer.seconds_to_look, "looking")
         return self.crew.view_points(who, point, lambda them, name: self.seat.hands.view_point(them, hand, name))
 
-    def bisect(self, who: Who, hand: int, point: str, errors: Array) -> None:
+    def bisect(self, who: Indices, hand: int, point: str, errors: Array) -> None:
         """Turn X and Y until the image seems to lie at the mark; errors ``(2, sessions)`` in um."""
         seat = self.seat
-        watch = Watch(2, self.crew.size)
+        watch = DivergenceMonitor(2, self.crew.size)
         for looks in range(MAX_LOOKS):
             seen = self.view_point(who, hand, point)
             if not watch.is_converging(who, seen):
@@ -124,7 +124,7 @@ class Eyes:
             f"{seat.model.name}: point {point}: the mark cannot be brought to rest on the image",
         )
 
-    def _look_again_with_levers_right(self, who: Who, hand: int, point: str, seen: Array, lost: Truths) -> None:
+    def _look_again_with_levers_right(self, who: Indices, hand: int, point: str, seen: Array, lost: BoolArray) -> None:
         """Put right the levers of those from whom a point ran away, go back to where it was seen and look, in place."""
         away = np.flatnonzero(lost)
         mended = away[correct_fittings(self.seat, who[away])]
@@ -133,10 +133,10 @@ class Eyes:
             seen[:, mended] = self.view_point(who[mended], hand, point)
             lost[mended] = np.isnan(seen[0, mended])
 
-    def _go_back(self, who: Who) -> None:
+    def _go_back(self, who: Indices) -> None:
         self.seat.drive(who, {"X": self._seen_from[0, who], "Y": self._seen_from[1, who]})
 
-    def _ran_away(self, who: Who, hand: int, point: str) -> None:
+    def _ran_away(self, who: Indices, hand: int, point: str) -> None:
         for session in who:
             one = np.array([session])
             self.crew.give_up(
@@ -145,7 +145,7 @@ class Eyes:
                 f"{self._why_it_ran_away(one, hand, point)}",
             )
 
-    def _why_it_ran_away(self, one: Who, hand: int, point: str) -> str:
+    def _why_it_ran_away(self, one: Indices, hand: int, point: str) -> str:
         """Go back to where the point was seen and try each wheel to find out what is wrong."""
         seat = self.seat
         reasons = []
@@ -164,7 +164,7 @@ class Eyes:
         return " and ".join(reasons) or "it left the field of view"
 
 
-class Watch:
+class DivergenceMonitor:
     """Watches whether displacements grow though they are being turned down."""
 
     def __init__(self, displacements: int, sessions: int) -> None:
@@ -172,7 +172,7 @@ class Watch:
         self._times = np.zeros((displacements, sessions), dtype=int)
         self._any_grew = False
 
-    def is_converging(self, who: Who, seen: Array) -> bool:
+    def is_converging(self, who: Indices, seen: Array) -> bool:
         """Whether all displacements ``(k, m)`` in um are seen and small, and none ever grew; if not, ask on."""
         now = np.abs(seen)
         well = not self._any_grew and bool(now.max(initial=0.0) <= DIVERGENCE_UM)
@@ -180,11 +180,11 @@ class Watch:
             put(now, who, self._before)
         return well
 
-    def has_grown(self, who: Who) -> Truths:
+    def has_grown(self, who: Indices) -> BoolArray:
         """Return which of the displacements ``(k, m)`` had grown when they were last seen."""
         return take(self._times, who) > 0
 
-    def is_diverging(self, who: Who, seen: Array) -> Truths:
+    def is_diverging(self, who: Indices, seen: Array) -> BoolArray:
         """Return which of the displacements ``(k, m)`` in um have grown in look after look."""
         now = np.abs(seen)
         grown = (now > 1.4 * take(self._before, who)) & (now > DIVERGENCE_UM)

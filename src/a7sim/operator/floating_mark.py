@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, exclude, put, take
+from a7sim.among import Indices, exclude, put, take
 from a7sim.geometry import Array
-from a7sim.operator.eyes import MAX_LOOKS, Eyes, Watch
-from a7sim.operator.hands import Truths
+from a7sim.operator.eyes import MAX_LOOKS, DivergenceMonitor, Pointing
+from a7sim.operator.hands import BoolArray
 from a7sim.operator.levers import correct_fittings
 
 MAX_RISE_MM = 20.0
@@ -20,7 +20,7 @@ RISES_TO_FUSE_MM = (0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0)
 
 
 @dataclass(frozen=True)
-class Judgement:
+class SettingErrors:
     """By how much a crew misjudges where the mark stands: in plan ``(2, sessions)`` and in x-parallax, um."""
 
     plan: Array
@@ -41,12 +41,12 @@ class Clearing:
 class FloatingMark:
     """The mark as both eyes see it."""
 
-    def __init__(self, eyes: Eyes) -> None:
+    def __init__(self, eyes: Pointing) -> None:
         self.eyes = eyes
         self.seat = eyes.seat
         self.crew = eyes.crew
 
-    def fuse(self, who: Who, point: str, judgement: Judgement) -> Who:
+    def fuse(self, who: Indices, point: str, judgement: SettingErrors) -> Indices:
         """Set the mark on a point, first with the left eye, then with both; return those who could fuse it."""
         seat, eyes, crew = self.seat, self.eyes, self.crew
         eyes.bring_into_view(who, 1, point)
@@ -54,7 +54,7 @@ class FloatingMark:
         height = np.zeros(crew.size)
         height[who] = -seat.z[who]
         exactly = np.zeros((2, crew.size))
-        fused: list[Who] = []
+        fused: list[Indices] = []
         for rise in RISES_TO_FUSE_MM:
             there = who
             if rise:
@@ -75,15 +75,15 @@ class FloatingMark:
         seat.drive_z_to(who, height[who])
         return _together(fused)
 
-    def settle(self, who: Who, point: str, judgement: Judgement, clearing: Clearing | None = None) -> Who:
+    def settle(self, who: Indices, point: str, judgement: SettingErrors, clearing: Clearing | None = None) -> Indices:
         """Turn X, Y, Z, and an element where one is to clear the y-parallax, until the mark seems to stand there.
 
         Return those for whom it does; the others have given up, lost the point or come to the element's end.
         """
         seat, eyes, crew = self.seat, self.eyes, self.crew
         drum = _Drum(self, who, clearing) if clearing is not None else None
-        watch = Watch(4, crew.size)
-        settled: list[Who] = []
+        watch = DivergenceMonitor(4, crew.size)
+        settled: list[Indices] = []
         begun = np.full((3, crew.size), np.nan)
         for looks in range(MAX_LOOKS):
             seen = self.view(who, point)
@@ -132,14 +132,14 @@ class FloatingMark:
         )
         return _together(settled)
 
-    def view(self, who: Who, point: str) -> Array:
+    def view(self, who: Indices, point: str) -> Array:
         """Return what both eyes see ``(4, m)``: x and y from the mark (mean of both), px, py, um; nan if lost."""
         self.crew.spend(who, self.crew.observer.seconds_to_look, "looking")
         lx, ly, rx, ry = self.crew.view_points(who, point, self.seat.hands.view_point_stereo)
         return np.array([(lx + rx) / 2.0, (ly + ry) / 2.0, lx - rx, ly - ry])
 
     def _see_what_runs_away(
-        self, who: Who, point: str, seen: Array, watch: Watch, begun: Array, clearing: Clearing | None
+        self, who: Indices, point: str, seen: Array, watch: DivergenceMonitor, begun: Array, clearing: Clearing | None
     ) -> None:
         """Put right the levers of those whose parallaxes grow, as far as these are wrong, else let them give up."""
         unseen = np.isnan(seen)
@@ -153,7 +153,7 @@ class FloatingMark:
             self._see_that_it_fuses(who, point, running_away, clearing)
 
     def _look_again_with_levers_right(
-        self, who: Who, point: str, seen: Array, parallaxes_grow: Truths, begun: Array
+        self, who: Indices, point: str, seen: Array, parallaxes_grow: BoolArray, begun: Array
     ) -> npt.NDArray[np.intp]:
         """Put right the levers of those whose parallaxes grow, go back to where it began and look again, in place.
 
@@ -166,7 +166,7 @@ class FloatingMark:
             seen[:, mended] = self.view(who[mended], point)
         return mended
 
-    def _see_that_it_fuses(self, who: Who, point: str, running_away: Truths, clearing: Clearing | None) -> None:
+    def _see_that_it_fuses(self, who: Indices, point: str, running_away: BoolArray, clearing: Clearing | None) -> None:
         model = self.seat.model.name
         self.crew.give_up(
             who[running_away[2]],
@@ -181,20 +181,20 @@ class FloatingMark:
             )
 
 
-def _together(parts: Sequence[Who]) -> Who:
+def _together(parts: Sequence[Indices]) -> Indices:
     return np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *parts]))
 
 
 class _Drum:
     """The drum of an element that is being turned."""
 
-    def __init__(self, mark: FloatingMark, who: Who, clearing: Clearing) -> None:
+    def __init__(self, mark: FloatingMark, who: Indices, clearing: Clearing) -> None:
         self._seat = mark.seat
         self._clearing = clearing
         self._element = mark.seat.manual.elements[clearing.element]
         mark.seat.grab_drum(who, clearing.element)
 
-    def to_turn(self, who: Who, parallax: Array, scale: Array, at_rest: float) -> tuple[Array, Truths]:
+    def to_turn(self, who: Indices, parallax: Array, scale: Array, at_rest: float) -> tuple[Array, BoolArray]:
         """Return by how much to turn, nothing where it is clear, and where that is out of range ``(m,)``."""
         left = parallax + take(self._clearing.error, who) * scale
         amounts = np.where(np.abs(left) < at_rest, 0.0, -left / take(self._clearing.gain, who))

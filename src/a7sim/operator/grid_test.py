@@ -6,19 +6,19 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from a7sim.among import Who
+from a7sim.among import Indices
 from a7sim.geometry import GON, Array
 from a7sim.manual import Variant
-from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Crew
+from a7sim.operator.bench import Workstation
+from a7sim.operator.crew import OperatorBatch
 from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import Job, ModelJob
-from a7sim.operator.line_hands import LineHands
+from a7sim.operator.line_hands import ScpiDriver
 from a7sim.operator.person import Person
 from a7sim.operator.plate import Crosses, cross_positions, locate_plate, point_at_crosses, sketch_positions
 from a7sim.operator.seat import side_name, wrap_gon
 from a7sim.operator.work import set_base_and_fittings
-from a7sim.reduction import Elements, PlateLie, ProjectorTest, grid_test
+from a7sim.reduction import Elements, PlatePlacement, ProjectorTest, grid_test
 from a7sim.scenario import Camera, GridPlate, Plan
 
 TIMES_REGISTERED = 4
@@ -37,7 +37,7 @@ PREPARED_HEIGHT_MM, PREPARED_BASE_MM = 300.0, 10.0
 
 
 @dataclass(frozen=True)
-class GridTestOrder:
+class GridTestPlan:
     """What is ordered: a plate, so many of its crosses, so many levels of Z, so many pointings at each."""
 
     camera: Camera
@@ -78,11 +78,11 @@ def level_heights(manual: Variant, c: float, outermost: float, levels: int) -> l
 
 
 @dataclass(frozen=True)
-class ProjectorSheet:
+class ProjectorReadings:
     """A projector's grid test; arrays ``(..., m)`` have those who came to the end of it as their last axis."""
 
     projector: int
-    sessions: Who
+    sessions: Indices
     counters: Mapping[str, Array]
     """What the counters of its elements and of bx show, gon and mm."""
     heights: tuple[float, ...]
@@ -96,17 +96,19 @@ class ProjectorSheet:
 
 def measure_grid(
     person: Person,
-    order: GridTestOrder,
+    order: GridTestPlan,
     tick: Callable[[], None] = lambda: None,
     begins: Callable[[str], None] = lambda _: None,
-) -> Iterator[ProjectorSheet]:
+) -> Iterator[ProjectorReadings]:
     """Yield both projectors as one person tests them. Raises DoesNotFit when one cannot be tested."""
-    yield from measure_grid_batch(Bench(Crew.single(person), LineHands(person), order.job, tick), order, begins)
+    yield from measure_grid_batch(
+        Workstation(OperatorBatch.single(person), ScpiDriver(person), order.job, tick), order, begins
+    )
 
 
 def measure_grid_batch(
-    bench: Bench, order: GridTestOrder, begins: Callable[[str], None] = lambda _: None
-) -> Iterator[ProjectorSheet]:
+    bench: Workstation, order: GridTestPlan, begins: Callable[[str], None] = lambda _: None
+) -> Iterator[ProjectorReadings]:
     """Yield the left and the right projector as a crew tests them, each session at its own instrument."""
     crew = bench.crew
     crew.begin(crew.active, "", "preparation")
@@ -121,7 +123,7 @@ def measure_grid_batch(
         bench.hands.unload(crew.active, hand)
 
 
-def _tested(bench: Bench, order: GridTestOrder, hand: int) -> ProjectorSheet:
+def _tested(bench: Workstation, order: GridTestPlan, hand: int) -> ProjectorReadings:
     crew, seat, plate = bench.crew, bench.seat, order.plate
     model = ModelJob(f"{plate.name} in projector {hand}", plate.name, plate.name, "inside", order.polarity, {})
     certificate = bench.job.certificate
@@ -135,14 +137,16 @@ def _tested(bench: Bench, order: GridTestOrder, hand: int) -> ProjectorSheet:
     bench.compute(who)
     counters = _counters(bench, who, hand)
     means = sets.mean(axis=0)[..., who]
-    its_lie = PlateLie(*(getattr(lie, field.name)[who] for field in fields(lie)))
+    its_lie = PlatePlacement(*(getattr(lie, field.name)[who] for field in fields(lie)))
     test = grid_test(cross_positions(order.chosen), means, heights, _elements(seat.manual, counters, hand), its_lie)
     enlarged = -np.array(heights)[:, None, None] / seat.c
     pointing = _repeatability(sets[..., who], enlarged)
-    return ProjectorSheet(hand, who, counters, tuple(heights), order.chosen, test, pointing, crew.seconds[who].copy())
+    return ProjectorReadings(
+        hand, who, counters, tuple(heights), order.chosen, test, pointing, crew.seconds[who].copy()
+    )
 
 
-def _set_to_zeros(bench: Bench, projector: int) -> None:
+def _set_to_zeros(bench: Workstation, projector: int) -> None:
     """Set a projector's elements and bx to their counter zeros, and the camera's principal distance."""
     seat, who = bench.seat, bench.crew.active
     elements = seat.manual.elements
@@ -154,7 +158,7 @@ def _set_to_zeros(bench: Bench, projector: int) -> None:
     seat.set_elements(who, zeros | {f"c{projector}": np.full(who.size, bench.job.certificate.c)})
 
 
-def _pointings(bench: Bench, order: GridTestOrder, hand: int, height: float) -> Array:
+def _pointings(bench: Workstation, order: GridTestPlan, hand: int, height: float) -> Array:
     """Return places of the mark ``(p, 2, n, sessions)`` in mm of the frame, pointed at all crosses p times."""
     crew, seat = bench.crew, bench.seat
     places = np.zeros((order.pointings, 2, len(order.chosen), crew.size))
@@ -166,7 +170,7 @@ def _pointings(bench: Bench, order: GridTestOrder, hand: int, height: float) -> 
     return places
 
 
-def _counters(bench: Bench, who: Who, projector: int) -> Mapping[str, Array]:
+def _counters(bench: Workstation, who: Indices, projector: int) -> Mapping[str, Array]:
     names = [name for name in bench.seat.manual.elements if name == "bx" or name[-1] == str(projector)]
     return bench.seat.elements(who, names)
 

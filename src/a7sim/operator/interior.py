@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who
+from a7sim.among import Indices
 from a7sim.geometry import GON, Array
-from a7sim.operator.bench import Bench
-from a7sim.reduction import PictureLie, Undetermined, picture_placement
+from a7sim.operator.bench import Workstation
+from a7sim.reduction import PicturePlacement, Undetermined, picture_placement
 from a7sim.scenario import Camera
 
 CENTRED_MM = 0.02
@@ -33,7 +33,7 @@ class InteriorOrientation:
 
 
 @dataclass(frozen=True)
-class InteriorOrientations:
+class InteriorOrientationBatch:
     """The interior orientations ``(sessions,)`` of a photograph in every session."""
 
     photograph: str
@@ -54,8 +54,8 @@ class InteriorOrientations:
 
 
 def interior_orientation(
-    bench: Bench, who: Who, projector: int, photograph: str, certificate: Camera
-) -> InteriorOrientations:
+    bench: Workstation, who: Indices, projector: int, photograph: str, certificate: Camera
+) -> InteriorOrientationBatch:
     """Mount a photograph in a projector, centre it and set its principal distance.
 
     Uniform film shrinkage, seen as a change of scale at the fiducials, goes into the principal distance. Those who
@@ -67,8 +67,8 @@ def interior_orientation(
 
 
 def centre_picture(
-    bench: Bench, who: Who, projector: int, photograph: str, certificate: Camera
-) -> InteriorOrientations:
+    bench: Workstation, who: Indices, projector: int, photograph: str, certificate: Camera
+) -> InteriorOrientationBatch:
     """Mount a picture in a projector and centre it on the calibrated principal point; no element is touched.
 
     The principal distances found are zero. Those who cannot centre the picture give up.
@@ -77,7 +77,7 @@ def centre_picture(
     _mount(bench, who, projector, photograph)
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
     wanted = -np.array(certificate.principal_point)[:, None]
-    found = InteriorOrientations(photograph, np.zeros(crew.size, dtype=np.intp), *np.zeros((3, crew.size)))
+    found = InteriorOrientationBatch(photograph, np.zeros(crew.size, dtype=np.intp), *np.zeros((3, crew.size)))
     centring = crew.remaining(who)
     for round_ in range(1, MAX_ROUNDS + 1):
         names, displacements = view_fiducials(bench, centring, projector)
@@ -107,7 +107,7 @@ def centre_picture(
     return found
 
 
-def _mount(bench: Bench, who: Who, projector: int, photograph: str) -> None:
+def _mount(bench: Workstation, who: Indices, projector: int, photograph: str) -> None:
     crew = bench.crew
     crew.spend(who, crew.observer.seconds_to_mount, "mounting")
     bench.seat.spend_setting(who)
@@ -118,7 +118,7 @@ def _mount(bench: Bench, who: Who, projector: int, photograph: str) -> None:
         crew.give_up(who, f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it")
 
 
-def view_fiducials(bench: Bench, who: Who, projector: int) -> tuple[list[str], Array]:
+def view_fiducials(bench: Workstation, who: Indices, projector: int) -> tuple[list[str], Array]:
     """Return the names of a picture's fiducials and their displacements ``(2, n, m)`` as they are registered, mm."""
     names, exact = bench.hands.fiducials(who, projector)
     crew = bench.crew
@@ -127,7 +127,7 @@ def view_fiducials(bench: Bench, who: Who, projector: int) -> tuple[list[str], A
 
 
 def _rightly_laid(
-    bench: Bench, who: Who, projector: int, photograph: str, displacements: Array, places: Array
+    bench: Workstation, who: Indices, projector: int, photograph: str, displacements: Array, places: Array
 ) -> npt.NDArray[np.bool_]:
     """Return whose fiducials stand near the collimating marks of their names ``(m,)``; the others give up."""
     furthest = np.abs(displacements).max(axis=(0, 1))
@@ -143,14 +143,19 @@ def _rightly_laid(
     return np.asarray(~misplaced)
 
 
-def _unexplained(displacements: Array, places: Array, lie: PictureLie) -> Array:
+def _unexplained(displacements: Array, places: Array, lie: PicturePlacement) -> Array:
     x, y = places[:, :, None]
     explained = np.array([lie.dx - lie.turn * y + lie.scale * x, lie.dy + lie.turn * x + lie.scale * y])
     return np.asarray(np.sqrt(((displacements - explained) ** 2).mean(axis=(0, 1))))
 
 
 def _set_principal_distance(
-    bench: Bench, who: Who, projector: int, photograph: str, certificate: Camera, found: InteriorOrientations
+    bench: Workstation,
+    who: Indices,
+    projector: int,
+    photograph: str,
+    certificate: Camera,
+    found: InteriorOrientationBatch,
 ) -> None:
     c = np.round(certificate.c * (1.0 + found.film_scale[who]), 2)
     found.principal_distance[who] = c

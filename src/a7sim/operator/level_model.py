@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import GON, Array
-from a7sim.operator.bench import Bench
+from a7sim.operator.bench import Workstation
 from a7sim.operator.levelling import Control, Levelling
 from a7sim.operator.stereo_view import StereoView
 from a7sim.reduction import AbsoluteOrientation, Ground, Model, Undetermined, absolute_orientation
@@ -49,7 +49,7 @@ class LevelModel:
 
 
 def level_model(
-    bench: Bench,
+    bench: Workstation,
     view: StereoView,
     points: Mapping[str, Place],
     control: Ground,
@@ -75,7 +75,7 @@ def level_model(
     return LevelModel(absolute, points, scale_number, _tilt(absolute), units, rounds)
 
 
-def _measured(bench: Bench, names: Sequence[str]) -> dict[str, Place]:
+def _measured(bench: Workstation, names: Sequence[str]) -> dict[str, Place]:
     readings = bench.measure_points(bench.crew.active, names)[:, :, 0].T
     return {
         name: (float(X), float(Y), float(Z))
@@ -84,7 +84,7 @@ def _measured(bench: Bench, names: Sequence[str]) -> dict[str, Place]:
     }
 
 
-def orient_model(bench: Bench, points: Mapping[str, Place], control: Ground, units: float) -> AbsoluteOrientation:
+def orient_model(bench: Workstation, points: Mapping[str, Place], control: Ground, units: float) -> AbsoluteOrientation:
     """Return the orientation to the ground of a model in which the control was measured, gives up where it has none."""
     names = tuple(name for name in points if name in control.points)
     coordinates = np.array([points[name] for name in names]).reshape(-1, 3).T / np.array([[1.0], [1.0], [units]])

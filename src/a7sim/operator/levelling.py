@@ -12,11 +12,11 @@ from itertools import combinations
 
 import numpy as np
 
-from a7sim.among import Who
+from a7sim.among import Indices
 from a7sim.geometry import GON, Array, angles_of, length_of, mxm, mxv, rotation
 from a7sim.manual import Variant
-from a7sim.operator.bench import Bench
-from a7sim.operator.hands import Truths
+from a7sim.operator.bench import Workstation
+from a7sim.operator.hands import BoolArray
 from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import expand_to_batch
 from a7sim.reduction import Ground, Undetermined, solve_least_squares
@@ -102,7 +102,7 @@ class Fit:
         in_model, on_ground = self.heights
         return np.asarray((1e-3 * number * in_model - on_ground).std(axis=0))
 
-    def of(self, keep: Truths) -> "Fit":
+    def of(self, keep: BoolArray) -> "Fit":
         """Return the fit of some of the sessions."""
         return Fit(self.up[:, keep], self.metres[keep], self.heights[:, :, keep])
 
@@ -110,23 +110,23 @@ class Fit:
 class Levelling:
     """Sessions with the same control at work on one model."""
 
-    def __init__(self, bench: Bench, model: ModelJob, control: Control) -> None:
+    def __init__(self, bench: Workstation, model: ModelJob, control: Control) -> None:
         self.bench, self.crew, self.seat = bench, bench.crew, bench.seat
         self.model, self.control = model, control
         self.names = [name for name in bench.seat.manual.elements if name not in ("c1", "c2")]
 
-    def settings(self, who: Who) -> dict[str, Array]:
+    def settings(self, who: Indices) -> dict[str, Array]:
         """Return where all elements stand ``(sessions,)``."""
         return expand_to_batch(self.seat.exact_values(who, self.names), who, self.crew.size)
 
-    def measured(self, who: Who, number: int) -> Array:
+    def measured(self, who: Indices, number: int) -> Array:
         """Return places ``(3, n, m)`` of the control in the frame as a round measures them, mm, Z up."""
         self.bench.begin_round(who, number)
         readings = self.bench.measure_points(who, self.control.names)[:, :, who]
         x, y, z = np.stack([self.seat.model_position(who, each) for each in np.moveaxis(readings, 1, 0)], axis=1)
         return np.array([x, y, -z])
 
-    def compared(self, who: Who, at: Array) -> Fit:
+    def compared(self, who: Indices, at: Array) -> Fit:
         """Compare places ``(3, n, m)`` with the control: the scale by its two ends, the tilts by its heights."""
         self.bench.compute(who)
         first, last = self.control.ends
@@ -141,7 +141,7 @@ class Levelling:
         in_model = at[2, self.control.with_height]
         return Fit(up, metres, np.array([in_model, np.broadcast_to(given, in_model.shape)]))
 
-    def _up(self, who: Who, at: Array, given: Array) -> Array:
+    def _up(self, who: Indices, at: Array, given: Array) -> Array:
         """Return the up directions ``(3, m)`` from places ``(3, n, m)`` and heights at their scale ``(n, m)``, mm."""
         slopes = np.zeros((2, who.size))
         design = np.moveaxis(np.array([at[0], at[1], np.ones_like(at[0])]), 0, 1)
@@ -155,7 +155,7 @@ class Levelling:
                 break
         return np.array([*slopes, np.sqrt(1.0 - (slopes**2).sum(axis=0))])
 
-    def level(self, who: Who, fit: Fit, number: float) -> dict[int, list[LevellingRound]]:
+    def level(self, who: Indices, fit: Fit, number: float) -> dict[int, list[LevellingRound]]:
         """Turn and measure until it gets no better, the model to a scale number; the best settings stand.
 
         Return the rounds by session.
@@ -188,7 +188,7 @@ class Levelling:
         return rounds
 
 
-def _note(rounds: Mapping[int, list[LevellingRound]], who: Who, fit: Fit, number: float) -> None:
+def _note(rounds: Mapping[int, list[LevellingRound]], who: Indices, fit: Fit, number: float) -> None:
     for session, rms, factor, tilts in zip(who.tolist(), fit.rms(number), fit.factor(number), fit.tilts.T, strict=True):
         rounds[session].append(LevellingRound(float(rms), float(factor), (float(tilts[0]), float(tilts[1]))))
 

@@ -5,10 +5,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from a7sim.among import Who
+from a7sim.among import Indices
 from a7sim.manual import REQUIRED_FITTINGS, Variant
-from a7sim.operator.hands import Truths
-from a7sim.operator.seat import Seat
+from a7sim.operator.hands import BoolArray
+from a7sim.operator.seat import Controls
 
 FITTING_NAMES: Mapping[str, str] = MappingProxyType(
     {
@@ -27,7 +27,7 @@ def required_fittings(manual: Variant, polarity: str, base: str) -> dict[str, st
     return {name: position for name, position in words.items() if name in manual.fittings}
 
 
-def correct_fittings(seat: Seat, who: Who) -> Truths:
+def correct_fittings(seat: Controls, who: Indices) -> BoolArray:
     """Look at every lever and put right those that were forgotten, with a remark.
 
     Return for whom there was one ``(m,)`` and all now stands as the table asks; a lever that does not stay is no help.

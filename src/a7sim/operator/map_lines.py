@@ -34,7 +34,7 @@ class Tracing:
 
 
 @dataclass(frozen=True)
-class Errand:
+class LineTarget:
     """A line to be compiled, from an old map: east and north in m of its start, of a place further on, and its end."""
 
     name: str
@@ -49,7 +49,7 @@ Ending = Literal["closed", "edge", "end", "joined", "lost"]
 
 
 @dataclass(frozen=True)
-class Traced:
+class TracedLine:
     """A line as it was registered: readings of the counters ``(3, n)``; a closed one ends with its first vertex."""
 
     name: str
@@ -105,7 +105,7 @@ class Area:
 
 
 @dataclass(frozen=True)
-class Spots:
+class SpotHeights:
     """Spot heights on a grid: readings ``(3, k, l)``, nan where the ground was not seen; heights in m ``(k, l)``."""
 
     readings: Array

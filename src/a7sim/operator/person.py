@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from a7sim.link.client import Client
 from a7sim.link.clock import Clock
-from a7sim.operator.book import Book
-from a7sim.operator.dice import Dice
+from a7sim.operator.book import ObservationBook
+from a7sim.operator.dice import OperatorRandom
 from a7sim.operator.slips import Slip
 from a7sim.operator.timesheet import Timesheet
 from a7sim.scenario import Observer
@@ -13,7 +13,7 @@ from a7sim.scenario import Observer
 MAX_NOTE_LENGTH = 900
 
 
-class DoesNotFit(Exception):
+class OperatorGaveUp(Exception):
     """The operator gives up: what is seen cannot be what was ordered. The text is the remark in the book."""
 
 
@@ -25,13 +25,13 @@ class Person:
     clock: Clock
     observer: Observer
     seed: int
-    book: Book = field(default_factory=Book)
+    book: ObservationBook = field(default_factory=ObservationBook)
     timesheet: Timesheet = field(default_factory=lambda: Timesheet(1))
     slips: list[Slip] = field(default_factory=list)
     """The truth about every slip, which this person does not have."""
 
     def __post_init__(self) -> None:
-        self.dice = Dice(self.observer, self.seed)
+        self.dice = OperatorRandom(self.observer, self.seed)
 
     def remark(self, text: str) -> None:
         """Write a remark into the book and into the journal of the instrument."""
@@ -43,7 +43,7 @@ class Person:
         printable = "".join(c if " " <= c <= "~" else "?" for c in text.replace('"', "'"))
         self.client.send(f'NOTE "{printable[:MAX_NOTE_LENGTH]}"')
 
-    def give_up(self, text: str) -> DoesNotFit:
+    def give_up(self, text: str) -> OperatorGaveUp:
         """Write what does not fit into the book and return it as an error to raise."""
         self.remark(f"does not fit: {text}")
-        return DoesNotFit(text)
+        return OperatorGaveUp(text)

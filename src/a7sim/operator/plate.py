@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who
+from a7sim.among import Indices
 from a7sim.geometry import Array
-from a7sim.operator.bench import Bench
+from a7sim.operator.bench import Workstation
 from a7sim.operator.interior import view_fiducials
-from a7sim.reduction import PlateLie, plane_fit, plate_placement
+from a7sim.reduction import PlatePlacement, plane_fit, plate_placement
 from a7sim.scenario import Camera
 
 Crosses = Mapping[str, tuple[float, float]]
@@ -31,7 +31,7 @@ def cross_positions(crosses: Crosses) -> Array:
     return np.array(list(crosses.values())).T
 
 
-def sketch_positions(bench: Bench, who: Who, projector: int) -> dict[str, Array]:
+def sketch_positions(bench: Workstation, who: Indices, projector: int) -> dict[str, Array]:
     """Return where the sketch of what lies in a projector shows points ``(2, sessions)``, nan for those not asked."""
     prints = {}
     for name, place in bench.hands.prints(who, projector).items():
@@ -40,7 +40,7 @@ def sketch_positions(bench: Bench, who: Who, projector: int) -> dict[str, Array]
     return prints
 
 
-def locate_plate(bench: Bench, who: Who, projector: int, certificate: Camera, times: int) -> PlateLie:
+def locate_plate(bench: Workstation, who: Indices, projector: int, certificate: Camera, times: int) -> PlatePlacement:
     """Register a mounted plate's fiducials so many times and return how it lies ``(sessions,)``."""
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
     registered = [view_fiducials(bench, who, projector) for _ in range(times)]
@@ -50,7 +50,7 @@ def locate_plate(bench: Bench, who: Who, projector: int, certificate: Camera, ti
     return plate_placement(every, np.array([marks[name] for names, _ in registered for name in names]).T)
 
 
-def point_at_crosses(bench: Bench, who: Who, hand: int, crosses: Crosses, level: float) -> Array:
+def point_at_crosses(bench: Workstation, who: Indices, hand: int, crosses: Crosses, level: float) -> Array:
     """Point with one eye at crosses at a Z reading; X, Y readings ``(2, n, sessions)``.
 
     A cross that its fellows contradict is struck out and pointed at again.
@@ -73,7 +73,7 @@ def point_at_crosses(bench: Bench, who: Who, hand: int, crosses: Crosses, level:
     return readings
 
 
-def _go_below(bench: Bench, who: Who, hand: int) -> None:
+def _go_below(bench: Workstation, who: Indices, hand: int) -> None:
     """Run the mark straight below a centre, whence it can go to any level: from the side the rods may not let it."""
     x, y = np.round(bench.seat.under_centre(who, hand), 2)
     bench.seat.drive(who, {"X": x, "Y": y})

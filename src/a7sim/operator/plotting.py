@@ -8,14 +8,14 @@ from types import MappingProxyType
 import numpy as np
 
 from a7sim.geometry import Array, length_of
-from a7sim.mistakes import Mistake
-from a7sim.operator.bench import Bench
+from a7sim.mistakes import A7SimError
+from a7sim.operator.bench import Workstation
 from a7sim.operator.compilation import Compilation
-from a7sim.operator.crew import Crew
+from a7sim.operator.crew import OperatorBatch
 from a7sim.operator.job import Job
 from a7sim.operator.level_model import LevelModel, level_model, orient_model
-from a7sim.operator.line_hands import LineHands
-from a7sim.operator.map_lines import Area, Errand, Spots, Traced, Tracing
+from a7sim.operator.line_hands import ScpiDriver
+from a7sim.operator.map_lines import Area, LineTarget, SpotHeights, TracedLine, Tracing
 from a7sim.operator.person import Person
 from a7sim.operator.preparation import PLAN_GEARS
 from a7sim.operator.stereo_view import StereoView
@@ -32,26 +32,26 @@ MAX_CONTOURS = 100
 
 
 @dataclass(frozen=True)
-class Order:
+class MapRequest:
     """What is to be drawn: heights of contours in m, all multiples of an interval, lines, and at what scale."""
 
     contours: tuple[float, ...]
     interval: float | None
-    lines: tuple[Errand, ...]
+    lines: tuple[LineTarget, ...]
     tracing: Tracing
     map_scale: float | None = None
     """Scale number of the map; when absent, the nearest round one."""
 
 
 @dataclass(frozen=True)
-class Sheet:
+class CompiledMap:
     """A compiled model as the person who compiled it knows it."""
 
     record: ModelRecord
     model: LevelModel
     area: Area
-    spots: Spots
-    lines: tuple[Traced, ...]
+    spots: SpotHeights
+    lines: tuple[TracedLine, ...]
     heights: tuple[float, ...]
     """Of the contours, m."""
     gear: float
@@ -82,16 +82,16 @@ def compile_map(
     person: Person,
     job: Job,
     control: Ground,
-    order: Order,
+    order: MapRequest,
     tick: Callable[[], None] = lambda: None,
     begins: Callable[[str], None] = lambda _: None,
-) -> Sheet:
+) -> CompiledMap:
     """Set up the one model of a job, level it on the control, and compile what is ordered.
 
     Raises DoesNotFit when it cannot be set up, Mistake for a contour that does not run in the model.
     """
     person.book.set_heading("", "preparation")
-    bench = Bench(Crew.single(person), LineHands(person), job, tick)
+    bench = Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick)
     record = next(measure_models_batch(bench, begins)).of(0)
     view = StereoView(bench, person)
     begin_form(bench, bench.seat.model, "absolute orientation", begins)
@@ -112,7 +112,7 @@ def compile_map(
     begin_form(bench, bench.seat.model, "spot heights", begins)
     spots = work.spot_heights()
     heights = _heights(order, spots)
-    lines: list[Traced] = []
+    lines: list[TracedLine] = []
     for height in heights:
         begin_form(bench, bench.seat.model, f"contour {height:g}", begins)
         lines += work.contour(height, spots)
@@ -122,7 +122,7 @@ def compile_map(
         lines.append(work.line(errand, spots))
         tick()
     above, sigma_height, sigma_plan = _expected(bench, view, model, spots, order.tracing)
-    return Sheet(
+    return CompiledMap(
         replace(record, finished_at=float(bench.crew.seconds[0])),
         model, area, spots, tuple(lines), heights, gear, above, sigma_height, sigma_plan,
     )  # fmt: skip
@@ -132,28 +132,28 @@ def _round_scale(number: float) -> float:
     return max(ROUND_SCALE, ROUND_SCALE * round(number / ROUND_SCALE))
 
 
-def _heights(order: Order, spots: Spots) -> tuple[float, ...]:
+def _heights(order: MapRequest, spots: SpotHeights) -> tuple[float, ...]:
     """Return the heights to be contoured in order. Raises Mistake for one outside the model."""
     low, high = spots.range
     for height in order.contours:
         if not low < height < high:
-            raise Mistake(f"--contour {height:g}: expected a height within the model, {low:.1f} to {high:.1f} m")
+            raise A7SimError(f"--contour {height:g}: expected a height within the model, {low:.1f} to {high:.1f} m")
     heights = set(order.contours)
     if order.interval is not None:
         first, last = math.ceil(low / order.interval), math.floor(high / order.interval)
         if last - first >= MAX_CONTOURS:
-            raise Mistake(
+            raise A7SimError(
                 f"--interval {order.interval:g}: expected at most {MAX_CONTOURS} contours from {low:.1f} to "
                 f"{high:.1f} m, got {last - first + 1}"
             )
         if last < first and not heights and not order.lines:
-            raise Mistake(f"--interval {order.interval:g}: expected a multiple of it from {low:.1f} to {high:.1f} m")
+            raise A7SimError(f"--interval {order.interval:g}: expected a multiple of it from {low:.1f} to {high:.1f} m")
         heights |= {order.interval * k for k in range(first, last + 1)}
     return tuple(sorted(heights))
 
 
 def _expected(
-    bench: Bench, view: StereoView, model: LevelModel, spots: Spots, tracing: Tracing
+    bench: Workstation, view: StereoView, model: LevelModel, spots: SpotHeights, tracing: Tracing
 ) -> tuple[float, float, float]:
     """Return the height of the centres above the mean spot in m, and the standard errors in m that a person expects."""
     who, observer = bench.crew.active, bench.crew.observer

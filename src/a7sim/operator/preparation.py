@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from a7sim.manual import Variant
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 PLAN_GEARS: Mapping[str, float] = MappingProxyType({"3-1-1": 4.0 / 3.0, "1-2-1": 1.5})
 """How many times larger than the model a horizontal gear draws: 1:3333 and 1:3750 into 1:2500 (thesis table 3.3).
@@ -22,7 +22,7 @@ MIN_WIDE_DEG, WIDEST_WIDE_DEG = 75.0, 100.0
 
 
 @dataclass(frozen=True)
-class Flight:
+class FlightPlan:
     """What is known of a flight: principal distance and photo base in mm, heights of the ground in m."""
 
     c: float
@@ -40,25 +40,27 @@ class Flight:
         heights: tuple[float, float],
         photo_scale: float | None = None,
         flying_height: float | None = None,
-    ) -> "Flight":
+    ) -> "FlightPlan":
         """Return a flight over the lowest and the highest ground, by its photo scale or its flying height.
 
         Heights are m, the flying height above the mean ground. Raises Mistake where they do not make a flight.
         """
         if (photo_scale is None) == (flying_height is None):
             got = "none" if photo_scale is None else "both"
-            raise Mistake(f"prepare: expected --photo-scale or --flying-height, one of the two, got {got}")
+            raise A7SimError(f"prepare: expected --photo-scale or --flying-height, one of the two, got {got}")
         lowest, highest = heights
         if lowest > highest:
-            raise Mistake(f"--heights: expected the lowest ground before the highest, got {lowest:g} and {highest:g}")
+            raise A7SimError(
+                f"--heights: expected the lowest ground before the highest, got {lowest:g} and {highest:g}"
+            )
         if photo_scale is None:
             photo_scale = 1e3 * (flying_height or 0.0) / c if c else 0.0
         if not min(c, photo_scale, photo_base) > 0.0:
-            raise Mistake("prepare: expected --c, --photo-base and --photo-scale or --flying-height above zero")
+            raise A7SimError("prepare: expected --c, --photo-base and --photo-scale or --flying-height above zero")
         flight = cls(c, photo_scale, photo_base, lowest, highest)
         if not flight.lowest_flown > 0.0:
             above = -flight.lowest_flown
-            raise Mistake(f"--heights: expected ground below the flight, got {highest:g} m, {above:g} m above it")
+            raise A7SimError(f"--heights: expected ground below the flight, got {highest:g} m, {above:g} m above it")
         return flight
 
     @property
@@ -115,10 +117,10 @@ class ModelScale:
 
 
 @dataclass(frozen=True)
-class Preparation:
+class FlightSettings:
     """The settings of a flight: the optimum scale number, all scales for which there are gears, the one chosen."""
 
-    flight: Flight
+    flight: FlightPlan
     optimum: float
     optimum_bx: float
     scales: tuple[ModelScale, ...]
@@ -126,7 +128,7 @@ class Preparation:
     reason: str
 
 
-def choose_settings(flight: Flight, variant: Variant, map_scale: float | None = None) -> Preparation:
+def choose_settings(flight: FlightPlan, variant: Variant, map_scale: float | None = None) -> FlightSettings:
     """Return the settings for a flight on a plotter, from a flight in mm and m and a map's scale number.
 
     The optimum puts the mean ground at the longest projection distance, equation 3.1. Of the scales for which there is
@@ -140,20 +142,20 @@ def choose_settings(flight: Flight, variant: Variant, map_scale: float | None = 
     possible = [scale for scale in scales if not scale.reason_rejected]
     if not possible:
         said = "; ".join(f"1:{scale.number:.0f} {scale.reason_rejected[0]}" for scale in scales)
-        raise Mistake(f"no model scale of an {variant.name} suits this flight: {said}")
+        raise A7SimError(f"no model scale of an {variant.name} suits this flight: {said}")
     chosen = min(possible, key=lambda scale: (scale.interval, abs(scale.number - optimum)))
-    return Preparation(flight, optimum, _base(flight, optimum), scales, chosen, _reason(chosen, possible))
+    return FlightSettings(flight, optimum, _base(flight, optimum), scales, chosen, _reason(chosen, possible))
 
 
 def _longest(variant: Variant) -> float:
     return -variant.carriages["Z"][0]
 
 
-def _base(flight: Flight, number: float) -> float:
+def _base(flight: FlightPlan, number: float) -> float:
     return flight.photo_base * flight.photo_scale / number
 
 
-def _scale(flight: Flight, variant: Variant, gear: str, map_scale: float | None) -> ModelScale:
+def _scale(flight: FlightPlan, variant: Variant, gear: str, map_scale: float | None) -> ModelScale:
     engaged = variant.height_gears[gear]
     number = 1e3 * engaged.units_per_mm
     plan_gear = _plan_gear(number, map_scale)

@@ -9,15 +9,15 @@ from typing import overload
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Who, exclude
+from a7sim.among import Indices, exclude
 from a7sim.geometry import GON, Array
 from a7sim.manual import TILTS
-from a7sim.operator.bench import Bench
-from a7sim.operator.crew import NobodyGoesOn
-from a7sim.operator.hands import Truths
+from a7sim.operator.bench import Workstation
+from a7sim.operator.crew import AllGaveUpError
+from a7sim.operator.hands import BoolArray
 from a7sim.operator.job import ModelJob
 from a7sim.operator.seat import wrap_gon
-from a7sim.reduction import Stand, Undetermined, element_corrections
+from a7sim.reduction import ProjectorPose, Undetermined, element_corrections
 from a7sim.reduction.hallert import REGULAR_POINTS, regular_corrections
 from a7sim.standard_points import CASES, POSITIONS, determine_orientation
 
@@ -50,7 +50,7 @@ class Round:
 
 
 @dataclass(frozen=True)
-class RelativeOrientation:
+class OrientationRecord:
     """The orientation of a session as set: rounds, elements as the counters show them, residuals by position."""
 
     method: str
@@ -70,15 +70,15 @@ class RelativeOrientation:
 
 
 @dataclass(frozen=True)
-class Rounds:
+class RoundBatch:
     """A round of those sessions that measured in it; arrays have all sessions as their last axis."""
 
-    who: Who
+    who: Indices
     settings: Mapping[str, Array]
     parallaxes: Mapping[str, Array]
     mean: Array
     rms: Array
-    corrected: Who
+    corrected: Indices
     sigmas: Mapping[str, Array]
     over_correction: Array | None = None
 
@@ -99,10 +99,10 @@ class Rounds:
         )
 
 
-class RoundsOfOne(Sequence[Round]):
+class SessionRounds(Sequence[Round]):
     """The rounds of one session, each put together when it is asked for."""
 
-    def __init__(self, session: int, rounds: Sequence[Rounds]) -> None:
+    def __init__(self, session: int, rounds: Sequence[RoundBatch]) -> None:
         self._session, self._rounds = session, rounds
 
     def __len__(self) -> int:
@@ -116,17 +116,17 @@ class RoundsOfOne(Sequence[Round]):
 
     def __getitem__(self, at: int | slice) -> Round | Sequence[Round]:
         if isinstance(at, slice):
-            return RoundsOfOne(self._session, self._rounds[at])
+            return SessionRounds(self._session, self._rounds[at])
         return self._rounds[at].of(self._session)
 
 
 @dataclass(frozen=True)
-class RelativeOrientations:
+class OrientationRecordBatch:
     """The orientations of a crew; arrays have all sessions as their last axis."""
 
     method: str
     case: str
-    rounds: Sequence[Rounds]
+    rounds: Sequence[RoundBatch]
     rough_rounds: npt.NDArray[np.intp]
     elements: Mapping[str, Array]
     residuals: Mapping[str, Array]
@@ -148,14 +148,14 @@ class RelativeOrientations:
             {label: list(zip(*each.tolist(), strict=True)) for label, each in self.places.items()},
         )
 
-    def of(self, session: int) -> RelativeOrientation:
+    def of(self, session: int) -> OrientationRecord:
         """Return one session's orientation."""
         listed = self._listed
         residuals = _there(_picked(listed.residuals, session))
-        return RelativeOrientation(
+        return OrientationRecord(
             self.method,
             self.case,
-            RoundsOfOne(session, [each for each in self.rounds if session in each.sessions]),
+            SessionRounds(session, [each for each in self.rounds if session in each.sessions]),
             int(self.rough_rounds[session]),
             _picked(listed.elements, session),
             residuals,
@@ -194,8 +194,15 @@ def unknown_elements(method: str, model: ModelJob) -> tuple[str, ...]:
 
 
 def relative_orientation(
-    bench: Bench, who: Who, model: ModelJob, method: str, case: str, readings: int, base: float, tolerated_rms: float
-) -> RelativeOrientations:
+    bench: Workstation,
+    who: Indices,
+    model: ModelJob,
+    method: str,
+    case: str,
+    readings: int,
+    base: float,
+    tolerated_rms: float,
+) -> OrientationRecordBatch:
     """Clear the y-parallaxes of a model in rounds of measuring, computing and setting.
 
     Once the parallaxes of a round are no longer gross their mean is taken off; in the dependent method, where by is
@@ -208,7 +215,7 @@ def relative_orientation(
         crew.give_up(
             who, f"an {seat.manual.name} has no by' and by\" to measure parallaxes with: it is oriented empirically"
         )
-        raise NobodyGoesOn
+        raise AllGaveUpError
     done = []
     positions = {model.standard_points[label]: label for label in model.all_positions()}
     for them, points in bench.group_by_points(who, list(positions)):
@@ -232,14 +239,21 @@ def _too_few(model: ModelJob, case: str, labels: Sequence[str]) -> str:
 
 
 def _oriented(
-    bench: Bench, who: Who, model: ModelJob, method: str, case: str, labels: Sequence[str], readings: int, base: float
-) -> RelativeOrientations:
+    bench: Workstation,
+    who: Indices,
+    model: ModelJob,
+    method: str,
+    case: str,
+    labels: Sequence[str],
+    readings: int,
+    base: float,
+) -> OrientationRecordBatch:
     """Return what came of the rounds on the points at some positions, the best settings standing."""
     crew, seat, plan = bench.crew, bench.seat, bench.job.plan
     unknowns = unknown_elements(method, model)
     measured_with = {"both": (1, 2), "by1": (1,), "by2": (2,)}[plan.measure_with]
     points = [model.standard_points[label] for label in labels]
-    rounds: list[Rounds] = []
+    rounds: list[RoundBatch] = []
     done, rough_rounds = np.zeros((2, crew.size), dtype=np.intp)
     best = _Best(unknowns, crew.size)
     measuring = who
@@ -262,7 +276,7 @@ def _oriented(
         )
         falling = crew.remaining(falling)
         rounds.append(
-            Rounds(together, settings, dict(zip(labels, seen.parallax_mm, strict=True)), mean, rms, falling, sigmas)
+            RoundBatch(together, settings, dict(zip(labels, seen.parallax_mm, strict=True)), mean, rms, falling, sigmas)
         )
         if falling.size:
             noted = crew.noted_elements(falling, settings, rounds[-2].settings if len(rounds) > 1 else {})
@@ -273,12 +287,12 @@ def _oriented(
     seat.set_if_changed(who, {name: kept[who] for name, kept in best.settings.items()})
     _set_mean_on_by(bench, who, model, "by1" if method == "independent" else unknowns[3], best.mean)
     bench.begin_round(who, int(done[who].max(initial=0)) + 1)
-    return RelativeOrientations(method, case, rounds, rough_rounds, {}, {}, {})
+    return OrientationRecordBatch(method, case, rounds, rough_rounds, {}, {}, {})
 
 
 def merge_groups(
-    groups: Sequence[tuple[Who, RelativeOrientations]], method: str, case: str, sessions: int, procedure: str
-) -> RelativeOrientations:
+    groups: Sequence[tuple[Indices, OrientationRecordBatch]], method: str, case: str, sessions: int, procedure: str
+) -> OrientationRecordBatch:
     """Return the orientations of all groups in one."""
     labels = [label for label in POSITIONS if any(label in found.residuals for _, found in groups)]
     elements: dict[str, Array] = {}
@@ -292,7 +306,7 @@ def merge_groups(
             places[label][:, who] = found.places[label][:, who]
     rounds = [each for _, found in groups for each in found.rounds]
     rough = np.sum([found.rough_rounds for _, found in groups], axis=0, dtype=np.intp)
-    return RelativeOrientations(
+    return OrientationRecordBatch(
         method, case, rounds, np.broadcast_to(rough, sessions), elements, residuals, places, procedure
     )
 
@@ -305,7 +319,7 @@ class _Best:
         self.mean = np.zeros(sessions)
         self.rms = np.full(sessions, np.inf)
 
-    def see(self, who: Who, settings: Mapping[str, Array], mean: Array, rms: Array) -> None:
+    def see(self, who: Indices, settings: Mapping[str, Array], mean: Array, rms: Array) -> None:
         """Keep the settings where the rms is smaller than any before."""
         better = who[rms[who] < self.rms[who]]
         self.mean[better], self.rms[better] = mean[better], rms[better]
@@ -313,7 +327,7 @@ class _Best:
             kept[better] = settings[name][better]
 
 
-def _mean_and_rms(p: Array, who: Who) -> tuple[Array, Array]:
+def _mean_and_rms(p: Array, who: Indices) -> tuple[Array, Array]:
     """Return the mean parallax, none while they are gross, and the rms about it ``(sessions,)``."""
     gross = np.sqrt(np.mean(p**2, axis=0)) > GROSS_MM
     mean = np.where(gross, 0.0, p.mean(axis=0))
@@ -323,14 +337,14 @@ def _mean_and_rms(p: Array, who: Who) -> tuple[Array, Array]:
 
 
 def assess_residuals(
-    bench: Bench,
-    who: Who,
+    bench: Workstation,
+    who: Indices,
     model: ModelJob,
-    found: RelativeOrientations,
+    found: OrientationRecordBatch,
     labels: Sequence[str],
     readings: int,
     tolerated_rms: float,
-) -> RelativeOrientations:
+) -> OrientationRecordBatch:
     """Return an orientation with what is left at standard points; those for whom it is too much give up."""
     crew = bench.crew
     names = [model.standard_points[label] for label in labels]
@@ -362,7 +376,7 @@ def assess_residuals(
     return orientations
 
 
-def expand_to_batch(values: Mapping[str, Array], who: Who, sessions: int) -> dict[str, Array]:
+def expand_to_batch(values: Mapping[str, Array], who: Indices, sessions: int) -> dict[str, Array]:
     """Return values ``(m,)`` of those who act among all sessions."""
     spread = {name: np.zeros(sessions) for name in values}
     for name, each in values.items():
@@ -370,15 +384,15 @@ def expand_to_batch(values: Mapping[str, Array], who: Who, sessions: int) -> dic
     return spread
 
 
-def _set_mean_on_by(bench: Bench, who: Who, model: ModelJob, by: str, mean: Array) -> None:
+def _set_mean_on_by(bench: Workstation, who: Indices, model: ModelJob, by: str, mean: Array) -> None:
     if who.size:
         sense = 1.0 if model.side_of(int(by[-1])) == 1 else -1.0
         bench.seat.set_elements(who, {by: bench.seat.elements(who, [by])[by] + sense * mean[who]})
 
 
 def _bring_together(
-    bench: Bench,
-    who: Who,
+    bench: Workstation,
+    who: Indices,
     model: ModelJob,
     points: Sequence[str],
     unknowns: Sequence[str],
@@ -414,8 +428,8 @@ def _bring_together(
 
 
 def compute_corrections(
-    bench: Bench,
-    who: Who,
+    bench: Workstation,
+    who: Indices,
     model: ModelJob,
     places: Array,
     parallaxes: Array,
@@ -461,7 +475,7 @@ def _pattern(places: Array, base: Array) -> tuple[Array, Array, Array]:
     return base, (rows @ y) / np.abs(rows).sum(), z.mean(axis=0)
 
 
-def _on_pattern(bench: Bench, who: Who, labels: Sequence[str], places: Array, base: Array) -> Truths:
+def _on_pattern(bench: Workstation, who: Indices, labels: Sequence[str], places: Array, base: Array) -> BoolArray:
     """Return whose points ``(3, n, m)`` lie near enough to the pattern of six or nine for the closed form."""
     if not labels:
         return np.zeros(who.size, dtype=bool)
@@ -478,9 +492,9 @@ def _on_pattern(bench: Bench, who: Who, labels: Sequence[str], places: Array, ba
     return near
 
 
-def projector_pose(bench: Bench, who: Who, projector: int, x: Array) -> Stand:
+def projector_pose(bench: Workstation, who: Indices, projector: int, x: Array) -> ProjectorPose:
     """Return how projectors stand by their counters, the centres at x ``(m,)`` of the instrument frame."""
     counts = bench.seat.elements(who, [f"{name}{projector}" for name in (*TILTS, "by", "bz")])
     omega, phi, kappa = bench.seat.manual.tilts(counts, projector)
     by, bz = counts[f"by{projector}"], counts[f"bz{projector}"]
-    return Stand(np.array([x, -by, bz]), GON * np.array([omega, phi, wrap_gon(kappa)]))
+    return ProjectorPose(np.array([x, -by, bz]), GON * np.array([omega, phi, wrap_gon(kappa)]))

@@ -6,9 +6,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from a7sim.operator.dice import Dice
+from a7sim.operator.dice import OperatorRandom
 from a7sim.scenario import Observer
-from a7sim.scenario.schema import CertainSlip, SlipKind
+from a7sim.scenario.schema import PlannedSlip, SlipKind
 from a7sim.standard_points import PLACES
 
 LAST_DIGIT = 0.01
@@ -67,7 +67,7 @@ class Slip:
 
 
 @dataclass(frozen=True)
-class Occasion:
+class SlipContext:
     """Where a slip can happen: whose instrument, when, under which heading, at what."""
 
     session: int
@@ -82,7 +82,7 @@ class Occasion:
         """Return the slip that happened here."""
         return Slip(self.time, self.model, self.form, self.round, self.point, self.item, kind, written, right)
 
-    def matches(self, certain: CertainSlip) -> bool:
+    def matches(self, certain: PlannedSlip) -> bool:
         """Return whether a planted slip belongs here."""
         return (
             certain.model in ("", self.model)
@@ -94,7 +94,7 @@ class Occasion:
 class Slips:
     """The slips of a crew: drawn by their rates or planted, and written down by session."""
 
-    def __init__(self, observer: Observer, dice: Sequence[Dice], log: list[list[Slip]]) -> None:
+    def __init__(self, observer: Observer, dice: Sequence[OperatorRandom], log: list[list[Slip]]) -> None:
         self.log = log
         """By session."""
         self._observer = observer
@@ -109,7 +109,7 @@ class Slips:
 
     # --- points ---------------------------------------------------------------------------------------
 
-    def select_point(self, each: Occasion, near: Sequence[str], factor: float) -> None:
+    def select_point(self, each: SlipContext, near: Sequence[str], factor: float) -> None:
         """Take one of the points near for the point of the occasion, if that happens; `factor` is that of the rate."""
         if not near:
             return
@@ -137,14 +137,14 @@ class Slips:
 
     # --- readings -------------------------------------------------------------------------------------
 
-    def transcribe(self, each: Occasion, shown: float, misread: float, factor: float) -> float:
+    def transcribe(self, each: SlipContext, shown: float, misread: float, factor: float) -> float:
         """Return what somebody writes of what a counter shows; `misread` is what chance makes of it already."""
         kind, written = self._written(each, shown, misread, factor)
         if kind is not None:
             self._happened(each, kind, f"{written:.2f}", f"{shown:.2f}")
         return written
 
-    def _written(self, each: Occasion, shown: float, misread: float, factor: float) -> tuple[SlipKind | None, float]:
+    def _written(self, each: SlipContext, shown: float, misread: float, factor: float) -> tuple[SlipKind | None, float]:
         dice = self._dice[each.session]
         if self._planted[each.session]:
             possible = _written_wrongly(shown, each.item)
@@ -167,15 +167,15 @@ class Slips:
 
     # --- levers and elements --------------------------------------------------------------------------
 
-    def forgets_fitting(self, each: Occasion, right: str, other: str, factor: float) -> bool:
+    def forgets_fitting(self, each: SlipContext, right: str, other: str, factor: float) -> bool:
         """Return whether somebody leaves the fitting of the occasion in the other position."""
         return self._lapses(each, "forgotten lever", factor, other, right)
 
-    def uses_stale_reading(self, each: Occasion, old: float, now: float, factor: float) -> bool:
+    def uses_stale_reading(self, each: SlipContext, old: float, now: float, factor: float) -> bool:
         """Return whether somebody goes on with an old reading of the element of the occasion."""
         return old != now and self._lapses(each, "element not re-read", factor, f"{old:.2f}", f"{now:.2f}")
 
-    def _lapses(self, each: Occasion, kind: SlipKind, factor: float, written: str, right: str) -> bool:
+    def _lapses(self, each: SlipContext, kind: SlipKind, factor: float, written: str, right: str) -> bool:
         planted = self._planted_here(each, (kind,)) is not None
         lapsed = planted or self._dice[each.session].slip_draws(self._rate(kind) * factor)
         if lapsed:
@@ -187,7 +187,7 @@ class Slips:
     def _rate(self, kind: SlipKind) -> float:
         return float(getattr(self._observer, _RATES[kind]))
 
-    def _planted_here(self, each: Occasion, kinds: Collection[str]) -> CertainSlip | None:
+    def _planted_here(self, each: SlipContext, kinds: Collection[str]) -> PlannedSlip | None:
         """Return the first planted slip of these kinds that belongs here; it does not come again."""
         planted = self._planted[each.session]
         for certain in planted:
@@ -196,7 +196,7 @@ class Slips:
                 return certain
         return None
 
-    def _happened(self, each: Occasion, kind: SlipKind, written: str, right: str) -> None:
+    def _happened(self, each: SlipContext, kind: SlipKind, written: str, right: str) -> None:
         self.log[each.session].append(each.slip(kind, written, right))
 
 

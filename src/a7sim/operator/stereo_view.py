@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import GON, Array, image_of, plane_rotation, rotation
-from a7sim.operator.bench import Bench
+from a7sim.operator.bench import Workstation
 from a7sim.operator.person import Person
 
 SIDE = 48
@@ -39,7 +39,7 @@ _NUDGE_MM = 0.05
 
 
 @dataclass(frozen=True)
-class Surface:
+class PerceivedSurface:
     """The ground as both eyes see it about the mark; lengths in mm at model scale."""
 
     height: float
@@ -61,7 +61,7 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class Look:
+class StereoPatch:
     """The pictures of both eyes ``(2, rows, columns)`` and how model displacements show in them."""
 
     pictures: Array
@@ -116,7 +116,7 @@ class Look:
 class StereoView:
     """The eyes of one person at a line on the ground at the mark."""
 
-    def __init__(self, bench: Bench, person: Person) -> None:
+    def __init__(self, bench: Workstation, person: Person) -> None:
         self._bench = bench
         self._person = person
         self._who = np.zeros(1, dtype=np.intp)
@@ -149,20 +149,22 @@ class StereoView:
             seen.append(swing @ (images[:, :3] - images[:, 3:]) / (2.0 * _NUDGE_MM))
         return np.array(seen)
 
-    def look(self, pitch: float = FINE_MM) -> Look:
+    def look(self, pitch: float = FINE_MM) -> StereoPatch:
         """Look with both eyes, a picture element being so many mm of the photographs; whoever looks spends the time."""
         bench = self._bench
         mark = bench.seat.model_position(self._who, bench.seat.counters(self._who))[:, 0] * (1.0, 1.0, -1.0)
         magnification = 2.0 * bench.seat.manual.field_radius_mm / (SIDE * pitch)
         pictures = np.array([self._picture(eye, magnification) for eye in (1, 2)])
         shown = self.displacements(mark)
-        return Look(pictures, pitch, shown, pitch / float(np.abs(np.linalg.det(shown[0, :, :2])) ** 0.5))
+        return StereoPatch(pictures, pitch, shown, pitch / float(np.abs(np.linalg.det(shown[0, :, :2])) ** 0.5))
 
     def _picture(self, eye: int, magnification: float) -> Array:
         block = self._person.client.block(f"EYEP{eye}:PICT? {SIDE},{SIDE},{magnification:.6g}")
         return np.frombuffer(block, dtype=np.uint8).reshape(SIDE, SIDE) / 255.0
 
-    def surface(self, look: Look, expected: Surface | None = None, reach: float = 0.0) -> Surface:
+    def surface(
+        self, look: StereoPatch, expected: PerceivedSurface | None = None, reach: float = 0.0
+    ) -> PerceivedSurface:
         """Return the ground that a look shows, beginning with an expected slope.
 
         Heights within `reach` mm of the mark are tried; without it the ground is expected at the mark's height.
@@ -179,16 +181,16 @@ class StereoView:
         return _matched(look, start)
 
 
-def _matched(look: Look, surface: Array) -> Surface:
+def _matched(look: StereoPatch, surface: Array) -> PerceivedSurface:
     """Return the plane that makes both pictures agree best, by Gauss-Newton from a plane nearby."""
     scale = np.array([1.0, 10.0, 10.0, 1.0])
     for _ in range(_MAX_STEPS):
         left, right, left_slopes, right_slopes, plan = _compared(look, surface)
         if left.size < _PATCH:
-            return Surface(0.0, np.zeros(2), 0.0, 0.0)
+            return PerceivedSurface(0.0, np.zeros(2), 0.0, 0.0)
         left_spread, right_spread = left.std(), right.std()
         if not left_spread * right_spread:
-            return Surface(0.0, np.zeros(2), 0.0, 0.0)
+            return PerceivedSurface(0.0, np.zeros(2), 0.0, 0.0)
         by_height = (left_slopes * look.shown[0, :, 2:]).sum(axis=0) / left_spread - (
             right_slopes * look.shown[1, :, 2:]
         ).sum(axis=0) / right_spread
@@ -200,10 +202,10 @@ def _matched(look: Look, surface: Array) -> Surface:
         surface[1:3] = np.clip(surface[1:3], -_STEEPEST, _STEEPEST)
         if np.abs(step * scale).max() < _AT_REST:
             break
-    return Surface(float(surface[0]), surface[1:3].copy(), float(surface[3]), _correlation(look, surface))
+    return PerceivedSurface(float(surface[0]), surface[1:3].copy(), float(surface[3]), _correlation(look, surface))
 
 
-def _compared(look: Look, surface: Array) -> tuple[Array, Array, Array, Array, Array]:
+def _compared(look: StereoPatch, surface: Array) -> tuple[Array, Array, Array, Array, Array]:
     """Return the greys ``(n,)`` of a surface in both pictures, their slopes ``(2, n)`` a mm and the places ``(2, n)``.
 
     Places that the mark covers or that lie outside either picture are left out.
@@ -214,7 +216,7 @@ def _compared(look: Look, surface: Array) -> tuple[Array, Array, Array, Array, A
     return between[0].greys, between[1].greys, left_slopes, right_slopes, plan
 
 
-def _seen_by_both(look: Look, surface: Array) -> tuple[list["_Between"], Array]:
+def _seen_by_both(look: StereoPatch, surface: Array) -> tuple[list["_Between"], Array]:
     """Return where both pictures show a surface free of the mark, and the places ``(2, n)``."""
     plan, seen = look.places(surface)
     columns, rows, plain = look.elements_at(seen)
@@ -258,14 +260,14 @@ class _Between:
         return np.array([self.upper_change * (1.0 - self.down) + self.lower_change * self.down, self._ends[1]])
 
 
-def _correlation(look: Look, surface: Array) -> float:
+def _correlation(look: StereoPatch, surface: Array) -> float:
     """Return how the greys of a surface in both pictures are correlated."""
     left, right = (each.greys for each in _seen_by_both(look, surface)[0])
     spread = float(left.std() * right.std()) if left.size >= _PATCH else 0.0
     return float(((left - left.mean()) * (right - right.mean())).mean()) / spread if spread > 0.0 else 0.0
 
 
-def rectify(look: Look, surface: Surface, side: int) -> tuple[npt.NDArray[np.bool_], Array, Array]:
+def rectify(look: StereoPatch, surface: PerceivedSurface, side: int) -> tuple[npt.NDArray[np.bool_], Array, Array]:
     """Return what the left eye sees laid out on the ground: where it sees, greys, both ``(n,)``, and places ``(2, n)``.
 
     The patch is `side` picture elements each way; places are displacements from the mark in plan, mm in the model.

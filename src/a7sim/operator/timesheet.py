@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from a7sim.among import Who, add_at
+from a7sim.among import Indices, add_at
 from a7sim.geometry import Array
 
 Act = Literal["looking", "turning", "reading", "setting", "driving", "mounting", "computing", "resting", "other"]
@@ -34,7 +34,7 @@ class Timesheet:
         self.by_activity: dict[str, Array] = defaultdict(partial(np.zeros, sessions))
         self.by_act: dict[str, Array] = defaultdict(partial(np.zeros, sessions))
 
-    def add(self, who: Who, seconds: float, form: str, act: Act) -> None:
+    def add(self, who: Indices, seconds: float, form: str, act: Act) -> None:
         """Write down that those who act spent so many seconds each."""
         activity = _OF_ACT.get(act) or _OF_FORM.get(form, form)
         add_at(seconds, who, self.by_activity[activity])

@@ -7,20 +7,20 @@ from functools import cached_property
 
 import numpy as np
 
-from a7sim.among import Who
+from a7sim.among import Indices
 from a7sim.geometry import Array
-from a7sim.operator.absolute import OnGround, absolute_orientation_at
-from a7sim.operator.bench import Bench
+from a7sim.operator.absolute import GroundOrientation, absolute_orientation_at
+from a7sim.operator.bench import Workstation
 from a7sim.operator.centres import centre_of, observe_centre
-from a7sim.operator.crew import Crew, NobodyGoesOn
+from a7sim.operator.crew import AllGaveUpError, OperatorBatch
 from a7sim.operator.empirical import empirical_orientation, perturb_elements
-from a7sim.operator.interior import InteriorOrientation, InteriorOrientations, interior_orientation
+from a7sim.operator.interior import InteriorOrientation, InteriorOrientationBatch, interior_orientation
 from a7sim.operator.job import Job, ModelJob
 from a7sim.operator.levers import required_fittings
-from a7sim.operator.line_hands import LineHands
+from a7sim.operator.line_hands import ScpiDriver
 from a7sim.operator.person import Person
 from a7sim.operator.plate import sketch_positions
-from a7sim.operator.relative import RelativeOrientation, RelativeOrientations, relative_orientation
+from a7sim.operator.relative import OrientationRecord, OrientationRecordBatch, relative_orientation
 from a7sim.reduction import PerspectiveCentre
 from a7sim.standard_points import CASES
 
@@ -31,7 +31,7 @@ class ModelRecord:
 
     model: ModelJob
     interior: Mapping[str, InteriorOrientation]
-    orientation: RelativeOrientation
+    orientation: OrientationRecord
     points: Mapping[str, tuple[float, float, float]]
     centres: Mapping[int, PerspectiveCentre]
     """By hand: 1 left, 2 right."""
@@ -39,26 +39,26 @@ class ModelRecord:
     z_units_per_mm: float
     finished_at: float
     """Simulated seconds."""
-    on_ground: OnGround | None = None
+    on_ground: GroundOrientation | None = None
     """The model in the system of the ground, where it was oriented absolutely at the instrument."""
 
 
 @dataclass(frozen=True)
-class ModelRecords:
+class ModelRecordBatch:
     """What a crew found of a model; arrays have all sessions as their last axis."""
 
     model: ModelJob
-    sessions: Who
+    sessions: Indices
     """Those who came to the end of it."""
-    interior: Mapping[str, InteriorOrientations]
-    orientation: RelativeOrientations
+    interior: Mapping[str, InteriorOrientationBatch]
+    orientation: OrientationRecordBatch
     points: Mapping[str, Array]
     """X, Y, Z ``(3, sessions)``, nan where a point was not measured."""
     centres: Mapping[int, PerspectiveCentre]
     xy_units_per_mm: float
     z_units_per_mm: float
     finished_at: Array
-    on_ground: Mapping[int, OnGround] | None = None
+    on_ground: Mapping[int, GroundOrientation] | None = None
     """By session, where models are levelled and scaled at the instrument; those without enough control have none."""
 
     @cached_property
@@ -92,21 +92,25 @@ def measure_models(
     `begins` is told of every activity, `tick` comes after every point.
     """
     person.book.set_heading("", "preparation")
-    for records in measure_models_batch(Bench(Crew.single(person), LineHands(person), job, tick), begins):
+    for records in measure_models_batch(
+        Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick), begins
+    ):
         yield records.of(0)
 
 
-def measure_models_batch(bench: Bench, begins: Callable[[str], None] = lambda _: None) -> Iterator[ModelRecords]:
+def measure_models_batch(
+    bench: Workstation, begins: Callable[[str], None] = lambda _: None
+) -> Iterator[ModelRecordBatch]:
     """Yield the models of a job as a crew does them, each session at its own instrument."""
     try:
         yield from _worked(bench, begins)
-    except NobodyGoesOn:
+    except AllGaveUpError:
         return
 
 
-def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecords]:
+def _worked(bench: Workstation, begins: Callable[[str], None]) -> Iterator[ModelRecordBatch]:
     job, crew = bench.job, bench.crew
-    interior: dict[str, InteriorOrientations] = {}
+    interior: dict[str, InteriorOrientationBatch] = {}
     bench.seat.prepare(crew.active)
     for model in job.models:
         begin_form(bench, model, "interior orientation", begins)
@@ -130,7 +134,7 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
             begin_form(bench, model, "absolute orientation", begins)
             on_ground = absolute_orientation_at(bench, model, job.control)
         require_active(bench)
-        yield ModelRecords(
+        yield ModelRecordBatch(
             model,
             crew.active,
             {name: interior[name] for name in (model.left, model.right)},
@@ -144,13 +148,13 @@ def _worked(bench: Bench, begins: Callable[[str], None]) -> Iterator[ModelRecord
         )
 
 
-def require_active(bench: Bench) -> None:
+def require_active(bench: Workstation) -> None:
     """Raise NobodyGoesOn when all have given up."""
     if not bench.crew.active.size:
-        raise NobodyGoesOn
+        raise AllGaveUpError
 
 
-def note_missing_points(bench: Bench, model: ModelJob) -> None:
+def note_missing_points(bench: Workstation, model: ModelJob) -> None:
     """Write into the book which points of the case lie in water, or are not pricked on both prints."""
     crew = bench.crew
     listed = {label: model.standard_points.get(label, "") for label in CASES[bench.job.plan.case]}
@@ -160,7 +164,7 @@ def note_missing_points(bench: Bench, model: ModelJob) -> None:
             crew.remark(who, f"{model.name}: not pricked on both prints, done without: {', '.join(absent)}")
 
 
-def preset_counters(bench: Bench, model: ModelJob) -> None:
+def preset_counters(bench: Workstation, model: ModelJob) -> None:
     """Preset the counters at point 1, as the thesis does, or where that is not there at the first point that is.
 
     Those who find no standard point at all on both their prints give up.
@@ -178,7 +182,7 @@ def preset_counters(bench: Bench, model: ModelJob) -> None:
     crew.give_up(waiting, f"{model.name}: no standard point is pricked on both prints")
 
 
-def model_coordinates(bench: Bench, model: ModelJob) -> dict[str, Array]:
+def model_coordinates(bench: Workstation, model: ModelJob) -> dict[str, Array]:
     """Measure all points that both prints show; sessions whose prints show the same do it together."""
     crew = bench.crew
     wanted = list(dict.fromkeys([*model.standard_points.values(), *model.other_points]))
@@ -189,7 +193,7 @@ def model_coordinates(bench: Bench, model: ModelJob) -> dict[str, Array]:
     return {name: points[name] for name in wanted if name in points}
 
 
-def begin_form(bench: Bench, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
+def begin_form(bench: Workstation, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
     """Begin a form of a model in book and journal."""
     require_active(bench)
     begins(f"model {model.name}: {form}")
@@ -197,7 +201,7 @@ def begin_form(bench: Bench, model: ModelJob, form: str, begins: Callable[[str],
     bench.hands.note(bench.crew.active, f"{model.name}: {form}")
 
 
-def orient_model(bench: Bench, model: ModelJob) -> RelativeOrientations:
+def orient_model(bench: Workstation, model: ModelJob) -> OrientationRecordBatch:
     """Orient a model by the procedure on the job sheet."""
     plan, who, tolerated = bench.job.plan, bench.crew.active, bench.job.tolerated_parallax_mm
     if plan.start_off_gon:
@@ -209,7 +213,7 @@ def orient_model(bench: Bench, model: ModelJob) -> RelativeOrientations:
     return relative_orientation(bench, who, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated)
 
 
-def set_base_and_fittings(bench: Bench, base: str, polarity: str) -> None:
+def set_base_and_fittings(bench: Workstation, base: str, polarity: str) -> None:
     """Set base in or out, and the fittings that belong to it and to the pictures."""
     who, hands = bench.crew.active, bench.hands
     right = required_fittings(bench.seat.manual, polarity, base)
@@ -221,7 +225,7 @@ def set_base_and_fittings(bench: Bench, base: str, polarity: str) -> None:
     bench.seat.give_up_on_errors(who, f"setting base {base} and its fittings")
 
 
-def mount_photographs(bench: Bench, model: ModelJob, interior: dict[str, InteriorOrientations]) -> None:
+def mount_photographs(bench: Workstation, model: ModelJob, interior: dict[str, InteriorOrientationBatch]) -> None:
     """Mount what is not yet in its projector; a projector with a new picture starts from its counter zeros."""
     seat, hands = bench.seat, bench.hands
     for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
@@ -241,7 +245,7 @@ def mount_photographs(bench: Bench, model: ModelJob, interior: dict[str, Interio
         )
 
 
-def load_prints(bench: Bench, model: ModelJob) -> dict[int, dict[str, Array]]:
+def load_prints(bench: Workstation, model: ModelJob) -> dict[int, dict[str, Array]]:
     """Take up the paper prints of both photographs and see that they overlap the right way round."""
     crew = bench.crew
     who = crew.active

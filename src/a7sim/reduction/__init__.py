@@ -16,10 +16,10 @@ from a7sim.reduction.centres import (
 )
 from a7sim.reduction.coplanarity import RelativeOrientation, relative_orientation
 from a7sim.reduction.corrections import corrected_image
-from a7sim.reduction.grid_test import Elements, PlateLie, ProjectorTest, grid_test, plate_placement
+from a7sim.reduction.grid_test import Elements, PlatePlacement, ProjectorTest, grid_test, plate_placement
 from a7sim.reduction.hallert import orientation_by_parallaxes
 from a7sim.reduction.interior import (
-    PictureLie,
+    PicturePlacement,
     PlaneFit,
     picture_placement,
     plane_fit,
@@ -27,7 +27,7 @@ from a7sim.reduction.interior import (
 )
 from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 from a7sim.reduction.modelling import a8_model_coordinates, model_coordinates
-from a7sim.reduction.parallax import Stand, element_corrections
+from a7sim.reduction.parallax import ProjectorPose, element_corrections
 from a7sim.reduction.polynomials import StripAdjustment, StripDeformation, strip_adjustment
 from a7sim.reduction.relative_poses import relative_poses
 from a7sim.reduction.resection import Resection
@@ -47,15 +47,15 @@ __all__ = [
     "Join",
     "Model",
     "PerspectiveCentre",
-    "PictureLie",
+    "PicturePlacement",
     "PlaneFit",
-    "PlateLie",
+    "PlatePlacement",
+    "ProjectorPose",
     "ProjectorTest",
     "RelativeOrientation",
     "Resection",
     "Similarity",
     "SnoopedOrientation",
-    "Stand",
     "Strip",
     "StripAdjustment",
     "StripDeformation",

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.similarity import (
     Similarity,
@@ -46,13 +46,13 @@ class Ground:
             )
         if len(set(self.points)) != len(self.points):
             twice = next(name for name in self.points if self.points.count(name) > 1)
-            raise Mistake(f"ground point {twice}: expected every point once, got it twice")
+            raise A7SimError(f"ground point {twice}: expected every point once, got it twice")
         for name, role, given in zip(self.points, self.roles, np.isfinite(self.coordinates).T, strict=True):
             if role not in ROLES:
-                raise Mistake(f"ground point {name}: expected a role of {', '.join(ROLES)}, got {role!r}")
+                raise A7SimError(f"ground point {name}: expected a role of {', '.join(ROLES)}, got {role!r}")
             needed = {"control": given.all(), "plan": given[:2].all(), "height": given[2], "check": given.any()}
             if not needed[role]:
-                raise Mistake(f"ground point {name}: expected the coordinates of a {role} point, got a gap")
+                raise A7SimError(f"ground point {name}: expected the coordinates of a {role} point, got a gap")
 
     @property
     def used(self) -> Array:

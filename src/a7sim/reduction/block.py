@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array, length_of, rotation
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground, GroundFit
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.similarity import rotation_from_vector, similarity_columns
@@ -95,9 +95,9 @@ def block_adjustment(models: Sequence[Model], ground: Ground, height_weight: flo
     be in plan. Raises Mistake for more than 500 models, Undetermined for a block that its ties and control leave open.
     """
     if not 1 <= len(models) <= MAX_MODELS:
-        raise Mistake(f"expected 1 to {MAX_MODELS} models, got {len(models)}")
+        raise A7SimError(f"expected 1 to {MAX_MODELS} models, got {len(models)}")
     if len({model.name for model in models}) != len(models):
-        raise Mistake("expected every model once, got one twice")
+        raise A7SimError("expected every model once, got one twice")
     e = _equations(tuple(models), ground)
     scales, turns, shifts, free = _level_start(e)
     weights = np.repeat([1.0, 1.0, height_weight], e.model_of.size)

@@ -18,7 +18,7 @@ import numpy as np
 
 from a7sim.files import first_line, read_text
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground
 from a7sim.reduction.strips import CENTRE, Model, Strip, in_order, is_centre
 
@@ -80,7 +80,7 @@ def read_cards(path: str | Path, text: str | None = None) -> Deck:
     seen: dict[tuple[str, str], Card] = {}
     for card in ground:
         if card.model:
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, line {card.line}, columns 1-4: expected blanks on ground control, got {card.model!r}"
             )
         _add(path, seen, card, card.point, again=False)
@@ -89,9 +89,9 @@ def read_cards(path: str | Path, text: str | None = None) -> Deck:
     for kind, cards in sections[1:]:
         for place, card in enumerate(cards):
             if not card.model:
-                raise Mistake(f"{path}, line {card.line}, columns 1-4: expected the number of a model, got blanks")
+                raise A7SimError(f"{path}, line {card.line}, columns 1-4: expected the number of a model, got blanks")
             if kind == TIES and card.model != cards[0].model:
-                raise Mistake(
+                raise A7SimError(
                     f"{path}, line {card.line}, columns 1-4: expected model {cards[0].model} as on the centre's card, "
                     f"got {card.model}"
                 )
@@ -102,7 +102,7 @@ def read_cards(path: str | Path, text: str | None = None) -> Deck:
             ties.append(cards)
     _check_pairs(path, ties)
     if not models:
-        raise Mistake(f"{path}: expected cards of models after the card {GROUND}, got none")
+        raise A7SimError(f"{path}: expected cards of models after the card {GROUND}, got none")
     points = tuple(card.point for card in ground)
     control = Ground(points, _coordinates(ground), ("control",) * len(points))
     found = [Model(name, tuple(cards), _coordinates(list(cards.values()))) for name, cards in models.items()]
@@ -161,7 +161,7 @@ def free_format_lines(models: Sequence[Model], decimals: int = 4) -> list[str]:
         for i, name in enumerate(model.points):
             number = _number(name.removesuffix(CENTRE), 12, f"model {model.name}, point {name}")
             if number in taken:
-                raise Mistake(
+                raise A7SimError(
                     f"model {model.name}, point {name}: expected a number of its own, got that of {taken[number]}"
                 )
             taken[number] = name
@@ -180,34 +180,38 @@ def _sections(path: Path, text: str) -> list[tuple[str, list[Card]]]:
         fields = _fields(path, number, line)
         if fields[0] in (GROUND, TIES):
             if any(fields[1:]):
-                raise Mistake(f"{path}, line {number}, column 5: expected nothing after a control card {fields[0]}")
+                raise A7SimError(f"{path}, line {number}, column 5: expected nothing after a control card {fields[0]}")
             _check_order(path, number, fields[0], sections)
             sections.append((fields[0], []))
         else:
             sections[-1][1].append(_card(path, number, fields))
     if len(sections) == 1:
-        raise Mistake(f"{path}: expected a card {GROUND} after the ground control, got none")
+        raise A7SimError(f"{path}: expected a card {GROUND} after the ground control, got none")
     if sections[-1][0] == TIES and not sections[-1][1]:
-        raise Mistake(f"{path}: expected a centre and tie points after the last card {TIES}, got none")
+        raise A7SimError(f"{path}: expected a centre and tie points after the last card {TIES}, got none")
     return sections
 
 
 def _check_order(path: Path, number: int, control: str, sections: Sequence[tuple[str, list[Card]]]) -> None:
     if len(sections) == 1 and control != GROUND:
-        raise Mistake(f"{path}, line {number}, columns 1-4: expected {GROUND} before the first {TIES}, got {control}")
+        raise A7SimError(
+            f"{path}, line {number}, columns 1-4: expected {GROUND} before the first {TIES}, got {control}"
+        )
     if sections[-1][0] == TIES and not sections[-1][1]:
-        raise Mistake(f"{path}, line {number}: expected a centre and tie points after the card {TIES}, got {control}")
+        raise A7SimError(
+            f"{path}, line {number}: expected a centre and tie points after the card {TIES}, got {control}"
+        )
 
 
 def _checked(path: Path, text: str) -> list[str]:
     """Return the lines of a deck, found to be printable ASCII."""
     cards = text.splitlines()
     if not text.strip():
-        raise Mistake(f"{path}: expected cards, got an empty file")
+        raise A7SimError(f"{path}: expected cards, got an empty file")
     for number, card in enumerate(cards, start=1):
         odd = next((i for i, each in enumerate(card, start=1) if not (each.isascii() and each.isprintable())), None)
         if odd:
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, line {number}, column {odd}: expected blanks, digits and points, got {card[odd - 1]!r}"
             )
     return cards
@@ -216,7 +220,7 @@ def _checked(path: Path, text: str) -> list[str]:
 def _fields(path: Path, number: int, line: str) -> list[str]:
     """Return the texts of the fields of a card, each found to be right-justified in its columns."""
     if len(line) > OUTPUT_COLUMNS:
-        raise Mistake(
+        raise A7SimError(
             f"{path}, line {number}, column {OUTPUT_COLUMNS + 1}: expected at most {OUTPUT_COLUMNS} columns, "
             f"got {line[OUTPUT_COLUMNS:][:20]!r}"
         )
@@ -225,7 +229,7 @@ def _fields(path: Path, number: int, line: str) -> list[str]:
         cell = line[first - 1 : last]
         text = cell.strip()
         if text and (" " in text or len(cell) < last - first + 1 or cell[-1] == " "):
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, line {number}, columns {first}-{last}: expected {name} right-justified and without blanks, "
                 f"got {cell!r} (is the card a column off?)"
             )
@@ -236,7 +240,7 @@ def _fields(path: Path, number: int, line: str) -> list[str]:
 def _card(path: Path, number: int, fields: Sequence[str]) -> Card:
     for text, (name, first, last) in zip(fields[:2], FIELDS, strict=False):
         if (text or name == "point") and not (text.isdigit() and int(text) > 0):
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, line {number}, columns {first}-{last}: expected {name} as a positive number, got {text!r}"
             )
     extra = any(fields[5:])
@@ -260,7 +264,7 @@ def _value(path: Path, line: int, text: str, field: tuple[str, int, int]) -> flo
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or "." not in text or "_" in text:
-        raise Mistake(
+        raise A7SimError(
             f"{path}, line {line}, columns {first}-{last}: expected {name} with a decimal point, got {text!r}"
         )
     return value
@@ -271,7 +275,7 @@ def _add(path: Path, seen: dict[tuple[str, str], Card], card: Card, name: str, a
     before = seen.setdefault((card.model, name), card)
     if before is not card and not (again and before.coordinates == card.coordinates):
         of = f"model {card.model}" if card.model else "ground control"
-        raise Mistake(
+        raise A7SimError(
             f"{path}, line {card.line}, columns 5-9: expected point {name} once in {of}, "
             f"got it{' with other coordinates' if again else ''} as in line {before.line}"
         )
@@ -280,17 +284,17 @@ def _add(path: Path, seen: dict[tuple[str, str], Card], card: Card, name: str, a
 def _check_pairs(path: Path, ties: Sequence[Sequence[Card]]) -> None:
     """See that the sets of ties come in pairs of the same centre and points."""
     if len(ties) % 2:
-        raise Mistake(
+        raise A7SimError(
             f"{path}, line {ties[-1][0].line}: expected the ties of model {ties[-1][0].model} again as the next model "
             f"has them, after a card {TIES}, got the end"
         )
     for first, second in zip(ties[::2], ties[1::2], strict=True):
         if first[0].model == second[0].model:
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, line {second[0].line}, columns 1-4: expected the next model, got {first[0].model} again"
             )
         if first[0].point != second[0].point:
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, line {second[0].line}, columns 5-9: expected the common centre {first[0].point} first, "
                 f"got {second[0].point}"
             )
@@ -298,7 +302,7 @@ def _check_pairs(path: Path, ties: Sequence[Sequence[Card]]) -> None:
         for cards, others, model in ((first, there, second[0].model), (second, here, first[0].model)):
             alone = next((card for card in cards[1:] if card.point not in others), None)
             if alone:
-                raise Mistake(
+                raise A7SimError(
                     f"{path}, line {alone.line}, columns 5-9: expected tie point {alone.point} in model {model} too, "
                     "got none"
                 )
@@ -314,7 +318,7 @@ def _dealt(ground: Ground, models: Sequence[Model]) -> Iterator[tuple[Card | Non
     ties = [sorted(set(a.points) & set(b.points)) for a, b in pairwise(chain)]
     for (a, b), names in zip(pairwise(chain), ties, strict=True):
         if sum(is_centre(name) for name in names) != 1:
-            raise Mistake(f"models {a.name} and {b.name}: expected one common projection centre (<photo>{CENTRE})")
+            raise A7SimError(f"models {a.name} and {b.name}: expected one common projection centre (<photo>{CENTRE})")
     control = set()
     for name, coordinates, role in zip(ground.points, ground.coordinates.T, ground.roles, strict=True):
         if role != "check" and np.isfinite(coordinates).all():
@@ -351,7 +355,7 @@ def _line(card: Card, decimals: int) -> str:
         text = f"{value:9.{decimals}f}"
         if len(text) > 9:
             of = f"model {card.model}" if card.model else "ground control"
-            raise Mistake(
+            raise A7SimError(
                 f"{of}, point {card.point}: expected {name} to fit nine columns with {decimals} decimals, got {text}"
             )
         line += text
@@ -360,7 +364,7 @@ def _line(card: Card, decimals: int) -> str:
 
 def _number(text: str, columns: int, where: str) -> str:
     if not (text.isascii() and text.isdigit() and int(text) > 0 and len(text) <= columns):
-        raise Mistake(f"{where}: expected a positive number of at most {columns} digits, got {text!r}")
+        raise A7SimError(f"{where}: expected a positive number of at most {columns} digits, got {text!r}")
     return text
 
 

@@ -46,7 +46,7 @@ class Elements:
 
 
 @dataclass(frozen=True)
-class PlateLie:
+class PlatePlacement:
     """How a plate lies on its carrier ``(...)``: shift in mm and turn in radians against the collimating marks."""
 
     dx: Array
@@ -62,7 +62,7 @@ class PlateLie:
         return np.asarray(mxv(plane_rotation(turn)[:, :, None], crosses) + np.array([self.dx, self.dy])[:, None])
 
 
-def plate_placement(displacements: Array, marks: Array) -> PlateLie:
+def plate_placement(displacements: Array, marks: Array) -> PlatePlacement:
     """Return how a plate lies from displacements ``(2, n, ...)`` of its fiducials at collimating marks ``(2, n)``, mm.
 
     Fiducials registered several times stand there as often. Raises Undetermined for one fiducial.
@@ -72,7 +72,7 @@ def plate_placement(displacements: Array, marks: Array) -> PlateLie:
     x, y = (each.reshape((n, *(1,) * (displacements.ndim - 2))) for each in marks)
     fitted = np.array([lie.dx + lie.scale * x - lie.turn * y, lie.dy + lie.scale * y + lie.turn * x])
     sigma = np.sqrt(((displacements - fitted) ** 2).sum(axis=(0, 1)) / max(2 * n - 4, 1))
-    return PlateLie(lie.dx, lie.dy, lie.turn, sigma / np.sqrt(n), sigma / np.sqrt((marks**2).sum()))
+    return PlatePlacement(lie.dx, lie.dy, lie.turn, sigma / np.sqrt(n), sigma / np.sqrt((marks**2).sum()))
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class ProjectorTest:
 
 
 def grid_test(
-    crosses: Array, readings: Array, heights: npt.ArrayLike, counters: Elements, lie: PlateLie | None = None
+    crosses: Array, readings: Array, heights: npt.ArrayLike, counters: Elements, lie: PlatePlacement | None = None
 ) -> ProjectorTest:
     """Return the errors of a projector from readings ``(2, k, n, ...)`` at n crosses ``(2, n)`` and k levels.
 
@@ -110,7 +110,7 @@ def grid_test(
     if n < MIN_CROSSES:
         raise Undetermined(f"expected {MIN_CROSSES} crosses or more for a grid test, got {n}")
     batch = readings.shape[3:]
-    lie = lie or PlateLie(*np.zeros((5, *batch)))
+    lie = lie or PlatePlacement(*np.zeros((5, *batch)))
     heights = np.asarray(heights, dtype=float)
     of_level = heights.reshape((k, 1, *heights.shape[1:], *(1,) * (len(batch) + 1 - heights.ndim)))
     mark = np.array([readings[0], readings[1], np.broadcast_to(of_level, readings.shape[1:])])

@@ -28,7 +28,7 @@ MIN_STEP = 1e-12
 
 
 @dataclass(frozen=True)
-class PictureLie:
+class PicturePlacement:
     """Shift in mm, turn in radians and change of scale ``(...)`` of a picture against its collimating marks."""
 
     dx: Array
@@ -38,7 +38,7 @@ class PictureLie:
     """Relative: 1e-4 for a picture that is too large by as much."""
 
 
-def picture_placement(displacements: Array, marks: Array) -> PictureLie:
+def picture_placement(displacements: Array, marks: Array) -> PicturePlacement:
     """Return how a picture lies from its fiducials' displacements ``(2, n, ...)`` at collimating marks ``(2, n)``, mm.
 
     Small-angle similarity ``d = t + (scale, turn) x`` by least squares. Raises Undetermined for one fiducial.
@@ -47,7 +47,7 @@ def picture_placement(displacements: Array, marks: Array) -> PictureLie:
     one, zero = np.ones_like(x), np.zeros_like(x)
     design = np.array([np.concatenate(pair) for pair in ((one, zero), (zero, one), (-y, x), (x, y))]).T
     design = design.reshape((*design.shape, *(1,) * (displacements.ndim - 2)))
-    return PictureLie(*solve_least_squares(design, np.concatenate([displacements[0], displacements[1]])).unknowns)
+    return PicturePlacement(*solve_least_squares(design, np.concatenate([displacements[0], displacements[1]])).unknowns)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array, mxv
-from a7sim.reduction.turns import TurningWork, aligned_array
+from a7sim.reduction.turns import RotationWorkspace, aligned_array
 
 MAX_CONDITION = 3e5
 """Of the scaled normal equations for turns about the axes of the base. Six standard points have some 3e2, the weak pair
@@ -16,7 +16,7 @@ CONDITION_BY_DETERMINANT = 5.0 * 5.0**0.5 * 1.25**4
 eigenvalues add up to 5 before they are inverted."""
 
 
-class Work(TurningWork):
+class Workspace(RotationWorkspace):
     """Arrays that the steps of an iteration fill anew, of pairs ``(...)`` with n points.
 
     They begin at lines of the cache: numpy takes half the time for them that it takes for arrays where malloc puts
@@ -48,7 +48,7 @@ def fast_any(mask: npt.NDArray[np.bool_]) -> bool:
     return bool(mask.any() if mask.ndim else mask)
 
 
-def condition_numbers(work: Work) -> Array:
+def condition_numbers(work: Workspace) -> Array:
     """Return the condition numbers ``(...)`` of the scaled normal equations, in the 1-norm, or small bounds of them.
 
     Their determinant bounds them, so that hardly any inverse is needed.
@@ -93,7 +93,7 @@ def compute_discrepancies(across: Array) -> Array:
     return np.asarray(across[0, 0] * across[1, 1] - across[0, 1] * across[1, 0])
 
 
-def form_equations(R: Array, rays: Array, work: Work) -> None:
+def form_equations(R: Array, rays: Array, work: Workspace) -> None:
     """Form the equations in mm of one image coordinate, in `work.rows`, of turned rays.
 
     The left rays are divided by what the four image coordinates change the condition by: that is the whole of
@@ -124,7 +124,7 @@ def form_equations(R: Array, rays: Array, work: Work) -> None:
     _form_rows(a, work)
 
 
-def form_level_equations(rays: Array, work: Work) -> None:
+def form_level_equations(rays: Array, work: Workspace) -> None:
     """Form what `form_equations` does for cameras that stand level."""
     work.steepness[:] = np.hypot(rays[0, 2].flat[0], rays[1, 2].flat[0])
     work.turned[:] = rays
@@ -132,7 +132,7 @@ def form_level_equations(rays: Array, work: Work) -> None:
     _form_rows(work.turned, work)
 
 
-def _form_rows(a: Array, work: Work) -> None:
+def _form_rows(a: Array, work: Workspace) -> None:
     """Form the five coefficients and the discrepancy ``(6, n, ...)`` from rays ``(2, 3, n, ...)``.
 
     Those of the right camera are for turns the other way.
@@ -148,7 +148,7 @@ def _form_rows(a: Array, work: Work) -> None:
     rows[5] -= products[1]
 
 
-def form_products(work: Work) -> None:
+def form_products(work: Workspace) -> None:
     """Form the sums over n of products ``(6, 6, ...)`` of the rows; in a batch, on the diagonal and above."""
     rows, normal = work.rows, work.normal
     if rows.ndim == 2:
@@ -158,7 +158,7 @@ def form_products(work: Work) -> None:
         np.einsum("n...,vn...->v...", row, rows[i:], out=normal[i, i:])
 
 
-def solve(work: Work, stiffness: Array) -> Array:
+def solve(work: Workspace, stiffness: Array) -> Array:
     """Return the corrections ``(5, ...)`` of the normal equations, stiffened by a share of their diagonal.
 
     What elimination leaves stands in `work.reduced`: the pivots and, last of all, the sum of squared residuals.
@@ -184,7 +184,7 @@ def solve(work: Work, stiffness: Array) -> Array:
     return corrections
 
 
-def _solved_alone(work: Work, stiffness: float) -> Array:
+def _solved_alone(work: Workspace, stiffness: float) -> Array:
     """Do what `solved` does for one pair, with the numbers of Python, which are quicker than arrays of one number."""
     rows = work.normal.tolist()
     for i in range(5):

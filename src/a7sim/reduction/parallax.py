@@ -10,7 +10,7 @@ from a7sim.reduction.least_squares import Adjustment, solve_least_squares
 
 
 @dataclass(frozen=True)
-class Stand:
+class ProjectorPose:
     """How a projector stands: centre ``(3, ...)`` in mm, angles omega, phi, kappa ``(3, ...)`` in radians."""
 
     centre: Array
@@ -18,7 +18,7 @@ class Stand:
 
 
 def element_corrections(
-    parallaxes: Array, points: Array, left: Stand, right: Stand, unknowns: Sequence[str]
+    parallaxes: Array, points: Array, left: ProjectorPose, right: ProjectorPose, unknowns: Sequence[str]
 ) -> Adjustment:
     """Return the corrections, radians and mm, that make y-parallaxes vanish in the least-squares sense.
 

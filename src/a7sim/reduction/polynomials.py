@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground, GroundFit
 from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 from a7sim.reduction.strips import Model, is_centre
@@ -130,7 +130,7 @@ def strip_adjustment(
     four bands of them. Raises Undetermined for less.
     """
     if degree not in (2, 3):
-        raise Mistake(f"expected a polynomial of degree 2 or 3, got {degree}")
+        raise A7SimError(f"expected a polynomial of degree 2 or 3, got {degree}")
     axis = strip_axis(model) if axis is None else axis
     known = ground.among(model.points)
     points = model.at(known.points)

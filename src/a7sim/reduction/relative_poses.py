@@ -16,7 +16,7 @@ from a7sim.geometry import Array, dots, mxm, rotation, transposed
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.normal_equations import (
     MAX_CONDITION,
-    Work,
+    Workspace,
     compute_discrepancies,
     condition_numbers,
     fast_all,
@@ -115,24 +115,24 @@ def relative_poses(image1: Array, image2: Array, c1: float, c2: float, tolerance
         raise Undetermined(f"expected at least {MIN_POINTS} points to orient a pair of photographs, got {n}")
     batch = image1.shape[2:]
     if not batch:
-        return _resolved((image1, image2), c1, c2, tolerance, Work(n, ()))
+        return _resolved((image1, image2), c1, c2, tolerance, Workspace(n, ()))
     flat1, flat2 = image1.reshape((2, n, -1)), image2.reshape((2, n, -1))
     pairs, step = flat1.shape[-1], 8 * max(1, WORKING_SET // (8 * n))
     found: dict[str, npt.NDArray[Any]] = {
         name: np.empty((*shape, pairs), dtype) for name, (shape, dtype) in _SHAPES.items()
     }
-    work = Work(n, (min(step, pairs),))
+    work = Workspace(n, (min(step, pairs),))
     for i in range(0, pairs, step):
         some = slice(i, min(i + step, pairs))
         if work.shape[1] != some.stop - i:
-            work = Work(n, (some.stop - i,))
+            work = Workspace(n, (some.stop - i,))
         poses = _oriented_from_near((flat1[..., some], flat2[..., some]), c1, c2, tolerance, work)
         for name, values in found.items():
             values[..., some] = getattr(poses, name)
     others = np.flatnonzero(~found["converged"])
     for i in range(0, others.size, step):
         rest = others[i : i + step]
-        poses = _resolved((flat1[..., rest], flat2[..., rest]), c1, c2, tolerance, Work(n, rest.shape))
+        poses = _resolved((flat1[..., rest], flat2[..., rest]), c1, c2, tolerance, Workspace(n, rest.shape))
         for name, values in found.items():
             values[..., rest] = getattr(poses, name)
     return RelativePoses(**{name: values.reshape((*values.shape[:-1], *batch)) for name, values in found.items()})
@@ -148,7 +148,7 @@ _SHAPES: Mapping[str, tuple[tuple[int, ...], type]] = {
 
 
 def _oriented_from_near(
-    images: tuple[Array, Array], c1: float, c2: float, tolerance: float, work: Work
+    images: tuple[Array, Array], c1: float, c2: float, tolerance: float, work: Workspace
 ) -> RelativePoses:
     """Orient those of many pairs ``(2, n, ...)`` that are near zero; the others are not `converged`.
 
@@ -166,7 +166,7 @@ def _oriented_from_near(
     return replace(poses, converged=poses.converged & sound & ~state.far)
 
 
-def _loaded(images: tuple[Array, Array], c1: float, c2: float, work: Work) -> Array:
+def _loaded(images: tuple[Array, Array], c1: float, c2: float, work: Workspace) -> Array:
     """Return the rays ``(2, 3, n, ...)`` of image points ``(2, n, ...)``, in their cameras' frames."""
     rays = work.rays
     rays[0, :2], rays[1, :2] = images
@@ -174,7 +174,7 @@ def _loaded(images: tuple[Array, Array], c1: float, c2: float, work: Work) -> Ar
     return rays
 
 
-def _resolved(images: tuple[Array, Array], c1: float, c2: float, tolerance: float, work: Work) -> RelativePoses:
+def _resolved(images: tuple[Array, Array], c1: float, c2: float, tolerance: float, work: Workspace) -> RelativePoses:
     """Orient pairs ``(2, n, ...)`` from zero, and those that refuse from swings of quarter turns."""
     rays = _loaded(images, c1, c2, work)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # singular pairs of a batch
@@ -191,7 +191,7 @@ def _tried_again(found: RelativePoses, rays: Array, tolerance: float) -> Relativ
         if not open_.any():
             break
         some = rays[..., open_] if rays.ndim > 3 else rays
-        again = _oriented(some, swings, tolerance, Work(some.shape[2], some.shape[3:]))
+        again = _oriented(some, swings, tolerance, Workspace(some.shape[2], some.shape[3:]))
         again = replace(again, converged=again.converged & (again.s0 < MAX_S0 * -rays[0, 2].flat[0]))
         found = _replaced(found, open_, again)
     return found
@@ -210,7 +210,7 @@ def _replaced(found: RelativePoses, where: npt.NDArray[np.bool_], again: Relativ
     return RelativePoses(**values)
 
 
-def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Work) -> RelativePoses:
+def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Workspace) -> RelativePoses:
     """Orient pairs of rays ``(2, 3, n, ...)`` in camera frames, from the given quarter turns.
 
     Of a batch, the pairs that are done are put aside once they are more than half.
@@ -236,7 +236,7 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Work
                 break
             going = np.flatnonzero(state.active)
             places, rays = going if places is None else places[going], rays[..., going]
-            state, work = state.of(going), Work(rays.shape[2], going.shape)
+            state, work = state.of(going), Workspace(rays.shape[2], going.shape)
     hopeless = first >= HOPELESS * MAX_CONDITION
     if not fast_any(hopeless):
         return done
@@ -285,7 +285,7 @@ def _start(swings: tuple[int, int], batch: tuple[int, ...]) -> _Iteration:
 
 
 def _iterated(
-    state: _Iteration, rays: Array, tolerance: float, work: Work, level: bool, chords: bool = True
+    state: _Iteration, rays: Array, tolerance: float, work: Workspace, level: bool, chords: bool = True
 ) -> _Iteration:
     """Do one iteration of Gauss-Newton, leaving in `work` the equations that it solved."""
     active = state.active
@@ -324,7 +324,7 @@ class _Chord:
     size: Array
 
     @classmethod
-    def of_all(cls, rays: Array, work: Work, size: Array) -> "_Chord":
+    def of_all(cls, rays: Array, work: Workspace, size: Array) -> "_Chord":
         """Return those of all pairs."""
         return cls(rays, work.rows[:5], work.steepness, work.normal[:5, :5], size)
 
@@ -373,7 +373,7 @@ def _chords(
     return _chords(R, left, size, far, equations, most - 1) if most > 1 and far.any() else (R, left)
 
 
-def _assessed(state: _Iteration, work: Work) -> RelativePoses:
+def _assessed(state: _Iteration, work: Workspace) -> RelativePoses:
     """Judge where iterations ended, by the equations of the last one."""
     n = work.shape[0]
     condition = condition_numbers(work)
@@ -385,7 +385,7 @@ def _assessed(state: _Iteration, work: Work) -> RelativePoses:
     return RelativePoses(R, np.asarray(s0), np.asarray(condition), state.iterations, np.asarray(converged))
 
 
-def _all_ahead(work: Work) -> bool:
+def _all_ahead(work: Workspace) -> bool:
     """Tell whether all rays ``(2, 3, n, ...)`` of all pairs meet before both cameras.
 
     They do where the planes with the base that hold them have one direction, and the left ray leans further along it.

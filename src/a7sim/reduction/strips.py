@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from a7sim.geometry import Array, length_of, mxv
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.similarity import Similarity, similarity_by_quaternion
 
@@ -38,7 +38,7 @@ class Model:
             raise ValueError(f"expected coordinates of {len(self.points)} points, got {self.coordinates.shape[1]}")
         if len(set(self.points)) != len(self.points):
             twice = next(name for name in self.points if self.points.count(name) > 1)
-            raise Mistake(f"model {self.name}: expected every point once, got {twice} twice")
+            raise A7SimError(f"model {self.name}: expected every point once, got {twice} twice")
 
     @property
     def centres(self) -> tuple[str, ...]:
@@ -157,7 +157,7 @@ def joined(before: Model, new: Model, method: JoinMethod = "points") -> Join:
     there = set(before.points)
     common = tuple(sorted(name for name in new.points if name in there))
     if len(common) < MIN_COMMON:
-        raise Mistake(
+        raise A7SimError(
             f"models {before.name} and {new.name}: expected at least {MIN_COMMON} common points with the centre, "
             f"got {len(common)} ({', '.join(common) or 'none'})"
         )
@@ -176,7 +176,7 @@ def _on_points(source: Array, target: Array) -> Similarity:
 def _on_centre(before: Model, new: Model, common: tuple[str, ...], method: JoinMethod) -> Similarity:
     centres = [name for name in common if is_centre(name)]
     if len(centres) != 1:
-        raise Mistake(
+        raise A7SimError(
             f"models {before.name} and {new.name}: expected one common projection centre (<photo>{CENTRE}), "
             f"got {', '.join(centres) or 'none'}"
         )
@@ -204,11 +204,11 @@ def in_order(models: Sequence[Model]) -> tuple[Model, ...]:
     shares a centre are taken in the order given. Raises Mistake for names given twice, branches, rings and gaps.
     """
     if not models:
-        raise Mistake("expected the models of a strip, got none")
+        raise A7SimError("expected the models of a strip, got none")
     names = [model.name for model in models]
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise Mistake(f"expected every model once, got model {twice} twice")
+        raise A7SimError(f"expected every model once, got model {twice} twice")
     having: dict[str, list[int]] = {}
     for i, model in enumerate(models):
         for centre in model.centres:
@@ -217,7 +217,7 @@ def in_order(models: Sequence[Model]) -> tuple[Model, ...]:
     for centre, members in having.items():
         if len(members) > 2:
             shown = ", ".join(names[i] for i in members)
-            raise Mistake(f"centre {centre}: expected at most two models of a strip to share it, got {shown}")
+            raise A7SimError(f"centre {centre}: expected at most two models of a strip to share it, got {shown}")
         if len(members) == 2:
             neighbours[members[0]].add(members[1])
             neighbours[members[1]].add(members[0])
@@ -225,14 +225,14 @@ def in_order(models: Sequence[Model]) -> tuple[Model, ...]:
         return tuple(models)
     ends = [i for i in range(len(models)) if len(neighbours[i]) <= 1]
     if not ends:
-        raise Mistake("expected a strip with two ends, got models in a ring")
+        raise A7SimError("expected a strip with two ends, got models in a ring")
     order, seen = [ends[0]], {ends[0]}
     while following := neighbours[order[-1]] - seen:
         order.append(min(following))
         seen.add(order[-1])
     if len(order) < len(models):
         left = next(names[i] for i in range(len(models)) if i not in seen)
-        raise Mistake(
+        raise A7SimError(
             f"model {left}: expected a projection centre in common with the strip of model {names[order[0]]}, got none"
         )
     return tuple(models[i] for i in order)

@@ -7,7 +7,7 @@ import numpy as np
 from a7sim.geometry import Array
 
 
-class TurningWork:
+class RotationWorkspace:
     """Arrays of pairs ``(...)`` that are filled anew when cameras are turned."""
 
     def __init__(self, batch: tuple[int, ...]) -> None:
@@ -26,7 +26,7 @@ def aligned_array(shape: tuple[int, ...]) -> Array:
     return room[first : first + size].reshape(shape)
 
 
-def rotate_by(R: Array, turns: Array, work: TurningWork | None = None, level: bool = False) -> Array:
+def rotate_by(R: Array, turns: Array, work: RotationWorkspace | None = None, level: bool = False) -> Array:
     """Turn both cameras ``(2, 3, 3, ...)`` about the axes of the base by the unknowns of the equations, radians.
 
     Only the difference of the omegas is determined; each camera takes half.
@@ -37,7 +37,7 @@ def rotate_by(R: Array, turns: Array, work: TurningWork | None = None, level: bo
         return np.asarray(
             R + (along + half @ along) * (2.0 / (1.0 + 0.5 * (half * half).sum(axis=(1, 2), keepdims=True)))
         )
-    work = work or TurningWork(R.shape[3:])
+    work = work or RotationWorkspace(R.shape[3:])
     halves = work.halves
     np.multiply(turns[:2], 0.5, out=halves[0, 1:])
     np.multiply(turns[2:4], -0.5, out=halves[1, 1:])

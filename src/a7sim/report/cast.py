@@ -8,9 +8,9 @@ import msgspec
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
-from a7sim.mistakes import Mistake
-from a7sim.operator.book import Entry
-from a7sim.report.kept import Kept
+from a7sim.mistakes import A7SimError
+from a7sim.operator.book import BookEntry
+from a7sim.report.kept import SessionFolder
 from a7sim.session import tables
 from a7sim.session.bridge import bridge_tables as of_bridge
 from a7sim.session.compiled_tables import map_tables
@@ -27,7 +27,7 @@ _NOTE = 'NOTE "'
 
 
 @dataclass(frozen=True)
-class Line:
+class CastLine:
     """What appears on the terminal at a simulated time, s; a marker where a model or a form begins."""
 
     time: float
@@ -35,7 +35,7 @@ class Line:
     marker: str = ""
 
 
-def make_cast(kept: Kept, speed: float) -> str:
+def make_cast(kept: SessionFolder, speed: float) -> str:
     """Return the film of a session in which simulated time runs `speed` times as fast. Raises Mistake."""
     with kept.reading_results():
         lines = sorted(_lines(kept), key=lambda line: line.time)
@@ -54,30 +54,30 @@ def make_cast(kept: Kept, speed: float) -> str:
     return "".join(f"{msgspec.json.encode(each).decode()}\n" for each in (header, *events))
 
 
-def _events(line: Line, speed: float) -> Iterator[tuple[float, str, str]]:
+def _events(line: CastLine, speed: float) -> Iterator[tuple[float, str, str]]:
     time = round(line.time / speed, 6)
     if line.marker:
         yield time, "m", line.marker
     yield time, "o", line.text.replace("\n", "\r\n")
 
 
-def _lines(kept: Kept) -> Iterator[Line]:
+def _lines(kept: SessionFolder) -> Iterator[CastLine]:
     document = kept.document
-    yield Line(0.0, f"$ {document.get('command_line', 'a7sim ' + kept.command)}\n")
+    yield CastLine(0.0, f"$ {document.get('command_line', 'a7sim ' + kept.command)}\n")
     notes = list(_notes(kept))
     if not notes and not kept.book:
-        raise Mistake(
+        raise A7SimError(
             f"{kept.folder}: expected the journal or the book of an operator to make a film of, "
             "got a session with neither"
         )
     yield from notes
     yield from (_reading(entry) for entry in kept.book if entry.reading or not notes)
     for model in document.get("models", ()):
-        yield Line(model["finished_at_s"], _printed(Group(*tables.model_tables(model))))
-    yield Line(3600.0 * document["operator"]["hours"], _printed(_end(kept)))
+        yield CastLine(model["finished_at_s"], _printed(Group(*tables.model_tables(model))))
+    yield CastLine(3600.0 * document["operator"]["hours"], _printed(_end(kept)))
 
 
-def _notes(kept: Kept) -> Iterator[Line]:
+def _notes(kept: SessionFolder) -> Iterator[CastLine]:
     """Yield what the operator noted in the journal: forms that begin, and remarks."""
     models, forms, remarks = ({getattr(entry, name) for entry in kept.book} for name in ("model", "form", "remark"))
     path = kept.folder / JOURNAL
@@ -89,20 +89,20 @@ def _notes(kept: Kept) -> Iterator[Line]:
         if event.dir == ">" and event.text.startswith(_NOTE):
             note = event.text.removeprefix(_NOTE).removesuffix('"').replace('""', '"')
             begins = note in forms or (note.partition(": ")[0] in models and note not in remarks)
-            yield Line(event.t, f"\x1b[1m{_clock(event.t)} {note}\x1b[0m\n", note if begins else "")
+            yield CastLine(event.t, f"\x1b[1m{_clock(event.t)} {note}\x1b[0m\n", note if begins else "")
 
 
-def _reading(entry: Entry) -> Line:
+def _reading(entry: BookEntry) -> CastLine:
     struck = f"  \x1b[9m{entry.reading}\x1b[0m {entry.struck}" if entry.struck else f"  {entry.reading}"
     words = entry.remark if entry.item == "remark" else f"{entry.point:<10}{entry.item:<28}{struck}"
-    return Line(entry.time, f"{_clock(entry.time)}   {words.rstrip()}\n")
+    return CastLine(entry.time, f"{_clock(entry.time)}   {words.rstrip()}\n")
 
 
 def _clock(seconds: float) -> str:
     return f"{int(seconds) // 3600:02d}:{int(seconds) // 60 % 60:02d}:{int(seconds) % 60:02d}"
 
 
-def _end(kept: Kept) -> RenderableType:
+def _end(kept: SessionFolder) -> RenderableType:
     """Return what the command shows at its end, but for the models, which have been shown when they were done."""
     document = kept.document
     if kept.command == "run":

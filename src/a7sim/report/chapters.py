@@ -20,8 +20,8 @@ from a7sim.report.figures.model import (
 from a7sim.report.figures.sessions import all_strips, hours
 from a7sim.report.figures.strip import Places, plan_and_profile, residuals_in_height, residuals_in_plan
 from a7sim.report.forms import make_forms
-from a7sim.report.kept import Kept
-from a7sim.report.page import Chapter, Folded, Part, Picture, Sheet
+from a7sim.report.kept import SessionFolder
+from a7sim.report.page import Chapter, Details, PageFigure, Part, TableBlock
 from a7sim.report.rays import pointing_rays
 from a7sim.report.terminal import terminal_parts
 from a7sim.session import tables
@@ -34,7 +34,7 @@ from a7sim.session.grid_test import report_tables as of_grid_test
 Chapters = Iterator[Chapter]
 
 
-def make_chapters(kept: Kept) -> Chapters:
+def make_chapters(kept: SessionFolder) -> Chapters:
     """Yield the chapters of what a folder keeps."""
     yield from _OF_COMMAND[kept.command](kept)
     yield from _of_operator(kept)
@@ -42,7 +42,7 @@ def make_chapters(kept: Kept) -> Chapters:
     yield _of_settings(kept)
 
 
-def _of_run(kept: Kept) -> Chapters:
+def _of_run(kept: SessionFolder) -> Chapters:
     document = kept.document
     for i, model in enumerate(document.get("models", ())):
         yield _of_model(kept, model, f"m{i}")
@@ -57,21 +57,21 @@ def _of_run(kept: Kept) -> Chapters:
         yield Chapter("A8 minus comparator", list(terminal_parts(each, caption="A8 minus comparator, m")))
 
 
-def _of_model(kept: Kept, model: Document, name: str) -> Chapter:
+def _of_model(kept: SessionFolder, model: Document, name: str) -> Chapter:
     orientation = model["relative_orientation"]
     title = f"Model {model['model']}: {model['left']} and {model['right']}, base {model['base']}"
     parts: list[Part] = [residual_parallaxes(model, f"{name}p")]
     if orientation["rounds"]:
         parts.append(iterations(model, f"{name}i"))
     parts += terminal_parts(tables.rounds_table(orientation))
-    parts += [Folded("Residual y-parallaxes in a table", [parallax_table(model)])]
+    parts += [Details("Residual y-parallaxes in a table", [parallax_table(model)])]
     parts += terminal_parts(tables.elements_table(orientation["elements"], model["truth"].get("elements", {})))
     rays = {side: pointing_rays(kept, model, side) for side in model["perspective_centres"]}
     parts += [perspective_centre(model, side, rays[side], f"{name}c{side}") for side in rays]
     parts += terminal_parts(tables.centres_table(model))
     missed = centre_residuals(model, rays)
     if missed is not None:
-        parts.append(Folded("Rays of the points beside the centres", [missed]))
+        parts.append(Details("Rays of the points beside the centres", [missed]))
     if "absolute_orientation" in model:
         parts += terminal_parts(tables.ground_table(model["absolute_orientation"]))
     parts += terminal_parts(tables.truth_table(model["truth"]))
@@ -99,13 +99,13 @@ def _of_all_strips(document: Document) -> Chapter:
     return Chapter("Strips of all cases", [*figures, *terminal_parts(tables.strips_table(document)), *times])
 
 
-def _of_calibration(kept: Kept) -> Chapters:
+def _of_calibration(kept: SessionFolder) -> Chapters:
     rows = kept.rows(RESIDUALS)
     figures = [grid_residuals(rows, side, f"g{side}") for side in kept.document["projectors"]]
     yield Chapter("Grid test", [*(each for each in figures if each), *terminal_parts(of_grid_test(kept.document))])
 
 
-def _of_compilation(kept: Kept) -> Chapters:
+def _of_compilation(kept: SessionFolder) -> Chapters:
     document = kept.document
     drawn = kept.text(SVG)
     sheet = [_map(drawn, f"Map of model {document['model']}")] if drawn else []
@@ -114,13 +114,13 @@ def _of_compilation(kept: Kept) -> Chapters:
         yield _of_strip(document["levelling"] | {"joins": []}, {}, "Levelling on the ground control", "l")
 
 
-def _map(svg: str, title: str) -> Picture:
+def _map(svg: str, title: str) -> PageFigure:
     """Return a map as a picture of its own, whose styles reach nothing else."""
     data = base64.b64encode(svg.encode()).decode()
-    return Picture(f'<img src="data:image/svg+xml;base64,{data}" alt="{html.escape(title)}">', title, wide=True)
+    return PageFigure(f'<img src="data:image/svg+xml;base64,{data}" alt="{html.escape(title)}">', title, wide=True)
 
 
-def _of_bridge(kept: Kept) -> Chapters:
+def _of_bridge(kept: SessionFolder) -> Chapters:
     document = kept.document
     yield Chapter("Bridge", list(terminal_parts(of_bridge(document), caption="Bridged models")))
     independent = _places(kept, f"{INDEPENDENT}/{STRIP}")
@@ -131,7 +131,7 @@ def _of_bridge(kept: Kept) -> Chapters:
             yield _of_strip({"joins": []} | strip, places, f"Strip, {way}", f"b{way}")
 
 
-def _of_operator(kept: Kept) -> Chapters:
+def _of_operator(kept: SessionFolder) -> Chapters:
     operator = kept.document.get("operator")
     if operator is None:
         return
@@ -144,7 +144,7 @@ def _of_operator(kept: Kept) -> Chapters:
             parts.append(hours(operator[key], key, title))
     for key, title in (("time_by_activity_h", "Hours by activity"), ("time_by_act_h", "Hours by act")):
         parts.append(
-            Sheet(
+            TableBlock(
                 title,
                 (title.removeprefix("Hours by "), "hours"),
                 [(what, f"{each:.4f}") for what, each in operator[key].items()],
@@ -154,18 +154,18 @@ def _of_operator(kept: Kept) -> Chapters:
     parts += terminal_parts(*(Text(remark) for remark in operator["remarks"]))
     slips = kept.document["truth"]["slips"]
     if slips:
-        parts.append(Folded(f"What the operator did wrongly without knowing: {len(slips)}", [_slips(slips)]))
+        parts.append(Details(f"What the operator did wrongly without knowing: {len(slips)}", [_slips(slips)]))
     yield Chapter("Time at the instrument", parts)
 
 
-def _slips(slips: list[Document]) -> Sheet:
+def _slips(slips: list[Document]) -> TableBlock:
     columns = tuple(slips[0])
     rows = [["" if each[key] is None else str(each[key]) for key in columns] for each in slips]
-    return Sheet("Slips", columns, rows, frozenset({2, 4, 5, 6}))
+    return TableBlock("Slips", columns, rows, frozenset({2, 4, 5, 6}))
 
 
-def _of_forms(kept: Kept) -> Chapters:
-    forms = [Folded(form.caption, form.as_parts()) for form in make_forms(kept) if form.columns]
+def _of_forms(kept: SessionFolder) -> Chapters:
+    forms = [Details(form.caption, form.as_parts()) for form in make_forms(kept) if form.columns]
     if forms:
         yield Chapter("Observation book", list(forms))
 
@@ -184,15 +184,17 @@ _SETTINGS = (
 )
 
 
-def _of_settings(kept: Kept) -> Chapter:
+def _of_settings(kept: SessionFolder) -> Chapter:
     document = kept.document
     rows = [(key.replace("_", " "), _words(document[key])) for key in _SETTINGS if key in document]
     changed = [(path, value) for path, value in document.get("settings", {}).items()]
-    parts: list[Part] = [Sheet("What gives this session again", ("what", "value"), rows, frozenset({0, 1}))]
+    parts: list[Part] = [TableBlock("What gives this session again", ("what", "value"), rows, frozenset({0, 1}))]
     if changed:
-        parts.append(Sheet("Changed in the scenario's file", ("setting", "value"), changed, frozenset({0, 1})))
+        parts.append(TableBlock("Changed in the scenario's file", ("setting", "value"), changed, frozenset({0, 1})))
     files = sorted(path.name for path in Path(kept.folder).iterdir())
-    parts.append(Sheet("Files in the folder", ("file", "bytes"), [(name, _size(kept.folder / name)) for name in files]))
+    parts.append(
+        TableBlock("Files in the folder", ("file", "bytes"), [(name, _size(kept.folder / name)) for name in files])
+    )
     return Chapter("Settings", parts)
 
 
@@ -204,11 +206,11 @@ def _size(path: Path) -> str:
     return "folder" if path.is_dir() else f"{path.stat().st_size}"
 
 
-def _places(kept: Kept, name: str) -> dict[str, tuple[float, float, float]]:
+def _places(kept: SessionFolder, name: str) -> dict[str, tuple[float, float, float]]:
     return {row["point"]: (float(row["X"]), float(row["Y"]), float(row["Z"])) for row in kept.rows(name)}
 
 
-_OF_COMMAND: dict[str, Callable[[Kept], Chapters]] = {
+_OF_COMMAND: dict[str, Callable[[SessionFolder], Chapters]] = {
     "run": _of_run,
     "calibrate": _of_calibration,
     "compile": _of_compilation,

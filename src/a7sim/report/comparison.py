@@ -11,8 +11,8 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from a7sim.documents import Document, document_header
-from a7sim.mistakes import Mistake
-from a7sim.report.kept import Kept
+from a7sim.mistakes import A7SimError
+from a7sim.report.kept import SessionFolder
 from a7sim.sheets import text_table
 from a7sim.wording import pluralize
 
@@ -50,7 +50,7 @@ MIN_WIDTH = 8
 
 
 @dataclass(frozen=True)
-class Row:
+class FactRow:
     """A fact by its path in the results, and what each session says of it."""
 
     fact: str
@@ -62,18 +62,18 @@ class Row:
         return len(set(self.values)) > 1
 
 
-def compare_sessions(sessions: Sequence[Kept], everything: bool = False) -> list[Row]:
+def compare_sessions(sessions: Sequence[SessionFolder], everything: bool = False) -> list[FactRow]:
     """Return the facts that differ between two sessions or more of one kind, or all of them. Raises Mistake."""
     kinds = {kept.command: kept.folder for kept in reversed(sessions)}
     if len(kinds) > 1:
         shown = " and ".join(f"{folder} is of a7sim {command}" for command, folder in kinds.items())
-        raise Mistake(f"expected sessions of one kind to compare, got several: {shown}")
+        raise A7SimError(f"expected sessions of one kind to compare, got several: {shown}")
     facts = []
     for kept in sessions:
         with kept.reading_results():
             facts.append(dict(_facts(kept.document, ())))
     names = _in_order(facts)
-    rows = (Row(name, tuple(each.get(name, ABSENT) for each in facts)) for name in names)
+    rows = (FactRow(name, tuple(each.get(name, ABSENT) for each in facts)) for name in names)
     return [row for row in rows if everything or row.differs]
 
 
@@ -122,7 +122,7 @@ def _as_text(value: Any) -> str:
     return msgspec.json.encode(value).decode()
 
 
-def comparison_document(sessions: Sequence[Kept], rows: Sequence[Row]) -> Document:
+def comparison_document(sessions: Sequence[SessionFolder], rows: Sequence[FactRow]) -> Document:
     """Return a comparison as a document."""
     return document_header("compare") | {
         "sessions": [str(kept.folder) for kept in sessions],
@@ -130,7 +130,7 @@ def comparison_document(sessions: Sequence[Kept], rows: Sequence[Row]) -> Docume
     }
 
 
-def comparison_table(sessions: Sequence[Kept], rows: Sequence[Row], width: int) -> RenderableType:
+def comparison_table(sessions: Sequence[SessionFolder], rows: Sequence[FactRow], width: int) -> RenderableType:
     """Return a comparison for a terminal of so many columns."""
     if not rows:
         return Text(f"{len(sessions)} sessions of a7sim {sessions[0].command}, all the same")

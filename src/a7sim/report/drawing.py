@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from a7sim.mistakes import Mistake
-from a7sim.report.page import Picture
+from a7sim.mistakes import A7SimError
+from a7sim.report.page import PageFigure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,21 +54,21 @@ _STYLE: dict[Any, Any] = {
 } | dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK)
 
 
-class Drawing:
+class FigureBuilder:
     """A figure under way: its `axes` while the body draws, its `picture` afterwards; a `legend` explains its signs."""
 
     def __init__(self, name: str, title: str, description: str, wide: bool) -> None:
         self._name, self._title, self._description, self._wide = name, title, description, wide
         self.axes: Sequence[Axes] = ()
         self.legend = ""
-        self.picture: Picture
+        self.picture: PageFigure
 
     def finish(self, figure: "Figure") -> None:
         """Make the picture."""
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
         markup = _inline(text.getvalue(), self._name, self._title, self._description)
-        self.picture = Picture(markup, ". ".join(filter(None, (self._title, self.legend))), self._wide)
+        self.picture = PageFigure(markup, ". ".join(filter(None, (self._title, self.legend))), self._wide)
 
 
 @contextmanager
@@ -80,7 +80,7 @@ def drawing(
     ratios: Sequence[float] = (1.0,),
     beside: bool = False,
     wide: bool = False,
-) -> Iterator[Drawing]:
+) -> Iterator[FigureBuilder]:
     """Let the body draw on the axes of a figure that is called `name` in its page.
 
     Axes stand below each other, or `beside`, in these ratios. Raises Mistake where matplotlib is not installed.
@@ -89,8 +89,8 @@ def drawing(
         import matplotlib  # noqa: PLC0415
         from matplotlib.figure import Figure  # noqa: PLC0415
     except ImportError as error:
-        raise Mistake("a report needs matplotlib for its figures, got none: pip install 'a7sim[report]'") from error
-    drawn = Drawing(name, title, description, wide)
+        raise A7SimError("a report needs matplotlib for its figures, got none: pip install 'a7sim[report]'") from error
+    drawn = FigureBuilder(name, title, description, wide)
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=size, layout="constrained")
         if beside:
@@ -136,7 +136,7 @@ def _inline(svg: str, name: str, title: str, description: str) -> str:
     return re.sub(r"<svg([^>]*)>", rf"{named}\1>{_safe(said)}", svg, count=1)
 
 
-def standalone(picture: Picture) -> tuple[str, str]:
+def standalone(picture: PageFigure) -> tuple[str, str]:
     """Return the name of a figure and its SVG as a file of its own: light colours, on a ground of its own."""
     svg = picture.markup
     for colour, variable in _VARIABLES.items():

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from a7sim.documents import Document
-from a7sim.mistakes import Mistake
-from a7sim.operator.book import Entry
-from a7sim.report.kept import Kept
-from a7sim.report.page import Paragraph, Part, Sheet
+from a7sim.mistakes import A7SimError
+from a7sim.operator.book import BookEntry
+from a7sim.report.kept import SessionFolder
+from a7sim.report.page import Paragraph, Part, TableBlock
 from a7sim.session.folder import BOOK
 
 PAGE_BREAK = "\f"
@@ -69,25 +69,25 @@ class Form:
         if self.columns:
             names = [f"{column.item} {column.which}".strip() for column in self.columns]
             rows = list(zip(*(column.cells for column in self.columns), strict=True))
-            parts.append(Sheet(self.caption, names, rows))
+            parts.append(TableBlock(self.caption, names, rows))
         return parts + ([Paragraph("\n".join(self.foot))] if self.foot else [])
 
 
-def forms_text(kept: Kept) -> str:
+def forms_text(kept: SessionFolder) -> str:
     """Return all forms of a session as plain text, a page break between them. Raises Mistake without a book."""
     if not kept.book:
-        raise Mistake(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
+        raise A7SimError(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
     with kept.reading_results():
         return PAGE_BREAK.join(form.as_text() for form in make_forms(kept))
 
 
-def make_forms(kept: Kept) -> Iterator[Form]:
+def make_forms(kept: SessionFolder) -> Iterator[Form]:
     """Yield the forms of a session in the order in which they were filled."""
     for (model, form, number), entries in groupby(kept.book, key=lambda entry: (entry.model, entry.form, entry.round)):
         yield _filled(kept.document, model, form, number, list(entries))
 
 
-def _filled(document: Document, model: str, form: str, number: int, entries: Sequence[Entry]) -> Form:
+def _filled(document: Document, model: str, form: str, number: int, entries: Sequence[BookEntry]) -> Form:
     found = next((each for each in document.get("models", ()) if each["model"] == model), None)
     round_of = f", round {number}" if number else ""
     observed = [entry for entry in entries if entry.point and entry.reading]
@@ -117,7 +117,7 @@ def _parallaxes(model: Document, form: str, number: int) -> dict[str, float]:
     return {model["standard_points"].get(label, label): p for label, p in by_label.items()}
 
 
-def _as_it_went(observed: Sequence[Entry]) -> Iterator[Column]:
+def _as_it_went(observed: Sequence[BookEntry]) -> Iterator[Column]:
     """Yield readings in their order: each is of a model that the one before has changed."""
     yield Column("point", "", [entry.point for entry in observed])
     yield Column("time", "", [_clock(entry.time) for entry in observed])
@@ -125,7 +125,7 @@ def _as_it_went(observed: Sequence[Entry]) -> Iterator[Column]:
     yield Column("reading", "", [entry.reading for entry in observed])
 
 
-def _columns(observed: Sequence[Entry], parallaxes: Mapping[str, float]) -> Iterator[Column]:
+def _columns(observed: Sequence[BookEntry], parallaxes: Mapping[str, float]) -> Iterator[Column]:
     points = list(dict.fromkeys(entry.point for entry in observed))
     yield Column("point", "", points)
     kept = valid_readings(observed)
@@ -141,7 +141,7 @@ def _columns(observed: Sequence[Entry], parallaxes: Mapping[str, float]) -> Iter
         yield Column("p", "", [f"{parallaxes[point]:+.3f}" if point in parallaxes else "" for point in points])
 
 
-def valid_readings(entries: Iterable[Entry]) -> dict[tuple[str, str], list[str]]:
+def valid_readings(entries: Iterable[BookEntry]) -> dict[tuple[str, str], list[str]]:
     """Return the readings that were not struck out by point and item."""
     readings: dict[tuple[str, str], list[str]] = {}
     for entry in entries:
@@ -168,7 +168,7 @@ def _shown(item: str) -> str:
     return symbols[name] + SIGNS[number] if name in symbols and number in SIGNS else item
 
 
-def _below(entries: Sequence[Entry]) -> Iterator[str]:
+def _below(entries: Sequence[BookEntry]) -> Iterator[str]:
     settings = [entry for entry in entries if not entry.point and entry.reading]
     if settings:
         words = (f"{_shown(entry.item.removeprefix('set '))} {entry.reading}" for entry in settings)

@@ -12,8 +12,8 @@ import msgspec
 
 from a7sim.documents import SCHEMA_VERSION, Document
 from a7sim.files import read_text
-from a7sim.mistakes import Mistake
-from a7sim.operator.book import COLUMNS, Entry
+from a7sim.mistakes import A7SimError
+from a7sim.operator.book import COLUMNS, BookEntry
 from a7sim.session.folder import BOOK, JOURNAL, RESULTS
 
 COMMANDS = ("run", "calibrate", "compile", "bridge")
@@ -21,7 +21,7 @@ COMMANDS = ("run", "calibrate", "compile", "bridge")
 
 
 @dataclass(frozen=True)
-class Kept:
+class SessionFolder:
     """A folder and its results."""
 
     folder: Path
@@ -43,12 +43,12 @@ class Kept:
         return list(csv.DictReader(io.StringIO("".join(lines))))
 
     @cached_property
-    def book(self) -> list[Entry]:
+    def book(self) -> list[BookEntry]:
         """The entries of the observation book, none where the session kept no book. Raises Mistake."""
         path = self.folder / BOOK
         rows = self.rows(BOOK)
         if rows and tuple(rows[0]) != COLUMNS:
-            raise Mistake(
+            raise A7SimError(
                 f"{path}, line 1: expected the columns {','.join(COLUMNS)}, got {','.join(map(str, rows[0]))}"
             )
         return [_entry(row, f"{path}, row {i}") for i, row in enumerate(rows, start=1)]
@@ -59,47 +59,49 @@ class Kept:
         try:
             yield
         except (LookupError, TypeError, AttributeError, ValueError) as error:
-            if isinstance(error, Mistake):
+            if isinstance(error, A7SimError):
                 raise
-            raise Mistake(
+            raise A7SimError(
                 f"{self.folder / RESULTS}: expected the results of a session as a7sim leaves them, "
                 f"got some that lack or change a part ({type(error).__name__}: {error})"
             ) from error
 
 
-def _entry(row: dict[str, str], place: str) -> Entry:
+def _entry(row: dict[str, str], place: str) -> BookEntry:
     try:
-        return Entry(
+        return BookEntry(
             number=int(row["number"]),
             time=float(row["time_s"]),
             round=int(row["round"] or 0),
             **{name: row[name] for name in ("model", "form", "point", "item", "reading", "remark", "struck")},
         )
     except (ValueError, TypeError) as error:
-        raise Mistake(f"{place}: expected an entry of the observation book, got {dict(row)}"[:300]) from error
+        raise A7SimError(f"{place}: expected an entry of the observation book, got {dict(row)}"[:300]) from error
 
 
-def read_session(folder: Path) -> Kept:
+def read_session(folder: Path) -> SessionFolder:
     """Return the session that a folder keeps. Raises Mistake for a folder without one and for damaged results."""
     if not folder.is_dir():
         came = "a file" if folder.exists() else "none"
-        raise Mistake(f"{folder}: expected the folder of a session, got {came}")
+        raise A7SimError(f"{folder}: expected the folder of a session, got {came}")
     path = folder / RESULTS
     if not path.is_file():
         if (folder / JOURNAL).is_file():
-            raise Mistake(f"{folder}: expected {RESULTS}, got only a journal: the session was cut off before its end")
-        raise Mistake(f"{folder}: expected the folder of a session with its {RESULTS}, got none")
+            raise A7SimError(
+                f"{folder}: expected {RESULTS}, got only a journal: the session was cut off before its end"
+            )
+        raise A7SimError(f"{folder}: expected the folder of a session with its {RESULTS}, got none")
     try:
         document = msgspec.json.decode(read_text(path))
     except msgspec.DecodeError as error:
-        raise Mistake(f"{path}: expected the results of a session in JSON, got a damaged file: {error}") from error
+        raise A7SimError(f"{path}: expected the results of a session in JSON, got a damaged file: {error}") from error
     if not isinstance(document, dict) or "command" not in document:
-        raise Mistake(f"{path}: expected the results of a session, got a document that names no command")
+        raise A7SimError(f"{path}: expected the results of a session, got a document that names no command")
     if document.get("schema_version") != SCHEMA_VERSION:
-        raise Mistake(
+        raise A7SimError(
             f"{path}: expected schema_version {SCHEMA_VERSION}, got {document.get('schema_version')!r}: "
             "results of another version of a7sim"
         )
     if document["command"] not in COMMANDS:
-        raise Mistake(f"{path}: expected the results of {', '.join(COMMANDS)}, got those of {document['command']}")
-    return Kept(folder, document)
+        raise A7SimError(f"{path}: expected the results of {', '.join(COMMANDS)}, got those of {document['command']}")
+    return SessionFolder(folder, document)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from a7sim.report.drawing import standalone
-from a7sim.report.page import Chapter, Folded, Heading, Paragraph, Part, Picture, Sheet
+from a7sim.report.page import Chapter, Details, Heading, PageFigure, Paragraph, Part, TableBlock
 
 
 def markdown(
@@ -29,20 +29,20 @@ def _blocks(parts: Sequence[Part], figures_at: str, figures: dict[str, str]) -> 
             case Paragraph(text, loud):
                 lines = [f"**{line}**" if loud else line for line in text.splitlines()]
                 yield "\n".join(f"- {line}" for line in lines) if len(lines) > 1 else "".join(lines)
-            case Sheet():
+            case TableBlock():
                 yield from _table(part)
-            case Picture():
+            case PageFigure():
                 name, figures_svg = standalone(part)
                 figures[f"{name}.svg"] = figures_svg
                 yield f"![{part.caption}]({figures_at}{name}.svg)"
                 yield f"*{part.caption}.*"
-            case Folded(summary, inner):
+            case Details(summary, inner):
                 yield f"<details><summary>{escape(summary)}</summary>"
                 yield from _blocks(inner, figures_at, figures)
                 yield "</details>"
 
 
-def _table(sheet: Sheet) -> Iterator[str]:
+def _table(sheet: TableBlock) -> Iterator[str]:
     yield f"*{sheet.caption}.*"
     ruler = [":---" if i in sheet.left else "---:" for i in range(len(sheet.columns))]
     rows = (sheet.columns, ruler, *sheet.rows)

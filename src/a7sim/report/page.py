@@ -25,7 +25,7 @@ class Paragraph:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class TableBlock:
     """A table; the first cell of a row names it. Columns in `left` hold words, the others numbers."""
 
     caption: str
@@ -35,7 +35,7 @@ class Sheet:
 
 
 @dataclass(frozen=True)
-class Picture:
+class PageFigure:
     """A figure: markup of its own, which carries its accessible name, and the caption below."""
 
     markup: str
@@ -44,14 +44,14 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Folded:
+class Details:
     """Parts that are shown when asked for, and always in print."""
 
     summary: str
     parts: Sequence["Part"]
 
 
-Part = Heading | Paragraph | Sheet | Picture | Folded
+Part = Heading | Paragraph | TableBlock | PageFigure | Details
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def _markup(parts: Iterable[Part]) -> Iterator[str]:
     """Yield the markup of parts; narrow figures that follow each other stand side by side where there is room."""
     together: list[str] = []
     for part in parts:
-        if isinstance(part, Picture) and not part.wide:
+        if isinstance(part, PageFigure) and not part.wide:
             together.append(_figure(part))
             continue
         if together:
@@ -101,15 +101,15 @@ def _one(part: Part) -> str:
         case Paragraph(text, loud):
             kind = ' class="loud"' if loud else ""
             return f"<p{kind}>{escape(text).replace(LINE_END, '<br>')}</p>\n"
-        case Sheet():
+        case TableBlock():
             return _table(part)
-        case Picture():
+        case PageFigure():
             return _figure(part)
-        case Folded(summary, inner):
+        case Details(summary, inner):
             return f"<details><summary>{escape(summary)}</summary>\n{_parts(inner)}</details>\n"
 
 
-def _figure(picture: Picture) -> str:
+def _figure(picture: PageFigure) -> str:
     if picture.wide:
         label = escape(picture.caption)
         drawn = f'<div class="wide" tabindex="0" role="region" aria-label="{label}">{picture.markup}</div>'
@@ -118,7 +118,7 @@ def _figure(picture: Picture) -> str:
     return f"<figure>{drawn}<figcaption>{escape(picture.caption)}</figcaption></figure>\n"
 
 
-def _table(sheet: Sheet) -> str:
+def _table(sheet: TableBlock) -> str:
     head = "".join(
         f'<th scope="col"{_side(sheet, i)}>{escape(name)}</th>' if name else "<td></td>"
         for i, name in enumerate(sheet.columns)
@@ -130,11 +130,11 @@ def _table(sheet: Sheet) -> str:
     return f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(sheet.caption)}">{table}</div>\n'
 
 
-def _row(sheet: Sheet, row: Sequence[str]) -> str:
+def _row(sheet: TableBlock, row: Sequence[str]) -> str:
     name, *values = row
     cells = "".join(f"<td{_side(sheet, i)}>{escape(value)}</td>" for i, value in enumerate(values, 1))
     return f'<tr><th scope="row">{escape(name)}</th>{cells}</tr>\n'
 
 
-def _side(sheet: Sheet, column: int) -> str:
+def _side(sheet: TableBlock, column: int) -> str:
     return ' class="words"' if column in sheet.left else ""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from a7sim.documents import Document
 from a7sim.report.forms import mean, valid_readings
-from a7sim.report.kept import Kept
+from a7sim.report.kept import SessionFolder
 
 _ITEM = re.compile(r"(?P<axis>[XY]) (left|right) at Z (?P<level>-?[0-9.]+)")
 
@@ -14,7 +14,7 @@ TOLERATED = 2e-3
 """Counter units within which the rays must give the rms that the results have."""
 
 
-def pointing_rays(kept: Kept, model: Document, side: str) -> dict[str, tuple[float, float]]:
+def pointing_rays(kept: SessionFolder, model: Document, side: str) -> dict[str, tuple[float, float]]:
     """Return X and Y by point where its pointings at two levels, gone on by T0, come to the centre's height.
 
     They are the residuals of the centre's equations, seen from it. None where a centre was found in another way, or

@@ -7,7 +7,7 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
-from a7sim.report.page import Heading, Paragraph, Part, Sheet
+from a7sim.report.page import Heading, Paragraph, Part, TableBlock
 
 
 def terminal_parts(*shown: RenderableType, caption: str = "") -> Iterator[Part]:
@@ -42,8 +42,8 @@ def _flat(shown: tuple[RenderableType, ...] | list[RenderableType]) -> Iterator[
             yield each
 
 
-def _sheet(table: Table, caption: str) -> Sheet:
+def _sheet(table: Table, caption: str) -> TableBlock:
     left = frozenset(i for i, column in enumerate(table.columns) if column.justify == "left")
     columns = [str(column.header) for column in table.columns]
     rows = [[str(cell) for cell in row] for row in zip(*(column.cells for column in table.columns), strict=True)]
-    return Sheet(caption, columns, rows, left)
+    return TableBlock(caption, columns, rows, left)

@@ -2,7 +2,7 @@
 
 from a7sim.documents import Document
 from a7sim.report.chapters import make_chapters
-from a7sim.report.kept import Kept
+from a7sim.report.kept import SessionFolder
 from a7sim.report.page import Paragraph, Part, page
 
 _TITLES = {"run": "session", "calibrate": "test of the projectors", "compile": "map", "bridge": "bridging"}
@@ -14,7 +14,7 @@ _ENDS = {
 }
 
 
-def render_report(kept: Kept) -> str:
+def render_report(kept: SessionFolder) -> str:
     """Return a session's report as a page of HTML. Raises Mistake for damaged results or files."""
     with kept.reading_results():
         document = kept.document

@@ -9,7 +9,7 @@ from a7sim.scenario.loading import (
     scenario_name,
     scenario_schema,
 )
-from a7sim.scenario.requests import Request, RequestedScenario, amend_provenance, with_provenance
+from a7sim.scenario.requests import Provenance, ScenarioWithProvenance, amend_provenance, with_provenance
 from a7sim.scenario.schema import (
     SCHEMA_VERSION,
     Camera,
@@ -25,7 +25,7 @@ from a7sim.scenario.schema import (
     Scenario,
     StripPlan,
 )
-from a7sim.scenario.schema import Model as ModelPlan
+from a7sim.scenario.schema import ModelPlan as ModelPlan
 from a7sim.scenario.skills import PROFILES, observer_of_skill
 
 __all__ = [
@@ -42,10 +42,10 @@ __all__ = [
     "Photo",
     "Plan",
     "ProjectorCondition",
-    "Request",
-    "RequestedScenario",
+    "Provenance",
     "Scenario",
     "ScenarioError",
+    "ScenarioWithProvenance",
     "StripPlan",
     "amend_provenance",
     "build_scenario",

@@ -6,9 +6,9 @@ from typing import Any
 
 import msgspec
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario.loading import SEARCH_PATH
-from a7sim.scenario.requests import RequestedScenario
+from a7sim.scenario.requests import ScenarioWithProvenance
 from a7sim.scenario.schema import Scenario
 
 
@@ -23,9 +23,9 @@ def to_data(scenario: Scenario) -> dict[str, Any]:
 def from_data(data: Any) -> Scenario:
     """Return the scenario that was carried. Raises Mistake for data that is none."""
     try:
-        return msgspec.convert(_naming(data, _found), RequestedScenario if "request" in data else Scenario)
+        return msgspec.convert(_naming(data, _found), ScenarioWithProvenance if "request" in data else Scenario)
     except (msgspec.ValidationError, TypeError, AttributeError) as error:
-        raise Mistake(f"expected a scenario of this version of a7sim, got another: {error}") from error
+        raise A7SimError(f"expected a scenario of this version of a7sim, got another: {error}") from error
 
 
 def hash_scenario(scenario: Scenario) -> str:
@@ -39,7 +39,7 @@ def hash_scenario(scenario: Scenario) -> str:
         try:
             digest.update(Path(file).read_bytes())
         except OSError as error:
-            raise Mistake(f"{file}: expected the measurements of the scenario: {error.strerror}") from error
+            raise A7SimError(f"{file}: expected the measurements of the scenario: {error.strerror}") from error
     return digest.hexdigest()
 
 

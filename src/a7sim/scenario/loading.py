@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from a7sim.files import describe_missing_file, read_toml
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario.references import cross_check_errors
 from a7sim.scenario.schema import Scenario
 from a7sim.scenario.skills import PROFILES
@@ -22,7 +22,7 @@ SEARCH_PATH = bundled_dirs("scenarios")
 """Where the scenarios are that come with a7sim."""
 
 
-class ScenarioError(Mistake):
+class ScenarioError(A7SimError):
     """A scenario that cannot be used; `mistakes` names each mistake with its path."""
 
     def __init__(self, source: str, mistakes: Sequence[str]) -> None:
@@ -68,7 +68,7 @@ def load_scenario(
     path = find_scenario(name)
     try:
         raw = _with_skill_as_table(read_toml(path))
-    except Mistake as mistake:
+    except A7SimError as mistake:
         raise ScenarioError(str(path), [str(mistake).removeprefix(str(path)).lstrip(":, ")]) from mistake
     for key, text in (overrides or {}).items():
         _set(raw, key, _value_of(text), f"--set {key}={text}")

@@ -11,7 +11,7 @@ from a7sim.scenario.schema import Scenario
 NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
-class Request(Struct, frozen=True):
+class Provenance(Struct, frozen=True):
     """How somebody asked for a session: the command that gives it again, and what it changed in the scenario's file."""
 
     command_line: str
@@ -19,22 +19,22 @@ class Request(Struct, frozen=True):
     """Changed values by their path."""
 
 
-class RequestedScenario(Scenario, frozen=True, kw_only=True):
+class ScenarioWithProvenance(Scenario, frozen=True, kw_only=True):
     """A scenario with the request that chose it."""
 
-    request: Request
+    request: Provenance
 
 
-def with_provenance(scenario: Scenario, request: Request) -> RequestedScenario:
+def with_provenance(scenario: Scenario, request: Provenance) -> ScenarioWithProvenance:
     """Return a scenario with the request that chose it."""
     values = {name: getattr(scenario, name) for name in Scenario.__struct_fields__}
-    return RequestedScenario(**values, request=request)
+    return ScenarioWithProvenance(**values, request=request)
 
 
 def amend_provenance(scenario: Scenario, words: str, instead: str, settings: Mapping[str, str] = NOTHING) -> Scenario:
     """Return a scenario whose request, where it has one, says something instead of words and changes more settings."""
-    if not isinstance(scenario, RequestedScenario):
+    if not isinstance(scenario, ScenarioWithProvenance):
         return scenario
     request = scenario.request
-    changed = Request(request.command_line.replace(words, instead), {**request.settings, **settings})
+    changed = Provenance(request.command_line.replace(words, instead), {**request.settings, **settings})
     return replace(scenario, request=changed)

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 from msgspec import Meta, Struct, field
 from msgspec.structs import replace
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 SCHEMA_VERSION = 1
 
@@ -69,7 +69,7 @@ class Camera(_Data, frozen=True, kw_only=True):
     """k1, k2, ... of the outward displacement k1 r^3 + k2 r^5 + ..., r and result in mm."""
 
 
-class Film(_Data, frozen=True, kw_only=True):
+class FilmDeformation(_Data, frozen=True, kw_only=True):
     """How film and pricking deform the imaged coordinates; standard deviations are drawn anew per photograph."""
 
     shrinkage_ppm: tuple[Ppm, Ppm] = (0.0, 0.0)
@@ -149,7 +149,7 @@ class GroundPoint(_Data, frozen=True, kw_only=True):
     role: Literal["control", "plan", "height", "check"] = "check"
 
 
-class Line(_Data, frozen=True, kw_only=True):
+class LinePlan(_Data, frozen=True, kw_only=True):
     """A line that is seen on the ground: a smooth curve through vertices, lighter than what lies beside it."""
 
     name: Name
@@ -177,7 +177,7 @@ class Published(_Data, frozen=True, kw_only=True):
     source: Text = "the scenario"
 
 
-class Model(_Data, frozen=True, kw_only=True):
+class ModelPlan(_Data, frozen=True, kw_only=True):
     """Two photographs to be set up as a model."""
 
     name: Name
@@ -210,14 +210,14 @@ class ProjectorCondition(_Data, frozen=True, kw_only=True):
     """Which pattern these local errors have; every seed has its own when absent."""
 
 
-Upkeep = Literal["new", "serviced", "worn"]
+MaintenanceClass = Literal["new", "serviced", "worn"]
 """Classes of maintenance (docs/decisions/0006-condition.md)."""
 
 
 class Condition(_Data, frozen=True, kw_only=True):
     """The state of maintenance of an instrument; all zero is a faultless one (never true)."""
 
-    upkeep: Upkeep | None = None
+    upkeep: MaintenanceClass | None = None
     """The faults listed beside it come on top of those that a seed draws for this class."""
     left: ProjectorCondition = ProjectorCondition()
     right: ProjectorCondition = ProjectorCondition()
@@ -261,7 +261,7 @@ class Instrument(_Data, frozen=True, kw_only=True):
 
     variant: Literal["A7", "A8"] = "A7"
     serial: Name = "3268"
-    condition: Condition | Upkeep = Condition()
+    condition: Condition | MaintenanceClass = Condition()
     """Faults in a table, or a class of maintenance by its name."""
     grid_test: GridTest = GridTest()
     """Of the A8 of an A8 strip."""
@@ -284,7 +284,7 @@ SlipKind = Literal[
 ]
 
 
-class CertainSlip(_Data, frozen=True, kw_only=True):
+class PlannedSlip(_Data, frozen=True, kw_only=True):
     """A slip that is made for certain, once, at the first occasion that fits; what is empty fits everywhere."""
 
     kind: SlipKind
@@ -327,7 +327,7 @@ class Observer(_Data, frozen=True, kw_only=True):
     """Share of fittings left in the other position."""
     not_reread_rate: Share = 0.0
     """Share of the elements of a round for which the reading of the round before is used."""
-    certain_slips: Annotated[list[CertainSlip], Meta(max_length=20, description="up to 20 slips")] = []
+    certain_slips: Annotated[list[PlannedSlip], Meta(max_length=20, description="up to 20 slips")] = []
     """Slips planted whatever the rates; each happens once."""
     warm_up: Annotated[float, Meta(ge=0, le=10, description="a share of the settings' errors, 0 to 10")] = 0.0
     """By what share settings are worse on sitting down; it falls evenly to nothing."""
@@ -449,7 +449,7 @@ class GridPlate(_Data, frozen=True, kw_only=True):
         """Return so many crosses, evenly spaced over the whole plate. Raises Mistake where none lie so."""
         if count not in self.even_counts:
             known = ", ".join(map(str, self.even_counts))
-            raise Mistake(f"expected a number of crosses that lie evenly on the grid plate ({known}), got {count}")
+            raise A7SimError(f"expected a number of crosses that lie evenly on the grid plate ({known}), got {count}")
         step = (self.lines - 1) // (round(count**0.5) - 1)
         crosses = list(self.crosses.items())
         return {
@@ -491,7 +491,7 @@ class StripPlan(_Data, frozen=True, kw_only=True):
     """Degree of the adjustment on the control after absolute orientation; none when absent."""
 
 
-Way = Literal["plotter", "comparator", "readings", "bridge"]
+StripMethod = Literal["plotter", "comparator", "readings", "bridge"]
 """How a strip is measured: by an operator at a plotter, in a comparator, as an A8's readings on arrays, or by an
 operator who bridges it, base in and base out in turn."""
 
@@ -503,17 +503,17 @@ class Scenario(_Data, frozen=True, kw_only=True):
     title: Text
     story: str = ""
     camera: Camera
-    film: Film = Film()
+    film: FilmDeformation = FilmDeformation()
     photos: Annotated[list[Photo], Meta(min_length=2, description="two photographs or more")]
     terrain: Terrain = Terrain()
     air: Air = Air()
     ground: list[GroundPoint] = []
-    lines: list[Line] = []
+    lines: list[LinePlan] = []
     """Roads and tracks, shown by the photographs."""
-    models: Annotated[list[Model], Meta(min_length=1, description="one model or more")] = []
+    models: Annotated[list[ModelPlan], Meta(min_length=1, description="one model or more")] = []
     """When absent, each photograph and the next, numbered from 1."""
     work: Annotated[
-        list[Way], Meta(min_length=1, description="'plotter', 'comparator', 'readings' or 'bridge', or several")
+        list[StripMethod], Meta(min_length=1, description="'plotter', 'comparator', 'readings' or 'bridge', or several")
     ] = field(default_factory=lambda: ["plotter"])
     """Who measures the strip."""
     instrument: Instrument = Instrument()
@@ -544,7 +544,7 @@ class Scenario(_Data, frozen=True, kw_only=True):
     def plan(self) -> Plan:
         """The job sheet of the operator at the plotter. Raises Mistake where there is none."""
         if self.plotting is None:
-            raise Mistake("plan: expected the settings of a plotter, got none: the scenario is not for one")
+            raise A7SimError("plan: expected the settings of a plotter, got none: the scenario is not for one")
         return self.plotting
 
     @property

@@ -14,8 +14,8 @@ from a7sim.scene.emulsion import Emulsion
 from a7sim.scene.houses import NO_HOUSES, Houses, houses_along
 from a7sim.scene.lines import GroundLine, distance_from, with_lines
 from a7sim.scene.noise import value_noise
-from a7sim.scene.photograph import Content, Marks
-from a7sim.scene.terrain import Ground
+from a7sim.scene.photograph import Content, NamedPoints
+from a7sim.scene.terrain import GroundSurface
 
 SIGNAL_MM = 0.12
 """Half the arm of a signal on film."""
@@ -34,7 +34,7 @@ def ground_texture(east: Array, north: Array) -> Array:
     return np.asarray(np.clip(grey, 0.0, 1.0))
 
 
-def signals(points: Marks) -> Content:
+def signals(points: NamedPoints) -> Content:
     """Return a function that tells, 0..1, how much of picture elements at places ``(2, ...)`` a white cross covers."""
 
     def covered(xy: Array, element: float) -> Array:
@@ -56,10 +56,10 @@ def signals(points: Marks) -> Content:
 
 
 @dataclass(frozen=True)
-class Depicted:
+class GroundAppearance:
     """What stands on the ground and is seen in every photograph of it, whatever its station."""
 
-    ground: Ground
+    ground: GroundSurface
     lines: Sequence[GroundLine]
     houses_seed: int | None
     """Draws the houses along the lines; without it there are none."""
@@ -86,19 +86,19 @@ class Depicted:
 
 
 @dataclass(frozen=True)
-class PictureOfGround:
+class GroundImage:
     """The picture of the ground from a station.
 
     `to_film` is the film's affine deformation ``(2, 2)``, `imaging` what air and lens make of perspective images.
     Without an emulsion nothing resolves or grains it, and the light is even.
     """
 
-    appearance: Depicted
+    appearance: GroundAppearance
     centre: Array
     rotation: Array
     camera: Camera
     to_film: Array
-    points: Marks
+    points: NamedPoints
     imaging: Callable[[Array], Array]
     emulsion: Emulsion | None
 
@@ -132,7 +132,7 @@ def _undone(imaging: Callable[[Array], Array], imaged: Array) -> Array:
     return image
 
 
-def marks_image(points: Marks) -> Content:
+def marks_image(points: NamedPoints) -> Content:
     """Return the picture of measured points: signals on grey."""
     covered = signals(points)
     return lambda xy, element: np.maximum(0.45, covered(xy, element))

@@ -5,7 +5,7 @@ import numpy as np
 from a7sim.scenario.schema import Camera, GridPlate
 from a7sim.scene.camera import fiducial_places
 from a7sim.scene.content import marks_image
-from a7sim.scene.photograph import Marks, Photograph, prick_points
+from a7sim.scene.photograph import NamedPoints, Photograph, prick_points
 
 GRID_PLATE_STREAM = 6
 """Spawn key of a plate's random numbers, under the plate's own seed."""
@@ -22,8 +22,8 @@ def grid_plate(plate: GridPlate, camera: Camera, polarity: str) -> Photograph:
     crosses = plate.crosses
     ruled = np.array(list(crosses.values())).T
     sigma = 1e-3 * plate.accuracy_um
-    points = Marks(tuple(crosses), ruled + sigma * rng.standard_normal(ruled.shape))
-    fiducials = Marks(names, nominal + sigma * rng.standard_normal(nominal.shape))
+    points = NamedPoints(tuple(crosses), ruled + sigma * rng.standard_normal(ruled.shape))
+    fiducials = NamedPoints(names, nominal + sigma * rng.standard_normal(nominal.shape))
     return Photograph(
         plate.name,
         certificate,

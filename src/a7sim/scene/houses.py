@@ -8,7 +8,7 @@ import numpy as np
 from a7sim.geometry import Array, length_of
 from a7sim.scene.coverage import within_band
 from a7sim.scene.lines import GroundLine
-from a7sim.scene.terrain import Ground
+from a7sim.scene.terrain import GroundSurface
 
 HOUSES_STREAM = 8
 """Spawn key of the houses' random numbers, under the terrain's own seed."""
@@ -70,7 +70,7 @@ NO_HOUSES = Houses(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros((2, 0)), np.zero
 """No house."""
 
 
-def houses_along(lines: Iterable[GroundLine], ground: Ground, seed: int) -> Houses:
+def houses_along(lines: Iterable[GroundLine], ground: GroundSurface, seed: int) -> Houses:
     """Return the houses along lines, which stand on dry ground, beside every line and clear of each other.
 
     The same lines on the same terrain have the same houses.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array, dots
-from a7sim.mistakes import Mistake
-from a7sim.scenario.schema import Line
+from a7sim.mistakes import A7SimError
+from a7sim.scenario.schema import LinePlan
 from a7sim.scene.coverage import within_band
 
 TONE, TEXTURE = 0.85, 0.3
@@ -53,12 +53,12 @@ def distance_from(chain: Array, plan: Array, within: float) -> Array:
     return np.asarray(np.sqrt(nearest).reshape(plan.shape[1:]))
 
 
-def make_lines(lines: Sequence[Line]) -> dict[str, GroundLine]:
+def make_lines(lines: Sequence[LinePlan]) -> dict[str, GroundLine]:
     """Return the lines of a scenario by name. Raises Mistake when two have the same name."""
     found: dict[str, GroundLine] = {}
     for line in lines:
         if line.name in found:
-            raise Mistake(f"lines: expected every name once, got {line.name!r} twice")
+            raise A7SimError(f"lines: expected every name once, got {line.name!r} twice")
         found[line.name] = GroundLine(line.name, line.kind, line.width, _smooth(np.array(line.vertices).T))
     return found
 

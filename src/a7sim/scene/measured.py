@@ -8,10 +8,10 @@ import numpy as np
 
 from a7sim.files import read_rows, rows_by_key
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario.schema import FORMAT_MM, Camera, Measured
 from a7sim.scene.camera import fiducial_places
-from a7sim.scene.photograph import Marks
+from a7sim.scene.photograph import NamedPoints
 
 MIN_FIDUCIALS = 3
 
@@ -19,7 +19,7 @@ MAX_FIDUCIAL_MM = 5.0
 """Film and a badly known count do not displace a fiducial by more; a confused one stands further off."""
 
 
-def measured_marks(measured: Measured, name: str, camera: Camera) -> tuple[Marks, Marks]:
+def measured_marks(measured: Measured, name: str, camera: Camera) -> tuple[NamedPoints, NamedPoints]:
     """Return fiducials and points of a photograph from its file, in mm on film.
 
     Coordinates in mm are taken as refined to the calibrated fiducials. Counts are brought to mm by the
@@ -36,17 +36,19 @@ def measured_marks(measured: Measured, name: str, camera: Camera) -> tuple[Marks
         wanted = measured.photo or name
         found = {key[1]: (row.numbers["x"], row.numbers["y"]) for key, row in by_photo.items() if key[0] == wanted}
         if not found:
-            raise Mistake(f"{path}, column photo: expected rows of photograph {wanted!r}, got none")
+            raise A7SimError(f"{path}, column photo: expected rows of photograph {wanted!r}, got none")
     for point in found:
         if not re.fullmatch(r"[ !#-~]{1,64}", point):
-            raise Mistake(f"{path}, column point: expected 1 to 64 ASCII characters without quotes, got {point[:80]!r}")
+            raise A7SimError(
+                f"{path}, column point: expected 1 to 64 ASCII characters without quotes, got {point[:80]!r}"
+            )
     names, calibrated = fiducial_places(camera)
     if measured.units == "counts":
         return _from_counts(path, found, names, calibrated, measured.count_mm)
     for point, place in found.items():
         if max(map(abs, place)) > FORMAT_MM / 2.0:
-            raise Mistake(f"{path}: expected mm within the {FORMAT_MM:.0f} mm format, got {place} for point {point}")
-    return Marks(names, calibrated), Marks(tuple(found), np.array(list(found.values())).T)
+            raise A7SimError(f"{path}: expected mm within the {FORMAT_MM:.0f} mm format, got {place} for point {point}")
+    return NamedPoints(names, calibrated), NamedPoints(tuple(found), np.array(list(found.values())).T)
 
 
 def _from_counts(
@@ -55,10 +57,10 @@ def _from_counts(
     names: tuple[str, ...],
     calibrated: Array,
     count_mm: float | None,
-) -> tuple[Marks, Marks]:
+) -> tuple[NamedPoints, NamedPoints]:
     seen = [name for name in names if name in found]
     if len(seen) < MIN_FIDUCIALS:
-        raise Mistake(
+        raise A7SimError(
             f"{path}, column point: expected {MIN_FIDUCIALS} or more of the fiducials {', '.join(names)} "
             f"among the counts, got {len(seen)}"
         )
@@ -68,13 +70,13 @@ def _from_counts(
     off = np.abs(to_film(counts) - places).max(axis=0)
     if not (off < MAX_FIDUCIAL_MM).all():
         worst = seen[int(np.nanargmax(np.nan_to_num(off, nan=np.inf)))]
-        raise Mistake(
+        raise A7SimError(
             f"{path}, column point: expected counts of the fiducials that lie as in the camera, "
             f"got {worst} more than {MAX_FIDUCIAL_MM:.0f} mm from its place"
         )
     others = [name for name in found if name not in names]
     all_points = np.array([found[name] for name in others]).reshape(-1, 2).T
-    return Marks(tuple(seen), to_film(counts)), Marks(tuple(others), to_film(all_points))
+    return NamedPoints(tuple(seen), to_film(counts)), NamedPoints(tuple(others), to_film(all_points))
 
 
 def _laid_over(counts: Array, places: Array, count_mm: float | None) -> Callable[[Array], Array]:

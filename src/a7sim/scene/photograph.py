@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array
-from a7sim.scenario.schema import Camera, Film
+from a7sim.scenario.schema import Camera, FilmDeformation
 
 SKETCH_SIGMA_MM = 0.3
 """Points are pricked on the paper print to about half a millimetre (protocol.md)."""
@@ -21,7 +21,7 @@ Content = Callable[[Array, float], Array]
 
 
 @dataclass(frozen=True)
-class Marks:
+class NamedPoints:
     """Named places on film: names in order and coordinates ``(2, n)`` in mm."""
 
     names: tuple[str, ...]
@@ -42,17 +42,17 @@ class Photograph:
 
     name: str
     camera: Camera
-    fiducials: Marks
-    points: Marks
-    sketch: Marks
+    fiducials: NamedPoints
+    points: NamedPoints
+    sketch: NamedPoints
     polarity: str = "positive"
     placement: str = "right way up"
     content: Content | None = field(default=None, compare=False)
 
 
-def prick_points(points: Marks, rng: np.random.Generator) -> Marks:
+def prick_points(points: NamedPoints, rng: np.random.Generator) -> NamedPoints:
     """Return the points as somebody pricked them on the paper print."""
-    return Marks(points.names, points.xy + rng.normal(0.0, SKETCH_SIGMA_MM, points.xy.shape))
+    return NamedPoints(points.names, points.xy + rng.normal(0.0, SKETCH_SIGMA_MM, points.xy.shape))
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Deformation:
     identification_mm: float
 
     @classmethod
-    def sample(cls, film: Film, rng: np.random.Generator) -> "Deformation":
+    def sample(cls, film: FilmDeformation, rng: np.random.Generator) -> "Deformation":
         """Return the deformation of one photograph on this film."""
         shrink = np.asarray(film.shrinkage_ppm) + film.shrinkage_sigma_ppm * rng.standard_normal(2)
         shear = film.shear_sigma_ppm * rng.standard_normal()
@@ -86,9 +86,9 @@ def within_format(xy: Array, half_width_mm: float = 107.0) -> npt.NDArray[np.boo
     return np.asarray((np.abs(xy) <= half_width_mm).all(axis=0))
 
 
-def select(marks: Marks, keep: Sequence[bool] | npt.NDArray[np.bool_]) -> Marks:
+def select(marks: NamedPoints, keep: Sequence[bool] | npt.NDArray[np.bool_]) -> NamedPoints:
     """Return the marks for which `keep` is true."""
     kept = np.asarray(keep, dtype=bool)
     if kept.all():
         return marks
-    return Marks(tuple(compress(marks.names, kept.tolist())), marks.xy[:, kept])
+    return NamedPoints(tuple(compress(marks.names, kept.tolist())), marks.xy[:, kept])

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from a7sim.geometry import Array
 from a7sim.scenario.schema import Terrain
 
-Truths = npt.NDArray[np.bool_]
+BoolArray = npt.NDArray[np.bool_]
 
 _WAVES = 7
 
@@ -17,7 +17,7 @@ _MAX_ROUNDS, _SETTLED_M = 8, 0.01
 
 
 @dataclass(frozen=True)
-class Ground:
+class GroundSurface:
     """Rolling ground: a sum of plane waves that stays within mean_height -+ relief."""
 
     mean_height: float
@@ -28,7 +28,7 @@ class Ground:
     """Of every sheet of water, places ``(2, n)`` in m once round."""
 
     @classmethod
-    def of(cls, terrain: Terrain) -> "Ground":
+    def of(cls, terrain: Terrain) -> "GroundSurface":
         """Return the ground that a scenario describes; the same terrain is the same ground."""
         rng = np.random.default_rng(terrain.seed)
         azimuths = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
@@ -67,7 +67,7 @@ class Ground:
                 break
         return np.asarray(centre + (level - centre[2]) / rays[2] * rays)
 
-    def under_water(self, plan: Array) -> Truths:
+    def under_water(self, plan: Array) -> BoolArray:
         """Return which places ``(2, ...)`` in m lie within a shore."""
         wet = np.zeros(plan.shape[1:], dtype=bool)
         for shore in self.shores:
@@ -75,7 +75,7 @@ class Ground:
         return wet
 
 
-def _within(border: Array, plan: Array) -> Truths:
+def _within(border: Array, plan: Array) -> BoolArray:
     """Return which places ``(2, ...)`` a closed border ``(2, n)`` runs round: a line to the east crosses it oddly."""
     east, north = plan
     odd = np.zeros(plan.shape[1:], dtype=bool)

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from a7sim.geometry import GON, Array, image_of, length_of, mxm, mxv, rotation, transposed
-from a7sim.mistakes import Mistake
-from a7sim.scenario.schema import Measured, Model, Photo, Published, Scenario
+from a7sim.mistakes import A7SimError
+from a7sim.scenario.schema import Measured, ModelPlan, Photo, Published, Scenario
 from a7sim.scene.camera import distorted, fiducial_places, lowered_by_curvature, refracted
-from a7sim.scene.content import Depicted, PictureOfGround, marks_image, point_sampled
+from a7sim.scene.content import GroundAppearance, GroundImage, marks_image, point_sampled
 from a7sim.scene.emulsion import Emulsion
 from a7sim.scene.grid_plate import grid_plate
 from a7sim.scene.lines import GroundLine, make_lines
 from a7sim.scene.measured import measured_marks
-from a7sim.scene.photograph import Content, Deformation, Marks, Photograph, prick_points, select, within_format
-from a7sim.scene.terrain import Ground, Truths
+from a7sim.scene.photograph import Content, Deformation, NamedPoints, Photograph, prick_points, select, within_format
+from a7sim.scene.terrain import BoolArray, GroundSurface
 from a7sim.standard_points import PLACES
 
 FILM_STREAM, SKETCH_STREAM = 1, 2
@@ -27,7 +27,7 @@ were worked with them are said again with them."""
 
 
 @dataclass(frozen=True)
-class Station:
+class ExposureStation:
     """Where a photograph was taken from: centre ``(3,)`` in m, rotation ``(3, 3)`` of camera vectors to the ground."""
 
     centre: Array
@@ -48,7 +48,7 @@ class Scene:
     """Everything that is true of a scenario and that no operator is told."""
 
     photographs: dict[str, Photograph]
-    stations: dict[str, Station]
+    stations: dict[str, ExposureStation]
     ground_points: dict[str, Array]
     standard_points: dict[str, dict[str, str]]
     """Model name to position to point name; where a position lies in water there is none."""
@@ -56,7 +56,7 @@ class Scene:
     """Names of the signalised and the measured points that a job sheet lists beside the standard points."""
     published: dict[str, RelativeTruth]
     grid_plate: Photograph
-    ground: Ground
+    ground: GroundSurface
     lines: dict[str, GroundLine]
     """Roads and tracks by name."""
 
@@ -65,7 +65,7 @@ class Scene:
         """All that can be put on a carrier: the photographs and the grid plate."""
         return self.photographs | {self.grid_plate.name: self.grid_plate}
 
-    def relative_truth(self, model: Model) -> RelativeTruth | None:
+    def relative_truth(self, model: ModelPlan) -> RelativeTruth | None:
         """Return the true (flown) or published relative orientation of a model, if any is known."""
         if model.left in self.stations and model.right in self.stations:
             left, right = self.stations[model.left], self.stations[model.right]
@@ -80,7 +80,7 @@ class Scene:
 
 def build_scene(scenario: Scenario, seed: int, pictures: int = PICTURES) -> Scene:
     """Return the scene of a scenario; the seed draws the film and the pricking. Raises Mistake for bad files."""
-    return Flight.of(scenario, pictures).scene(seed)
+    return SharedScene.of(scenario, pictures).scene(seed)
 
 
 @dataclass(frozen=True)
@@ -89,23 +89,23 @@ class _Exposure:
 
     photo: Photo
     index: int
-    fiducials: Marks
-    points: Marks
+    fiducials: NamedPoints
+    points: NamedPoints
     """Where perfect film would show them; of measured photographs what was measured."""
-    visible: Truths
-    picture: Callable[[Array, Marks, Emulsion | None], Content] | None
+    visible: BoolArray
+    picture: Callable[[Array, NamedPoints, Emulsion | None], Content] | None
     """Of the ground, from the film's affine deformation, the points on it and its emulsion; none where measured."""
 
 
 @dataclass(frozen=True)
-class Flight:
+class SharedScene:
     """What of a scenario's scenes no seed draws, and all of them share."""
 
     scenario: Scenario
     pictures: int
-    ground: Ground
+    ground: GroundSurface
     lines: dict[str, GroundLine]
-    stations: dict[str, Station]
+    stations: dict[str, ExposureStation]
     points: dict[str, Array]
     standard_points: dict[str, dict[str, str]]
     other_points: tuple[str, ...]
@@ -114,12 +114,12 @@ class Flight:
     exposures: tuple[_Exposure, ...]
 
     @classmethod
-    def of(cls, scenario: Scenario, pictures: int = PICTURES) -> "Flight":
+    def of(cls, scenario: Scenario, pictures: int = PICTURES) -> "SharedScene":
         """Return what the scenes of a scenario share. Raises Mistake for bad files."""
-        ground, lines = Ground.of(scenario.terrain), make_lines(scenario.lines)
-        depicted = Depicted(ground, tuple(lines.values()), None if pictures < 2 else scenario.terrain.seed)
+        ground, lines = GroundSurface.of(scenario.terrain), make_lines(scenario.lines)
+        depicted = GroundAppearance(ground, tuple(lines.values()), None if pictures < 2 else scenario.terrain.seed)
         stations = {
-            photo.name: Station(
+            photo.name: ExposureStation(
                 np.array(photo.position),
                 rotation(photo.omega * GON, photo.phi * GON, photo.kappa * GON),
             )
@@ -184,8 +184,8 @@ class Flight:
             stream = (FILM_STREAM, exposure.index)
             filming = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=stream))
             deformation = Deformation.sample(self.scenario.film, filming)
-            fiducials = Marks(exposure.fiducials.names, deformation.of_fiducials(exposure.fiducials.xy, filming))
-            imaged = Marks(exposure.points.names, deformation.of_points(exposure.points.xy, filming))
+            fiducials = NamedPoints(exposure.fiducials.names, deformation.of_fiducials(exposure.fiducials.xy, filming))
+            imaged = NamedPoints(exposure.points.names, deformation.of_points(exposure.points.xy, filming))
             points = select(imaged, within_format(imaged.xy) & exposure.visible)
             emulsion = None if self.pictures < 2 else Emulsion(seed, stream)
             content = exposure.picture(deformation.matrix, points, emulsion)
@@ -211,10 +211,10 @@ def _see_that_positions_are_measured(scenario: Scenario, exposures: Sequence[_Ex
         if side in measured and measured[side].get(name) is None
     ]
     if mistakes:
-        raise Mistake("\n".join(mistakes))
+        raise A7SimError("\n".join(mistakes))
 
 
-def _height_of(ground: Ground, east: float, north: float) -> float:
+def _height_of(ground: GroundSurface, east: float, north: float) -> float:
     return float(ground.height(np.asarray(east), np.asarray(north)))
 
 
@@ -228,9 +228,9 @@ def _as_truth(published: Published) -> RelativeTruth:
 
 def _lay_out_standard_points(
     scenario: Scenario,
-    model: Model,
-    stations: dict[str, Station],
-    ground: Ground,
+    model: ModelPlan,
+    stations: dict[str, ExposureStation],
+    ground: GroundSurface,
     signalised: dict[str, Array],
 ) -> dict[str, str]:
     left, right = stations[model.left].centre, stations[model.right].centre
@@ -248,7 +248,7 @@ def _lay_out_standard_points(
     return names
 
 
-def _standard_name(model: Model, label: str) -> str:
+def _standard_name(model: ModelPlan, label: str) -> str:
     """Return a point's name: a pass point is numbered by the photograph in whose nadir line it lies."""
     if label in "135":
         return f"{model.left}{label}"
@@ -263,20 +263,23 @@ def _measured(scenario: Scenario, photo: Photo, index: int, measured: Measured) 
 
 
 def _exposed(
-    scenario: Scenario, photo: Photo, index: int, station: Station, depicted: Depicted, points: dict[str, Array]
+    scenario: Scenario,
+    photo: Photo,
+    index: int,
+    station: ExposureStation,
+    depicted: GroundAppearance,
+    points: dict[str, Array],
 ) -> _Exposure:
     camera, ground = scenario.camera, depicted.ground
     places = np.array(list(points.values())).T
     visible = (places[2] < station.centre[2]) & ~ground.under_water(places[:2])
     imaging = _imaging(scenario, station, ground)
 
-    def picture(deformation: Array, on_film: Marks, emulsion: Emulsion | None) -> Content:
-        return PictureOfGround(
-            depicted, station.centre, station.rotation, camera, deformation, on_film, imaging, emulsion
-        )
+    def picture(deformation: Array, on_film: NamedPoints, emulsion: Emulsion | None) -> Content:
+        return GroundImage(depicted, station.centre, station.rotation, camera, deformation, on_film, imaging, emulsion)
 
-    imaged = Marks(tuple(points), _imaged(scenario, station, imaging, places))
-    return _Exposure(photo, index, Marks(*fiducial_places(camera)), imaged, visible, picture)
+    imaged = NamedPoints(tuple(points), _imaged(scenario, station, imaging, places))
+    return _Exposure(photo, index, NamedPoints(*fiducial_places(camera)), imaged, visible, picture)
 
 
 def _sharp_before_2(photograph: Photograph, pictures: int) -> Photograph:
@@ -285,14 +288,14 @@ def _sharp_before_2(photograph: Photograph, pictures: int) -> Photograph:
     return replace(photograph, content=point_sampled(photograph.content))
 
 
-def _imaged(scenario: Scenario, station: Station, imaging: Callable[[Array], Array], points: Array) -> Array:
+def _imaged(scenario: Scenario, station: ExposureStation, imaging: Callable[[Array], Array], points: Array) -> Array:
     if scenario.air.earth_curvature:
         points = lowered_by_curvature(points, station.centre)
     image = image_of(points, station.centre[:, None], station.rotation, scenario.camera.c)
     return imaging(image)
 
 
-def _imaging(scenario: Scenario, station: Station, ground: Ground) -> Callable[[Array], Array]:
+def _imaging(scenario: Scenario, station: ExposureStation, ground: GroundSurface) -> Callable[[Array], Array]:
     """Return what air and lens make of perspective images ``(2, ...)``, in mm from the fiducial centre."""
 
     def imaged(image: Array) -> Array:

@@ -7,9 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from a7sim.session.running import Cable, Session, Watcher, direct, open_session, run
+    from a7sim.session.running import PortAdapter, ProgressCallbacks, Session, direct, open_session, run
 
-__all__ = ["Cable", "Session", "Watcher", "direct", "open_session", "run"]
+__all__ = ["PortAdapter", "ProgressCallbacks", "Session", "direct", "open_session", "run"]
 
 
 def __getattr__(name: str) -> Any:

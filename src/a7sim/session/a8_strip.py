@@ -26,7 +26,7 @@ from a7sim.session.analytical import (
     pointing_errors,
     round_to_count,
 )
-from a7sim.session.clearing import Cleared, clear_parallaxes
+from a7sim.session.clearing import ClearedPair, clear_parallaxes
 from a7sim.session.projectors import Projector
 from a7sim.standard_points import CASES
 
@@ -47,14 +47,16 @@ C_STEP_MM = 0.01
 
 
 @dataclass(frozen=True)
-class Laid:
+class CentredPhoto:
     """A photograph on its carrier: image points ``(2, n)`` about the principal point, and the c set for its film."""
 
     image: Array
     c: float
 
 
-def centre_photo(photograph: Photograph, names: tuple[str, ...], observer: Observer, rng: np.random.Generator) -> Laid:
+def centre_photo(
+    photograph: Photograph, names: tuple[str, ...], observer: Observer, rng: np.random.Generator
+) -> CentredPhoto:
     """Centre a photograph by its fiducials and set the principal distance for the size its film has."""
     camera = photograph.camera
     marks = calibrated_fiducials(photograph)
@@ -62,7 +64,7 @@ def centre_photo(photograph: Photograph, names: tuple[str, ...], observer: Obser
     lie = picture_placement(seen - marks, marks)
     shift = np.array([lie.dx, lie.dy]) + np.array(camera.principal_point)
     centred = plane_rotation(-lie.turn) @ mark_coordinates(photograph.points, names) - shift[:, None]
-    return Laid(centred, float(round_to_count(np.array(camera.c * (1.0 + lie.scale)), C_STEP_MM)))
+    return CentredPhoto(centred, float(round_to_count(np.array(camera.c * (1.0 + lie.scale)), C_STEP_MM)))
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,9 @@ class A8Setup:
     readings_of_parallax: int
     rng: np.random.Generator
 
-    def set_up(self, model: ModelPlan, scene: Scene, wanted: frozenset[str], standard: frozenset[str]) -> "Shown":
+    def set_up(
+        self, model: ModelPlan, scene: Scene, wanted: frozenset[str], standard: frozenset[str]
+    ) -> "ProjectedPair":
         """Lay the photographs of a model on their carriers; draw how they are shown, and all that is seen wrongly."""
         photographs = scene.photographs[model.left], scene.photographs[model.right]
         names = common_points(photographs[0].points, photographs[1].points, wanted)
@@ -92,9 +96,9 @@ class A8Setup:
         sigma = 1e-3 * self.observer.parallax_um / np.sqrt(self.readings_of_parallax)
         errors = sigma * self.rng.standard_normal(len(oriented_on))
         pointing = pointing_errors((3, len(names)), self.observer.repeat_share, POINTINGS, self.rng)
-        return Shown(model, names, left, right, (c[0], c[1]), oriented_on, errors, pointing)
+        return ProjectedPair(model, names, left, right, (c[0], c[1]), oriented_on, errors, pointing)
 
-    def cleared(self, models: Sequence["Shown"]) -> list[Cleared]:
+    def cleared(self, models: Sequence["ProjectedPair"]) -> list[ClearedPair]:
         """Clear the parallaxes of models, all at once where they have as many points to do it on."""
         if len({len(each.oriented_on) for each in models}) == 1:
             left, right = (np.stack([each.at_standard_points[side] for each in models], axis=-1) for side in range(2))
@@ -113,14 +117,14 @@ class A8Setup:
                 alone.append(clear_parallaxes(*each.at_standard_points, each.c, self.bx, each.errors))
         return alone
 
-    def measured(self, shown: "Shown", stand: Cleared) -> Model:
+    def measured(self, shown: "ProjectedPair", stand: ClearedPair) -> Model:
         """Return a model with all its points, mm at its scale."""
         readings = self._read(stand.model_points(shown.left, shown.right)[0], stand, shown.pointing)
         centres = np.array(a8_centres(self.bx, COLUMN_MM, REFERENCE_MM)).T
         points, ends = (a8_model_coordinates(each, self.bx, COLUMN_MM, REFERENCE_MM) for each in (readings, centres))
         return add_centres(shown.model, shown.names, points, ends)
 
-    def _read(self, points: Array, stand: Cleared, pointing: Array) -> Array:
+    def _read(self, points: Array, stand: ClearedPair, pointing: Array) -> Array:
         """Return the scales' readings ``(3, n)`` for points ``(3, n)`` from the left centre, as pointed at."""
         observer = self.observer
         enlargement = -points[2] / stand.c[0]
@@ -132,7 +136,7 @@ class A8Setup:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ProjectedPair:
     """A model's photographs as the projectors show them, and how wrongly they are going to be seen."""
 
     model: ModelPlan

@@ -21,9 +21,9 @@ from a7sim.reduction.schut import orientation_by_schut
 from a7sim.reduction.strips import CENTRE, is_centre
 from a7sim.scenario import ModelPlan, Scenario
 from a7sim.scenario.schema import Comparator, Observer
-from a7sim.scene import Marks, Photograph, Scene
+from a7sim.scene import NamedPoints, Photograph, Scene
 from a7sim.session.clearing import clear_parallaxes
-from a7sim.session.strips import GroundedStrip, ground_control, orient_strip
+from a7sim.session.strips import OrientedStrip, ground_control, orient_strip
 from a7sim.standard_points import CASES
 
 COMPARATOR_STREAM = 5
@@ -40,11 +40,11 @@ class StripResult:
     """A strip as it was measured: its independent models, and what they came to on the ground."""
 
     models: tuple[Model, ...]
-    strip: GroundedStrip
+    strip: OrientedStrip
 
 
 @dataclass(frozen=True)
-class Pair:
+class ImagePair:
     """The images ``(2, n)`` of points that a model's photographs have in common, mm in the system of the fiducials."""
 
     model: ModelPlan
@@ -52,7 +52,7 @@ class Pair:
     left: Array
     right: Array
 
-    def corrected(self, left: Callable[[Array], Array], right: Callable[[Array], Array]) -> "Pair":
+    def corrected(self, left: Callable[[Array], Array], right: Callable[[Array], Array]) -> "ImagePair":
         """Return the pair with corrected images."""
         return replace(self, left=left(self.left), right=right(self.right))
 
@@ -89,7 +89,7 @@ def measured_points(scenario: Scenario, scene: Scene, case: str) -> frozenset[st
     }
 
 
-def _in_pairs(scenario: Scenario, scene: Scene, wanted: frozenset[str], seed: int) -> list[Pair]:
+def _in_pairs(scenario: Scenario, scene: Scene, wanted: frozenset[str], seed: int) -> list[ImagePair]:
     """Return the pairs of a scenario as measured."""
     comparator, observer = scenario.comparator, scenario.observer
     if comparator.kind == "stereo":
@@ -102,7 +102,7 @@ def _in_pairs(scenario: Scenario, scene: Scene, wanted: frozenset[str], seed: in
         for index, (name, photograph) in enumerate(scene.photographs.items())
     }
     return [
-        Pair(
+        ImagePair(
             model, names, mark_coordinates(measured[model.left], names), mark_coordinates(measured[model.right], names)
         )
         for model in scenario.models
@@ -112,13 +112,13 @@ def _in_pairs(scenario: Scenario, scene: Scene, wanted: frozenset[str], seed: in
 
 def _measured_alone(
     photograph: Photograph, observer: Observer, comparator: Comparator, rng: np.random.Generator
-) -> Marks:
+) -> NamedPoints:
     """Return all points of a photograph from a monocomparator."""
     stage = _Stage.laid(photograph, observer, comparator, rng)
     seen = simulate_pointings(
         stage.at(photograph.points.xy), 1e-3 * observer.monocular_um, observer.repeat_share, comparator.pointings, rng
     )
-    return Marks(photograph.points.names, stage.read(seen))
+    return NamedPoints(photograph.points.names, stage.read(seen))
 
 
 def _measured_in_stereo(
@@ -128,7 +128,7 @@ def _measured_in_stereo(
     observer: Observer,
     comparator: Comparator,
     rng: np.random.Generator,
-) -> Pair:
+) -> ImagePair:
     """Return the points of a pair from a stereocomparator: x', y' of the left image, and px, py to the right one."""
     photographs = scene.photographs[model.left], scene.photographs[model.right]
     names = common_points(photographs[0].points, photographs[1].points, wanted)
@@ -142,7 +142,7 @@ def _measured_in_stereo(
     py = simulate_pointings((right - left)[1:], 1e-3 * observer.parallax_um, 1.0, pointings, rng)
     step = 1e-3 * comparator.least_count_um
     parallaxes = round_to_count(np.concatenate([px, py]), step)
-    return Pair(model, names, stages[0].read(seen), stages[1].read(round_to_count(seen, step) + parallaxes))
+    return ImagePair(model, names, stages[0].read(seen), stages[1].read(round_to_count(seen, step) + parallaxes))
 
 
 @dataclass(frozen=True)
@@ -204,12 +204,12 @@ def round_to_count(values: Array, least_count: float) -> Array:
     return np.asarray(np.round(values / least_count) * least_count) if least_count else values
 
 
-def common_points(left: Marks, right: Marks, wanted: frozenset[str]) -> tuple[str, ...]:
+def common_points(left: NamedPoints, right: NamedPoints, wanted: frozenset[str]) -> tuple[str, ...]:
     """Return the names, in order, of the wanted points that both photographs have."""
     return tuple(sorted(wanted.intersection(left.names) & wanted.intersection(right.names)))
 
 
-def mark_coordinates(marks: Marks, names: Sequence[str]) -> Array:
+def mark_coordinates(marks: NamedPoints, names: Sequence[str]) -> Array:
     """Return the places ``(2, len(names))`` of named marks."""
     place = {name: i for i, name in enumerate(marks.names)}
     return marks.xy[:, [place[name] for name in names]]
@@ -238,7 +238,7 @@ def _of_air(image: Array, scenario: Scenario, flying_height: float, ground_heigh
     )
 
 
-def _strip_of(pairs: Sequence[Pair], scenario: Scenario, scene: Scene) -> StripResult:
+def _strip_of(pairs: Sequence[ImagePair], scenario: Scenario, scene: Scene) -> StripResult:
     c, way = scenario.camera.c, scenario.comparator.orientation
     return orient_measured_strip(tuple(_computed(pair, c, way) for pair in pairs), scenario, scene)
 
@@ -249,7 +249,7 @@ def orient_measured_strip(models: tuple[Model, ...], scenario: Scenario, scene: 
     return StripResult(models, orient_strip(models, ground_control(scenario, scene), plan.join, plan.polynomial))
 
 
-def _computed(pair: Pair, c: float, way: str) -> Model:
+def _computed(pair: ImagePair, c: float, way: str) -> Model:
     """Return a model computed from its images, at the scale of the photographs, in the left photograph's frame."""
     with errors_for_model(pair.model.name):
         turn, base = _oriented(pair.left, pair.right, c, way)

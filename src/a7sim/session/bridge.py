@@ -10,8 +10,8 @@ from rich.text import Text
 
 import a7sim
 from a7sim.documents import Document, absolute_document, adjustment_document, as_json, document_header
-from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit
+from a7sim.mistakes import A7SimError
+from a7sim.operator import OperatorGaveUp
 from a7sim.operator.bridging import BridgedModels, bridge_strip, bridge_strip_batch
 from a7sim.reduction import Ground, Model, Strip, Undetermined, absolute_orientation, strip_adjustment
 from a7sim.scenario import Scenario, amend_provenance
@@ -19,11 +19,11 @@ from a7sim.scene import Scene
 from a7sim.session.analytical import StripResult
 from a7sim.session.crowd import open_batch
 from a7sim.session.folder import MODELS, RESULTS, write_atomic
-from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.results import hours_document, models_csv, request_document
-from a7sim.session.running import Watcher, open_session, run
+from a7sim.session.running import ProgressCallbacks, open_session, run
 from a7sim.session.sitting import recorded_session
-from a7sim.session.strips import GroundedStrip, ground_control
+from a7sim.session.strips import OrientedStrip, ground_control
 from a7sim.sheets import text_table
 
 INDEPENDENT = "independent"
@@ -36,9 +36,9 @@ def run_bridge(
     scenario: Scenario,
     seed: int,
     out: Path | None = None,
-    watcher: Watcher | None = None,
+    watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    keeping: Keeping | None = None,
+    keeping: JournalOptions | None = None,
 ) -> Document:
     """Bridge a strip, work the same models independently, and return both on the ground; with `out`, leave the files.
 
@@ -47,10 +47,10 @@ def run_bridge(
     'interrupted' until the independent models are worked, too. Raises Mistake for a plotter that cannot bridge, and for
     a folder that cannot be used, before anything is written.
     """
-    watcher = watcher or Watcher()
-    keeping = keeping or Keeping()
+    watcher = watcher or ProgressCallbacks()
+    keeping = keeping or JournalOptions()
     if len(scenario.models) < 2 or "outside" not in {model.base for model in scenario.models}:
-        raise Mistake("models: expected a strip with base inside and outside in turn, as bridging needs")
+        raise A7SimError("models: expected a strip with base inside and outside in turn, as bridging needs")
     journal = Journal(keeping)
     session = open_session(scenario, seed, journal.on_link_event)
     job = session.job
@@ -99,7 +99,7 @@ def _leave(document: Document, out: Path | None) -> None:
 
 
 @dataclass(frozen=True)
-class Bridging:
+class BridgeResult:
     """What came of bridging a strip: the strip, or why there is none, and where the hours went."""
 
     result: StripResult | None
@@ -107,7 +107,7 @@ class Bridging:
     operator: Document
 
 
-def bridge_over_link(scenario: Scenario, seed: int) -> Bridging:
+def bridge_over_link(scenario: Scenario, seed: int) -> BridgeResult:
     """Bridge the strip of a scenario over the link."""
     session = open_session(scenario, seed)
     models: list[Model] = []
@@ -115,13 +115,13 @@ def bridge_over_link(scenario: Scenario, seed: int) -> Bridging:
     try:
         for each in bridge_strip(session.person, session.job):
             models.append(_as_model(each.model.name, each.coordinates_of(0)))
-    except (DoesNotFit, Undetermined) as trouble:
+    except (OperatorGaveUp, Undetermined) as trouble:
         message = str(trouble)
     operator = hours_document(session.person.clock.now, session.person.timesheet)
     return _bridging(models, message, operator, scenario, session.scene)
 
 
-def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[Bridging]:
+def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[BridgeResult]:
     """Bridge the strip once a seed, all sessions at once, each to the digit what `bridged_alone` gives."""
     crowd = open_batch(scenario, seeds)
     models: list[list[Model]] = [[] for _ in seeds]
@@ -141,17 +141,21 @@ def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[Bridging]:
     ]
 
 
-def _bridging(models: Sequence[Model], message: str, operator: Document, scenario: Scenario, scene: Scene) -> Bridging:
+def _bridging(
+    models: Sequence[Model], message: str, operator: Document, scenario: Scenario, scene: Scene
+) -> BridgeResult:
     if message:
-        return Bridging(None, message, operator)
+        return BridgeResult(None, message, operator)
     ground, degree = ground_control(scenario, scene), scenario.strip.polynomial
     strip = average_points(models)
     try:
         oriented = absolute_orientation(strip, ground)
         adjusted = strip_adjustment(oriented.model, ground, degree) if degree else None
     except Undetermined as undetermined:
-        return Bridging(None, f"the bridged strip: {undetermined}", operator)
-    return Bridging(StripResult(tuple(models), GroundedStrip(Strip((strip,), ()), oriented, adjusted)), "", operator)
+        return BridgeResult(None, f"the bridged strip: {undetermined}", operator)
+    return BridgeResult(
+        StripResult(tuple(models), OrientedStrip(Strip((strip,), ()), oriented, adjusted)), "", operator
+    )
 
 
 def _as_model(name: str, places: Places) -> Model:
@@ -180,7 +184,7 @@ def _on_ground(strip: Model, ground: Ground, scenario: Scenario) -> Document:
             document["polynomial"] = adjustment_document(
                 strip_adjustment(oriented.model, ground, scenario.strip.polynomial)
             )
-    except (Mistake, Undetermined) as reason:
+    except (A7SimError, Undetermined) as reason:
         return {"message": str(reason)}
     return document
 

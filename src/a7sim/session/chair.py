@@ -4,32 +4,34 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.link.client import Client
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import TIMEOUT_S
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.lines import Event
-from a7sim.session.resuming import Begun, restore_instrument
+from a7sim.session.resuming import ResumableSession, restore_instrument
 from a7sim.session.shelf import COMMAND, new_folder
 
 
-class Chair:
+class InteractiveSession:
     """A chair at the instrument of a scenario, which is built when somebody first speaks to it.
 
     The journal is begun in a new folder of the name `folder`; or it goes on, where `begun` is a session that was left.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, folder: Path, clock: Clock, begun: Begun | None = None) -> None:
+    def __init__(
+        self, scenario: Scenario, seed: int, folder: Path, clock: Clock, begun: ResumableSession | None = None
+    ) -> None:
         self.clock = clock
         self.begun = begun
         self.folder = begun.journalled.path.parent if begun else folder
         self._scenario, self._seed = scenario, seed
-        self._journal = Journal(Keeping(resumes=begun is not None))
-        self._desk: Desk | None = None
+        self._journal = Journal(JournalOptions(resumes=begun is not None))
+        self._desk: SharedInstrument | None = None
         self._held = False
 
     def open(self) -> Client:
@@ -41,9 +43,9 @@ class Chair:
             client.ask("SYST:LOCK:REQ?")
         return client
 
-    def _anew(self) -> Desk:
+    def _anew(self) -> SharedInstrument:
         scenario, seed = self._scenario, self._seed
-        desk = Desk(
+        desk = SharedInstrument(
             build_autograph(scenario.instrument, build_scene(scenario, seed).mountable, seed),
             self._journal.on_link_event,
         )
@@ -51,7 +53,7 @@ class Chair:
         self._journal.recording(self.folder, make_header(COMMAND, scenario, seed), desk)
         return desk
 
-    def _again(self, begun: Begun) -> Desk:
+    def _again(self, begun: ResumableSession) -> SharedInstrument:
         desk, now, held_by = restore_instrument(begun, self._journal, from_checkpoint=True)
         self.clock.advance_to(now)
         self._held = held_by is not None

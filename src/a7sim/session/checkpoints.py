@@ -54,7 +54,7 @@ def read_checkpoints(path: Path) -> Iterator[Checkpoint]:
 
 
 @dataclass(frozen=True)
-class Differing:
+class StateDifference:
     """A part of a state that is not as it was: where it stands in it, what it was, and what it is."""
 
     part: str
@@ -62,10 +62,10 @@ class Differing:
     after: Any
 
 
-def differences(was: Any, is_now: Any, part: str = "") -> Iterator[Differing]:
+def differences(was: Any, is_now: Any, part: str = "") -> Iterator[StateDifference]:
     """Yield the parts in which two states differ."""
     if isinstance(was, dict) and isinstance(is_now, dict):
         for key in [*was, *(key for key in is_now if key not in was)]:
             yield from differences(was.get(key), is_now.get(key), f"{part}.{key}" if part else key)
     elif was != is_now:
-        yield Differing(part, was, is_now)
+        yield StateDifference(part, was, is_now)

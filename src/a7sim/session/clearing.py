@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array, mxm, mxv, ray_of, rotation, stereoscopic_intersection, transposed
-from a7sim.reduction import Stand, Undetermined, element_corrections
+from a7sim.reduction import ProjectorPose, Undetermined, element_corrections
 
 UNKNOWNS = ("kappa1", "kappa2", "phi1", "phi2", "omega2")
 """Of the paper P, which has omega" in place of omega'."""
@@ -16,7 +16,7 @@ CONVERGED_MM = 1e-10
 
 
 @dataclass(frozen=True)
-class Cleared:
+class ClearedPair:
     """Two projectors as they stand when the parallaxes are cleared: images about the principal points, base along X."""
 
     c: tuple[float | Array, float | Array]
@@ -42,10 +42,10 @@ class Cleared:
         """Unit vector ``(3,)`` from the left to the right centre in the left photograph's frame."""
         return mxv(transposed(self.rotations[0]), np.array([1.0, 0.0, 0.0]))
 
-    def of(self, model: int) -> "Cleared":
+    def of(self, model: int) -> "ClearedPair":
         """Return one of several models that were cleared at once."""
         c = float(np.ravel(self.c[0])[model]), float(np.ravel(self.c[1])[model])
-        return Cleared(c, (self.angles[0][:, model], self.angles[1][:, model]), self.bx, self.rounds)
+        return ClearedPair(c, (self.angles[0][:, model], self.angles[1][:, model]), self.bx, self.rounds)
 
     def model_points(self, left: Array, right: Array) -> tuple[Array, Array]:
         """Return where x-parallax vanishes ``(3, n, ...)``, from the left centre, and y-parallaxes ``(n, ...)``, mm."""
@@ -60,7 +60,7 @@ class Cleared:
 
 def clear_parallaxes(
     left: Array, right: Array, c: tuple[float | Array, float | Array], bx: float, errors_mm: Array | float = 0.0
-) -> Cleared:
+) -> ClearedPair:
     """Clear the y-parallaxes of image points ``(2, n, ...)`` in mm, in rounds of seeing, computing and setting.
 
     `c` are the principal distances ``(...)`` of both. `errors_mm` ``(n, ...)`` are those with which each one is seen
@@ -74,19 +74,19 @@ def clear_parallaxes(
     swing = -np.arctan2(dy, dx)
     still = np.zeros_like(swing)
     level = np.array([still, still, swing])
-    stand = Cleared(c, (level, level), bx, 0)
+    stand = ClearedPair(c, (level, level), bx, 0)
     clearing = np.ones(swing.shape, dtype=bool)
     for i in range(1, MAX_ROUNDS + 1):
         points, parallaxes = stand.model_points(left, right)
         enlargement = -points[2] / c[0]
         one, two = (
-            Stand(np.array([still + x, still, still]), angles)
+            ProjectorPose(np.array([still + x, still, still]), angles)
             for x, angles in zip((0.0, bx), stand.angles, strict=True)
         )
         step = element_corrections(parallaxes + enlargement * errors_mm, points, one, two, UNKNOWNS).unknowns
         kappa1, kappa2, phi1, phi2, omega2 = np.where(clearing, step, 0.0)
         turns = np.array([still, phi1, kappa1]), np.array([omega2, phi2, kappa2])
-        stand = Cleared(c, (stand.angles[0] + turns[0], stand.angles[1] + turns[1]), bx, i)
+        stand = ClearedPair(c, (stand.angles[0] + turns[0], stand.angles[1] + turns[1]), bx, i)
         clearing = clearing & ~(np.abs(step).max(axis=0) < CONVERGED_MM)
         if not clearing.any():
             return stand

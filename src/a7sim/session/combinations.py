@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from a7sim.documents import Document, as_json
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.operator import ModelJob
 from a7sim.reduction import Ground, Model, Undetermined
 from a7sim.scenario import Scenario, amend_provenance
@@ -16,8 +16,8 @@ from a7sim.scenario.schema import StripPlan
 from a7sim.scene import build_scene
 from a7sim.session import results
 from a7sim.session.folder import RESULTS, STRIPS, write_atomic
-from a7sim.session.journal import Keeping, make_header, write_header_only
-from a7sim.session.running import Watcher, make_job, run
+from a7sim.session.journal import JournalOptions, make_header, write_header_only
+from a7sim.session.running import ProgressCallbacks, make_job, run
 from a7sim.session.strips import ground_control, models_from_documents, orient_strip, oriented_strip_document
 from a7sim.standard_points import CASES
 
@@ -40,18 +40,18 @@ def run_combinations(
     scenario: Scenario,
     seed: int,
     out: Path | None = None,
-    watcher: Watcher | None = None,
+    watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    keeping: Keeping | None = None,
+    keeping: JournalOptions | None = None,
 ) -> Document:
     """Work through a scenario once in every case and return the document of all strips that the models make.
 
     The sessions are those that `run` gives for each case; with `out`, their folders are there. The first session that
     does not fit ends the work. Raises Mistake for a scenario without ground control or of too many models.
     """
-    watcher = watcher or Watcher()
+    watcher = watcher or ProgressCallbacks()
     check_strips_possible(scenario)
-    keeping = keeping or Keeping()
+    keeping = keeping or JournalOptions()
     keeping.prepare(out, force, map(FOLDER_OF_CASE.format, CASES))
     if out is not None and not keeping.resumes:
         write_header_only(out, make_header("run", scenario, seed, strips="all"))
@@ -88,11 +88,11 @@ def check_strips_possible(scenario: Scenario) -> None:
     """Raise Mistake for a scenario of too many models or without ground control."""
     strips = len(CASES) ** len(scenario.models)
     if strips > MAX_STRIPS:
-        raise Mistake(
+        raise A7SimError(
             f"--strips all: expected at most {MAX_STRIPS} strips, got {len(scenario.models)} models: {strips}"
         )
     if not any(point.role != "check" for point in scenario.ground):
-        raise Mistake("--strips all: expected ground control in the scenario, got none")
+        raise A7SimError("--strips all: expected ground control in the scenario, got none")
 
 
 def _strips(scenario: Scenario, seed: int, sessions: Mapping[str, Document]) -> list[Document]:
@@ -118,7 +118,7 @@ def _of_combination(combination: Combination, jobs: Sequence[ModelJob], ground: 
     try:
         return described | oriented_strip_document(orient_strip(combination.models, ground, plan.join, plan.polynomial))
     except Undetermined as undetermined:
-        raise Mistake(f"strip {combination.number}: {undetermined}") from undetermined
+        raise A7SimError(f"strip {combination.number}: {undetermined}") from undetermined
 
 
 def describe(combination: Combination, jobs: Sequence[ModelJob]) -> str:

@@ -13,16 +13,16 @@ import a7sim
 from a7sim.documents import Document, absolute_document, document_header
 from a7sim.geometry import Array, length_of
 from a7sim.manual import BASE_COMPONENTS, VARIANTS
-from a7sim.mistakes import Mistake
-from a7sim.operator.map_lines import CONTOUR, Errand, Traced, Tracing
-from a7sim.operator.plotting import TABLE_GEARS, Order, Sheet, compile_map
+from a7sim.mistakes import A7SimError
+from a7sim.operator.map_lines import CONTOUR, LineTarget, TracedLine, Tracing
+from a7sim.operator.plotting import TABLE_GEARS, CompiledMap, MapRequest, compile_map
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
 from a7sim.session.folder import GEOJSON, SVG
-from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.map_sheet import to_geojson, to_svg
 from a7sim.session.results import request_document
-from a7sim.session.running import Session, Watcher, open_session
+from a7sim.session.running import ProgressCallbacks, Session, open_session
 from a7sim.session.sitting import recorded_session
 from a7sim.session.strips import given_control
 
@@ -39,7 +39,7 @@ USUAL_C_FACTORS = (900.0, 2200.0)
 
 
 @dataclass(frozen=True)
-class Wanted:
+class CompilationRequest:
     """What a user asks to be compiled."""
 
     model: str
@@ -50,7 +50,7 @@ class Wanted:
     tremor_um: float | None = None
 
     @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> "Wanted":
+    def from_settings(cls, settings: Mapping[str, Any]) -> "CompilationRequest":
         """Return what the settings of a journal ask for."""
         return msgspec.convert(dict(settings), cls)
 
@@ -58,18 +58,18 @@ class Wanted:
 def compile_model(
     scenario: Scenario,
     seed: int,
-    wanted: Wanted,
+    wanted: CompilationRequest,
     out: Path | None = None,
-    watcher: Watcher | None = None,
+    watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    keeping: Keeping | None = None,
+    keeping: JournalOptions | None = None,
 ) -> Document:
     """Let the operator compile a model and return the document of results; with `out`, leave map and files there.
 
     `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for what cannot be compiled.
     """
-    watcher = watcher or Watcher()
-    keeping = keeping or Keeping()
+    watcher = watcher or ProgressCallbacks()
+    keeping = keeping or JournalOptions()
     _see_that_it_can_be(scenario, wanted)
     journal = Journal(keeping)
     session = open_session(scenario, seed, journal.on_link_event)
@@ -93,39 +93,41 @@ def compile_model(
     return document
 
 
-def _see_that_it_can_be(scenario: Scenario, wanted: Wanted) -> None:
+def _see_that_it_can_be(scenario: Scenario, wanted: CompilationRequest) -> None:
     if VARIANTS[scenario.instrument.variant].missing_elements(*BASE_COMPONENTS):
-        raise Mistake(
+        raise A7SimError(
             "instrument.variant: expected a plotter with by and bz, whose cameras the stereo view knows, "
             f"got an {scenario.instrument.variant}"
         )
     if scenario.plan.plan_gear not in TABLE_GEARS:
         known = ", ".join(TABLE_GEARS)
-        raise Mistake(f"plan.plan_gear: expected a gear to the plotting table ({known}), got {scenario.plan.plan_gear}")
+        raise A7SimError(
+            f"plan.plan_gear: expected a gear to the plotting table ({known}), got {scenario.plan.plan_gear}"
+        )
     models = {model.name: model for model in scenario.models}
     if wanted.model not in models:
-        raise Mistake(f"--model: expected one of {', '.join(models)}, got {wanted.model}")
+        raise A7SimError(f"--model: expected one of {', '.join(models)}, got {wanted.model}")
     flown = {photo.name for photo in scenario.photos if photo.position is not None}
     model = models[wanted.model]
     if not {model.left, model.right} <= flown:
-        raise Mistake(f"--model {wanted.model}: expected photographs that show the ground, got measured points only")
+        raise A7SimError(f"--model {wanted.model}: expected photographs that show the ground, got measured points only")
     known_lines = [line.name for line in scenario.lines]
     for name in wanted.lines:
         if name not in known_lines:
-            raise Mistake(
+            raise A7SimError(
                 f"--line: expected one of {', '.join(known_lines) or 'none, the scenario has no lines'}, got {name}"
             )
     if not (wanted.contours or wanted.interval or wanted.lines):
-        raise Mistake("compile: expected a --contour, an --interval or a --line to be drawn, got none")
+        raise A7SimError("compile: expected a --contour, an --interval or a --line to be drawn, got none")
 
 
-def _order(wanted: Wanted, scenario: Scenario, scene: Scene) -> Order:
+def _order(wanted: CompilationRequest, scenario: Scenario, scene: Scene) -> MapRequest:
     errands = tuple(_errand(scene, name) for name in dict.fromkeys(wanted.lines))
     tracing = Tracing.of(scenario.observer, wanted.tremor_um)
-    return Order(wanted.contours, wanted.interval, errands, tracing, wanted.map_scale)
+    return MapRequest(wanted.contours, wanted.interval, errands, tracing, wanted.map_scale)
 
 
-def _errand(scene: Scene, name: str) -> Errand:
+def _errand(scene: Scene, name: str) -> LineTarget:
     """Return what an old map tells of a line: its two ends and which way it sets out, to some metres."""
     line = scene.lines[name]
     along = np.concatenate([[0.0], np.cumsum(length_of(np.diff(line.middle, axis=1)))])
@@ -135,10 +137,12 @@ def _errand(scene: Scene, name: str) -> Errand:
         east, north = OLD_MAP_M * np.round(place / OLD_MAP_M)
         return float(east), float(north)
 
-    return Errand(name, line.kind, on_the_map(line.middle[:, 0]), on_the_map(further), on_the_map(line.middle[:, -1]))
+    return LineTarget(
+        name, line.kind, on_the_map(line.middle[:, 0]), on_the_map(further), on_the_map(line.middle[:, -1])
+    )
 
 
-def _sheet(session: Session, wanted: Wanted, order: Order, watcher: Watcher) -> Sheet:
+def _sheet(session: Session, wanted: CompilationRequest, order: MapRequest, watcher: ProgressCallbacks) -> CompiledMap:
     models = tuple(model for model in session.job.models if model.name == wanted.model)
     control = given_control(session.scenario, session.scene)
     return compile_map(
@@ -154,7 +158,7 @@ def _sheet(session: Session, wanted: Wanted, order: Order, watcher: Watcher) -> 
 # --- the document ------------------------------------------------------------------------------------------
 
 
-def _of_sheet(sheet: Sheet, scene: Scene, scenario: Scenario) -> Document:
+def _of_sheet(sheet: CompiledMap, scene: Scene, scenario: Scenario) -> Document:
     lines = [_of_line(each, sheet, scene) for each in sheet.lines]
     errors = np.concatenate([np.zeros(0), *(_height_errors(t, sheet, scene) for t in sheet.lines if t.kind == CONTOUR)])
     at = sheet.model.on_ground(sheet.spots.readings)
@@ -180,7 +184,7 @@ def _of_sheet(sheet: Sheet, scene: Scene, scenario: Scenario) -> Document:
     }
 
 
-def _accuracy(errors: Array, sheet: Sheet) -> Document:
+def _accuracy(errors: Array, sheet: CompiledMap) -> Document:
     """Return rms height error of contours, the interval it is good for, and the flying height by that (C-factor)."""
     rms = float(np.sqrt((errors**2).mean()))
     interval = WITHIN_HALF * rms
@@ -195,7 +199,7 @@ def _accuracy(errors: Array, sheet: Sheet) -> Document:
     }
 
 
-def _of_line(traced: Traced, sheet: Sheet, scene: Scene) -> Document:
+def _of_line(traced: TracedLine, sheet: CompiledMap, scene: Scene) -> Document:
     at = sheet.model.on_ground(traced.readings)
     errors = _height_errors(traced, sheet, scene)
     document: Document = {
@@ -215,7 +219,7 @@ def _of_line(traced: Traced, sheet: Sheet, scene: Scene) -> Document:
     return document
 
 
-def _height_errors(traced: Traced, sheet: Sheet, scene: Scene) -> Array:
+def _height_errors(traced: TracedLine, sheet: CompiledMap, scene: Scene) -> Array:
     """Return by how much a line is too high at its vertices ``(n,)``, m."""
     east, north, height = sheet.model.on_ground(traced.readings)
     drawn = height if traced.height is None else np.full_like(height, traced.height)

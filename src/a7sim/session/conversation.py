@@ -26,7 +26,7 @@ def _line(time: float, who: str, what: str) -> str:
 
 
 @dataclass(frozen=True)
-class Told:
+class TranscriptListener:
     """A listener that tells people what it hears when it is due, and lets another listener hear it first."""
 
     tell: Callable[[str], None]

@@ -8,7 +8,7 @@ import numpy as np
 
 from a7sim.documents import Document
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction import Ground, GroundFit, Model, Strip, Undetermined, formed_strip
 from a7sim.reduction.absolute import fitted_to_ground, root_mean_square
 from a7sim.scenario.schema import StripPlan
@@ -77,7 +77,7 @@ def _of_group(
         strip = formed_strip(stacked, plan.join)
         fit = fitted_to_ground(strip.as_model, ground)[1]
     except Undetermined as undetermined:
-        raise Mistake(f"strips of all cases: {undetermined}") from undetermined
+        raise A7SimError(f"strips of all cases: {undetermined}") from undetermined
     keys = [(i, cases) for i, _ in group for cases in of_strips]
     yield from zip(keys, _documents(strip, fit), strict=True)
 
@@ -122,7 +122,7 @@ def _by_itself(replicate: Replicate, cases: Cases, ground: Ground, plan: StripPl
     try:
         return oriented_strip_document(orient_strip(models, ground, plan.join, plan.polynomial))
     except Undetermined as undetermined:
-        raise Mistake(f"strip of the cases {' and '.join(cases)}: {undetermined}") from undetermined
+        raise A7SimError(f"strip of the cases {' and '.join(cases)}: {undetermined}") from undetermined
 
 
 def _document(replicate: Replicate, cases: Cases, strip: Document) -> Document:

@@ -4,33 +4,33 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from a7sim.documents import Document
-from a7sim.instrument.fleet import Fleet, build_batch
+from a7sim.instrument.fleet import AutographBatch, build_batch
 from a7sim.operator import Job
-from a7sim.operator.bench import Bench
-from a7sim.operator.crew import Crew
-from a7sim.operator.dice import Dice
-from a7sim.operator.work import ModelRecords, measure_models_batch
+from a7sim.operator.bench import Workstation
+from a7sim.operator.crew import OperatorBatch
+from a7sim.operator.dice import OperatorRandom
+from a7sim.operator.work import ModelRecordBatch, measure_models_batch
 from a7sim.scenario import Scenario
-from a7sim.scene import Flight, RelativeTruth, Scene
+from a7sim.scene import RelativeTruth, Scene, SharedScene
 from a7sim.session import results
-from a7sim.session.fleet_hands import FleetHands
+from a7sim.session.fleet_hands import BatchDriver
 from a7sim.session.running import make_job, strip_document
 from a7sim.session.strips import ground_control
-from a7sim.session.truth import Beside
+from a7sim.session.truth import TruthComparison
 
 
 @dataclass(frozen=True)
-class Crowd:
+class SessionBatch:
     """Sessions of a scenario, one a seed, ready to begin."""
 
     scenario: Scenario
     seeds: tuple[int, ...]
     scenes: tuple[Scene, ...]
-    fleet: Fleet
-    bench: Bench
+    fleet: AutographBatch
+    bench: Workstation
     job: Job
 
-    def measure_models(self) -> Iterator[ModelRecords]:
+    def measure_models(self) -> Iterator[ModelRecordBatch]:
         """Yield the models as they are done; what a session gives up for stands in `bench.crew.reasons`."""
         return measure_models_batch(self.bench)
 
@@ -53,7 +53,7 @@ class Crowd:
                 )
         return [self._document(session, models, strips) for session, models in enumerate(found)]
 
-    def _beside(self, records: ModelRecords, truth: RelativeTruth | None) -> Beside:
+    def _beside(self, records: ModelRecordBatch, truth: RelativeTruth | None) -> TruthComparison:
         """Return the truth about a model of those who did it; their instruments stand as they left them."""
         who, model, fleet = records.sessions, records.model, self.fleet
         centres = {
@@ -61,7 +61,7 @@ class Crowd:
             for hand, projector in ((1, model.left_projector), (2, model.right_projector))
         }
         elements = {name: counts[who] for name, counts in records.orientation.elements.items()}
-        return Beside.of(truth, centres, records.orientation.method, elements, model, fleet.variant)
+        return TruthComparison.of(truth, centres, records.orientation.method, elements, model, fleet.variant)
 
     def _document(self, session: int, models: list[Document], strips: bool) -> Document:
         crew, scenario = self.bench.crew, self.scenario
@@ -77,11 +77,11 @@ class Crowd:
         return document
 
 
-def open_batch(scenario: Scenario, seeds: Sequence[int]) -> Crowd:
+def open_batch(scenario: Scenario, seeds: Sequence[int]) -> SessionBatch:
     """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
-    flight = Flight.of(scenario)
+    flight = SharedScene.of(scenario)
     scenes = tuple(flight.scene(seed) for seed in seeds)
     fleet = build_batch(scenario.instrument, [scene.mountable for scene in scenes], seeds)
-    crew = Crew(scenario.observer, [Dice(scenario.observer, seed) for seed in seeds])
+    crew = OperatorBatch(scenario.observer, [OperatorRandom(scenario.observer, seed) for seed in seeds])
     job = make_job(scenario, scenes[0])
-    return Crowd(scenario, tuple(seeds), scenes, fleet, Bench(crew, FleetHands(fleet), job), job)
+    return SessionBatch(scenario, tuple(seeds), scenes, fleet, Workstation(crew, BatchDriver(fleet), job), job)

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Literal, get_args
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 Durability = Literal["always", "records", "none"]
 """When a line is on the disk before anybody goes on: always, where it registers something, or when it pleases the
@@ -21,11 +21,11 @@ SYNCED_WITHIN_S = 0.2
 _on_disk = getattr(os, "fdatasync", os.fsync)
 
 
-class JournalStopped(Mistake):
+class JournalWriteError(A7SimError):
     """A journal that can no longer be written, while its session goes on."""
 
 
-class DurableFile:
+class AppendOnlyFile:
     """A file of lines. What `add` has returned from, the operating system has: no end of this process loses it."""
 
     def __init__(self, path: Path, durability: Durability = "records", size: int = 0) -> None:
@@ -33,7 +33,7 @@ class DurableFile:
         self._path = path
         self._durability = durability
         self._size = size
-        self._trouble: JournalStopped | None = None
+        self._trouble: JournalWriteError | None = None
         self._pending = threading.Event()
         self._closing = threading.Event()
         try:
@@ -42,9 +42,9 @@ class DurableFile:
             os.ftruncate(self._file, size)
             _sync_folder(path.parent)
         except BlockingIOError as error:
-            raise Mistake(f"{path}: expected a session that is over, got one that is being written") from error
+            raise A7SimError(f"{path}: expected a session that is over, got one that is being written") from error
         except OSError as error:
-            raise Mistake(f"{path}: expected a journal that can be written: {error.strerror}") from error
+            raise A7SimError(f"{path}: expected a journal that can be written: {error.strerror}") from error
         self._syncing = threading.Thread(target=self._sync_now_and_then, name="journal", daemon=True)
         if durability == "records":
             self._syncing.start()
@@ -93,7 +93,7 @@ class DurableFile:
         except OSError as error:
             self._failed(error)
 
-    def _failed(self, error: OSError) -> JournalStopped:
+    def _failed(self, error: OSError) -> JournalWriteError:
         self._trouble = write_failure_message(self._path, error)
         with suppress(OSError):
             os.ftruncate(self._file, self._size)
@@ -115,9 +115,9 @@ def is_being_written(path: Path) -> bool:
     return False
 
 
-def write_failure_message(path: Path, error: OSError) -> JournalStopped:
+def write_failure_message(path: Path, error: OSError) -> JournalWriteError:
     """Return what is said where a file of a journal can no longer be written."""
-    return JournalStopped(f"{path}: it can no longer be written, so the session stops here: {error.strerror}")
+    return JournalWriteError(f"{path}: it can no longer be written, so the session stops here: {error.strerror}")
 
 
 def _sync_folder(folder: Path) -> None:

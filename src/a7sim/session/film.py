@@ -8,16 +8,16 @@ from pathlib import Path
 
 import msgspec
 
-from a7sim.instrument.language import Desk, LinkEvent
+from a7sim.instrument.language import LinkEvent, SharedInstrument
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import TIMEOUT_S
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario
 from a7sim.session.folder import JOURNAL
 from a7sim.session.journal import is_registration, make_header
-from a7sim.session.lines import Chain, Event, Journalled, read_journal
-from a7sim.session.playing import Player
+from a7sim.session.lines import ChecksumChain, Event, JournalFile, read_journal
+from a7sim.session.playing import ScriptRunner
 from a7sim.session.replaying import Replay
 from a7sim.session.scripts import SUFFIX, find_script, read_script
 from a7sim.session.seeking import find_line
@@ -55,14 +55,14 @@ class Frame:
     """Where what was filmed did not happen again."""
 
 
-class Film:
+class Recording:
     """A session worked again, and an instrument's front at which it is seen.
 
     The front has a desk of its own, so that who looks is not a client of the session. Whoever runs the film and whoever
     looks do so one after the other.
     """
 
-    def __init__(self, journalled: Journalled, scenario: Scenario | None = None) -> None:
+    def __init__(self, journalled: JournalFile, scenario: Scenario | None = None) -> None:
         """Make the film of a journal, whose scenario stands beside it unless it is given. Raises Mistake."""
         self.journalled = journalled
         self._scenario = scenario
@@ -73,9 +73,9 @@ class Film:
         for number in range(2, len(journalled) + 1):
             self._list(number, journalled.event(number))
         if not self._numbers:
-            raise Mistake(f"{journalled.path}: expected a session in which something was said, got none")
+            raise A7SimError(f"{journalled.path}: expected a session in which something was said, got none")
         self._replay = Replay(journalled, scenario)
-        self._front = Desk(self._replay.desk.autograph)
+        self._front = SharedInstrument(self._replay.desk.autograph)
         self._next = 2
         self._trouble = ""
         self.frame = self._framed(0)
@@ -143,7 +143,7 @@ class Film:
             return int(words)
         line = None if words.isdecimal() else find_line(self.journalled, words)
         if line is None:
-            raise Mistake(
+            raise A7SimError(
                 f"jump to {words}: expected a step up to {self.steps}, a time up to {self._times[-1]:.0f}s, "
                 f"@{len(self.journalled)} or the text of a note"
             )
@@ -174,22 +174,22 @@ class Film:
         return None
 
 
-def open_recording(session: str) -> Film:
+def open_recording(session: str) -> Recording:
     """Return the film of a session's folder, of a journal, or of a script as it is played. Raises Mistake."""
     path = Path(session)
     if path.is_dir():
-        return Film(read_journal(path / JOURNAL))
+        return Recording(read_journal(path / JOURNAL))
     if session.endswith(SUFFIX) or not path.exists():
         return _played(find_script(session))
-    return Film(read_journal(path))
+    return Recording(read_journal(path))
 
 
-def _played(file: Path) -> Film:
+def _played(file: Path) -> Recording:
     """Return the film of a script that is played up to its end, or to where it and the instrument part."""
     script = read_script(file)
     heard: list[LinkEvent] = []
-    Player(script, heard.append).run()
-    chain = Chain()
+    ScriptRunner(script, heard.append).run()
+    chain = ChecksumChain()
     header = chain.line(make_header("replay", script.scenario, script.seed, script=file.name).line)
     lines = [chain.line(Event(each.time, each.client, each.direction, each.text)) for each in heard]
-    return Film(Journalled(file, msgspec.json.decode(header), [header, *lines], b"", chain.crc), script.scenario)
+    return Recording(JournalFile(file, msgspec.json.decode(header), [header, *lines], b"", chain.crc), script.scenario)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 JOURNAL, STATES, TORN = "session.jsonl", "session.states.jsonl", "session.jsonl.torn"
 SCENARIO_SUFFIX = ".scenario.json"
@@ -41,9 +41,9 @@ def prepare_folder(out: Path, force: bool, parts: Iterable[str] = ()) -> None:
     """Make a folder for a session's files, without any of its parts'. Raises Mistake where it exists, unless forced."""
     try:
         if out.exists() and not out.is_dir():
-            raise Mistake(f"{out}: expected a folder, got a file")
+            raise A7SimError(f"{out}: expected a folder, got a file")
         if out.exists() and not force:
-            raise Mistake(
+            raise A7SimError(
                 f"{out}: expected a folder that does not exist yet, got one that does (--force writes into it)"
             )
         out.mkdir(parents=True, exist_ok=True)
@@ -51,7 +51,7 @@ def prepare_folder(out: Path, force: bool, parts: Iterable[str] = ()) -> None:
             for name in FILES:
                 (folder / name).unlink(missing_ok=True)
     except OSError as error:
-        raise Mistake(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
+        raise A7SimError(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
 
 
 def write_atomic(path: Path, text: str) -> None:

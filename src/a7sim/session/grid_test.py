@@ -15,15 +15,15 @@ from a7sim.files import to_csv
 from a7sim.geometry import GON, angles_of
 from a7sim.instrument import Autograph
 from a7sim.instrument.condition import draw_condition
-from a7sim.operator.grid_test import GridTestOrder, ProjectorSheet, measure_grid
+from a7sim.operator.grid_test import GridTestPlan, ProjectorReadings, measure_grid
 from a7sim.operator.seat import side_name, wrap_gon
 from a7sim.reduction import Adjustment
 from a7sim.reduction.grid_test import UNKNOWNS
 from a7sim.scenario import Condition, Scenario
 from a7sim.session.folder import RESIDUALS
-from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.results import request_document
-from a7sim.session.running import Watcher, open_session
+from a7sim.session.running import ProgressCallbacks, open_session
 from a7sim.session.sitting import recorded_session
 from a7sim.sheets import text_table
 from a7sim.wording import pluralize
@@ -36,25 +36,25 @@ RESIDUAL_COLUMNS = ("projector", "level_mm", "cross", "x_mm", "y_mm", "vx_um", "
 def run_grid_test(
     scenario: Scenario,
     seed: int,
-    order: GridTestOrder,
+    order: GridTestPlan,
     out: Path | None = None,
-    watcher: Watcher | None = None,
+    watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    keeping: Keeping | None = None,
+    keeping: JournalOptions | None = None,
 ) -> Document:
     """Test both projectors of a scenario's instrument and return the document; with `out`, leave the files there.
 
     `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for an order that the plate
     or the instrument cannot fill and for a folder that cannot be used, before anything is written.
     """
-    watcher = watcher or Watcher()
-    keeping = keeping or Keeping()
+    watcher = watcher or ProgressCallbacks()
+    keeping = keeping or JournalOptions()
     journal = Journal(keeping)
     session = open_session(scenario, seed, journal.on_link_event)
     autograph = session.autograph
     document = _header(scenario, seed, order, autograph)
     keeping.prepare(out, force)
-    sheets: list[ProjectorSheet] = []
+    sheets: list[ProjectorReadings] = []
 
     def leaves() -> dict[str, str]:
         return {RESIDUALS: to_csv(RESIDUAL_COLUMNS, _residual_rows(sheets))}
@@ -70,7 +70,7 @@ def run_grid_test(
     return document
 
 
-def _header(scenario: Scenario, seed: int, order: GridTestOrder, autograph: Autograph) -> Document:
+def _header(scenario: Scenario, seed: int, order: GridTestPlan, autograph: Autograph) -> Document:
     return document_header("calibrate") | {
         **request_document(scenario),
         "software": f"a7sim {a7sim.__version__}",
@@ -91,7 +91,7 @@ def _header(scenario: Scenario, seed: int, order: GridTestOrder, autograph: Auto
 # --- the document -------------------------------------------------------------------------------------
 
 
-def projector_document(sheet: ProjectorSheet, truth: Document) -> Document:
+def projector_document(sheet: ProjectorReadings, truth: Document) -> Document:
     """Return a projector's sheet of one session, um at photo scale, with the truth and what is left of it."""
     test = sheet.test
     found = _found(sheet)
@@ -119,7 +119,7 @@ def projector_document(sheet: ProjectorSheet, truth: Document) -> Document:
     }
 
 
-def _of_one(sheet: ProjectorSheet) -> Adjustment:
+def _of_one(sheet: ProjectorReadings) -> Adjustment:
     """Return the adjustment without its axis of sessions."""
     every = sheet.test.adjustment
     unknowns, cofactors, residuals, s0, condition, design = (
@@ -129,7 +129,7 @@ def _of_one(sheet: ProjectorSheet) -> Adjustment:
     return Adjustment(unknowns, cofactors, residuals, every.redundancy, s0, condition, design)
 
 
-def _found(sheet: ProjectorSheet) -> Document:
+def _found(sheet: ProjectorReadings) -> Document:
     elements = {}
     for name, error in sheet.test.errors.items():
         unit = "gon" if name in SYMBOLS else "mm"
@@ -148,7 +148,7 @@ def _known(value: float) -> float | None:
     return round(value, 3) if np.isfinite(value) else None
 
 
-def _residual_rows(sheets: list[ProjectorSheet]) -> Iterator[tuple[str, ...]]:
+def _residual_rows(sheets: list[ProjectorReadings]) -> Iterator[tuple[str, ...]]:
     for each in sheets:
         residuals = 1e3 * each.test.residuals[..., 0]
         for k, height in enumerate(each.heights):

@@ -10,15 +10,15 @@ from typing import Any
 import msgspec
 
 import a7sim
-from a7sim.instrument.language import Desk, LinkEvent
-from a7sim.mistakes import Mistake
-from a7sim.operator.book import Entry
+from a7sim.instrument.language import LinkEvent, SharedInstrument
+from a7sim.mistakes import A7SimError
+from a7sim.operator.book import BookEntry
 from a7sim.scenario import Scenario, hash_scenario, to_data
 from a7sim.scene import PICTURES
 from a7sim.session.checkpoints import LINES_PER_CHECKPOINT, Checkpoint, state_hash, to_lines
-from a7sim.session.durable import Durability, DurableFile, JournalStopped, write_failure_message
+from a7sim.session.durable import AppendOnlyFile, Durability, JournalWriteError, write_failure_message
 from a7sim.session.folder import JOURNAL, SCENARIO_SUFFIX, STATES, TORN, prepare_folder
-from a7sim.session.lines import SCHEMA_VERSION, Chain, Event, Journalled, has_header, read_journal
+from a7sim.session.lines import SCHEMA_VERSION, ChecksumChain, Event, JournalFile, has_header, read_journal
 
 _REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
 
@@ -66,7 +66,7 @@ def make_header_without_scenario(command: str, **settings: Any) -> Header:
 
 
 @dataclass(frozen=True)
-class Keeping:
+class JournalOptions:
     """How a session is kept: when its journal is on the disk, and whether it goes on from a journal that is there."""
 
     durability: Durability = "records"
@@ -79,7 +79,7 @@ class Keeping:
         if folder is not None and not self.resumes:
             prepare_folder(folder, force, parts)
 
-    def for_part(self, folder: Path | None) -> "Keeping":
+    def for_part(self, folder: Path | None) -> "JournalOptions":
         """Return how a session is kept that is part of another, which may have been cut off before this one began."""
         begun = folder is not None and has_header(folder / JOURNAL)
         return replace(self, resumes=self.resumes and begun)
@@ -92,21 +92,21 @@ class Journal:
     would be written is compared with it; then it is written on.
     """
 
-    def __init__(self, keeping: Keeping | None = None) -> None:
+    def __init__(self, keeping: JournalOptions | None = None) -> None:
         self.lines_over_the_link = 0
-        self._keeping = keeping or Keeping()
+        self._keeping = keeping or JournalOptions()
         self._unwritten: list[LinkEvent] = []
-        self._file: DurableFile | None = None
+        self._file: AppendOnlyFile | None = None
         self._states: Path | None = None
-        self._desk: Desk | None = None
-        self._there: Journalled | None = None
-        self._chain = Chain()
+        self._desk: SharedInstrument | None = None
+        self._there: JournalFile | None = None
+        self._chain = ChecksumChain()
         self._line = 0
         self._time = 0.0
         self._since_checkpoint = 0
         self._changes = 0
 
-    def recording(self, folder: Path | None, header: Header, desk: Desk | None) -> "Journal":
+    def recording(self, folder: Path | None, header: Header, desk: SharedInstrument | None) -> "Journal":
         """Begin to write, where there is a folder; about a desk, where there is one.
 
         A session that is resumed sets aside what is torn of its journal. Raises Mistake where it cannot be written.
@@ -129,7 +129,7 @@ class Journal:
         self._unwritten.clear()
         return self
 
-    def resume_at(self, there: Journalled, desk: Desk, checkpoints: list[Checkpoint]) -> "Journal":
+    def resume_at(self, there: JournalFile, desk: SharedInstrument, checkpoints: list[Checkpoint]) -> "Journal":
         """Go on behind a journal whose session stands at a desk. Raises Mistake where it cannot be written."""
         save_truncated_tail(there)
         self._desk = desk
@@ -141,7 +141,7 @@ class Journal:
         return self
 
     def _begin(self, folder: Path, size: int, states: bytes) -> None:
-        self._file = DurableFile(folder / JOURNAL, self._keeping.durability, size)
+        self._file = AppendOnlyFile(folder / JOURNAL, self._keeping.durability, size)
         if self._keeping.states:
             self._states = folder / STATES
             self._states.write_bytes(states)
@@ -150,7 +150,7 @@ class Journal:
         """Write what happened on the link. Raises JournalStopped where that fails, unless somebody just went."""
         try:
             self._hear(event)
-        except JournalStopped:
+        except JournalWriteError:
             if event.direction != "-":
                 raise
 
@@ -169,7 +169,7 @@ class Journal:
         self._since_checkpoint += 1
         self._write(Event(event.time, event.client, event.direction, event.text), at_once)
 
-    def on_book_entry(self, entry: Entry, time: float) -> None:
+    def on_book_entry(self, entry: BookEntry, time: float) -> None:
         """Write an entry of the observation book, or that it was struck out. Raises Mistake where that fails."""
         if self._file is None:
             return
@@ -199,7 +199,7 @@ class Journal:
                 self._checkpoint(self._time, self._desk)
             if error is None and self._there is not None and self._line < len(self._there):
                 over = self._there.location(self._line + 1)
-                raise Mistake(f"{over}: expected the end of the session, got a line that is left over")
+                raise A7SimError(f"{over}: expected the end of the session, got a line that is left over")
         finally:
             self._close()
 
@@ -208,7 +208,7 @@ class Journal:
         if file is not None:
             file.close()
 
-    def _checkpoint(self, time: float, desk: Desk) -> None:
+    def _checkpoint(self, time: float, desk: SharedInstrument) -> None:
         state = desk.state(self._changes)
         self._changes = len(desk.autograph.recorder.changes)
         self._since_checkpoint = 0
@@ -228,7 +228,7 @@ class Journal:
         self._line += 1
         if self._there is not None and self._line <= len(self._there):
             if line != self._there.lines[self._line - 1]:
-                raise Mistake(_not_the_same(self._there, self._line, line))
+                raise A7SimError(_not_the_same(self._there, self._line, line))
         else:
             self._file.add(line + b"\n", at_once)
 
@@ -244,32 +244,32 @@ class Journal:
 
 def write_header_only(folder: Path, header: Header) -> None:
     """Leave a journal of nothing but its header: what is worked in a folder's folders. Raises Mistake."""
-    file = DurableFile(folder / JOURNAL)
+    file = AppendOnlyFile(folder / JOURNAL)
     _leave_scenario(folder, header)
-    file.add(Chain().line(header.line) + b"\n")
+    file.add(ChecksumChain().line(header.line) + b"\n")
     file.close()
 
 
 def _leave_scenario(folder: Path, header: Header) -> None:
     if header.scenario is not None:
         data = msgspec.json.format(msgspec.json.encode(to_data(header.scenario))) + b"\n"
-        file = DurableFile((folder / JOURNAL).with_suffix(SCENARIO_SUFFIX), "always")
+        file = AppendOnlyFile((folder / JOURNAL).with_suffix(SCENARIO_SUFFIX), "always")
         try:
             file.add(data)
         finally:
             file.close()
 
 
-def save_truncated_tail(there: Journalled) -> None:
+def save_truncated_tail(there: JournalFile) -> None:
     """Put what is torn of a journal beside it. Raises Mistake where that cannot be written."""
     if there.truncated_tail:
         try:
             (there.path.parent / TORN).write_bytes(there.truncated_tail)
         except OSError as error:
-            raise Mistake(f"{there.path}: expected a journal that can be written: {error.strerror}") from error
+            raise A7SimError(f"{there.path}: expected a journal that can be written: {error.strerror}") from error
 
 
-def _not_the_same(there: Journalled, number: int, line: bytes) -> str:
+def _not_the_same(there: JournalFile, number: int, line: bytes) -> str:
     was, is_now = (each[:_MAX_SHOWN_LENGTH].decode("utf-8", "replace") for each in (there.lines[number - 1], line))
     if number == 1:
         return (

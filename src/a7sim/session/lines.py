@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 SCHEMA_VERSION = 3
 
@@ -43,7 +43,7 @@ class Event(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 @dataclass
-class Chain:
+class ChecksumChain:
     """The checksum that goes from line to line: one that is changed, lost or moved breaks it."""
 
     crc: int = 0
@@ -64,7 +64,7 @@ class Chain:
 
 
 @dataclass(frozen=True)
-class Journalled:
+class JournalFile:
     """What a journal holds: its lines as they stand there, and what of a last one was not written to its end."""
 
     path: Path
@@ -95,7 +95,7 @@ class Journalled:
 _DECODER = msgspec.json.Decoder(Event)
 
 
-def read_journal(path: Path) -> Journalled:
+def read_journal(path: Path) -> JournalFile:
     """Return what a journal holds. Raises Mistake for one that cannot be read, or is damaged, naming the line.
 
     A last line without an end is torn: it was being written when everything stopped, and nobody was told of it.
@@ -103,18 +103,20 @@ def read_journal(path: Path) -> Journalled:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise Mistake(f"{path}: expected the journal of a session: {error.strerror}") from error
+        raise A7SimError(f"{path}: expected the journal of a session: {error.strerror}") from error
     *lines, torn = data.split(b"\n")
-    chain = Chain()
+    chain = ChecksumChain()
     for number, line in enumerate(lines, start=1):
         if not chain.accepts(line):
-            raise Mistake(f"{path}, line {number}: {_damage(line, number)}")
+            raise A7SimError(f"{path}, line {number}: {_damage(line, number)}")
     crc = chain.crc
     if not lines:
-        raise Mistake(f"{path}: expected the journal of a session, got no whole line: nothing was observed yet")
+        raise A7SimError(f"{path}: expected the journal of a session, got no whole line: nothing was observed yet")
     if chain.accepts(torn[:-1]):
-        raise Mistake(f"{path}, line {len(lines) + 1}: expected a line end, got another byte: the journal is damaged")
-    return Journalled(path, _header(path, lines[0]), lines, torn, crc)
+        raise A7SimError(
+            f"{path}, line {len(lines) + 1}: expected a line end, got another byte: the journal is damaged"
+        )
+    return JournalFile(path, _header(path, lines[0]), lines, torn, crc)
 
 
 def has_header(path: Path) -> bool:
@@ -129,7 +131,7 @@ def has_header(path: Path) -> bool:
 def _header(path: Path, line: bytes) -> dict[str, Any]:
     header = msgspec.json.decode(line)
     if header.get("schema_version") not in READABLE_VERSIONS:
-        raise Mistake(f"{path}, line 1: {_other_version(header)}")
+        raise A7SimError(f"{path}, line 1: {_other_version(header)}")
     return dict(header)
 
 

@@ -10,8 +10,8 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from a7sim.geometry import Array, length_of
-from a7sim.operator.map_lines import CONTOUR, Traced
-from a7sim.operator.plotting import Sheet
+from a7sim.operator.map_lines import CONTOUR, TracedLine
+from a7sim.operator.plotting import CompiledMap
 
 INDEX_EVERY = 5
 """Every so manieth contour of an equal interval is drawn heavier and has its height written on it."""
@@ -37,7 +37,7 @@ text { font-family: 'Liberation Sans', Arial, sans-serif; fill: #222; }
 """
 
 
-def to_geojson(sheet: Sheet) -> str:
+def to_geojson(sheet: CompiledMap) -> str:
     """Return lines, spot heights and control as GeoJSON: east, north and height in m of the control's own system."""
     features = [
         *(_line_feature(each, sheet) for each in sheet.lines if each.readings.shape[1] > 1),
@@ -53,11 +53,11 @@ def to_geojson(sheet: Sheet) -> str:
     return json.dumps(collection, indent=1, ensure_ascii=False) + "\n"
 
 
-def _common(sheet: Sheet) -> dict[str, Any]:
+def _common(sheet: CompiledMap) -> dict[str, Any]:
     return {"model": sheet.record.model.name, "scale": round(sheet.map_scale)}
 
 
-def _line_feature(traced: Traced, sheet: Sheet) -> dict[str, Any]:
+def _line_feature(traced: TracedLine, sheet: CompiledMap) -> dict[str, Any]:
     at = sheet.model.on_ground(traced.readings)
     if traced.height is not None:
         at = np.array([at[0], at[1], np.full(at.shape[1], traced.height)])
@@ -67,14 +67,14 @@ def _line_feature(traced: Traced, sheet: Sheet) -> dict[str, Any]:
     return _feature("LineString", [_metres(place) for place in at.T], properties)
 
 
-def _spot_features(sheet: Sheet) -> Iterator[dict[str, Any]]:
+def _spot_features(sheet: CompiledMap) -> Iterator[dict[str, Any]]:
     for place in sheet.model.on_ground(sheet.spots.readings).reshape(3, -1).T:
         if np.isfinite(place).all():
             properties = {"kind": "spot height", "height": round(float(place[2]), 3), **_common(sheet)}
             yield _feature("Point", _metres(place), properties | {"sigma": round(sheet.sigma_height, 4)})
 
 
-def _control_features(sheet: Sheet) -> Iterator[dict[str, Any]]:
+def _control_features(sheet: CompiledMap) -> Iterator[dict[str, Any]]:
     ground = sheet.model.absolute.fit.ground
     for name, role, place in zip(ground.points, ground.roles, ground.coordinates.T, strict=True):
         if np.isfinite(place[:2]).all():
@@ -105,13 +105,13 @@ def _metres(place: Array) -> list[float]:
 class _Paper:
     """Where things stand on the paper: mm from its upper left corner, y downward."""
 
-    sheet: Sheet
+    sheet: CompiledMap
     low: Array
     high: Array
     """Of what is drawn, on the table ``(2,)``, mm."""
 
     @classmethod
-    def of(cls, sheet: Sheet) -> "_Paper":
+    def of(cls, sheet: CompiledMap) -> "_Paper":
         corners = _corners(sheet)
         return cls(sheet, corners.min(axis=1) - 2.0, corners.max(axis=1) + 2.0)
 
@@ -131,12 +131,12 @@ class _Paper:
         return self.drawn(self.sheet.model.readings_of(ground))
 
 
-def _corners(sheet: Sheet) -> Array:
+def _corners(sheet: CompiledMap) -> Array:
     (x0, y0), (x1, y1) = sheet.area.low, sheet.area.high
     return sheet.on_table(np.array([[x0, x1, x1, x0], [y0, y0, y1, y1]]))
 
 
-def to_svg(sheet: Sheet, title: str) -> str:
+def to_svg(sheet: CompiledMap, title: str) -> str:
     """Return the sheet in mm at map scale, with neat line, grid, contours, lines, control, scale bar and north."""
     paper = _Paper.of(sheet)
     width, height = paper.size
@@ -160,7 +160,7 @@ def to_svg(sheet: Sheet, title: str) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _description(sheet: Sheet) -> str:
+def _description(sheet: CompiledMap) -> str:
     contours = ", ".join(f"{height:g}" for height in sheet.heights) or "none"
     lines = ", ".join(each.name for each in sheet.lines if each.kind != CONTOUR) or "none"
     low, high = sheet.spots.range
@@ -326,7 +326,7 @@ def _frame(paper: _Paper, name: str) -> Iterator[str]:
         )
 
 
-def _legend(sheet: Sheet) -> list[str]:
+def _legend(sheet: CompiledMap) -> list[str]:
     contours = ""
     if sheet.heights:
         steps = {round(float(step), 6) for step in np.diff(sheet.heights)}

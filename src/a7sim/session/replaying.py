@@ -8,49 +8,51 @@ from typing import Any
 import msgspec
 
 from a7sim.instrument import Autograph, build_autograph
-from a7sim.instrument.language import MAX_LINE_LENGTH, Desk, LinkEvent
+from a7sim.instrument.language import MAX_LINE_LENGTH, LinkEvent, SharedInstrument
 from a7sim.instrument.language.desk import POLL_SECONDS
 from a7sim.instrument.language.logins import TOKEN_PLACEHOLDER
 from a7sim.link.clock import Clock
 from a7sim.link.waiting import feed_until_idle
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario, from_data, hash_scenario
 from a7sim.scene import build_scene
-from a7sim.session.checkpoints import Checkpoint, Differing, differences, read_checkpoints, state_hash
+from a7sim.session.checkpoints import Checkpoint, StateDifference, differences, read_checkpoints, state_hash
 from a7sim.session.folder import SCENARIO_SUFFIX, STATES
-from a7sim.session.lines import Event, Journalled
+from a7sim.session.lines import Event, JournalFile
 
 RECORDED = "record"
 """The command whose journals hold what crossed a line, and nothing of how the instrument waited."""
 
 
-def scenario_of_journal(journalled: Journalled, known: Scenario | None = None) -> tuple[Scenario, int]:
+def scenario_of_journal(journalled: JournalFile, known: Scenario | None = None) -> tuple[Scenario, int]:
     """Return the scenario and the seed of a session, the scenario from beside the journal unless it is known.
 
     Raises Mistake where they are not those the session was begun with.
     """
     header = journalled.header
     if not knows_scenario(journalled):
-        raise Mistake(f"{journalled.location(1)}: expected a session whose scenario is known, got one that names none")
+        raise A7SimError(
+            f"{journalled.location(1)}: expected a session whose scenario is known, got one that names none"
+        )
     scenario = known or _scenario_beside(journalled)
     try:
         found = hash_scenario(scenario)
-    except Mistake as mistake:
-        raise Mistake(f"{journalled.location(1)}: {mistake}") from mistake
+    except A7SimError as mistake:
+        raise A7SimError(f"{journalled.location(1)}: {mistake}") from mistake
     if found != header.get("scenario_hash"):
-        raise Mistake(
+        raise A7SimError(
             f"{journalled.location(1)}: expected the scenario and the measurements that the session began with "
             f"(hash {str(header.get('scenario_hash'))[:12]}), got others ({found[:12]})"
         )
     return scenario, header["seed"]
 
 
-def knows_scenario(journalled: Journalled) -> bool:
+def knows_scenario(journalled: JournalFile) -> bool:
     """Whether it is said of what scenario the instrument is."""
     return journalled.header.get("scenario_hash") is not None
 
 
-def _scenario_beside(journalled: Journalled) -> Scenario:
+def _scenario_beside(journalled: JournalFile) -> Scenario:
     """Return the scenario of a journal, which in version 2 stood in its header. Raises Mistake where there is none."""
     path, where = journalled.path.with_suffix(SCENARIO_SUFFIX), journalled.location(1)
     data = journalled.header.get("scenario")
@@ -59,23 +61,23 @@ def _scenario_beside(journalled: Journalled) -> Scenario:
         try:
             data = msgspec.json.decode(path.read_bytes())
         except OSError as error:
-            raise Mistake(f"{path}: expected the scenario of the session: {error.strerror}") from error
+            raise A7SimError(f"{path}: expected the scenario of the session: {error.strerror}") from error
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            raise Mistake(f"{path}: expected the scenario of the session as JSON, got something else") from error
+            raise A7SimError(f"{path}: expected the scenario of the session as JSON, got something else") from error
     try:
         return from_data(data)
-    except Mistake as mistake:
-        raise Mistake(f"{where}: {mistake}") from mistake
+    except A7SimError as mistake:
+        raise A7SimError(f"{where}: {mistake}") from mistake
 
 
 @dataclass(frozen=True)
-class Difference:
+class ReplayDifference:
     """Where a replay first differs: the line, what the journal has and what the instrument says; '' for nothing."""
 
     line: int
     journalled: str
     replayed: str
-    parts: tuple[Differing, ...] = ()
+    parts: tuple[StateDifference, ...] = ()
     """Of the state, at the next checkpoint whose state is known."""
 
 
@@ -86,7 +88,7 @@ class Replay:
     """
 
     def __init__(
-        self, journalled: Journalled, known: Scenario | None = None, autograph: Autograph | None = None
+        self, journalled: JournalFile, known: Scenario | None = None, autograph: Autograph | None = None
     ) -> None:
         header = journalled.header
         settings = header.get("settings", {})
@@ -95,7 +97,7 @@ class Replay:
             drawer = build_scene(scenario, seed, header.get("pictures", 1)).mountable
             autograph = build_autograph(scenario.instrument, drawer, seed)
         self.journalled = journalled
-        self.desk = Desk(
+        self.desk = SharedInstrument(
             autograph,
             self._heard,
             TOKEN_PLACEHOLDER if settings.get("login") else None,
@@ -135,7 +137,7 @@ class Replay:
         number = checkpoint.line
         return 1 < number <= len(self.journalled) and self.journalled.event(number).hash == checkpoint.hash
 
-    def apply(self, number: int, event: Event) -> Difference | None:
+    def apply(self, number: int, event: Event) -> ReplayDifference | None:
         """Let an event of the journal happen again; return how it differs, if it does."""
         self.time = event.t
         if event.kind == "state":
@@ -151,7 +153,7 @@ class Replay:
                 return left
         return self._expected(number, event)
 
-    def _say_as_recorded(self, number: int, event: Event) -> Difference | None:
+    def _say_as_recorded(self, number: int, event: Event) -> ReplayDifference | None:
         """Compare replies only, in their order: lines may have been sent before they came."""
         if event.dir == "<":
             return self._expected(number, event)
@@ -160,7 +162,7 @@ class Replay:
         self._happen(event)
         return None
 
-    def final_difference(self) -> Difference | None:
+    def final_difference(self) -> ReplayDifference | None:
         """Return what the instrument still says where the journal ends, if it does."""
         return self._left_over(len(self.journalled) + 1)
 
@@ -170,21 +172,21 @@ class Replay:
         self._said.clear()
         return left
 
-    def _left_over(self, number: int) -> Difference | None:
+    def _left_over(self, number: int) -> ReplayDifference | None:
         if not self._said:
             return None
         said = self._said.popleft()
         self._said.clear()
-        return Difference(number, "", _shown(said.client, said.direction, said.text))
+        return ReplayDifference(number, "", _shown(said.client, said.direction, said.text))
 
-    def _expected(self, number: int, event: Event) -> Difference | None:
+    def _expected(self, number: int, event: Event) -> ReplayDifference | None:
         said = self._said.popleft() if self._said else None
         if said is not None:
             same = (said.direction, said.text) == (event.dir, event.text)
             if same and (self._clock is not None or (said.time, said.client) == (event.t, event.client)):
                 return None
         replayed = "" if said is None else _shown(said.client, said.direction, said.text)
-        return Difference(number, _shown(event.client, event.dir, event.text), replayed)
+        return ReplayDifference(number, _shown(event.client, event.dir, event.text), replayed)
 
     def _happen(self, event: Event) -> None:
         desk, client = self.desk, event.client
@@ -201,22 +203,22 @@ class Replay:
                 self._clock.advance_to(event.t)
                 feed_until_idle(engine, received, self._clock)
 
-    def _compared(self, number: int, event: Event) -> Difference | None:
+    def _compared(self, number: int, event: Event) -> ReplayDifference | None:
         state = self.desk.state(self._changes)
         self._changes = len(self.desk.autograph.recorder.changes)
         found = state_hash(state)
         self.checkpoints.append(Checkpoint(number, event.t, found, state))
         if found == event.hash:
             return None
-        return Difference(number, f"state {event.hash}", f"state {found}", self._parts(number, state))
+        return ReplayDifference(number, f"state {event.hash}", f"state {found}", self._parts(number, state))
 
-    def _parts(self, number: int, state: dict[str, Any]) -> tuple[Differing, ...]:
+    def _parts(self, number: int, state: dict[str, Any]) -> tuple[StateDifference, ...]:
         for checkpoint in read_checkpoints(self.journalled.path.with_name(STATES)):
             if checkpoint.line == number and self._is_of_the_journal(checkpoint):
                 return tuple(differences(checkpoint.state, state))
         return ()
 
-    def state_differences(self, after: int) -> tuple[Differing, ...]:
+    def state_differences(self, after: int) -> tuple[StateDifference, ...]:
         """Return in what the state differs at the first checkpoint after a line, the rest up to there said again."""
         for number in range(after + 1, len(self.journalled) + 1):
             event = self.journalled.event(number)
@@ -226,7 +228,7 @@ class Replay:
         return ()
 
 
-def replay_lines(replay: Replay, first: int = 2) -> Iterator[tuple[int, Event, Difference | None]]:
+def replay_lines(replay: Replay, first: int = 2) -> Iterator[tuple[int, Event, ReplayDifference | None]]:
     """Say the lines of a journal again, from a line on; yield each with its number and how it differs."""
     for number in range(first, len(replay.journalled) + 1):
         event = replay.journalled.event(number)

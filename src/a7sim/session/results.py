@@ -11,12 +11,12 @@ from a7sim.documents import Document, document_header
 from a7sim.files import to_csv
 from a7sim.geometry import Array
 from a7sim.operator import ModelRecord, Person
-from a7sim.operator.absolute import OnGround
+from a7sim.operator.absolute import GroundOrientation
 from a7sim.operator.timesheet import Timesheet
 from a7sim.reduction import Model, PerspectiveCentre
-from a7sim.scenario import RequestedScenario, Scenario
+from a7sim.scenario import Scenario, ScenarioWithProvenance
 from a7sim.scenario.schema import Published
-from a7sim.session.truth import Beside
+from a7sim.session.truth import TruthComparison
 
 SIDES = {1: "left", 2: "right"}
 
@@ -42,11 +42,11 @@ def results_header(scenario: Scenario, seed: int) -> dict[str, Any]:
 
 def request_document(scenario: Scenario) -> dict[str, Any]:
     """Return the command that gives a session again, and what it changed in the scenario's file."""
-    return msgspec.structs.asdict(scenario.request) if isinstance(scenario, RequestedScenario) else {}
+    return msgspec.structs.asdict(scenario.request) if isinstance(scenario, ScenarioWithProvenance) else {}
 
 
 def model_document(
-    record: ModelRecord, beside: Beside, member: int = 0, published: Published | None = None
+    record: ModelRecord, beside: TruthComparison, member: int = 0, published: Published | None = None
 ) -> dict[str, Any]:
     """Return the results of a model beside the truth, of which this session's is that of a member."""
     orientation = record.orientation
@@ -92,7 +92,7 @@ def model_document(
     }
 
 
-def brief_model_document(record: ModelRecord, beside: Beside, member: int) -> dict[str, Any]:
+def brief_model_document(record: ModelRecord, beside: TruthComparison, member: int) -> dict[str, Any]:
     """Return of the results of a model what its strip and the responses of a study that have names are read from."""
     orientation = record.orientation
     found = {hand: _centre(centre, _CENTRE_FIELDS[:3]) for hand, centre in record.centres.items()}
@@ -170,7 +170,7 @@ def _hours(seconds: Mapping[str, float]) -> dict[str, float]:
     return {name: round(each / 3600.0, 4) for name, each in seconds.items()}
 
 
-def _on_ground(found: OnGround) -> dict[str, Any]:
+def _on_ground(found: GroundOrientation) -> dict[str, Any]:
     return {
         "scale_number": found.scale_number,
         "height_gear": found.height_gear,
@@ -204,7 +204,7 @@ def _rounded(values: Any) -> dict[str, float]:
 
 
 def _beside_truth(
-    record: ModelRecord, beside: Beside, member: int, found: dict[int, dict[str, float]]
+    record: ModelRecord, beside: TruthComparison, member: int, found: dict[int, dict[str, float]]
 ) -> dict[str, Any]:
     centres = {
         SIDES[hand]: {name: round(float(each[member]), 5) for name, each in beside.centres[hand].items()}
@@ -232,7 +232,7 @@ def _beside_truth(
     }
 
 
-def _differences(beside: Beside, member: int, found: dict[int, dict[str, float]]) -> dict[str, Any]:
+def _differences(beside: TruthComparison, member: int, found: dict[int, dict[str, float]]) -> dict[str, Any]:
     """Return by how much what was found differs from the truth, in single numbers."""
     document: dict[str, Any] = {
         "centre_differences": {

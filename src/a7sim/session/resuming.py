@@ -4,20 +4,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from a7sim.instrument.language import Desk
-from a7sim.mistakes import Mistake
+from a7sim.instrument.language import SharedInstrument
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario
 from a7sim.session.folder import JOURNAL
 from a7sim.session.journal import Journal, software_version
-from a7sim.session.lines import SCHEMA_VERSION, Journalled, read_journal
-from a7sim.session.replaying import Difference, Replay, replay_lines, scenario_of_journal
+from a7sim.session.lines import SCHEMA_VERSION, JournalFile, read_journal
+from a7sim.session.replaying import Replay, ReplayDifference, replay_lines, scenario_of_journal
 
 
 @dataclass(frozen=True)
-class Begun:
+class ResumableSession:
     """A session that was begun: what its journal holds, and the scenario and the seed that stand there."""
 
-    journalled: Journalled
+    journalled: JournalFile
     scenario: Scenario
     seed: int
 
@@ -31,31 +31,33 @@ class Begun:
         return self.settings.get(name)
 
 
-def find_resumable(folder: Path, command: str) -> Begun:
+def find_resumable(folder: Path, command: str) -> ResumableSession:
     """Return the session that a command began in a folder. Raises Mistake where that cannot be gone on with."""
     journalled = read_journal(folder / JOURNAL)
     for name, expected in (("command", command), ("software", software_version())):
         got = journalled.header.get(name)
         if got != expected:
-            raise Mistake(f"{journalled.location(1)}: expected a session of {expected} to go on with, got one of {got}")
+            raise A7SimError(
+                f"{journalled.location(1)}: expected a session of {expected} to go on with, got one of {got}"
+            )
     version = journalled.header["schema_version"]
     if version != SCHEMA_VERSION:
-        raise Mistake(
+        raise A7SimError(
             f"{journalled.location(1)}: expected schema_version {SCHEMA_VERSION} to go on with, got {version}, "
             "which can be replayed only"
         )
-    return Begun(journalled, *scenario_of_journal(journalled))
+    return ResumableSession(journalled, *scenario_of_journal(journalled))
 
 
-class Again(NamedTuple):
+class RestoredInstrument(NamedTuple):
     """An instrument as a journal leaves it, its clients gone: the desk, the time there in s, and who held the lock."""
 
-    desk: Desk
+    desk: SharedInstrument
     time: float
     lock_holder: str | None
 
 
-def restore_instrument(begun: Begun, journal: Journal, from_checkpoint: bool = False) -> Again:
+def restore_instrument(begun: ResumableSession, journal: Journal, from_checkpoint: bool = False) -> RestoredInstrument:
     """Return an instrument as its journal leaves it; the journal goes on.
 
     All that it holds happens again, or what stands behind its last checkpoint. Raises Mistake where it does not.
@@ -64,7 +66,7 @@ def restore_instrument(begun: Begun, journal: Journal, from_checkpoint: bool = F
     first = replay.seek(len(begun.journalled) + 1) if from_checkpoint else 2
     for number, _, difference in replay_lines(replay, first):
         if difference is not None:
-            raise Mistake(f"{begun.journalled.location(number)}: {_not_again(difference)}")
+            raise A7SimError(f"{begun.journalled.location(number)}: {_not_again(difference)}")
     desk = replay.desk
     desk.listener = journal.resume_at(begun.journalled, desk, replay.checkpoints).on_link_event
     for event in replay.pending_events():
@@ -72,9 +74,9 @@ def restore_instrument(begun: Begun, journal: Journal, from_checkpoint: bool = F
     held_by = desk.lock_holder
     for client in [*desk.clients]:
         desk.close(client, replay.time)
-    return Again(desk, replay.time, held_by)
+    return RestoredInstrument(desk, replay.time, held_by)
 
 
-def _not_again(difference: Difference) -> str:
+def _not_again(difference: ReplayDifference) -> str:
     expected, got = difference.journalled or "nothing", difference.replayed or "nothing"
     return f"expected what the instrument does again, {got}, got another's, {expected}"

@@ -8,11 +8,11 @@ from pathlib import Path
 from a7sim.documents import Document, as_json
 from a7sim.files import to_csv
 from a7sim.instrument import Autograph, build_autograph
-from a7sim.instrument.language import Desk, Listener
+from a7sim.instrument.language import Listener, SharedInstrument
 from a7sim.link.client import Client, Port
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.operator import Job, ModelJob, Person, measure_models
 from a7sim.reduction import Ground, Model, Undetermined
 from a7sim.scenario import Scenario
@@ -27,10 +27,10 @@ from a7sim.session.folder import (
     STRIP,
     write_atomic,
 )
-from a7sim.session.journal import Journal, Keeping, make_header
+from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.sitting import recorded_session
 from a7sim.session.strips import (
-    GroundedStrip,
+    OrientedStrip,
     given_control,
     ground_control,
     models_from_documents,
@@ -38,9 +38,9 @@ from a7sim.session.strips import (
     oriented_strip_document,
     strip_cards,
 )
-from a7sim.session.truth import Beside
+from a7sim.session.truth import TruthComparison
 
-Cable = Callable[[InProcessSerial], Port]
+PortAdapter = Callable[[InProcessSerial], Port]
 """What lies between instrument and operator: it takes the instrument's end and returns the operator's."""
 
 
@@ -58,7 +58,7 @@ class Session:
     scene: Scene
     autograph: Autograph
     person: Person
-    desk: Desk
+    desk: SharedInstrument
 
     @cached_property
     def job(self) -> Job:
@@ -66,12 +66,14 @@ class Session:
         return make_job(self.scenario, self.scene)
 
 
-def open_session(scenario: Scenario, seed: int, listener: Listener | None = None, cable: Cable = direct) -> Session:
+def open_session(
+    scenario: Scenario, seed: int, listener: Listener | None = None, cable: PortAdapter = direct
+) -> Session:
     """Return a session ready to begin. Raises Mistake when a file of measurements is bad."""
     scene = build_scene(scenario, seed)
     autograph = build_autograph(scenario.instrument, scene.mountable, seed)
     clock = Clock()
-    desk = Desk(autograph, listener)
+    desk = SharedInstrument(autograph, listener)
     port = InProcessSerial(desk=desk, clock=clock, timeout=1.0)
     person = Person(Client(cable(port)), clock, scenario.observer, seed)
     return Session(scenario, seed, scene, autograph, person, desk)
@@ -101,7 +103,7 @@ def _control_of(scenario: Scenario, scene: Scene) -> dict[str, tuple[float, floa
 
 
 @dataclass(frozen=True)
-class Watcher:
+class ProgressCallbacks:
     """Who is told how a session goes on: an activity begins, a point is done."""
 
     on_activity: Callable[[str], None] = lambda _: None
@@ -112,10 +114,10 @@ def run(
     scenario: Scenario,
     seed: int,
     out: Path | None = None,
-    watcher: Watcher | None = None,
+    watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    cable: Cable = direct,
-    keeping: Keeping | None = None,
+    cable: PortAdapter = direct,
+    keeping: JournalOptions | None = None,
 ) -> Document:
     """Work through a scenario up to its strip and return the document of results; with `out`, leave the files there.
 
@@ -125,8 +127,8 @@ def run(
 
     A session that `keeping` resumes works on in its folder, and leaves there what one without interruption leaves.
     """
-    watcher = watcher or Watcher()
-    keeping = keeping or Keeping()
+    watcher = watcher or ProgressCallbacks()
+    keeping = keeping or JournalOptions()
     journal = Journal(keeping)
     session = open_session(scenario, seed, journal.on_link_event, cable)
     job = session.job
@@ -141,7 +143,7 @@ def run(
         for record in measure_models(session.person, job, watcher.on_point, watcher.on_activity):
             plan = next(model for model in scenario.models if model.name == record.model.name)
             truth = session.scene.relative_truth(plan)
-            beside = Beside.from_record(record, session.autograph, truth)
+            beside = TruthComparison.from_record(record, session.autograph, truth)
             done.append(results.model_document(record, beside, published=plan.published))
     return _concluded(session, document, out)
 
@@ -162,18 +164,18 @@ def _concluded(session: Session, document: Document, out: Path | None) -> Docume
 
 def strip_document(
     scenario: Scenario, ground: Ground, models: Sequence[Document]
-) -> tuple[Document, GroundedStrip | None]:
+) -> tuple[Document, OrientedStrip | None]:
     """Return the strip that the models of a document make on the ground, or why they make none in its `message`."""
     try:
         if not ground.used.any():
-            raise Mistake("the scenario has no ground control")
+            raise A7SimError("the scenario has no ground control")
         strip = orient_strip(models_from_documents(models), ground, scenario.strip.join, scenario.strip.polynomial)
-    except (Mistake, Undetermined) as reason:
+    except (A7SimError, Undetermined) as reason:
         return {"message": str(reason)}, None
     return oriented_strip_document(strip), strip
 
 
-def _write_cards(out: Path, strip: GroundedStrip, models: Sequence[Model], ground: Ground) -> None:
+def _write_cards(out: Path, strip: OrientedStrip, models: Sequence[Model], ground: Ground) -> None:
     cards = strip_cards(strip, models, ground)
     write_atomic(out / CARDS, "\n".join([*cards.deck, ""]))
     write_atomic(out / OUTPUT_CARDS, "\n".join([*cards.output, ""]))

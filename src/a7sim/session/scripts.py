@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from a7sim.files import read_text
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
 from a7sim.scenario.loading import SEARCH_PATH
 
@@ -33,7 +33,7 @@ _VALUES = re.compile(r"\s*(\"(?:[^\"]|\"\")*\"|[^,\"]+?)\s*(?:,|$)")
 
 
 @dataclass(frozen=True)
-class Place:
+class SourceLocation:
     """Where in which file something stands."""
 
     file: Path
@@ -44,10 +44,10 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Say:
+class SendLine:
     """A line for the instrument."""
 
-    place: Place
+    place: SourceLocation
     text: str
 
 
@@ -55,7 +55,7 @@ class Say:
 class Wait:
     """Simulated s that go by."""
 
-    place: Place
+    place: SourceLocation
     seconds: float
 
 
@@ -63,7 +63,7 @@ class Wait:
 class Expect:
     """A query and what it is to answer, numbers `within` so much; a value * may be any."""
 
-    place: Place
+    place: SourceLocation
     query: str
     values: tuple[str, ...]
     within: float = 0.0
@@ -85,7 +85,7 @@ class Expect:
         return abs(wanted - shown) <= self.within + _OF_BINARY_FRACTIONS
 
 
-Statement = Say | Wait | Expect
+Statement = SendLine | Wait | Expect
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def find_script(name: str) -> Path:
         if path.parent == Path() and found.is_file():
             return found
     known = sorted({file.stem for shelf in shelves for file in shelf.glob(f"*{SUFFIX}")})
-    raise Mistake(
+    raise A7SimError(
         f"{name}: expected the folder of a session, its journal, or a script such as {', '.join(known)}; "
         "found no such file"
     )
@@ -117,34 +117,34 @@ def find_script(name: str) -> Path:
 
 def read_script(path: Path) -> Script:
     """Return a script. Raises Mistake for what is none, naming file and line."""
-    asked: list[tuple[Place, str, int | None]] = []
+    asked: list[tuple[SourceLocation, str, int | None]] = []
     statements = tuple(_statements(path, (), asked))
     if not asked:
-        raise Mistake(f"{path}, line 1: expected a first line such as 'scenario akwanga seed 7', got none")
+        raise A7SimError(f"{path}, line 1: expected a first line such as 'scenario akwanga seed 7', got none")
     place, name, seed = asked[0]
     for other, *rest in asked[1:]:
         if rest != [name, seed]:
-            raise Mistake(f"{other}: expected the scenario and seed of {place}, got others")
+            raise A7SimError(f"{other}: expected the scenario and seed of {place}, got others")
     try:
         beside = place.file.parent / name
         scenario = load_scenario(beside if beside.is_file() else name)
     except ScenarioError as error:
-        raise Mistake(f"{place}: {error}") from error
+        raise A7SimError(f"{place}: {error}") from error
     return Script(path, scenario, scenario.seed if seed is None else seed, statements)
 
 
 def _statements(
-    path: Path, within: tuple[Path, ...], asked: list[tuple[Place, str, int | None]]
+    path: Path, within: tuple[Path, ...], asked: list[tuple[SourceLocation, str, int | None]]
 ) -> Iterator[Statement]:
     for number, line in enumerate(read_text(path).splitlines(), start=1):
         text = _without_comment(line).strip()
-        place = Place(path, number)
+        place = SourceLocation(path, number)
         keyword = _KEYWORD.match(text)
         rest = text[keyword.end() :].strip() if keyword else ""
         if keyword and keyword[1] == "scenario":
             asked.append((place, *_scenario(place, text)))
         elif text and not asked:
-            raise Mistake(f"{place}: expected a first line such as 'scenario akwanga seed 7', got {text!r}")
+            raise A7SimError(f"{place}: expected a first line such as 'scenario akwanga seed 7', got {text!r}")
         elif keyword and keyword[1] == "include":
             yield from _included(place, rest, (*within, path.resolve()), asked)
         elif keyword and keyword[1] == "wait":
@@ -152,44 +152,44 @@ def _statements(
         elif keyword:
             yield _expect(place, text)
         elif text:
-            yield Say(place, text)
+            yield SendLine(place, text)
 
 
 def _included(
-    place: Place, name: str, within: tuple[Path, ...], asked: list[tuple[Place, str, int | None]]
+    place: SourceLocation, name: str, within: tuple[Path, ...], asked: list[tuple[SourceLocation, str, int | None]]
 ) -> Iterator[Statement]:
     path = place.file.parent / name
     if not name or not path.is_file():
-        raise Mistake(f"{place}: expected a script beside this one to include, got {name or 'no name'}")
+        raise A7SimError(f"{place}: expected a script beside this one to include, got {name or 'no name'}")
     if path.resolve() in within:
-        raise Mistake(f"{place}: expected a script that does not include itself, got {name}")
+        raise A7SimError(f"{place}: expected a script that does not include itself, got {name}")
     yield from _statements(path, within, asked)
 
 
-def _scenario(place: Place, text: str) -> tuple[str, int | None]:
+def _scenario(place: SourceLocation, text: str) -> tuple[str, int | None]:
     found = _SCENARIO.fullmatch(text)
     if found is None:
-        raise Mistake(f"{place}: expected 'scenario NAME' or 'scenario NAME seed N', got {text!r}")
+        raise A7SimError(f"{place}: expected 'scenario NAME' or 'scenario NAME seed N', got {text!r}")
     return found[1], int(found[2]) if found[2] else None
 
 
-def _seconds(place: Place, text: str) -> float:
+def _seconds(place: SourceLocation, text: str) -> float:
     seconds = _number(text)
     if seconds is None or not 0.0 <= seconds <= 1e6:
-        raise Mistake(f"{place}: expected 'wait' and 0 to 1000000 s, got {text!r}")
+        raise A7SimError(f"{place}: expected 'wait' and 0 to 1000000 s, got {text!r}")
     return seconds
 
 
-def _expect(place: Place, text: str) -> Expect:
+def _expect(place: SourceLocation, text: str) -> Expect:
     found = _EXPECTED.fullmatch(text)
     if found is None or "?" not in found["query"]:
-        raise Mistake(f"{place}: expected 'expect QUERY? = VALUE, VALUE +- TOLERANCE', got {text!r}")
+        raise A7SimError(f"{place}: expected 'expect QUERY? = VALUE, VALUE +- TOLERANCE', got {text!r}")
     within = 0.0 if found["within"] is None else _number(found["within"])
     if within is None or within < 0.0:
-        raise Mistake(f"{place}: expected a tolerance of 0 or more behind +-, got {found['within']!r}")
+        raise A7SimError(f"{place}: expected a tolerance of 0 or more behind +-, got {found['within']!r}")
     values = tuple(_VALUES.findall(found["values"]))
     if ",".join(values).replace(" ", "") != found["values"].replace(" ", ""):
-        raise Mistake(f"{place}: expected values with commas between them, got {found['values']!r}")
+        raise A7SimError(f"{place}: expected values with commas between them, got {found['values']!r}")
     return Expect(place, found["query"], values, within)
 
 

@@ -3,12 +3,12 @@
 import re
 from bisect import bisect_left
 
-from a7sim.session.lines import Journalled
+from a7sim.session.lines import JournalFile
 
 _TIME = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:\.\d*)?)s?")
 
 
-def find_line(journalled: Journalled, words: str) -> int | None:
+def find_line(journalled: JournalFile, words: str) -> int | None:
     """Return the line that @LINE, a time (s, or h:mm:ss) or the text of a note names, None where there is none."""
     numbers = range(2, len(journalled) + 1)
     found: int | None = None

@@ -5,22 +5,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario, hash_scenario
 from a7sim.session.durable import is_being_written
 from a7sim.session.folder import JOURNAL
 from a7sim.session.lines import read_journal
-from a7sim.session.resuming import Begun, find_resumable
+from a7sim.session.resuming import ResumableSession, find_resumable
 
 COMMAND = "console"
 
 
 @dataclass(frozen=True)
-class Left:
+class SavedSession:
     """A session that was left or cut off."""
 
     folder: Path
-    begun: Begun | None
+    begun: ResumableSession | None
     trouble: str = ""
     """Why it cannot be gone on with, where `begun` is None."""
 
@@ -49,7 +49,7 @@ def _does(line: str) -> bool:
     return any(unit and "?" not in unit for unit in line.split(";"))
 
 
-def last_session(folder: Path, scenario: Scenario, seed: int) -> Left | None:
+def last_session(folder: Path, scenario: Scenario, seed: int) -> SavedSession | None:
     """Return the last session of a scenario and a seed in a folder of this name, numbered or not, if there is one."""
     wanted = hash_scenario(scenario), seed
     return next((left for each in _latest_first(folder) if (left := _left_in(each, *wanted)) is not None), None)
@@ -60,19 +60,19 @@ def _latest_first(folder: Path) -> list[Path]:
     return sorted(there, key=lambda each: (each / JOURNAL).stat().st_mtime, reverse=True)
 
 
-def _left_in(folder: Path, scenario_hash: str, seed: int) -> Left | None:
+def _left_in(folder: Path, scenario_hash: str, seed: int) -> SavedSession | None:
     try:
         header = read_journal(folder / JOURNAL).header
-    except Mistake as mistake:
-        return Left(folder, None, str(mistake))
+    except A7SimError as mistake:
+        return SavedSession(folder, None, str(mistake))
     if (header.get("scenario_hash"), header.get("seed")) != (scenario_hash, seed):
         return None
     if is_being_written(folder / JOURNAL):
-        return Left(folder, None, f"{folder}: somebody sits there")
+        return SavedSession(folder, None, f"{folder}: somebody sits there")
     try:
-        return Left(folder, find_resumable(folder, COMMAND))
-    except Mistake as mistake:
-        return Left(folder, None, str(mistake))
+        return SavedSession(folder, find_resumable(folder, COMMAND))
+    except A7SimError as mistake:
+        return SavedSession(folder, None, str(mistake))
 
 
 def new_folder(folder: Path) -> Path:
@@ -86,7 +86,7 @@ def new_folder(folder: Path) -> Path:
                 continue
             return each
     except OSError as error:
-        raise Mistake(f"{folder}: expected a folder that can be written: {error.strerror}") from error
+        raise A7SimError(f"{folder}: expected a folder that can be written: {error.strerror}") from error
     raise AssertionError("there is always another number")
 
 

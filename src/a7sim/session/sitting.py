@@ -7,26 +7,26 @@ from pathlib import Path
 from typing import Protocol
 
 from a7sim.documents import Document, as_json
-from a7sim.instrument.language import Desk
-from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit, Person
+from a7sim.instrument.language import SharedInstrument
+from a7sim.mistakes import A7SimError
+from a7sim.operator import OperatorGaveUp, Person
 from a7sim.reduction import Undetermined
 from a7sim.session.folder import BOOK, RESULTS, write_atomic
 from a7sim.session.journal import Header, Journal
 from a7sim.session.results import operator_document, slips_document
 
 
-class Seated(Protocol):
+class SeatedOperator(Protocol):
     """An operator at the desk of an instrument."""
 
     person: Person
-    desk: Desk
+    desk: SharedInstrument
 
 
 @contextmanager
 def recorded_session(
     document: Document,
-    seated: Seated,
+    seated: SeatedOperator,
     journal: Journal,
     header: Header,
     out: Path | None = None,
@@ -46,9 +46,9 @@ def recorded_session(
         try:
             yield
             document["status"] = "complete"
-        except (DoesNotFit, Undetermined) as trouble:
+        except (OperatorGaveUp, Undetermined) as trouble:
             document |= {"status": "does not fit", "message": str(trouble)}
-        except Mistake as mistake:
+        except A7SimError as mistake:
             document["message"] = str(mistake)
             raise
         except KeyboardInterrupt:

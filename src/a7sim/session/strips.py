@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.documents import Document, absolute_document, adjustment_document, joins_document
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction import (
     AbsoluteOrientation,
     Ground,
@@ -29,7 +29,7 @@ MAX_CARD_NUMBER_LENGTH = 5
 
 
 @dataclass(frozen=True)
-class Cards:
+class StripCards:
     """A strip on cards: the deck, the output, and which number stands for which point."""
 
     deck: list[str]
@@ -38,7 +38,7 @@ class Cards:
 
 
 @dataclass(frozen=True)
-class GroundedStrip:
+class OrientedStrip:
     """A strip, its absolute orientation and, where asked for, its adjustment by polynomials."""
 
     formed: Strip
@@ -73,14 +73,14 @@ def given_control(scenario: Scenario, scene: Scene) -> Ground:
 
 def orient_strip(
     models: Sequence[Model], ground: Ground, method: JoinMethod = "points", degree: Degree | None = None
-) -> GroundedStrip:
+) -> OrientedStrip:
     """Return the strip of models on its control. Raises Undetermined or Mistake for models or control too few."""
     formed = formed_strip(models, method)
     oriented = absolute_orientation(formed, ground)
-    return GroundedStrip(formed, oriented, strip_adjustment(oriented.model, ground, degree) if degree else None)
+    return OrientedStrip(formed, oriented, strip_adjustment(oriented.model, ground, degree) if degree else None)
 
 
-def oriented_strip_document(strip: GroundedStrip) -> Document:
+def oriented_strip_document(strip: OrientedStrip) -> Document:
     """Return a strip on the ground as a document."""
     document: Document = {"joins": joins_document(strip.formed)} | absolute_document(strip.oriented)
     return document | ({"polynomial": adjustment_document(strip.adjusted)} if strip.adjusted else {})
@@ -100,7 +100,7 @@ def _model(document: Document) -> Model:
     return Model(document["model"], tuple(places), coordinates)
 
 
-def strip_cards(strip: GroundedStrip, models: Sequence[Model], ground: Ground) -> Cards:
+def strip_cards(strip: OrientedStrip, models: Sequence[Model], ground: Ground) -> StripCards:
     """Return the N.R.C. cards of a strip: the deck that goes in, and the output with residuals and deviations.
 
     Names that are no numbers of five digits get one. Raises Mistake for coordinates that do not fit nine columns.
@@ -110,7 +110,7 @@ def strip_cards(strip: GroundedStrip, models: Sequence[Model], ground: Ground) -
     on_ground = strip.on_ground
     numbered_strip = Strip(tuple(_numbered(model, key) for model in on_ground.models), on_ground.joins)
     deck = _fitting(lambda decimals: deck_lines(numbered_ground, [_numbered(model, key) for model in models], decimals))
-    return Cards(deck, _fitting(lambda decimals: output_lines(numbered_ground, numbered_strip, decimals)), key)
+    return StripCards(deck, _fitting(lambda decimals: output_lines(numbered_ground, numbered_strip, decimals)), key)
 
 
 def card_numbers(names: Iterable[str]) -> dict[str, str]:
@@ -135,6 +135,6 @@ def _fitting(lines_of: Callable[[int], list[str]]) -> list[str]:
     for decimals in (3, 2):
         try:
             return lines_of(decimals)
-        except Mistake:
+        except A7SimError:
             continue
     return lines_of(1)

@@ -11,19 +11,19 @@ from a7sim.manual import Variant
 from a7sim.operator import ModelJob, ModelRecord
 from a7sim.scene import RelativeTruth
 
-Elements = Mapping[str, Any]
+ElementValues = Mapping[str, Any]
 """What counters show: of one session, or ``(m,)`` of many."""
 
 
 @dataclass(frozen=True)
-class Relative:
+class RelativePose:
     """The right-hand photograph in the left-hand one's frame: rotation ``(3, 3, ...)`` and unit base ``(3, ...)``."""
 
     rotation: Array
     base: Array
 
     @classmethod
-    def from_counters(cls, elements: Elements, model: ModelJob, variant: Variant) -> "Relative":
+    def from_counters(cls, elements: ElementValues, model: ModelJob, variant: Variant) -> "RelativePose":
         """Return the relative orientation that the counters ``(...)`` of a model describe."""
         left, right = model.left_projector, model.right_projector
 
@@ -35,22 +35,22 @@ class Relative:
         return cls(mxm(to_left, turned(right)), mxv(to_left, base) / length_of(base))
 
     @classmethod
-    def from_truth(cls, truth: RelativeTruth) -> "Relative":
+    def from_truth(cls, truth: RelativeTruth) -> "RelativePose":
         """Return a true or published relative orientation."""
         return cls(truth.rotation, truth.base / length_of(truth.base))
 
-    def batch(self) -> "Relative":
+    def batch(self) -> "RelativePose":
         """Return the same for any number of sessions, with an axis of theirs at the end."""
-        return Relative(self.rotation[..., None], self.base[..., None])
+        return RelativePose(self.rotation[..., None], self.base[..., None])
 
-    def differences_gon(self, other: "Relative") -> tuple[Array, Array]:
+    def differences_gon(self, other: "RelativePose") -> tuple[Array, Array]:
         """Return by what angles ``(...)`` the rotations and the bases differ."""
         turn = turn_of(mxm(transposed(self.rotation), other.rotation))
         return turn / GON, angle_between(self.base, other.base) / GON
 
 
 def true_elements(
-    truth: Relative, method: str, elements: Elements, model: ModelJob, variant: Variant
+    truth: RelativePose, method: str, elements: ElementValues, model: ModelJob, variant: Variant
 ) -> dict[str, Array]:
     """Return what the counters ``(m,)`` of the elements that a method turns would show if the truth were set.
 
@@ -87,7 +87,7 @@ def true_elements(
 _MAX_TURNS = 12
 
 
-def _base_of(elements: Elements, model: ModelJob) -> Array:
+def _base_of(elements: ElementValues, model: ModelJob) -> Array:
     left, right = model.left_projector, model.right_projector
     across = elements.get(f"by{left}", 0.0) - elements.get(f"by{right}", 0.0)
     rise = elements.get(f"bz{right}", 0.0) - elements.get(f"bz{left}", 0.0)
@@ -109,13 +109,13 @@ def _laid_onto(vector: Array, other: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class RelativeBeside:
+class RelativeComparison:
     """The true relative orientation of m sessions beside that which their counters describe."""
 
     source: str
-    true: Relative
+    true: RelativePose
     """One for all."""
-    found: Relative
+    found: RelativePose
     rotation_gon: Array
     """By what angles ``(m,)`` the rotations differ."""
     base_gon: Array
@@ -124,12 +124,12 @@ class RelativeBeside:
 
 
 @dataclass(frozen=True)
-class Beside:
+class TruthComparison:
     """The truth about a model in m sessions; arrays have the sessions last."""
 
     centres: Mapping[int, Mapping[str, Array]]
     """Where the centres really stand ``(m,)``, in counter units, by hand (1 left, 2 right)."""
-    relative: RelativeBeside | None
+    relative: RelativeComparison | None
     """None where no truth is known."""
 
     @classmethod
@@ -141,16 +141,16 @@ class Beside:
         elements: Mapping[str, Array],
         model: ModelJob,
         variant: Variant,
-    ) -> "Beside":
+    ) -> "TruthComparison":
         """Return the truth beside the elements ``(m,)`` of sessions that turned them by a method."""
         if truth is None:
             return cls(centres, None)
-        true, found = Relative.from_truth(truth), Relative.from_counters(elements, model, variant)
+        true, found = RelativePose.from_truth(truth), RelativePose.from_counters(elements, model, variant)
         exact = true_elements(true.batch(), method, elements, model, variant)
-        return cls(centres, RelativeBeside(truth.source, true, found, *found.differences_gon(true.batch()), exact))
+        return cls(centres, RelativeComparison(truth.source, true, found, *found.differences_gon(true.batch()), exact))
 
     @classmethod
-    def from_record(cls, record: ModelRecord, standing: "Standing", truth: RelativeTruth | None) -> "Beside":
+    def from_record(cls, record: ModelRecord, standing: "TruePose", truth: RelativeTruth | None) -> "TruthComparison":
         """Return the truth about one session, whose instrument stands as the operator left it."""
         model = record.model
         centres = {
@@ -161,7 +161,7 @@ class Beside:
         return cls.of(truth, centres, record.orientation.method, elements, model, standing.variant)
 
 
-class Standing(Protocol):
+class TruePose(Protocol):
     """An instrument as the truth sees it: where its projectors and its mark really stand."""
 
     variant: Variant
@@ -173,7 +173,7 @@ class Standing(Protocol):
         """Return what the counters would show, unrounded, with the mark at a place ``(3,)``."""
 
 
-def true_centre(autograph: Standing, projector: int) -> dict[str, float]:
+def true_centre(autograph: TruePose, projector: int) -> dict[str, float]:
     """Return where a projection centre really stands, in counter units."""
     centre, _ = autograph.pose(projector)
     readings = autograph.readings_at(centre)

@@ -25,7 +25,7 @@ class Residuals:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class StripComparison:
     """The same strips by comparator and on the A8, and the differences of their new points ``(3, seeds)``, m."""
 
     seeds: tuple[int, ...]
@@ -35,7 +35,7 @@ class Comparison:
     difference_largest: Array
 
 
-def compare_a8_to_comparator(scenario: Scenario, seeds: Iterable[int]) -> Comparison:
+def compare_a8_to_comparator(scenario: Scenario, seeds: Iterable[int]) -> StripComparison:
     """Return what both ways leave at the check points, over seeds, each seed a flight's film, an A8 and two people."""
     seeds = tuple(seeds)
     both: list[tuple[StripResult, StripResult]] = []
@@ -44,7 +44,7 @@ def compare_a8_to_comparator(scenario: Scenario, seeds: Iterable[int]) -> Compar
         both.append((strip_by_comparator(scenario, scene, seed), strip_on_a8(scenario, scene, seed)))
     c = scenario.camera.c
     apart = [coordinate_differences(*pair) for pair in both]
-    return Comparison(
+    return StripComparison(
         seeds,
         _residuals([comparator for comparator, _ in both], c),
         _residuals([a8 for _, a8 in both], c),

@@ -4,18 +4,18 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from a7sim.documents import Document, as_json, differences_document
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction import Undetermined
 from a7sim.scenario import Scenario
-from a7sim.scene import Flight, Scene, build_scene
+from a7sim.scene import Scene, SharedScene, build_scene
 from a7sim.session import results
 from a7sim.session.a8_strip import strip_on_a8
 from a7sim.session.analytical import StripResult, strip_by_comparator
-from a7sim.session.bridge import Bridging, bridge_batch, bridge_over_link
+from a7sim.session.bridge import BridgeResult, bridge_batch, bridge_over_link
 from a7sim.session.crowd import open_batch
 from a7sim.session.folder import MODELS_OF_WAY, RESULTS, STRIP_OF_WAY, prepare_folder, write_atomic
-from a7sim.session.journal import Keeping
-from a7sim.session.running import Cable, Watcher, direct, run
+from a7sim.session.journal import JournalOptions
+from a7sim.session.running import PortAdapter, ProgressCallbacks, direct, run
 from a7sim.session.strips import oriented_strip_document
 from a7sim.session.two_ways import coordinate_differences
 
@@ -24,10 +24,10 @@ def run_all_methods(
     scenario: Scenario,
     seed: int,
     out: Path | None = None,
-    watcher: Watcher | None = None,
+    watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    cable: Cable = direct,
-    keeping: Keeping | None = None,
+    cable: PortAdapter = direct,
+    keeping: JournalOptions | None = None,
 ) -> Document:
     """Measure the strip of a scenario in every way it asks for and return the document of results.
 
@@ -67,13 +67,13 @@ def run_all_methods_batch(
     if scenario.work == ["plotter"]:
         return documents
     bridgings = dict(zip(seeds, bridge_batch(scenario, seeds), strict=True)) if "bridge" in scenario.work else {}
-    flight = Flight.of(scenario)
+    flight = SharedScene.of(scenario)
     for document, seed in zip(documents, seeds, strict=True):
         _add(document, *_measured(scenario, flight.scene(seed), seed, lambda _, seed: bridgings[seed]))
     return documents
 
 
-def _add(document: Document, strips: Mapping[str, StripResult], bridging: Bridging | None) -> None:
+def _add(document: Document, strips: Mapping[str, StripResult], bridging: BridgeResult | None) -> None:
     """Add to a document what the ways beside the plotter came to."""
     if strips:
         document["ways"] = {name: oriented_strip_document(each.strip) for name, each in strips.items()}
@@ -88,8 +88,8 @@ def _add(document: Document, strips: Mapping[str, StripResult], bridging: Bridgi
 
 
 def _measured(
-    scenario: Scenario, scene: Scene, seed: int, bridge: Callable[[Scenario, int], Bridging]
-) -> tuple[dict[str, StripResult], Bridging | None]:
+    scenario: Scenario, scene: Scene, seed: int, bridge: Callable[[Scenario, int], BridgeResult]
+) -> tuple[dict[str, StripResult], BridgeResult | None]:
     """Return the strips of all ways but the plotter's, by their names, and how bridging went where it is asked for."""
     ways = {}
     bridging = None
@@ -103,5 +103,5 @@ def _measured(
             if bridging.result is not None:
                 ways["bridge"] = bridging.result
     except Undetermined as undetermined:
-        raise Mistake(f"{scenario.title}: {undetermined}") from undetermined
+        raise A7SimError(f"{scenario.title}: {undetermined}") from undetermined
     return ways, bridging

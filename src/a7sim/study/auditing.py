@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from a7sim.study.loading import Laid
+from a7sim.study.loading import LoadedStudy
 from a7sim.study.responses import SIGNIFICANT
 from a7sim.study.simulating import replicate_seed
 from a7sim.study.tally import Tally
@@ -20,7 +20,7 @@ _AS_NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
-class Difference:
+class AuditDifference:
     """What is not the same over the link in a session: the first of it."""
 
     cell: int
@@ -41,7 +41,9 @@ class Difference:
         )
 
 
-def audit_study(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] = lambda: None) -> list[Difference]:
+def audit_study(
+    laid: LoadedStudy, tally: Tally, picks: int, tick: Callable[[], None] = lambda: None
+) -> list[AuditDifference]:
     """Work so many picked replicates on both benches and return a difference for every one that is not the same.
 
     Over the link a replicate must give the responses that the tally holds, to the last digit, and all values of the
@@ -63,12 +65,12 @@ def audit_study(laid: Laid, tally: Tally, picks: int, tick: Callable[[], None] =
             ]
             if differences:
                 where = (laid.cells[i].number, replicate + 1, seed)
-                found.append(Difference(*where, *differences[0], others=len(differences) - 1))
+                found.append(AuditDifference(*where, *differences[0], others=len(differences) - 1))
             tick()
     return found
 
 
-def _picked(laid: Laid, tally: Tally, picks: int) -> Mapping[int, list[int]]:
+def _picked(laid: LoadedStudy, tally: Tally, picks: int) -> Mapping[int, list[int]]:
     """Return the picked replicates by the place of their cell."""
     there = [(i, replicate) for i in range(len(laid.cells)) for replicate in range(tally.sample(i).shape[1])]
     rng = np.random.default_rng(np.random.SeedSequence(laid.study.seed, spawn_key=(_STREAM,)))

@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import a7sim
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.study.executors import RESUME_HINT
 
 WORKER_TIMEOUT_S = 5.0
@@ -32,7 +32,7 @@ def open_dask_executor(scheduler: str | None, workers: int) -> Iterator[tuple[Ex
     try:
         distributed = import_module("distributed")
     except ImportError as missing:
-        raise Mistake(
+        raise A7SimError(
             f"--executor dask: expected distributed to be installed (pip install 'a7sim[dask]'): {missing}"
         ) from missing
     _say_nothing()
@@ -53,14 +53,14 @@ def open_dask_executor(scheduler: str | None, workers: int) -> Iterator[tuple[Ex
         try:
             client = until.enter_context(distributed.Client(address, timeout=WORKER_TIMEOUT_S, set_as_default=False))
         except (OSError, ValueError) as error:
-            raise Mistake(f"--scheduler: expected one that answers at {scheduler}, got none in 5 s") from error
+            raise A7SimError(f"--scheduler: expected one that answers at {scheduler}, got none in 5 s") from error
         at_once = _at_once(client, scheduler)
         executor = client.get_executor(retries=_RETRIES, pure=False)
         until.callback(executor.shutdown, wait=False)
         try:
             yield executor, at_once
         except (distributed.scheduler.KilledWorker, distributed.CancelledError, CancelledError) as error:
-            raise Mistake(f"dask lost its scheduler, or one worker after the other; {RESUME_HINT}") from error
+            raise A7SimError(f"dask lost its scheduler, or one worker after the other; {RESUME_HINT}") from error
 
 
 def dask_setup(worker: object) -> None:
@@ -70,7 +70,7 @@ def dask_setup(worker: object) -> None:
 
 def _checked(scheduler: str) -> str:
     if not _URL.fullmatch(scheduler):
-        raise Mistake(f"--scheduler: expected a URL such as tcp://127.0.0.1:8786, got {scheduler[:200]!r}")
+        raise A7SimError(f"--scheduler: expected a URL such as tcp://127.0.0.1:8786, got {scheduler[:200]!r}")
     return scheduler
 
 
@@ -79,16 +79,16 @@ def _at_once(client: Any, scheduler: str | None) -> int:
     try:
         client.wait_for_workers(1, timeout=WORKER_TIMEOUT_S)
     except TimeoutError as error:
-        raise Mistake(f"--scheduler: expected workers at {scheduler}, got a scheduler without any") from error
+        raise A7SimError(f"--scheduler: expected workers at {scheduler}, got a scheduler without any") from error
     try:
         versions = client.run(version, "a7sim")
     except PackageNotFoundError as error:
-        raise Mistake(
+        raise A7SimError(
             f"--scheduler: expected a7sim {a7sim.__version__} at its workers, got one without a7sim"
         ) from error
     for worker, found in versions.items():
         if found != a7sim.__version__:
-            raise Mistake(f"--scheduler: expected a7sim {a7sim.__version__} at {worker}, got a7sim {found}")
+            raise A7SimError(f"--scheduler: expected a7sim {a7sim.__version__} at {worker}, got a7sim {found}")
     return sum(client.nthreads().values())
 
 

@@ -5,7 +5,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from importlib import import_module
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 MPI_COMMAND = "mpiexec -n 5 a7sim study ... --executor mpi"
 """How four workers and the one that asks are started."""
@@ -23,10 +23,10 @@ def open_mpi_executor(environment: Mapping[str, str]) -> Iterator[tuple[Executor
         MPI, futures = import_module("mpi4py.MPI"), import_module("mpi4py.futures")
     except (ImportError, RuntimeError) as missing:
         why = str(missing).splitlines()[0]
-        raise Mistake(f"--executor mpi: expected MPI and mpi4py (pip install 'a7sim[mpi]'): {why}") from missing
+        raise A7SimError(f"--executor mpi: expected MPI and mpi4py (pip install 'a7sim[mpi]'): {why}") from missing
     processes = MPI.COMM_WORLD.Get_size()
     if processes < 2:
-        raise Mistake(f"--executor mpi: expected two processes or more ({MPI_COMMAND}), got this one alone")
+        raise A7SimError(f"--executor mpi: expected two processes or more ({MPI_COMMAND}), got this one alone")
     with futures.MPICommExecutor(MPI.COMM_WORLD, root=0, env=dict(environment)) as executor:
         if executor is not None:
             yield executor, processes - 1

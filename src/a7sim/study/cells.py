@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.session.crossing import cases_of_strips
 from a7sim.standard_points import CASES
 from a7sim.study.schema import MAX_CELLS, Factor, Settings, Study
@@ -39,7 +39,7 @@ def make_cells(study: Study) -> list[Cell]:
         _see_that_it_varies(factor, study.design)
     rows = _hypercube(study) if study.design == "latin-hypercube" else _rows(study)
     if len(rows) > MAX_CELLS:
-        raise Mistake(f"factor: expected levels that make at most {MAX_CELLS} cells, got {len(rows)}")
+        raise A7SimError(f"factor: expected levels that make at most {MAX_CELLS} cells, got {len(rows)}")
     names = [factor.name for factor in study.factor]
     return [
         Cell(
@@ -55,7 +55,7 @@ def make_strip_cells(cells: Sequence[Cell], models: Sequence[str]) -> list[Cell]
     """Return cells of which each stands for all strips that its models, each in every case, make; numbered anew."""
     combinations = cases_of_strips(tuple(CASES), len(models))
     if len(cells) * len(combinations) > MAX_CELLS:
-        raise Mistake(f"strips: expected at most {MAX_CELLS} cells, got {len(cells) * len(combinations)}")
+        raise A7SimError(f"strips: expected at most {MAX_CELLS} cells, got {len(cells) * len(combinations)}")
     both = enumerate(product(cells, combinations), start=1)
     return [
         Cell(
@@ -86,17 +86,17 @@ def _see_that_it_varies(factor: Factor, design: str) -> None:
     if factor.range is not None:
         low, high = factor.range
         if design != "latin-hypercube":
-            raise Mistake(f"{where}: expected levels, got a range, which only design = 'latin-hypercube' takes")
+            raise A7SimError(f"{where}: expected levels, got a range, which only design = 'latin-hypercube' takes")
         if factor.levels or factor.groups or factor.path is None or not low < high:
-            raise Mistake(f"{where}: expected a path and a range from low to high alone, got {low:g} to {high:g}")
+            raise A7SimError(f"{where}: expected a path and a range from low to high alone, got {low:g} to {high:g}")
         return
     if factor.groups and (factor.levels or factor.path):
-        raise Mistake(f"{where}: expected either path and levels or groups, got both")
+        raise A7SimError(f"{where}: expected either path and levels or groups, got both")
     if factor.levels and factor.path is None:
-        raise Mistake(f"{where}: expected the path of the scenario value that its levels give, got none")
+        raise A7SimError(f"{where}: expected the path of the scenario value that its levels give, got none")
     labels = [level.label for level in factor_levels(factor)]
     if len(labels) < 2 or len(set(labels)) < len(labels):
-        raise Mistake(f"{where}: expected two different levels or more, got {', '.join(labels) or 'none'}")
+        raise A7SimError(f"{where}: expected two different levels or more, got {', '.join(labels) or 'none'}")
 
 
 def _rows(study: Study) -> Sequence[tuple[Level, ...]]:
@@ -114,7 +114,7 @@ def _hypercube(study: Study) -> Sequence[tuple[Level, ...]]:
     from scipy.stats import qmc  # noqa: PLC0415
 
     if study.samples is None or not study.factor:
-        raise Mistake("samples: expected the number of cells of the Latin hypercube and factors to vary, got none")
+        raise A7SimError("samples: expected the number of cells of the Latin hypercube and factors to vary, got none")
     places = qmc.LatinHypercube(d=len(study.factor), rng=study.seed).random(study.samples)
     return [tuple(_at(factor, at) for factor, at in zip(study.factor, row, strict=True)) for row in places.tolist()]
 

@@ -14,8 +14,8 @@ import numpy as np
 
 import a7sim
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
-from a7sim.study.sketch import Counts, Sketch
+from a7sim.mistakes import A7SimError
+from a7sim.study.sketch import Counts, QuantileSketch
 from a7sim.study.tally import Tally
 
 PARQUET, NPZ = "checkpoint.parquet", "checkpoint.npz"
@@ -74,7 +74,7 @@ def save(tally: Tally, path: Path, identity: str) -> None:
 def load(path: Path, identity: str) -> Tally:
     """Return what `save` wrote. Raises Mistake for a damaged file, or one of another study or version."""
     if path.suffix == ".parquet" and find_spec("pyarrow") is None:
-        raise Mistake(f"{path}: expected pyarrow to read it (pip install 'a7sim[parquet]'; --force begins anew)")
+        raise A7SimError(f"{path}: expected pyarrow to read it (pip install 'a7sim[parquet]'; --force begins anew)")
     try:
         columns, whose = (_of_parquet if path.suffix == ".parquet" else _of_npz)(path)
         software, of = (whose[name] for name in _WHOSE)
@@ -82,11 +82,11 @@ def load(path: Path, identity: str) -> Tally:
             return _tally(columns)
     except (OSError, ValueError, KeyError, EOFError, TypeError, IndexError, BadZipFile) as error:
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise Mistake(f"{path}: expected the checkpoint of a study, got a file that is none: {why}") from error
+        raise A7SimError(f"{path}: expected the checkpoint of a study, got a file that is none: {why}") from error
     if software != a7sim.__version__:
         asked = f"expected a checkpoint of a7sim {a7sim.__version__}, got one of {software}"
-        raise Mistake(f"{path}: {asked} (--force begins anew)")
-    raise Mistake(f"{path}: expected the checkpoint of this study, got that of another (--force begins anew)")
+        raise A7SimError(f"{path}: {asked} (--force begins anew)")
+    raise A7SimError(f"{path}: expected the checkpoint of this study, got that of another (--force begins anew)")
 
 
 def _columns(tally: Tally) -> _Columns:
@@ -110,7 +110,7 @@ def _tally(columns: _Columns) -> Tally:
     shape = (cells, responses)
     samples = list(columns["sample"])
     sketches = [
-        Sketch(list(np.split(values, np.cumsum(sizes)[:-1])) if sizes.size else [], halved.tolist())
+        QuantileSketch(list(np.split(values, np.cumsum(sizes)[:-1])) if sizes.size else [], halved.tolist())
         for values, sizes, halved in zip(
             columns["sketch"], columns["sketch_levels"], columns["sketch_halved"], strict=True
         )

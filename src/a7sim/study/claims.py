@@ -9,9 +9,9 @@ import numpy as np
 
 from a7sim.documents import Document
 from a7sim.geometry import Array
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.study.cells import Cell
-from a7sim.study.schema import Claim, Study
+from a7sim.study.schema import Hypothesis, Study
 from a7sim.study.statistics import CONFIDENCE, binned, compare_cells, holm, regress_on
 
 SMALL_EFFECT = 0.2
@@ -32,34 +32,36 @@ def validate_claims(study: Study, cells: Sequence[Cell]) -> None:
         where = f"claim {number}"
         kinds = [each for each in ("differ", "alike", "depends_on") if getattr(claim, each) is not None]
         if len(kinds) != 1 or (claim.factor is None) != (kinds == ["depends_on"]):
-            raise Mistake(f"{where}: expected a factor with differ or alike, or depends_on alone, got {_listed(kinds)}")
+            raise A7SimError(
+                f"{where}: expected a factor with differ or alike, or depends_on alone, got {_listed(kinds)}"
+            )
         for name in [*claim.responses, *(claim.depends_on or [])]:
             if name not in study.responses:
-                raise Mistake(f"{where}: expected a response of {', '.join(study.responses)}, got {name!r}")
+                raise A7SimError(f"{where}: expected a response of {', '.join(study.responses)}, got {name!r}")
         if claim.factor is not None:
             known = list(dict.fromkeys(cell.levels.get(claim.factor, "") for cell in cells))
             if known == [""]:
-                raise Mistake(f"{where}: expected a factor of {', '.join(cells[0].levels)}, got {claim.factor!r}")
+                raise A7SimError(f"{where}: expected a factor of {', '.join(cells[0].levels)}, got {claim.factor!r}")
             if [] in (claim.differ or []):
-                raise Mistake(f"{where}: expected a level or more in both groups of differ, got none in one")
+                raise A7SimError(f"{where}: expected a level or more in both groups of differ, got none in one")
             levels = _levels(claim)
             for level in levels:
                 if level not in known:
-                    raise Mistake(f"{where}: expected a level of {', '.join(known)}, got {level!r}")
+                    raise A7SimError(f"{where}: expected a level of {', '.join(known)}, got {level!r}")
                 if levels.count(level) > 1:
-                    raise Mistake(f"{where}: expected every level once, got {level!r} twice")
+                    raise A7SimError(f"{where}: expected every level once, got {level!r} twice")
 
 
 def _listed(kinds: Sequence[str]) -> str:
     return " and ".join(kinds) or "none"
 
 
-def _levels(claim: Claim) -> list[str]:
+def _levels(claim: Hypothesis) -> list[str]:
     return [*(claim.alike or []), *(level for group in claim.differ or [] for level in group)]
 
 
 def test_claims(
-    claims: Sequence[Claim], cells: Sequence[Cell], responses: Mapping[str, Document], values: Values
+    claims: Sequence[Hypothesis], cells: Sequence[Cell], responses: Mapping[str, Document], values: Values
 ) -> list[Document]:
     """Return claims with their tests, adjusted for the number of all of them, verdicts and answers in words."""
     tests = [list(_tests(claim, cells, values)) for claim in claims]
@@ -70,7 +72,7 @@ def test_claims(
     return [_document(claim, of_claim, responses) for claim, of_claim in zip(claims, tests, strict=True)]
 
 
-def _tests(claim: Claim, cells: Sequence[Cell], values: Values) -> Iterator[Document]:
+def _tests(claim: Hypothesis, cells: Sequence[Cell], values: Values) -> Iterator[Document]:
     for response in claim.responses:
         of_response = values(response)
         for on in claim.depends_on or []:
@@ -86,7 +88,7 @@ def _tests(claim: Claim, cells: Sequence[Cell], values: Values) -> Iterator[Docu
             } | asdict(compare_cells(second, first))
 
 
-def _pairs(claim: Claim) -> Iterator[tuple[Sequence[str], Sequence[str]]]:
+def _pairs(claim: Hypothesis) -> Iterator[tuple[Sequence[str], Sequence[str]]]:
     """Yield the groups of levels of which the second is compared with the first."""
     if claim.differ is not None:
         yield claim.differ[0], claim.differ[1]
@@ -108,7 +110,7 @@ def _verdict(test: Document) -> Verdict:
     return NOTHING if -small < low and high < small else OPEN
 
 
-def _document(claim: Claim, tests: Sequence[Document], responses: Mapping[str, Document]) -> Document:
+def _document(claim: Hypothesis, tests: Sequence[Document], responses: Mapping[str, Document]) -> Document:
     verdict = _overall([each["verdict"] for each in tests])
     telling = [each for each in tests if each["verdict"] == verdict]
     return {

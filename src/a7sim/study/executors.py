@@ -10,7 +10,7 @@ from multiprocessing.connection import Connection
 from threading import Thread
 from typing import Any, Literal, ParamSpec, TypeVar, get_args
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 Kind = Literal["process", "pool", "dask", "mpi"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -47,10 +47,10 @@ def open_executor(
     Raises Mistake for what is not installed or does not answer, and where a worker is lost in the body.
     """
     if scheduler is not None and kind != "dask":
-        raise Mistake(f"--scheduler: expected it beside --executor dask, got --executor {kind}")
+        raise A7SimError(f"--scheduler: expected it beside --executor dask, got --executor {kind}")
     if workers is not None and (scheduler is not None or kind in ("process", "mpi")):
         asked = f"--executor {kind}" if scheduler is None else "--scheduler, which has workers of its own"
-        raise Mistake(f"--workers: expected it for a pool or for dask on this computer, got {asked}")
+        raise A7SimError(f"--workers: expected it for a pool or for dask on this computer, got {asked}")
     workers = workers or os.cpu_count() or 1
     if kind == "process":
         yield InProcess(), 1
@@ -80,7 +80,7 @@ def _pool(workers: int) -> Iterator[Executor]:
         except BaseException as error:
             ours.close()
             if isinstance(error, BrokenExecutor):
-                raise Mistake(f"a worker of the study was lost (killed, or out of memory); {RESUME_HINT}") from error
+                raise A7SimError(f"a worker of the study was lost (killed, or out of memory); {RESUME_HINT}") from error
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)

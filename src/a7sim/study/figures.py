@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from a7sim.documents import Document
 from a7sim.report.drawing import FAINT, FILL, INK, LEFT, PANEL, RIGHT, SOFT, TRUE, drawing
-from a7sim.report.page import Picture
+from a7sim.report.page import PageFigure
 from a7sim.study.claims import SMALL_CORRELATION, SMALL_EFFECT
 from a7sim.study.findings import cell_label
 from a7sim.study.responses import OF_MODEL
@@ -26,7 +26,7 @@ _UNITS = ("m", "mm", "gon")
 _MAX_IN_A_MAP, _MAX_BESIDE = 10, 3
 
 
-def response_figures(document: Document, response: Document) -> Iterator[Picture]:
+def response_figures(document: Document, response: Document) -> Iterator[PageFigure]:
     """Yield what there is to draw of a response. Raises Mistake where matplotlib is not installed."""
     name = response["name"]
     cells = [cell for cell in document["cells"] if cell["responses"][name]["count"]]
@@ -40,7 +40,7 @@ def response_figures(document: Document, response: Document) -> Iterator[Picture
         yield intervals(cells, response)
 
 
-def claim_figures(document: Document) -> Iterator[Picture]:
+def claim_figures(document: Document) -> Iterator[PageFigure]:
     """Yield effects with their intervals, and how responses go with those on which they are said to depend."""
     tests = [(claim, test) for claim in document["claims"] for test in claim["tests"]]
     effects = [(c, t) for c, t in tests if "on" not in t and isfinite(t["effect_interval"][0])]
@@ -64,7 +64,7 @@ def _named(kind: str, response: Document) -> str:
     return f"{kind}-{''.join(each if each.isalnum() else '-' for each in response['name'])}"
 
 
-def intervals(cells: Sequence[Document], response: Document) -> Picture:
+def intervals(cells: Sequence[Document], response: Document) -> PageFigure:
     """Return quantiles, medians, means and their intervals by cell."""
     spreads = [cell["responses"][response["name"]] for cell in cells]
     means = "; ".join(f"{cell_label(c)} {s['mean']:.4g}" for c, s in zip(cells, spreads, strict=True))
@@ -89,7 +89,7 @@ def intervals(cells: Sequence[Document], response: Document) -> Picture:
     return drawn.picture
 
 
-def density_figure(curves: Sequence[Document], response: Document) -> Picture:
+def density_figure(curves: Sequence[Document], response: Document) -> PageFigure:
     """Return kernel densities of a response, an axes for each factor and a curve for each of its levels."""
     factors = " and ".join(each["factor"] for each in curves)
     size = (WIDTH_IN if len(curves) > 1 else 0.75 * WIDTH_IN, _INCHES_HIGH)
@@ -115,7 +115,7 @@ def _is_a_map(document: Document, cells: Sequence[Document]) -> bool:
     return whole and len(counts) == 2 and max(counts) <= _MAX_IN_A_MAP
 
 
-def heat_map(document: Document, response: Document) -> Picture:
+def heat_map(document: Document, response: Document) -> PageFigure:
     """Return the means of all combinations of two factors, each with its interval."""
     name, (down, across) = response["name"], document["factors"]
     rows, columns = (list(dict.fromkeys(cell["levels"][f] for cell in document["cells"])) for f in (down, across))
@@ -154,7 +154,7 @@ def _levels(document: Document, response: str, factor: str) -> list[Document]:
     return [each for each in document["levels"] if (each["response"], each["factor"]) == (response, factor)]
 
 
-def axis_figure(document: Document, response: Document, factors: Sequence[str]) -> Picture:
+def axis_figure(document: Document, response: Document, factors: Sequence[str]) -> PageFigure:
     """Return means against what the levels of factors count: points, or how far levels lie apart."""
     size = (WIDTH_IN if len(factors) > 1 else 0.75 * WIDTH_IN, _INCHES_HIGH)
     counts = [document["places"][factor]["counts"] for factor in factors]
@@ -198,7 +198,7 @@ def _against(axes: "Axes", document: Document, name: str, factor: str) -> None:
     axes.grid(axis="y", linewidth=0.6)
 
 
-def _forest(tests: Sequence[tuple[Document, Document]], size_of: str, small: float, label: str) -> Picture:
+def _forest(tests: Sequence[tuple[Document, Document]], size_of: str, small: float, label: str) -> PageFigure:
     rows = [_row(claim, test) for claim, test in tests]
     size = (WIDTH_IN, _INCHES_BESIDE + _INCHES_A_ROW * len(tests))
     text = "; ".join(f"{row} {test[size_of]:.2f}" for row, (_, test) in zip(rows, tests, strict=True))
@@ -233,7 +233,7 @@ def _in_words(name: str) -> str:
     return f"{words} of model {model}" if model else words
 
 
-def _dependences(document: Document, tests: Sequence[Document]) -> Iterator[Picture]:
+def _dependences(document: Document, tests: Sequence[Document]) -> Iterator[PageFigure]:
     """Yield for every response its means against those on which it is said to depend."""
     responses = {each["name"]: each for each in document["responses"]}
     for name in dict.fromkeys(test["response"] for test in tests):

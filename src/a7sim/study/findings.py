@@ -13,7 +13,7 @@ from a7sim.geometry import Array
 from a7sim.study.cells import Cell
 from a7sim.study.claims import format_probability, test_claims
 from a7sim.study.latin import main_effects, noise_share
-from a7sim.study.loading import Laid
+from a7sim.study.loading import LoadedStudy
 from a7sim.study.places import axis_positions
 from a7sim.study.running import precision_reached
 from a7sim.study.statistics import (
@@ -36,7 +36,7 @@ MAX_DENSITIES = 8
 """Levels of a factor whose curves can be told apart."""
 
 
-def findings_document(laid: Laid, tally: Tally) -> Document:
+def findings_document(laid: LoadedStudy, tally: Tally) -> Document:
     """Return the document of a study; the same study and tally give the same document."""
     study = laid.study
     document = document_header("study") | {
@@ -67,7 +67,7 @@ def findings_document(laid: Laid, tally: Tally) -> Document:
     return document | {"in_a_sentence": summary_sentence(document), "answer": list(_answer(document))}
 
 
-def _cell(laid: Laid, tally: Tally, i: int, cell: Cell) -> Document:
+def _cell(laid: LoadedStudy, tally: Tally, i: int, cell: Cell) -> Document:
     sample = tally.sample(i)
     return {
         "cell": cell.number,
@@ -81,7 +81,7 @@ def _cell(laid: Laid, tally: Tally, i: int, cell: Cell) -> Document:
     }
 
 
-def _spread(laid: Laid, tally: Tally, at: tuple[int, int], sample: Array) -> Document:
+def _spread(laid: LoadedStudy, tally: Tally, at: tuple[int, int], sample: Array) -> Document:
     count = int(tally.count[at])
     if count == 0:
         return {"count": 0}
@@ -101,14 +101,14 @@ def _spread(laid: Laid, tally: Tally, at: tuple[int, int], sample: Array) -> Doc
     } | _theory(laid, at, mean, sd)
 
 
-def _theory(laid: Laid, at: tuple[int, int], mean: float, sd: float) -> Document:
+def _theory(laid: LoadedStudy, at: tuple[int, int], mean: float, sd: float) -> Document:
     """Return what theory says of a response in a cell; nothing of strips, whose models differ in their plans."""
     if laid.study.strips is not None:
         return {}
     return theory_comparison(laid.scenarios[at[0]], laid.responses[at[1]].name, mean, sd)
 
 
-def _comparisons(laid: Laid, tally: Tally) -> Iterator[Document]:
+def _comparisons(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
     """Yield every other cell beside the first, response by response, adjusted for as many comparisons."""
     first = tally.sample(0)
     others = [tally.sample(i) for i in range(1, len(laid.cells))]
@@ -131,14 +131,14 @@ def _comparisons(laid: Laid, tally: Tally) -> Iterator[Document]:
             }
 
 
-def _variance(laid: Laid, tally: Tally) -> Iterator[Document]:
+def _variance(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
     for j, response in enumerate(laid.responses):
         for effects in _analyses(laid, tally, j):
             if effects:
                 yield {"response": response.name, "sources": [_effect(each) for each in effects]}
 
 
-def _analyses(laid: Laid, tally: Tally, response: int) -> Iterator[Sequence[Effect]]:
+def _analyses(laid: LoadedStudy, tally: Tally, response: int) -> Iterator[Sequence[Effect]]:
     """Yield one analysis of a full factorial, one a factor where factors were varied one at a time, none else."""
     factors, design = laid.factors, laid.study.design
     if not factors or design == "latin-hypercube":
@@ -155,7 +155,7 @@ def _analyses(laid: Laid, tally: Tally, response: int) -> Iterator[Sequence[Effe
         begin += count - 1
 
 
-def _main_effects(laid: Laid, tally: Tally) -> Iterator[Document]:
+def _main_effects(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
     """Yield what the factors of a Latin hypercube weigh, response by response; nothing of another design."""
     if laid.study.design != "latin-hypercube":
         return
@@ -176,14 +176,14 @@ def _main_effects(laid: Laid, tally: Tally) -> Iterator[Document]:
             yield {"response": response.name} | found
 
 
-def _replicates(laid: Laid, tally: Tally, response: int) -> Array:
+def _replicates(laid: LoadedStudy, tally: Tally, response: int) -> Array:
     """Return the replicates ``(cells, n)`` of a response that every cell has."""
     samples = [tally.sample(i)[response] for i in range(len(laid.cells))]
     n = min(each.size for each in samples)
     return np.array([each[:n] for each in samples])
 
 
-def _claims(laid: Laid, tally: Tally, document: Document) -> list[Document]:
+def _claims(laid: LoadedStudy, tally: Tally, document: Document) -> list[Document]:
     responses = {each["name"]: each for each in document["responses"]}
     names = laid.study.responses
     return test_claims(
@@ -191,7 +191,7 @@ def _claims(laid: Laid, tally: Tally, document: Document) -> list[Document]:
     )
 
 
-def _levels(laid: Laid, tally: Tally) -> Iterator[Document]:
+def _levels(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
     """Yield the mean of every level of a factor, replicate by replicate that of all its cells."""
     for j, response in enumerate(laid.responses):
         values = _replicates(laid, tally, j)
@@ -206,7 +206,7 @@ def _levels(laid: Laid, tally: Tally) -> Iterator[Document]:
                     yield {"response": response.name, "factor": factor, "level": level} | found
 
 
-def _densities(laid: Laid, tally: Tally) -> Iterator[Document]:
+def _densities(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
     """Yield how a response is distributed at each level of a factor, whatever those of the others."""
     for j, response in enumerate(laid.responses):
         values = _replicates(laid, tally, j)

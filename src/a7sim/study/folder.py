@@ -6,10 +6,10 @@ from tempfile import TemporaryFile
 
 from a7sim.documents import Document, as_json
 from a7sim.files import to_csv
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.session.folder import RESULTS, write_atomic
 from a7sim.study import checkpoint
-from a7sim.study.loading import Laid
+from a7sim.study.loading import LoadedStudy
 from a7sim.study.page import study_page
 from a7sim.study.simulating import replicate_seed
 from a7sim.study.tally import Tally
@@ -23,7 +23,7 @@ CELLS, COMPARISONS, REPLICATES, PAGE = (
 FILES = (*checkpoint.KINDS, CELLS, COMPARISONS, REPLICATES, PAGE, RESULTS)
 
 
-def open_tally(laid: Laid, out: Path | None, force: bool) -> Tally:
+def open_tally(laid: LoadedStudy, out: Path | None, force: bool) -> Tally:
     """Return the tally of a study as its folder holds it, or an empty one, and make the folder.
 
     Raises Mistake for a folder that holds something else, unless forced to begin anew.
@@ -33,20 +33,22 @@ def open_tally(laid: Laid, out: Path | None, force: bool) -> Tally:
         return empty
     try:
         if out.exists() and not out.is_dir():
-            raise Mistake(f"{out}: expected a folder, got a file")
+            raise A7SimError(f"{out}: expected a folder, got a file")
         if out.is_dir() and not force:
             left = checkpoint.newest_checkpoint(out)
             if left is not None:
                 _see_that_it_can_be_written(out)
                 return _not_beyond(checkpoint.load(left, laid.identity), laid, left)
             if any(out.iterdir()):
-                raise Mistake(f"{out}: expected an empty folder or that of a study, got another (--force writes there)")
+                raise A7SimError(
+                    f"{out}: expected an empty folder or that of a study, got another (--force writes there)"
+                )
         out.mkdir(parents=True, exist_ok=True)
         _see_that_it_can_be_written(out)
         for name in FILES:
             (out / name).unlink(missing_ok=True)
     except OSError as error:
-        raise Mistake(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
+        raise A7SimError(f"{str(out)[:200]}: expected a folder that can be written: {error.strerror}") from error
     return empty
 
 
@@ -54,14 +56,14 @@ def _see_that_it_can_be_written(folder: Path) -> None:
     TemporaryFile(dir=folder).close()
 
 
-def _not_beyond(tally: Tally, laid: Laid, path: Path) -> Tally:
+def _not_beyond(tally: Tally, laid: LoadedStudy, path: Path) -> Tally:
     done = int(tally.done.max())
     if done > laid.replicates:
-        raise Mistake(f"{path}: expected {done} replicates or more, since so many are done, got {laid.replicates}")
+        raise A7SimError(f"{path}: expected {done} replicates or more, since so many are done, got {laid.replicates}")
     return tally
 
 
-def write_results(out: Path, laid: Laid, tally: Tally, document: Document) -> None:
+def write_results(out: Path, laid: LoadedStudy, tally: Tally, document: Document) -> None:
     """Leave results and tables in a folder."""
     write_atomic(out / CELLS, _cells_csv(document))
     write_atomic(out / COMPARISONS, _comparisons_csv(document))
@@ -112,7 +114,7 @@ def _comparisons_csv(document: Document) -> str:
     return to_csv(header, rows)
 
 
-def _replicates_csv(laid: Laid, tally: Tally) -> str:
+def _replicates_csv(laid: LoadedStudy, tally: Tally) -> str:
     """Return the sample, a replicate a line; nan is a session that gave up."""
     rows = (
         (

@@ -11,7 +11,7 @@ import msgspec
 
 import a7sim
 from a7sim.files import describe_missing_file, read_toml
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
 from a7sim.scenario.validation import schema_errors
 from a7sim.session.combinations import check_strips_possible
@@ -27,7 +27,7 @@ SEARCH_PATH = bundled_dirs("studies")
 """Where the studies are that come with a7sim."""
 
 
-class StudyError(Mistake):
+class StudyError(A7SimError):
     """A study that cannot be used; every line names a mistake and where it stands."""
 
     def __init__(self, source: str, mistakes: Sequence[str]) -> None:
@@ -35,7 +35,7 @@ class StudyError(Mistake):
 
 
 @dataclass(frozen=True)
-class Laid:
+class LoadedStudy:
     """A study with its cells, the scenarios that give their numbers, and its responses, ready to be worked.
 
     A scenario gives those of one cell, or of as many that follow each other as its `Task` says.
@@ -97,7 +97,7 @@ def find_study(name: str | Path) -> Path:
     )
 
 
-def load_study(name: str | Path, replicates: int | None = None) -> Laid:
+def load_study(name: str | Path, replicates: int | None = None) -> LoadedStudy:
     """Return a study ready to be worked, with other replicates if given. Raises Mistake."""
     path = find_study(name)
     raw = read_toml(path)
@@ -106,7 +106,7 @@ def load_study(name: str | Path, replicates: int | None = None) -> Laid:
     return build_study(raw, path.parent, str(path))
 
 
-def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> Laid:
+def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> LoadedStudy:
     """Return the study of raw tables whose scenario stands in `folder`, or comes with a7sim. Raises StudyError."""
     if "scenario" not in raw and "photos" in raw:
         raise StudyError(source, ["expected a study, got a scenario (`a7sim run` takes it)"])
@@ -116,7 +116,7 @@ def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> 
     study = msgspec.convert(raw, Study)
     try:
         cells, responses = make_cells(study), [find_response(name) for name in study.responses]
-    except Mistake as mistake:
+    except A7SimError as mistake:
         raise StudyError(source, [str(mistake)]) from mistake
     mistakes = list(_mistakes_between(study))
     if mistakes:
@@ -126,9 +126,9 @@ def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> 
         if study.strips is not None:
             cells = make_strip_cells(cells, _models_of_strips(study, scenarios))
         validate_claims(study, cells)
-    except Mistake as mistake:
+    except A7SimError as mistake:
         raise StudyError(source, [str(mistake)]) from mistake
-    return Laid(study, tuple(cells), scenarios, tuple(responses), source)
+    return LoadedStudy(study, tuple(cells), scenarios, tuple(responses), source)
 
 
 def _mistakes_between(study: Study) -> list[str]:
@@ -150,10 +150,10 @@ def _models_of_strips(study: Study, scenarios: Sequence[Scenario]) -> list[str]:
     """Return the names of the models whose cases are combined. Raises Mistake where that cannot be done."""
     paths = [*study.settings, *(path for cell in make_cells(study) for path in cell.settings)]
     if "plan.case" in paths or study.design != "full":
-        raise Mistake("strips = 'all': expected a full design without plan.case, since every case is worked")
+        raise A7SimError("strips = 'all': expected a full design without plan.case, since every case is worked")
     names = {tuple(model.name for model in scenario.models) for scenario in scenarios}
     if len(names) != 1 or any(scenario.work != ["plotter"] for scenario in scenarios):
-        raise Mistake("strips = 'all': expected the same models in every cell and work at the plotter alone")
+        raise A7SimError("strips = 'all': expected the same models in every cell and work at the plotter alone")
     for scenario in scenarios:
         check_strips_possible(scenario)
     return list(names.pop())

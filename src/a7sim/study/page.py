@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from a7sim.documents import Document
 from a7sim.report.markdown import markdown
-from a7sim.report.page import Chapter, Folded, Heading, Paragraph, Part, Sheet, page
+from a7sim.report.page import Chapter, Details, Heading, Paragraph, Part, TableBlock, page
 from a7sim.study import figures
 from a7sim.study.findings import cell_label
 
@@ -85,8 +85,8 @@ def _how(document: Document) -> Iterator[Part]:
         )
         for cell in document["cells"]
     ]
-    cells = Sheet("Cells", ("Cell", "Levels", "Settings", "Sessions", "Gave up"), rows, frozenset({0, 1, 2}))
-    yield Folded(f"The {len(rows)} cells", [cells]) if len(rows) > _MAX_OPEN else cells
+    cells = TableBlock("Cells", ("Cell", "Levels", "Settings", "Sessions", "Gave up"), rows, frozenset({0, 1, 2}))
+    yield Details(f"The {len(rows)} cells", [cells]) if len(rows) > _MAX_OPEN else cells
 
 
 def _settings(settings: Document) -> str:
@@ -113,10 +113,10 @@ def _response(document: Document, response: Document) -> Iterator[Part]:
     beside = [each for each in document["comparisons"] if each["response"] == name]
     if beside:
         sheets.append(_comparisons(beside, {cell["cell"]: cell_label(cell) for cell in document["cells"]}))
-    yield Folded("Cells in numbers", sheets)
+    yield Details("Cells in numbers", sheets)
 
 
-def _spreads(cells: Sequence[Document], name: str) -> Sheet:
+def _spreads(cells: Sequence[Document], name: str) -> TableBlock:
     columns = ("Cell", "Sessions", "Mean", "95 %", "Sd", "95 %")
     quantiles = list(cells[0]["responses"][name]["quantiles"])
     rows = [_spread(cell, name) for cell in cells]
@@ -127,7 +127,7 @@ def _spreads(cells: Sequence[Document], name: str) -> Sheet:
         rows = [
             [*row, *("" if math.isnan(v) else _short(v) for v in two)] for row, two in zip(rows, of_theory, strict=True)
         ]
-    return Sheet("Means, standard deviations and quantiles", header, rows)
+    return TableBlock("Means, standard deviations and quantiles", header, rows)
 
 
 def _spread(cell: Document, name: str) -> Sequence[str]:
@@ -140,7 +140,7 @@ def _spread(cell: Document, name: str) -> Sequence[str]:
     )
 
 
-def _comparisons(beside: Sequence[Document], labels: dict[int, str]) -> Sheet:
+def _comparisons(beside: Sequence[Document], labels: dict[int, str]) -> TableBlock:
     rows = [
         (
             labels[each["cell"]],
@@ -153,12 +153,12 @@ def _comparisons(beside: Sequence[Document], labels: dict[int, str]) -> Sheet:
         )
         for each in beside
     ]
-    return Sheet(
+    return TableBlock(
         f"Minus {labels[1]}, in pairs", ("Cell", "Pairs", "Difference", "95 %", "Cohen's d", "95 %", "p"), rows
     )
 
 
-def _variance(sources: Sequence[Document]) -> Sheet:
+def _variance(sources: Sequence[Document]) -> TableBlock:
     rows = [
         (
             each["source"],
@@ -177,7 +177,7 @@ def _variance(sources: Sequence[Document]) -> Sheet:
         for tested in [each["source"] != "remaining"]
     ]
     columns = ("Source", "Squares", "Freedom", "Against", "F", "Epsilon", "p", "Partial eta²")
-    return Sheet("Analysis of variance, replicates as blocks", columns, rows)
+    return TableBlock("Analysis of variance, replicates as blocks", columns, rows)
 
 
 def _main_effects(hypercube: Document) -> Iterator[Part]:
@@ -188,7 +188,7 @@ def _main_effects(hypercube: Document) -> Iterator[Part]:
         )
         for each in hypercube["factors"]
     ]
-    yield Sheet("What each factor weighs alone", ("Factor", "Share", "95 %", "p", "Slope of ranks", "95 %"), rows)
+    yield TableBlock("What each factor weighs alone", ("Factor", "Share", "95 %", "p", "Slope of ranks", "95 %"), rows)
     yield Paragraph(
         "Share: of the variance between the means of cells, that of the curve fitted along a factor, the curves of all "
         "factors together, and what chance adds to it taken off; p by the F test of the curve; slope: standardised "

@@ -5,11 +5,11 @@ from typing import Any
 from a7sim.documents import Document
 from a7sim.standard_points import CASES
 from a7sim.study.cells import factor_levels
-from a7sim.study.loading import Laid
+from a7sim.study.loading import LoadedStudy
 from a7sim.study.schema import Factor
 
 
-def axis_positions(laid: Laid) -> dict[str, Document]:
+def axis_positions(laid: LoadedStudy) -> dict[str, Document]:
     """Return by factor what its axis counts and the place of every level; nothing of a factor that has no axis."""
     own = {factor.name: factor for factor in laid.study.factor}
     found = {}

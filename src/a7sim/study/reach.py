@@ -8,9 +8,9 @@ from a7sim.geometry import GON, Array, mxm, mxv, rotation, transposed
 from a7sim.manual import VARIANTS, Variant
 from a7sim.operator import ModelJob
 from a7sim.scenario import Plan, Scenario
-from a7sim.scenario.schema import Model, Photo
+from a7sim.scenario.schema import ModelPlan, Photo
 from a7sim.scene import RelativeTruth
-from a7sim.session.truth import Relative, true_elements
+from a7sim.session.truth import RelativePose, true_elements
 
 
 def settings_out_of_range(scenario: Scenario) -> Iterator[str]:
@@ -48,7 +48,9 @@ def _levels_beyond_reach(plan: Plan, variant: Variant) -> Iterator[str]:
             )
 
 
-def _orientation_beyond_reach(model: Model, left: Photo, right: Photo, plan: Plan, variant: Variant) -> Iterator[str]:
+def _orientation_beyond_reach(
+    model: ModelPlan, left: Photo, right: Photo, plan: Plan, variant: Variant
+) -> Iterator[str]:
     """Yield a sentence for every element that the photographs as they were flown would take beyond its range."""
     if left.position is None or right.position is None or "upside down" in (left.laid, right.laid):
         return
@@ -64,10 +66,10 @@ def _orientation_beyond_reach(model: Model, left: Photo, right: Photo, plan: Pla
             )
 
 
-def _flown(left: Photo, right: Photo) -> Relative:
+def _flown(left: Photo, right: Photo) -> RelativePose:
     to_left = transposed(_turned(left))
     base = np.subtract(right.position or (), left.position or ())
-    return Relative.from_truth(RelativeTruth(mxm(to_left, _turned(right)), mxv(to_left, base), "the flight"))
+    return RelativePose.from_truth(RelativeTruth(mxm(to_left, _turned(right)), mxv(to_left, base), "the flight"))
 
 
 def _turned(photo: Photo) -> Array:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from a7sim.documents import Document
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 
 Reader = Callable[[Document], float]
 
@@ -62,7 +62,9 @@ class Response:
         try:
             return float(f"{self.read(document):.{SIGNIFICANT}g}")
         except (KeyError, IndexError, TypeError, ValueError) as error:
-            raise Mistake(f"response {self.name!r}: expected a number in the results, found none ({error})") from error
+            raise A7SimError(
+                f"response {self.name!r}: expected a number in the results, found none ({error})"
+            ) from error
 
 
 def find_response(name: str) -> Response:
@@ -80,7 +82,7 @@ def find_response(name: str) -> Response:
         return Response(name, "", f"{name} in results.json", lambda document: _at(document, parts))
     near = get_close_matches(name, RESPONSES, n=1)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(RESPONSES)}"
-    raise Mistake(f"responses: expected a response or a path that begins with models., got {name!r}; {hint}")
+    raise A7SimError(f"responses: expected a response or a path that begins with models., got {name!r}; {hint}")
 
 
 def needs_strip(name: str) -> bool:
@@ -97,7 +99,7 @@ def _in_one_model(response: Response, model: int) -> Response:
     """Return a response of the models read in one of them, counted from 1. Raises Mistake for one of the strip."""
     of_all = next((each for each in OF_ALL if response.meaning.endswith(each)), None)
     if of_all is None:
-        raise Mistake(f"responses: expected a response of models before {OF_MODEL}, got {response.name!r}")
+        raise A7SimError(f"responses: expected a response of models before {OF_MODEL}, got {response.name!r}")
 
     def read(document: Document) -> float:
         models = document["models"][model - 1 : model]

@@ -11,7 +11,7 @@ import numpy as np
 
 from a7sim.geometry import Array
 from a7sim.study.checkpoint import save
-from a7sim.study.loading import Laid
+from a7sim.study.loading import LoadedStudy
 from a7sim.study.simulating import Task, replicate_seed
 from a7sim.study.tally import Tally
 
@@ -23,7 +23,7 @@ _FIRST_CHUNK, _FASTEST_GROWTH = 8, 4.0
 
 
 @dataclass(frozen=True)
-class Pace:
+class ChunkPolicy:
     """How a study is cut in chunks; what comes of it does not depend on this."""
 
     chunk_seconds: float = 20.0
@@ -38,7 +38,7 @@ class Pace:
 class _Size:
     """How many replicates a chunk has, from the seconds that chunks of other sizes took."""
 
-    def __init__(self, pace: Pace) -> None:
+    def __init__(self, pace: ChunkPolicy) -> None:
         self._pace = pace
         self._seconds: dict[int, float] = {}
         self.best = min(_FIRST_CHUNK, pace.largest_chunk)
@@ -73,20 +73,20 @@ class _Chunk:
 
 
 def run_study(
-    laid: Laid,
+    laid: LoadedStudy,
     tally: Tally,
     executor: Executor,
     at_once: int = 1,
     checkpoint: Path | None = None,
     tick: Callable[[int], None] = lambda _: None,
-    pace: Pace | None = None,
+    pace: ChunkPolicy | None = None,
 ) -> None:
     """Work a study on from where its tally stands until all replicates are done or its precision is reached.
 
     `at_once` chunks are under way beside as many that wait; results are added in the order in which they were asked
     for. However it ends, the checkpoint holds what was added.
     """
-    pace = pace or Pace()
+    pace = pace or ChunkPolicy()
     saved_at = -np.inf
     try:
         for chunk, values in _results(laid, tally, executor, 2 * at_once, pace):
@@ -101,7 +101,7 @@ def run_study(
             save(tally, checkpoint, laid.identity)
 
 
-def precision_reached(laid: Laid, tally: Tally) -> bool:
+def precision_reached(laid: LoadedStudy, tally: Tally) -> bool:
     """Return whether the mean that a study wants to know is known well enough in every cell."""
     wanted = laid.study.precision
     if wanted is None or int(tally.done.min()) == 0:
@@ -112,7 +112,7 @@ def precision_reached(laid: Laid, tally: Tally) -> bool:
 
 
 def _results(
-    laid: Laid, tally: Tally, executor: Executor, most_waiting: int, pace: Pace
+    laid: LoadedStudy, tally: Tally, executor: Executor, most_waiting: int, pace: ChunkPolicy
 ) -> Iterator[tuple[_Chunk, Array]]:
     for stop in _stops(laid):
         if int(tally.done.min()) >= stop:
@@ -127,7 +127,7 @@ def _on_a_step(tally: Tally) -> bool:
     return bool((tally.done == tally.done[0]).all()) and int(tally.done[0]) % STEP == 0
 
 
-def _stops(laid: Laid) -> Iterator[int]:
+def _stops(laid: LoadedStudy) -> Iterator[int]:
     """Yield the numbers of replicates that every cell must have before the study looks whether that is enough."""
     if laid.study.precision is not None:
         yield from range(STEP, laid.replicates, STEP)
@@ -135,7 +135,7 @@ def _stops(laid: Laid) -> Iterator[int]:
 
 
 def _up_to(
-    stop: int, laid: Laid, tally: Tally, executor: Executor, most_waiting: int, pace: Pace
+    stop: int, laid: LoadedStudy, tally: Tally, executor: Executor, most_waiting: int, pace: ChunkPolicy
 ) -> Iterator[tuple[_Chunk, Array]]:
     asked = tally.done.reshape(len(laid.tasks), -1).min(axis=1)
     size = _Size(pace)

@@ -40,7 +40,7 @@ class Precision(_Data, frozen=True, kw_only=True):
     """Of the 95 % interval of its mean."""
 
 
-class Claim(_Data, frozen=True, kw_only=True):
+class Hypothesis(_Data, frozen=True, kw_only=True):
     """What somebody holds to be so, and the cells or responses that tell whether it is.
 
     `differ`, two groups of levels of a factor that are said to differ; `alike`, levels that are said to give the same;
@@ -79,7 +79,7 @@ class Study(_Data, frozen=True, kw_only=True):
     """Cells of a Latin hypercube."""
     responses: Annotated[list[str], Meta(min_length=1, max_length=100, description="1 to 100 responses")]
     """Names that `study.responses` lists, or paths in a document of results such as models.0.truth.centres.left.Z0."""
-    claim: list[Claim] = []
+    claim: list[Hypothesis] = []
     replicates: Count | None = None
     """In every cell; with a precision to reach, at most so many."""
     precision: Precision | None = None

@@ -14,7 +14,7 @@ Counts = npt.NDArray[np.int64]
 
 
 @dataclass
-class Sketch:
+class QuantileSketch:
     """Values in levels, each of which stands for ``2**level`` of those that were added.
 
     A level that is full is put in order, and every second value goes one level up: the first, third ... and the next

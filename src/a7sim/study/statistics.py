@@ -122,7 +122,7 @@ def binned(values: Array, on: Array, bins: int = 10) -> dict[str, list[float]]:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class CellComparison:
     """A cell's replicates minus those of another, pair by pair."""
 
     pairs: int
@@ -137,7 +137,7 @@ class Comparison:
     """Of no difference, by the paired t test."""
 
 
-def compare_cells(values: Array, against: Array) -> Comparison:
+def compare_cells(values: Array, against: Array) -> CellComparison:
     """Compare replicates ``(n,)`` with those of the same numbers in another cell, or ``(cells, n)`` in several.
 
     Several cells are averaged replicate by replicate. Who gave up in any is left out. The interval of the effect is by
@@ -150,7 +150,7 @@ def compare_cells(values: Array, against: Array) -> Comparison:
     values, against = values[:, whole], against[:, whole]
     pairs = values.shape[1]
     if pairs < 2:
-        return Comparison(pairs, math.nan, _UNKNOWN, math.nan, math.nan, _UNKNOWN, math.nan)
+        return CellComparison(pairs, math.nan, _UNKNOWN, math.nan, math.nan, _UNKNOWN, math.nan)
     from scipy.stats import t  # noqa: PLC0415
 
     differences = values.mean(axis=0) - against.mean(axis=0)
@@ -162,7 +162,7 @@ def compare_cells(values: Array, against: Array) -> Comparison:
     p = 2.0 * float(t.sf(abs(deviations), pairs - 1))
     influence = (differences - mean) / math.sqrt(variance) - effect / 2.0 * (squares / variance) if variance else None
     spread = mean_interval(effect, float(influence.std(ddof=1)), pairs) if influence is not None else _UNKNOWN
-    return Comparison(pairs, mean, mean_interval(mean, sd, pairs), sd, effect, spread, p)
+    return CellComparison(pairs, mean, mean_interval(mean, sd, pairs), sd, effect, spread, p)
 
 
 def _squares(values: Array) -> Array:

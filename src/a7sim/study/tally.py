@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.study.sketch import Counts, Sketch
+from a7sim.study.sketch import Counts, QuantileSketch
 
 SAMPLE = 10_000
 """Replicates of a cell that are kept one by one: the first, since replicates come in no order."""
@@ -32,7 +32,7 @@ class Tally:
     high: Array
     samples: list[list[Array]]
     """Blocks ``(responses, n)`` of the first replicates, by cell."""
-    sketches: list[list[Sketch]]
+    sketches: list[list[QuantileSketch]]
     """Of the replicates beyond the sample, by cell and response."""
 
     @classmethod
@@ -48,7 +48,7 @@ class Tally:
             np.full(shape, np.inf),
             np.full(shape, -np.inf),
             [[] for _ in range(cells)],
-            [[Sketch() for _ in range(responses)] for _ in range(cells)],
+            [[QuantileSketch() for _ in range(responses)] for _ in range(cells)],
         )
 
     def add(self, cell: int, values: Array) -> None:

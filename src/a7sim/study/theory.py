@@ -23,7 +23,7 @@ from a7sim.reduction.least_squares import solve_least_squares
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene, build_scene
 from a7sim.session.running import make_job
-from a7sim.session.truth import Relative, true_elements
+from a7sim.session.truth import RelativePose, true_elements
 from a7sim.standard_points import CASES, PLACES
 
 ROUNDING = LEAST_COUNT / math.sqrt(12.0)
@@ -37,7 +37,7 @@ _CENTRE = re.compile(r"models\.\d+\.truth\.centre_differences\.(?:left|right)\.(
 
 
 @dataclass(frozen=True)
-class Propagated:
+class PropagatedErrors:
     """The elements that a procedure turns, and the covariance ``(5, 5)`` of their errors, gon and mm."""
 
     names: tuple[str, ...]
@@ -101,7 +101,7 @@ def theory_sentence(document: Document, scenarios: Sequence[Scenario]) -> Docume
 # --- elements of relative orientation ---------------------------------------------------------------------------------
 
 
-def element_errors(scenario: Scenario, number: int) -> Propagated:
+def element_errors(scenario: Scenario, number: int) -> PropagatedErrors:
     """Return how well the elements of a model are found by the procedure of the plan, and set.
 
     In the first model it is known where between two counts a true element lies, and so how often it is set to which;
@@ -125,7 +125,7 @@ def element_errors(scenario: Scenario, number: int) -> Propagated:
     covariance = by_mean @ (np.outer(gains, gains) * errors + np.diag(spreads)) @ by_mean.T
     covariance += (lasting.mean() + anew / n + ROUNDING**2) * np.outer(to_mean, to_mean)
     with_mean = np.outer(by_mean @ (gains * (solution @ lasting.mean(axis=0))), to_mean)
-    return Propagated(names, (covariance + with_mean + with_mean.T) / np.outer(units, units))
+    return PropagatedErrors(names, (covariance + with_mean + with_mean.T) / np.outer(units, units))
 
 
 def _set_to_counts(sds: Array, fractions: Array) -> Array:
@@ -206,7 +206,7 @@ def _fractions(scenario: Scenario, scene: Scene, number: int, names: Sequence[st
     counters = {name: element.zero for name, element in variant.elements.items()} | {"bx": scenario.plan.bx}
     zeros = {name: np.array([shown]) for name, shown in counters.items()}
     model = make_job(scenario, scene).models[number]
-    true = true_elements(Relative.from_truth(truth).batch(), scenario.plan.method, zeros, model, variant)
+    true = true_elements(RelativePose.from_truth(truth).batch(), scenario.plan.method, zeros, model, variant)
     taking_the_mean = np.abs(to_mean) > 1e-6 * np.abs(to_mean).max()
     return np.where(taking_the_mean, np.nan, [true[name][0] / LEAST_COUNT % 1.0 for name in names])
 

@@ -10,29 +10,29 @@ from a7sim.scenario import Scenario
 from a7sim.scene import Scene
 from a7sim.session.running import make_job
 from a7sim.training.exercise import OPENING, Exercise
-from a7sim.training.witness import Deed, Reading, Witness, WitnessedAutograph
+from a7sim.training.witness import ActionLog, LoggedAutograph, Reading, StudentAction
 
 ANSWER = "answer "
 """How a note begins that answers something at the instrument: NOTE "answer play=0.05"."""
 
 
 @dataclass(frozen=True)
-class Account:
+class AttemptRecord:
     """An attempt as it stands."""
 
     exercise: Exercise
     scenario: Scenario
     scene: Scene
-    autograph: WitnessedAutograph
+    autograph: LoggedAutograph
     """As the attempt leaves it."""
-    witness: Witness
+    witness: ActionLog
     written: Mapping[str, str] = field(default_factory=dict)
     """Answers that were written down beside the journal."""
     hidden: Mapping[str, Any] = field(default_factory=dict)
     """What the maker of the papers knows and did not hand out."""
 
     @property
-    def actions(self) -> Sequence[Deed]:
+    def actions(self) -> Sequence[StudentAction]:
         """The student's deeds."""
         return [each for each in self.witness.deeds if each.client != OPENING]
 

@@ -6,16 +6,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from a7sim.files import read_text
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.session.folder import JOURNAL, write_atomic
 from a7sim.session.lines import read_journal
-from a7sim.session.playing import Player
+from a7sim.session.playing import ScriptRunner
 from a7sim.session.scripts import Script, read_script
 from a7sim.training.account import parse_answers
-from a7sim.training.exercise import OPENING, Played, Shelved
+from a7sim.training.exercise import OPENING, ExerciseFolder, PlayedRun
 from a7sim.training.handouts import make_handout
 from a7sim.training.procedures import run_procedure
-from a7sim.training.room import Room, open_environment, resume_environment
+from a7sim.training.room import AttemptEnvironment, open_environment, resume_environment
 from a7sim.training.variation import scenario_for
 
 ANSWERS = "answers.txt"
@@ -31,7 +31,9 @@ STUDENT = "student"
 
 
 @contextmanager
-def start_attempt(shelved: Shelved, seed: int, folder: Path, student: str, mode: str) -> Iterator[Room]:
+def start_attempt(
+    shelved: ExerciseFolder, seed: int, folder: Path, student: str, mode: str
+) -> Iterator[AttemptEnvironment]:
     """Begin an attempt in a folder: its papers are handed out and its opening is done. Raises Mistake."""
     folder.mkdir(parents=True, exist_ok=True)
     hand_out(shelved, seed, folder)
@@ -41,7 +43,7 @@ def start_attempt(shelved: Shelved, seed: int, folder: Path, student: str, mode:
 
 
 @contextmanager
-def resume_attempt(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
+def resume_attempt(shelved: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
     """Go on with an attempt that was left, or cut off. Raises Mistake."""
     with resume_environment(shelved, seed, folder) as room:
         if not room.action_log.opened:
@@ -49,13 +51,13 @@ def resume_attempt(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
         yield room
 
 
-def hand_out(shelved: Shelved, seed: int, folder: Path) -> None:
+def hand_out(shelved: ExerciseFolder, seed: int, folder: Path) -> None:
     """Put the papers of an exercise into a folder."""
     for name, text in make_papers(shelved, seed).items():
         write_atomic(folder / name, text)
 
 
-def make_papers(shelved: Shelved, seed: int) -> Mapping[str, str]:
+def make_papers(shelved: ExerciseFolder, seed: int) -> Mapping[str, str]:
     """Return the papers of an exercise by file name, none where it has none."""
     exercise = shelved.exercise
     if not exercise.handout:
@@ -63,31 +65,31 @@ def make_papers(shelved: Shelved, seed: int) -> Mapping[str, str]:
     return make_handout(exercise.handout, scenario_for(shelved, seed), seed, exercise.handout_options).papers
 
 
-def run_opening(room: Room) -> None:
+def run_opening(room: AttemptEnvironment) -> None:
     """Do the opening of an exercise. Raises Mistake where it cannot be done."""
     opening = room.shelved.exercise.opening
     if opening is not None:
         trouble = play_item(room, opening, OPENING)
         if trouble:
-            raise Mistake(f"{room.shelved.name}: the opening cannot be done: {trouble}")
+            raise A7SimError(f"{room.shelved.name}: the opening cannot be done: {trouble}")
 
 
-def play_item(room: Room, played: Played, client: str = STUDENT) -> str:
+def play_item(room: AttemptEnvironment, played: PlayedRun, client: str = STUDENT) -> str:
     """Let a script or a procedure be played; return what kept it from its end, empty where nothing did."""
     if played.procedure:
         return run_procedure(room, played, client, make_papers(room.shelved, room.seed))
     return play_script(room, read_script(room.shelved.folder / played.script), client)
 
 
-def play_script(room: Room, script: Script, client: str = STUDENT) -> str:
+def play_script(room: AttemptEnvironment, script: Script, client: str = STUDENT) -> str:
     """Play a script at the instrument of an attempt; return what it expected in vain, empty where nothing."""
-    not_met = Player(script, desk=room.desk, clock=room.clock).run(client)
+    not_met = ScriptRunner(script, desk=room.desk, clock=room.clock).run(client)
     if not_met is not None and client in room.desk.clients:
         room.desk.close(client, room.clock.now)
     return str(not_met) if not_met is not None else ""
 
 
-def seed_for(shelved: Shelved, played: Played, otherwise: int = 1) -> int:
+def seed_for(shelved: ExerciseFolder, played: PlayedRun, otherwise: int = 1) -> int:
     """Return the seed with which something is played: a script's own, or that of the exercise's reference."""
     if played.seed is not None:
         return played.seed
@@ -97,7 +99,7 @@ def seed_for(shelved: Shelved, played: Played, otherwise: int = 1) -> int:
     return otherwise if played is reference else seed_for(shelved, reference)
 
 
-def run_attempt(shelved: Shelved, played: Played, folder: Path, seed: int, student: str = "somebody") -> str:
+def run_attempt(shelved: ExerciseFolder, played: PlayedRun, folder: Path, seed: int, student: str = "somebody") -> str:
     """Do an exercise from its opening to its end in a folder; return what kept it from its end."""
     folder.mkdir(parents=True, exist_ok=True)
     hand_out(shelved, seed, folder)
@@ -145,4 +147,4 @@ def attempt_mode(folder: Path) -> tuple[str, str, str]:
     try:
         return settings["exercise"], settings["student"], settings["mode"]
     except (KeyError, TypeError):
-        raise Mistake(f"{folder}: expected the journal of an attempt at an exercise, got another") from None
+        raise A7SimError(f"{folder}: expected the journal of an attempt at an exercise, got another") from None

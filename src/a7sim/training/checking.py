@@ -7,15 +7,15 @@ from pathlib import Path
 
 from msgspec.structs import replace as changed
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario
-from a7sim.session.scripts import Say, Script, read_script
-from a7sim.training.account import Account
+from a7sim.session.scripts import Script, SendLine, read_script
+from a7sim.training.account import AttemptRecord
 from a7sim.training.attempts import run_attempt, seed_for
-from a7sim.training.exercise import FULL_MARKS, Exercise, Shelved
+from a7sim.training.exercise import FULL_MARKS, Exercise, ExerciseFolder
 from a7sim.training.grading import Grade, evaluate_metrics, grade_by, load_record
-from a7sim.training.measures import Found, make_metric
-from a7sim.training.rehearsing import Rehearsals
+from a7sim.training.measures import MetricResult, make_metric
+from a7sim.training.rehearsing import DryRuns
 from a7sim.training.variation import scenario_for
 from a7sim.wording import pluralize
 
@@ -26,7 +26,7 @@ NEVER = 1e12
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckResult:
     """What was found of an exercise: sentences on what is missing or wrong, none where all is well."""
 
     name: str
@@ -38,11 +38,11 @@ class Checked:
 class _Run:
     """Something played: its account, and what every criterion's measure came to, which no change of a limit changes."""
 
-    account: Account
-    found: Sequence[Found]
+    account: AttemptRecord
+    found: Sequence[MetricResult]
 
     @classmethod
-    def of(cls, account: Account) -> "_Run":
+    def of(cls, account: AttemptRecord) -> "_Run":
         return cls(account, evaluate_metrics(account))
 
     def grade(self, exercise: Exercise) -> Grade:
@@ -50,25 +50,25 @@ class _Run:
         return grade_by(exercise, self.found, self.account.seconds)
 
 
-def check_exercise(shelved: Shelved) -> Checked:
+def check_exercise(shelved: ExerciseFolder) -> CheckResult:
     """Check an exercise whole."""
     exercise = shelved.exercise
     faults = list(_of_form(shelved))
     if not _all_there(shelved):
-        return Checked(shelved.name, tuple(faults))
+        return CheckResult(shelved.name, tuple(faults))
     with tempfile.TemporaryDirectory() as place:
         try:
             faults += _of_tolerances(exercise, scenario_for(shelved, seed_for(shelved, exercise.reference)))
             accounts = _accounts(shelved, Path(place))
-        except Mistake as mistake:
-            return Checked(shelved.name, (*faults, str(mistake)))
+        except A7SimError as mistake:
+            return CheckResult(shelved.name, (*faults, str(mistake)))
         runs = {name: _Run.of(account) for name, account in accounts.items()}
         faults += _of_runs(exercise, runs)
         faults += _dead_criteria(exercise, runs)
-    return Checked(shelved.name, tuple(faults), runs["reference"].grade(exercise).points)
+    return CheckResult(shelved.name, tuple(faults), runs["reference"].grade(exercise).points)
 
 
-def _of_form(shelved: Shelved) -> Iterator[str]:
+def _of_form(shelved: ExerciseFolder) -> Iterator[str]:
     exercise = shelved.exercise
     if not shelved.text.strip():
         yield "text.md: expected the exercise in plain words, found none"
@@ -86,7 +86,7 @@ def _of_form(shelved: Shelved) -> Iterator[str]:
             yield f"{played.script}: expected a script beside the exercise, found none"
 
 
-def _all_there(shelved: Shelved) -> bool:
+def _all_there(shelved: ExerciseFolder) -> bool:
     exercise = shelved.exercise
     played = [each for each in (exercise.reference, *exercise.faulty, exercise.opening) if each is not None]
     return all(not each.script or (shelved.folder / each.script).is_file() for each in played)
@@ -104,18 +104,18 @@ def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
             yield f"{each.id}: expected excellent no worse than pass, got {each.excellent:g} and {each.passing:g}"
 
 
-def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
+def _accounts(shelved: ExerciseFolder, place: Path) -> dict[str, AttemptRecord]:
     """Return the accounts of the reference, the faulty ones, who does nothing, who is slow, who stops early.
 
     The reference is an attempt as a student's, journal and all; the others are rehearsed.
     """
     exercise = shelved.exercise
-    rehearsals = Rehearsals(shelved)
+    rehearsals = DryRuns(shelved)
     accounts = {"reference": _of_reference(shelved, place)}
     for i, played in enumerate(exercise.faulty, start=1):
         accounts[f"faulty {i}"], trouble = rehearsals.run_attempt(played)
         if trouble and played.script:
-            raise Mistake(f"{played.script}: {trouble}")
+            raise A7SimError(f"{played.script}: {trouble}")
     seed = seed_for(shelved, exercise.reference)
     script = read_script(shelved.folder / exercise.reference.script) if exercise.reference.script else None
     accounts["nothing"] = rehearsals.run_and_leave(seed, None)
@@ -124,17 +124,17 @@ def _accounts(shelved: Shelved, place: Path) -> dict[str, Account]:
     return accounts
 
 
-def _of_reference(shelved: Shelved, place: Path) -> Account:
+def _of_reference(shelved: ExerciseFolder, place: Path) -> AttemptRecord:
     reference = shelved.exercise.reference
     seed = seed_for(shelved, reference)
     trouble = run_attempt(shelved, reference, place, seed)
     if trouble:
-        raise Mistake(f"reference: expected it to come to its end: {trouble}")
+        raise A7SimError(f"reference: expected it to come to its end: {trouble}")
     return load_record(shelved, seed, place)
 
 
 def _half_of(script: Script) -> Script:
-    lines = [each for each in script.statements if isinstance(each, Say)]
+    lines = [each for each in script.statements if isinstance(each, SendLine)]
     return replace(script, statements=tuple(lines[: len(lines) // 2]))
 
 

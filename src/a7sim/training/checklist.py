@@ -7,7 +7,7 @@ from a7sim.training.attempts import ANSWERS, HINTS, written_answers
 from a7sim.training.exercise import Exercise
 from a7sim.training.measures import make_metric
 from a7sim.training.progress import EXAM, Attempt
-from a7sim.training.room import Room
+from a7sim.training.room import AttemptEnvironment
 
 TICKED, OPEN = "[x]", "[ ]"
 
@@ -19,7 +19,7 @@ PAPERS = (".csv", ".txt", ".md")
 class Checklist:
     """The checklist of an attempt in its room; in an exam it only says what is to be done."""
 
-    room: Room
+    room: AttemptEnvironment
     attempt: Attempt
 
     @property

@@ -24,21 +24,21 @@ class _Data(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Frozen data read from a file; unknown keys are mistakes."""
 
 
-class Measured(_Data, frozen=True, kw_only=True):
+class MetricSpec(_Data, frozen=True, kw_only=True):
     """A registered measure with its options."""
 
     measure: Words
     options: dict[str, Any] = {}
 
 
-class Step(Measured, frozen=True, kw_only=True):
+class ChecklistItem(MetricSpec, frozen=True, kw_only=True):
     """A line of the checklist: it ticks itself once a measure of what is seen at the link is as good as `done`."""
 
     text: Words
     done: float
 
 
-class Criterion(Measured, frozen=True, kw_only=True):
+class Criterion(MetricSpec, frozen=True, kw_only=True):
     """What is graded: a measure, its bands, its weight, and what to tell who does not reach them."""
 
     id: Id
@@ -58,7 +58,7 @@ class Hint(_Data, frozen=True, kw_only=True):
     cost: Points
 
 
-class Played(_Data, frozen=True, kw_only=True):
+class PlayedRun(_Data, frozen=True, kw_only=True):
     """Something done by a script beside the exercise, or by a procedure of the virtual operator."""
 
     script: str = ""
@@ -71,7 +71,7 @@ class Played(_Data, frozen=True, kw_only=True):
     """Of a procedure; a script names its own in its first line."""
 
 
-class Faulty(Played, frozen=True, kw_only=True):
+class FaultyRun(PlayedRun, frozen=True, kw_only=True):
     """The exercise done with a mistake: which criterion must fail of it, and why."""
 
     fails: Id
@@ -93,7 +93,7 @@ class Exercise(_Data, frozen=True, kw_only=True):
     """By path, within how much of its own value a number of the scenario is drawn anew by the seed."""
     choose: list[Annotated[list[dict[str, Any]], Meta(min_length=1, description="one alternative or more")]] = []
     """Groups of alternatives, each values by path that belong together; of every group the seed draws one."""
-    opening: Played | None = None
+    opening: PlayedRun | None = None
     """What is done at the instrument before the student sits down."""
     handout: str = ""
     """What is put into the student's hands: a registered maker of papers."""
@@ -107,13 +107,13 @@ class Exercise(_Data, frozen=True, kw_only=True):
     pass_points: Points = 60.0
     answers: dict[str, Words] = {}
     """What is to be answered on paper: key, and what it is."""
-    steps: list[Step] = field(default_factory=list, name="step")
+    steps: list[ChecklistItem] = field(default_factory=list, name="step")
     criteria: Annotated[list[Criterion], Meta(min_length=1, description="one criterion or more")] = field(
         name="criterion"
     )
     hints: list[Hint] = field(default_factory=list, name="hint")
-    reference: Played
-    faulty: list[Faulty] = []
+    reference: PlayedRun
+    faulty: list[FaultyRun] = []
 
     @property
     def criterion_ids(self) -> list[str]:
@@ -121,7 +121,7 @@ class Exercise(_Data, frozen=True, kw_only=True):
         return [each.id for each in self.criteria]
 
 
-class Shelved(Struct, frozen=True):
+class ExerciseFolder(Struct, frozen=True):
     """An exercise with the folder in which it stands."""
 
     exercise: Exercise

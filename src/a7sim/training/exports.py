@@ -9,7 +9,7 @@ import msgspec
 from a7sim.documents import Document, document_header
 from a7sim.files import to_csv
 from a7sim.training.exercise import FULL_MARKS
-from a7sim.training.progress import Attempt, Graded
+from a7sim.training.progress import Attempt, GradeRecord
 
 NBGRADER_COLUMNS = (
     "assignment",
@@ -36,7 +36,7 @@ _STATEMENTS = uuid.UUID("5d9cfd3b-3a61-5c7e-9a53-7b6a7d1f0a07")
 _EXTENSIONS = "http://localhost/a7sim/xapi"
 
 
-def to_nbgrader(best: Mapping[tuple[str, str], Graded]) -> str:
+def to_nbgrader(best: Mapping[tuple[str, str], GradeRecord]) -> str:
     """Return best grades as CSV in the columns of nbgrader. Hints are taken off; names and due dates are not known."""
     rows: list[list[str | float | None]] = []
     for (student, exercise), each in sorted(best.items()):
@@ -46,7 +46,7 @@ def to_nbgrader(best: Mapping[tuple[str, str], Graded]) -> str:
 
 
 def to_class_document(
-    graded: Sequence[Graded], best: Mapping[tuple[str, str], Graded], attempts: Sequence[Attempt]
+    graded: Sequence[GradeRecord], best: Mapping[tuple[str, str], GradeRecord], attempts: Sequence[Attempt]
 ) -> Document:
     """Return all grades as a document, the best ones by student and exercise first."""
     return document_header("train report") | {
@@ -66,19 +66,19 @@ def to_class_document(
     }
 
 
-def _told(each: Graded) -> Document:
+def _told(each: GradeRecord) -> Document:
     attempt = each.attempt
     where = {"student": attempt.student, "exercise": attempt.exercise, "mode": attempt.mode, "attempt": attempt.number}
     grade: Document = msgspec.to_builtins(each.grade)
     return where | {"at": each.at, "grade": grade}
 
 
-def to_xapi(graded: Sequence[Graded], home_page: str = HOME_PAGE) -> str:
+def to_xapi(graded: Sequence[GradeRecord], home_page: str = HOME_PAGE) -> str:
     """Return grades as xAPI statements, a JSON object a line."""
     return "".join(msgspec.json.encode(_statement(each, home_page)).decode() + "\n" for each in graded)
 
 
-def _statement(each: Graded, home_page: str) -> dict[str, Any]:
+def _statement(each: GradeRecord, home_page: str) -> dict[str, Any]:
     attempt, grade = each.attempt, each.grade
     verb = "passed" if grade.passed else "failed"
     named = f"{attempt.student}/{attempt.exercise}/{attempt.number}/{each.at}/{grade.points}"

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import msgspec
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.session.folder import JOURNAL
 from a7sim.session.lines import read_journal
-from a7sim.training.account import Account
+from a7sim.training.account import AttemptRecord
 from a7sim.training.attempts import written_answers
-from a7sim.training.exercise import FULL_MARKS, Criterion, Exercise, Shelved
+from a7sim.training.exercise import FULL_MARKS, Criterion, Exercise, ExerciseFolder
 from a7sim.training.handouts import make_handout
-from a7sim.training.measures import Found, make_metric
-from a7sim.training.room import Room, Unreliable, replay_environment
+from a7sim.training.measures import MetricResult, make_metric
+from a7sim.training.room import AttemptEnvironment, UnreliableJournalError, replay_environment
 
 JUST_PASSED = 0.6
 """Share of its weight that a criterion earns at the limit of its pass band; from there it rises to all of it."""
@@ -22,7 +22,7 @@ JUST_PASSED = 0.6
 EXCELLENT, PASSED, FAILED = "excellent", "pass", "fail"
 
 
-class Marked(msgspec.Struct, frozen=True):
+class CriterionResult(msgspec.Struct, frozen=True):
     """A criterion as it was graded."""
 
     id: str
@@ -63,10 +63,10 @@ class Grade(msgspec.Struct, frozen=True):
     hints: int
     hint_points: float
     minutes: float
-    marks: list[Marked]
+    marks: list[CriterionResult]
 
     @property
-    def failed(self) -> list[Marked]:
+    def failed(self) -> list[CriterionResult]:
         """Return the criteria that were failed."""
         return [each for each in self.marks if each.band == FAILED]
 
@@ -79,19 +79,19 @@ class HintsTaken:
     cost: float = 0.0
 
 
-def grade_record(account: Account, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
+def grade_record(account: AttemptRecord, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
     """Grade an account."""
     return grade_by(account.exercise, evaluate_metrics(account), account.seconds, hints, shelved_name)
 
 
-def evaluate_metrics(account: Account) -> list[Found]:
+def evaluate_metrics(account: AttemptRecord) -> list[MetricResult]:
     """Return what the measure of every criterion comes to, in their order."""
     return [make_metric(each).evaluate(account) for each in account.exercise.criteria]
 
 
 def grade_by(
     exercise: Exercise,
-    found: Sequence[Found],
+    found: Sequence[MetricResult],
     seconds: float,
     hints: HintsTaken | None = None,
     shelved_name: str = "",
@@ -114,7 +114,7 @@ def grade_by(
     )
 
 
-def grade_criterion(criterion: Criterion, found: Found) -> Marked:
+def grade_criterion(criterion: Criterion, found: MetricResult) -> CriterionResult:
     """Return a criterion with its band and points by what its measure came to."""
     measure = make_metric(criterion)
     value = found.value
@@ -126,7 +126,7 @@ def grade_criterion(criterion: Criterion, found: Found) -> Marked:
         band, share = PASSED, JUST_PASSED + (1.0 - JUST_PASSED) * left
     else:
         band, share = FAILED, 0.0
-    return Marked(
+    return CriterionResult(
         criterion.id,
         criterion.title,
         band,
@@ -142,23 +142,23 @@ def grade_criterion(criterion: Criterion, found: Found) -> Marked:
     )
 
 
-def grade_folder(shelved: Shelved, seed: int, folder: Path, hints: HintsTaken | None = None) -> Grade:
+def grade_folder(shelved: ExerciseFolder, seed: int, folder: Path, hints: HintsTaken | None = None) -> Grade:
     """Grade the attempt in a folder. Raises Unreliable for a journal that cannot be relied on."""
     return grade_record(load_record(shelved, seed, folder), hints, shelved.name)
 
 
-def load_record(shelved: Shelved, seed: int, folder: Path) -> Account:
+def load_record(shelved: ExerciseFolder, seed: int, folder: Path) -> AttemptRecord:
     """Return the account of the attempt in a folder, by working it again. Raises Unreliable."""
     try:
         room = replay_environment(shelved, seed, read_journal(folder / JOURNAL))
-    except Unreliable:
+    except UnreliableJournalError:
         raise
-    except Mistake as mistake:
-        raise Unreliable(str(mistake)) from mistake
+    except A7SimError as mistake:
+        raise UnreliableJournalError(str(mistake)) from mistake
     return make_record(room, written_answers(folder))
 
 
-def make_record(room: Room, written: dict[str, str] | None = None) -> Account:
+def make_record(room: AttemptEnvironment, written: dict[str, str] | None = None) -> AttemptRecord:
     """Return the account of an attempt with what was answered on paper, and what its maker of papers knows."""
     exercise = room.shelved.exercise
     hidden = make_handout(exercise.handout, room.scenario, room.seed, exercise.handout_options).hidden

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.session.folder import JOURNAL
 from a7sim.training.attempts import attempt_mode, written_hints
 from a7sim.training.grading import Grade, HintsTaken, grade_folder
@@ -20,7 +20,7 @@ ALONE = 8
 """So many are graded before other processes could begin."""
 
 
-class HandedIn(msgspec.Struct, frozen=True):
+class Submission(msgspec.Struct, frozen=True):
     """What came of an attempt that was handed in: its grade, or why it has none."""
 
     folder: str
@@ -39,7 +39,7 @@ def find_submissions(folders: Sequence[Path]) -> list[Path]:
     return found
 
 
-def grade_submissions(folders: Sequence[Path], seed: int | None = None, workers: int | None = None) -> list[HandedIn]:
+def grade_submissions(folders: Sequence[Path], seed: int | None = None, workers: int | None = None) -> list[Submission]:
     """Grade the attempts in folders, each by its journal alone, in their order.
 
     Their seeds are those of the students whom their journals name, unless one is given.
@@ -52,15 +52,15 @@ def grade_submissions(folders: Sequence[Path], seed: int | None = None, workers:
         return list(pool.map(grade, folders, chunksize=max(1, len(folders) // (8 * workers))))
 
 
-def grade_submission(folder: Path, seed: int | None = None) -> HandedIn:
+def grade_submission(folder: Path, seed: int | None = None) -> Submission:
     """Grade the attempt in a folder; a journal that cannot be relied on gets no grade."""
     try:
         exercise, student, mode = attempt_mode(folder)
-    except Mistake as mistake:
-        return HandedIn(str(folder), error=str(mistake))
+    except A7SimError as mistake:
+        return Submission(str(folder), error=str(mistake))
     try:
         drawn = attempt_seed(student, exercise, mode) if seed is None else seed
         grade = grade_folder(find_exercise(exercise), drawn, folder, HintsTaken(*written_hints(folder)))
-    except Mistake as mistake:
-        return HandedIn(str(folder), student, exercise, error=str(mistake))
-    return HandedIn(str(folder), student, exercise, grade)
+    except A7SimError as mistake:
+        return Submission(str(folder), student, exercise, error=str(mistake))
+    return Submission(str(folder), student, exercise, grade)

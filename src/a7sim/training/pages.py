@@ -5,19 +5,19 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from a7sim.report.drawing import INK, LEFT, RIGHT, drawing
-from a7sim.report.page import Chapter, Paragraph, Part, Picture, Sheet, page
-from a7sim.training.exercise import FULL_MARKS, Shelved
+from a7sim.report.page import Chapter, PageFigure, Paragraph, Part, TableBlock, page
+from a7sim.training.exercise import FULL_MARKS, ExerciseFolder
 from a7sim.training.grading import EXCELLENT, Grade
-from a7sim.training.progress import Attempt, Graded
+from a7sim.training.progress import Attempt, GradeRecord
 from a7sim.wording import pluralize
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Best = Mapping[tuple[str, str], Graded]
+Best = Mapping[tuple[str, str], GradeRecord]
 
 
-def student_sheet(student: str, shelf: Sequence[Shelved], best: Best, graded: Sequence[Graded]) -> str:
+def student_sheet(student: str, shelf: Sequence[ExerciseFolder], best: Best, graded: Sequence[GradeRecord]) -> str:
     """Return the sheet of a student: where they stand, and for every exercise what to do better."""
     mine = {exercise: each for (name, exercise), each in best.items() if name == student}
     passed = sum(each.grade.passed for each in mine.values())
@@ -30,7 +30,9 @@ def student_sheet(student: str, shelf: Sequence[Shelved], best: Best, graded: Se
     return page(f"{student}: exercises at the plotter", lead, chapters)
 
 
-def _overview(shelf: Sequence[Shelved], mine: Mapping[str, Graded], graded: Sequence[Graded]) -> Sheet:
+def _overview(
+    shelf: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord], graded: Sequence[GradeRecord]
+) -> TableBlock:
     rows = []
     for shelved in shelf:
         each = mine.get(shelved.name)
@@ -41,14 +43,16 @@ def _overview(shelf: Sequence[Shelved], mine: Mapping[str, Graded], graded: Sequ
         else:
             grade = each.grade
             rows.append([name, _verdict(grade), f"{grade.points:g}", str(grade.hints), str(tried)])
-    return Sheet("Best grade of each exercise", ["exercise", "", "points", "hints", "graded"], rows, frozenset({0, 1}))
+    return TableBlock(
+        "Best grade of each exercise", ["exercise", "", "points", "hints", "graded"], rows, frozenset({0, 1})
+    )
 
 
 def _verdict(grade: Grade) -> str:
     return "passed" if grade.passed else "not passed"
 
 
-def _of_exercise(each: Graded) -> Sequence[Part]:
+def _of_exercise(each: GradeRecord) -> Sequence[Part]:
     grade, attempt = each.grade, each.attempt
     after = f", {pluralize(grade.hints, 'hint')} (-{grade.hint_points:g})" if grade.hints else ""
     first = Paragraph(
@@ -56,13 +60,13 @@ def _of_exercise(each: Graded) -> Sequence[Part]:
         f"attempt {attempt.number}, {attempt.mode}, {pluralize(grade.minutes, 'minute')} at the instrument's clock."
     )
     rows = [[mark.title, mark.band, f"{mark.points:g} of {mark.weight:g}", mark.reason] for mark in grade.marks]
-    table = Sheet("What was graded", ["criterion", "", "points", "why"], rows, frozenset({0, 1, 3}))
+    table = TableBlock("What was graded", ["criterion", "", "points", "why"], rows, frozenset({0, 1, 3}))
     advice = [mark for mark in grade.marks if mark.band != EXCELLENT]
     better = [Paragraph(f"{mark.title} (-{mark.lost:g}): {mark.feedback}") for mark in advice]
     return [first, table, *better]
 
 
-def _points(shelf: Sequence[Shelved], mine: Mapping[str, Graded]) -> Picture:
+def _points(shelf: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord]) -> PageFigure:
     numbers = [str(each.exercise.number) for each in shelf]
     points = [mine[each.name].grade.points if each.name in mine else 0.0 for each in shelf]
     colours = [LEFT if each.name in mine and mine[each.name].grade.passed else RIGHT for each in shelf]
@@ -78,14 +82,14 @@ def _points(shelf: Sequence[Shelved], mine: Mapping[str, Graded]) -> Picture:
     return drawn.picture
 
 
-def _what_passes(axes: "Axes", shelf: Sequence[Shelved]) -> None:
+def _what_passes(axes: "Axes", shelf: Sequence[ExerciseFolder]) -> None:
     """Draw the points with which each exercise is passed."""
     for place, shelved in enumerate(shelf):
         limit = shelved.exercise.pass_points
         axes.plot([place - 0.45, place + 0.45], [limit] * 2, ":", color=INK, linewidth=1.6)
 
 
-def class_sheet(shelf: Sequence[Shelved], best: Best, attempts: Sequence[Attempt]) -> str:
+def class_sheet(shelf: Sequence[ExerciseFolder], best: Best, attempts: Sequence[Attempt]) -> str:
     """Return the sheet of a class: who stands where, and which mistakes are everybody's."""
     students = sorted({each.student for each in attempts})
     lead: list[Part] = [Paragraph(f"{pluralize(len(students), 'student')}, {pluralize(len(attempts), 'attempt')}.")]
@@ -96,7 +100,7 @@ def class_sheet(shelf: Sequence[Shelved], best: Best, attempts: Sequence[Attempt
     totals = [_passed(best, students, [each]) for each in shelf]
     rows.append(["how many passed", str(sum(totals)), *map(str, totals)])
     columns = ["student", "passed", *(str(each.exercise.number) for each in shelf)]
-    table = Sheet("Best points by exercise; in brackets: not passed", columns, rows)
+    table = TableBlock("Best points by exercise; in brackets: not passed", columns, rows)
     chapters = [
         Chapter("The class", [_spread(shelf, best), table]),
         Chapter("What went wrong", [_mistakes(shelf, best)]),
@@ -104,19 +108,19 @@ def class_sheet(shelf: Sequence[Shelved], best: Best, attempts: Sequence[Attempt
     return page("Exercises at the plotter: the class", lead, chapters)
 
 
-def _passed(best: Best, students: Sequence[str], shelf: Sequence[Shelved]) -> int:
+def _passed(best: Best, students: Sequence[str], shelf: Sequence[ExerciseFolder]) -> int:
     """Return how many exercises of these were passed by these students, all together."""
     grades = [best.get((student, shelved.name)) for student in students for shelved in shelf]
     return sum(each is not None and each.grade.passed for each in grades)
 
 
-def _cell(each: Graded | None) -> str:
+def _cell(each: GradeRecord | None) -> str:
     if each is None:
         return ""
     return f"{each.grade.points:g}" if each.grade.passed else f"({each.grade.points:g})"
 
 
-def _spread(shelf: Sequence[Shelved], best: Best) -> Picture:
+def _spread(shelf: Sequence[ExerciseFolder], best: Best) -> PageFigure:
     by_exercise = [[each.grade.points for (_, name), each in best.items() if name == s.name] for s in shelf]
     numbers = [str(each.exercise.number) for each in shelf]
     said = "; ".join(
@@ -139,7 +143,7 @@ def _spread(shelf: Sequence[Shelved], best: Best) -> Picture:
     return drawn.picture
 
 
-def _mistakes(shelf: Sequence[Shelved], best: Best) -> Sheet:
+def _mistakes(shelf: Sequence[ExerciseFolder], best: Best) -> TableBlock:
     rows = []
     for shelved in shelf:
         marked = [each.grade.marks for (_, name), each in best.items() if name == shelved.name]
@@ -149,4 +153,4 @@ def _mistakes(shelf: Sequence[Shelved], best: Best) -> Sheet:
             if failed:
                 rows.append([f"{shelved.exercise.number}: {criterion.title}", f"{failed} of {len(bands)}"])
     rows.sort(key=lambda row: -int(row[1].split()[0]))
-    return Sheet("Criteria that were failed, those of most students first", ["criterion", "failed"], rows)
+    return TableBlock("Criteria that were failed, those of most students first", ["criterion", "failed"], rows)

@@ -10,8 +10,8 @@ from urllib.parse import quote
 
 import msgspec
 
-from a7sim.mistakes import Mistake
-from a7sim.training.exercise import Exercise, Hint, Shelved
+from a7sim.mistakes import A7SimError
+from a7sim.training.exercise import Exercise, ExerciseFolder, Hint
 from a7sim.training.grading import Grade, HintsTaken
 from a7sim.training.variation import attempt_seed
 
@@ -74,7 +74,7 @@ class Attempt:
 
 
 @dataclass(frozen=True)
-class Graded:
+class GradeRecord:
     """A grade that was given, when, and for what."""
 
     attempt: Attempt
@@ -98,7 +98,7 @@ class Progress:
             self._database.execute("PRAGMA foreign_keys = ON")
             self._migrate()
         except (OSError, sqlite3.Error) as error:
-            raise Mistake(f"{home / FILE}: expected a file of progress that can be used: {error}") from error
+            raise A7SimError(f"{home / FILE}: expected a file of progress that can be used: {error}") from error
 
     def close(self) -> None:
         """Let go of the file."""
@@ -121,7 +121,7 @@ class Progress:
                         self._database.execute(statement)
                     self._database.execute(f"PRAGMA user_version = {version + 1}")
         if self._version() > len(MIGRATIONS):
-            raise Mistake(
+            raise A7SimError(
                 f"{self.home / FILE}: expected progress of schema version {len(MIGRATIONS)} or older, "
                 f"got {self._version()}: a newer a7sim wrote it"
             )
@@ -138,7 +138,7 @@ class Progress:
 
     # --- attempts -------------------------------------------------------------------------------------
 
-    def begin(self, student: str, shelved: Shelved, mode: str = PRACTICE, seed: int | None = None) -> Attempt:
+    def begin(self, student: str, shelved: ExerciseFolder, mode: str = PRACTICE, seed: int | None = None) -> Attempt:
         """Begin a new attempt; one that is open is closed. Its folder is still to be made."""
         name = shelved.name
         with self._writing():
@@ -170,7 +170,7 @@ class Progress:
         )
         if not found:
             at = f" at {exercise}" if exercise else ""
-            raise Mistake(
+            raise A7SimError(
                 f"student {student}: expected an attempt{at}, found none: a7sim train start {exercise or 'EXERCISE'}"
             )
         return found[-1]
@@ -206,11 +206,11 @@ class Progress:
         Raises Mistake in an exam, and where all were given.
         """
         if attempt.mode == EXAM:
-            raise Mistake(f"{attempt.exercise}: expected an attempt for practice, got an exam: there are no hints")
+            raise A7SimError(f"{attempt.exercise}: expected an attempt for practice, got an exam: there are no hints")
         with self._writing():
             given = self._one("SELECT count(*) FROM hint WHERE attempt = ?", attempt.id)
             if given >= len(exercise.hints):
-                raise Mistake(f"{attempt.exercise}: expected another hint, but all {given} were given")
+                raise A7SimError(f"{attempt.exercise}: expected another hint, but all {given} were given")
             hint = exercise.hints[given]
             self._database.execute("INSERT INTO hint VALUES (?, ?, ?, ?)", (attempt.id, given + 1, hint.cost, _now()))
         return given + 1, hint
@@ -238,19 +238,19 @@ class Progress:
         ).fetchone()
         return msgspec.json.decode(row[0], type=Grade) if row else None
 
-    def grades(self, student: str | None = None) -> list[Graded]:
+    def grades(self, student: str | None = None) -> list[GradeRecord]:
         """Return the grades of a student, or of all, in the order in which they were given."""
         attempts = {each.id: each for each in self.attempts(student)}
         rows = self._database.execute("SELECT attempt, at, document FROM grade ORDER BY id")
         return [
-            Graded(attempts[attempt], at, msgspec.json.decode(document, type=Grade))
+            GradeRecord(attempts[attempt], at, msgspec.json.decode(document, type=Grade))
             for attempt, at, document in rows
             if attempt in attempts
         ]
 
-    def best(self, student: str | None = None) -> dict[tuple[str, str], Graded]:
+    def best(self, student: str | None = None) -> dict[tuple[str, str], GradeRecord]:
         """Return the best grade by student and exercise; one that passed before any that did not."""
-        best: dict[tuple[str, str], Graded] = {}
+        best: dict[tuple[str, str], GradeRecord] = {}
         for each in self.grades(student):
             key = each.attempt.student, each.attempt.exercise
             rank = (each.grade.passed, each.grade.points)

@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from a7sim.instrument.language import Desk, LinkEvent, Listener
+from a7sim.instrument.language import LinkEvent, Listener, SharedInstrument
 from a7sim.link.clock import Clock
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario, hash_scenario
 from a7sim.scene import Scene, build_scene
 from a7sim.session.folder import JOURNAL
-from a7sim.session.journal import Header, Journal, Keeping, make_header_without_scenario, software_version
-from a7sim.session.lines import Journalled, read_journal
-from a7sim.session.replaying import Difference, Replay, replay_lines
-from a7sim.training.account import Account
-from a7sim.training.exercise import Shelved
+from a7sim.session.journal import Header, Journal, JournalOptions, make_header_without_scenario, software_version
+from a7sim.session.lines import JournalFile, read_journal
+from a7sim.session.replaying import Replay, ReplayDifference, replay_lines
+from a7sim.training.account import AttemptRecord
+from a7sim.training.exercise import ExerciseFolder
 from a7sim.training.variation import scenario_for
-from a7sim.training.witness import Witness, WitnessedAutograph
+from a7sim.training.witness import ActionLog, LoggedAutograph
 
 _CHECKSUM = re.compile(r"(?<=bytes, )crc32 [0-9a-f]{8}")
 
@@ -27,91 +27,93 @@ JOURNAL_COMMAND = "train"
 """The command in the header of an attempt's journal."""
 
 
-class Unreliable(Mistake):
+class UnreliableJournalError(A7SimError):
     """A journal that is damaged, or in which stands what the instrument does not do again."""
 
 
 @dataclass(frozen=True)
-class Room:
+class AttemptEnvironment:
     """An exercise's instrument."""
 
-    shelved: Shelved
+    shelved: ExerciseFolder
     scenario: Scenario
     seed: int
     scene: Scene
-    desk: Desk
+    desk: SharedInstrument
     clock: Clock
-    autograph: WitnessedAutograph
+    autograph: LoggedAutograph
 
     @property
-    def action_log(self) -> Witness:
+    def action_log(self) -> ActionLog:
         """Who saw all that happened."""
         return self.autograph.witness
 
-    def record(self, written: dict[str, str] | None = None, hidden: dict[str, Any] | None = None) -> Account:
+    def record(self, written: dict[str, str] | None = None, hidden: dict[str, Any] | None = None) -> AttemptRecord:
         """Return the account of what has happened so far."""
         exercise = self.shelved.exercise
-        return Account(
+        return AttemptRecord(
             exercise, self.scenario, self.scene, self.autograph, self.action_log, written or {}, hidden or {}
         )
 
-    def snapshot(self) -> "Room":
+    def snapshot(self) -> "AttemptEnvironment":
         """Return a room of its own in which all has happened as in this one, of which no journal is kept.
 
         To be asked while every client is gone.
         """
-        autograph = WitnessedAutograph.from_parts(self.scenario.instrument, self.scene.mountable, self.seed)
-        desk = Desk(autograph, autograph.witness.on_link_event)
+        autograph = LoggedAutograph.from_parts(self.scenario.instrument, self.scene.mountable, self.seed)
+        desk = SharedInstrument(autograph, autograph.witness.on_link_event)
         desk.restore(self.desk.state())
         autograph.witness.copy_from(self.action_log)
         return replace(self, desk=desk, clock=Clock(self.clock.now), autograph=autograph)
 
 
-def header_for(shelved: Shelved, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
+def header_for(shelved: ExerciseFolder, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
     """Return what the journal of an attempt says first. It names the scenario by its hash alone: it holds the truth."""
     first = make_header_without_scenario(JOURNAL_COMMAND, exercise=shelved.name, student=student, mode=mode).line
     return Header(first | {"title": shelved.exercise.title, "scenario_hash": hash_scenario(scenario), "seed": seed})
 
 
-def _built(shelved: Shelved, seed: int, observer: dict[str, Any]) -> tuple[Scenario, Scene, WitnessedAutograph]:
+def _built(shelved: ExerciseFolder, seed: int, observer: dict[str, Any]) -> tuple[Scenario, Scene, LoggedAutograph]:
     scenario = scenario_for(shelved, seed, observer)
     scene = build_scene(scenario, seed)
-    return scenario, scene, WitnessedAutograph.from_parts(scenario.instrument, scene.mountable, seed)
+    return scenario, scene, LoggedAutograph.from_parts(scenario.instrument, scene.mountable, seed)
 
 
-def dry_run_environment(shelved: Shelved, seed: int) -> Room:
+def dry_run_environment(shelved: ExerciseFolder, seed: int) -> AttemptEnvironment:
     """Return the room of an attempt of which no journal is kept; the opening is still to be done."""
     scenario, scene, autograph = _built(shelved, seed, {})
-    return Room(shelved, scenario, seed, scene, Desk(autograph, autograph.witness.on_link_event), Clock(), autograph)
+    return AttemptEnvironment(
+        shelved, scenario, seed, scene, SharedInstrument(autograph, autograph.witness.on_link_event), Clock(), autograph
+    )
 
 
 @contextmanager
 def open_environment(
-    shelved: Shelved, seed: int, folder: Path, student: str, mode: str, observer: dict[str, Any] | None = None
-) -> Iterator[Room]:
+    shelved: ExerciseFolder, seed: int, folder: Path, student: str, mode: str, observer: dict[str, Any] | None = None
+) -> Iterator[AttemptEnvironment]:
     """Enter the room of a new attempt, journalled in a folder; the opening is still to be done.
 
     Raises Mistake where it cannot be written.
     """
     scenario, scene, autograph = _built(shelved, seed, observer or {})
-    journal = Journal(Keeping(states=False))
-    desk = Desk(autograph, tee_listener(journal.on_link_event, autograph.witness.on_link_event))
+    journal = Journal(JournalOptions(states=False))
+    desk = SharedInstrument(autograph, tee_listener(journal.on_link_event, autograph.witness.on_link_event))
     nominal = scenario_for(shelved, seed)
     with journal.recording(folder, header_for(shelved, nominal, seed, student, mode), desk):
-        yield Room(shelved, scenario, seed, scene, desk, Clock(), autograph)
+        yield AttemptEnvironment(shelved, scenario, seed, scene, desk, Clock(), autograph)
 
 
 @contextmanager
-def resume_environment(shelved: Shelved, seed: int, folder: Path) -> Iterator[Room]:
+def resume_environment(shelved: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
     """Enter the room of an attempt that was left, as its journal leaves it. Raises Unreliable, Mistake."""
     there = read_journal(folder / JOURNAL)
     if there.header.get("software") != software_version():
-        raise Mistake(
+        raise A7SimError(
             f"{there.location(1)}: expected an attempt of {software_version()} to go on with, got one of "
             f"{there.header.get('software')} (a7sim train reset begins anew)"
         )
     room, replay = _replayed(shelved, seed, there)
-    journal = Journal(Keeping(resumes=True, states=False)).resume_at(there, room.desk, replay.checkpoints)
+    journal = Journal(JournalOptions(resumes=True, states=False)).resume_at(there, room.desk, replay.checkpoints)
     room.desk.listener = tee_listener(journal.on_link_event, room.action_log.on_link_event)
     with journal:
         for event in replay.pending_events():
@@ -121,18 +123,20 @@ def resume_environment(shelved: Shelved, seed: int, folder: Path) -> Iterator[Ro
         yield room
 
 
-def replay_environment(shelved: Shelved, seed: int, there: Journalled) -> Room:
+def replay_environment(shelved: ExerciseFolder, seed: int, there: JournalFile) -> AttemptEnvironment:
     """Return the room of an attempt as its journal leaves it. Raises Unreliable."""
     return _replayed(shelved, seed, there)[0]
 
 
-def _replayed(shelved: Shelved, seed: int, there: Journalled) -> tuple[Room, Replay]:
+def _replayed(shelved: ExerciseFolder, seed: int, there: JournalFile) -> tuple[AttemptEnvironment, Replay]:
     scenario, scene, autograph = _built(shelved, seed, {})
     expected = header_for(shelved, scenario, seed, "", "").line
     for name in ("command", "scenario_hash", "seed"):
         got = there.header.get(name)
         if got != expected[name]:
-            raise Unreliable(f"{there.location(1)}: expected an attempt with {name} {expected[name]}, got {got}")
+            raise UnreliableJournalError(
+                f"{there.location(1)}: expected an attempt with {name} {expected[name]}, got {got}"
+            )
     replay = Replay(there, autograph=autograph)
     autograph.blind = True
     assert replay.desk.listener is not None
@@ -140,14 +144,14 @@ def _replayed(shelved: Shelved, seed: int, there: Journalled) -> tuple[Room, Rep
     for number, _, difference in replay_lines(replay):
         if difference is not None and not _same_but_for_pictures(difference):
             expected_, got = difference.replayed or "nothing", difference.journalled or "nothing"
-            raise Unreliable(
+            raise UnreliableJournalError(
                 f"{there.location(number)}: expected what the instrument does again, {expected_[:200]}, got {got[:200]}"
             )
     autograph.blind = False
-    return Room(shelved, scenario, seed, scene, replay.desk, Clock(replay.time), autograph), replay
+    return AttemptEnvironment(shelved, scenario, seed, scene, replay.desk, Clock(replay.time), autograph), replay
 
 
-def _same_but_for_pictures(difference: Difference) -> bool:
+def _same_but_for_pictures(difference: ReplayDifference) -> bool:
     """Whether two replies differ in nothing but the checksums of pictures, which are not drawn again."""
     journalled, again = (_CHECKSUM.sub("", each) for each in (difference.journalled, difference.replayed))
     return journalled == again != difference.replayed

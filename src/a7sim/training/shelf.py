@@ -7,10 +7,10 @@ from typing import Any
 import msgspec
 
 from a7sim.files import read_toml
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario.validation import schema_errors
 from a7sim.shelves import bundled_dirs
-from a7sim.training.exercise import Exercise, Measured, Shelved
+from a7sim.training.exercise import Exercise, ExerciseFolder, MetricSpec
 from a7sim.training.handouts import HANDOUTS
 from a7sim.training.measures import MEASURES, make_metric
 from a7sim.training.procedures import PROCEDURES
@@ -21,16 +21,16 @@ SEARCH_PATH = bundled_dirs("exercises")
 FILE = "exercise.toml"
 
 
-class ExerciseError(Mistake):
+class ExerciseError(A7SimError):
     """An exercise that cannot be used; the text names each mistake with its path."""
 
 
-def all_exercises() -> list[Shelved]:
+def all_exercises() -> list[ExerciseFolder]:
     """Return the exercises that come with a7sim, by their numbers."""
     return [read_exercise(folder) for folder in _folders()]
 
 
-def find_exercise(name: str) -> Shelved:
+def find_exercise(name: str) -> ExerciseFolder:
     """Return an exercise by its number, the name of its folder or a part of it, or a folder. Raises Mistake."""
     if (Path(name) / FILE).is_file():
         return read_exercise(Path(name))
@@ -41,7 +41,7 @@ def find_exercise(name: str) -> Shelved:
         found = [each for each in there if each.name == name] or [each for each in there if name and name in each.name]
     if len(found) != 1:
         known = ", ".join(each.name for each in found or there)
-        raise Mistake(f"{name}: expected the number of an exercise, its folder, or one of {known}")
+        raise A7SimError(f"{name}: expected the number of an exercise, its folder, or one of {known}")
     return read_exercise(found[0])
 
 
@@ -51,7 +51,7 @@ def _folders() -> list[Path]:
     return sorted(path.parent for path in shelf.glob(f"[0-9][0-9]-*/{FILE}")) if shelf else []
 
 
-def read_exercise(folder: Path) -> Shelved:
+def read_exercise(folder: Path) -> ExerciseFolder:
     """Return the exercise in a folder. Raises Mistake, which names every mistake at once."""
     path = folder / FILE
     raw = read_toml(path)
@@ -60,7 +60,7 @@ def read_exercise(folder: Path) -> Shelved:
         exercise = msgspec.convert(raw, Exercise)
         mistakes = _mistakes_of_reference(exercise)
         if not mistakes:
-            return Shelved(exercise, folder)
+            return ExerciseFolder(exercise, folder)
     raise ExerciseError("\n".join(f"{path}: {mistake}" for mistake in mistakes))
 
 
@@ -71,7 +71,7 @@ def _expected() -> msgspec.inspect.Type:
 
 def _mistakes_of_reference(exercise: Exercise) -> list[str]:
     mistakes: list[str] = []
-    measured: list[tuple[str, Measured]] = [(f"step[{i}]", each) for i, each in enumerate(exercise.steps)]
+    measured: list[tuple[str, MetricSpec]] = [(f"step[{i}]", each) for i, each in enumerate(exercise.steps)]
     measured += [(f"criterion[{i}]", each) for i, each in enumerate(exercise.criteria)]
     for place, each in measured:
         mistakes += _mistakes_of_measure(place, each)
@@ -100,7 +100,7 @@ def _mistakes_of_reference(exercise: Exercise) -> list[str]:
     return mistakes
 
 
-def _mistakes_of_measure(place: str, each: Measured) -> list[str]:
+def _mistakes_of_measure(place: str, each: MetricSpec) -> list[str]:
     kind = MEASURES.get(each.measure)
     if kind is None:
         return [f"{place}.measure: expected one of {', '.join(MEASURES)}, got {each.measure!r}"]

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.training.shelf import FILE
 
 _EXERCISE = """\
@@ -99,7 +99,7 @@ def write_template(folder: Path, number: int) -> Path:
     try:
         folder.mkdir(parents=True)
     except OSError as error:
-        raise Mistake(f"{folder}: expected a folder that does not exist yet: {error.strerror}") from error
+        raise A7SimError(f"{folder}: expected a folder that does not exist yet: {error.strerror}") from error
     escaped = title.replace("\\", "\\\\").replace('"', '\\"')
     texts = {
         FILE: _EXERCISE.format(number=number, title=escaped),

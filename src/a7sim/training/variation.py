@@ -7,9 +7,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario, load_scenario
-from a7sim.training.exercise import Shelved
+from a7sim.training.exercise import ExerciseFolder
 
 TRAINING_STREAM = 7
 """Spawn key of what exercises vary, beside those of scene, instrument and operator."""
@@ -23,7 +23,7 @@ def attempt_seed(student: str, exercise: str, mode: str = "practice") -> int:
     return int.from_bytes(digest[:4])
 
 
-def scenario_for(shelved: Shelved, seed: int, observer: Mapping[str, Any] | None = None) -> Scenario:
+def scenario_for(shelved: ExerciseFolder, seed: int, observer: Mapping[str, Any] | None = None) -> Scenario:
     """Return the scenario of an exercise as a seed draws it. Raises Mistake for settings that do not fit.
 
     `observer` says who the virtual operator is, where one plays.
@@ -55,9 +55,9 @@ def _at(data: Any, path: str) -> float:
         try:
             data = data[int(key)] if isinstance(data, list | tuple) else data[key]
         except (KeyError, IndexError, ValueError, TypeError):
-            raise Mistake(f"vary: expected the path of a number of the scenario, got {path!r}") from None
+            raise A7SimError(f"vary: expected the path of a number of the scenario, got {path!r}") from None
     if not isinstance(data, int | float) or isinstance(data, bool):
-        raise Mistake(f"vary: expected the path of a number of the scenario, got {path!r}")
+        raise A7SimError(f"vary: expected the path of a number of the scenario, got {path!r}")
     return data
 
 

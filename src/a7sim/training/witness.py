@@ -10,7 +10,7 @@ from msgspec import Struct
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import LinkEvent
 from a7sim.instrument.language.commands.recording import recorded_element
-from a7sim.instrument.language.program import Fault, Step, parse_program
+from a7sim.instrument.language.program import ParsedCommand, ParseFailure, parse_program
 from a7sim.instrument.recorder import Recorder, Registration
 from a7sim.scenario import Condition
 from a7sim.training.exercise import OPENING
@@ -21,7 +21,7 @@ PLAIN = ("drive", "wheel", "set", "turn")
 """Deeds that move a drum or a carriage."""
 
 
-class Deed(Struct, frozen=True, gc=False):
+class StudentAction(Struct, frozen=True, gc=False):
     """Something done at the instrument, with where a handle stood before and after, as its counter counts.
 
     `what` is 'set' or 'turn' of an element, 'drive' or 'wheel' of an axis, 'preset', 'fit', 'base', 'gear', 'load',
@@ -70,10 +70,10 @@ class Reading:
 
 
 @dataclass
-class Witness:
+class ActionLog:
     """What was seen at an instrument, the truth beside it; everything but the truth can be had at the link."""
 
-    deeds: list[Deed] = field(default_factory=list)
+    deeds: list[StudentAction] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)
     sides: dict[str, int] = field(default_factory=dict)
     began: float = 0.0
@@ -83,7 +83,7 @@ class Witness:
     now: float = 0.0
     client: str = ""
 
-    def copy_from(self, other: "Witness") -> None:
+    def copy_from(self, other: "ActionLog") -> None:
         """Know what another has seen so far, and nothing else."""
         self.deeds, self.readings, self.sides = [*other.deeds], [*other.readings], dict(other.sides)
         self.began, self.opened, self.now, self.client = other.began, other.opened, other.now, other.client
@@ -102,17 +102,17 @@ class Witness:
             for unit in parse_program(event.text.encode("latin-1", "replace")):
                 self._take_note(unit)
 
-    def _take_note(self, unit: Step | Fault) -> None:
-        if isinstance(unit, Step) and unit.command.header == "NOTE" and unit.given:
+    def _take_note(self, unit: ParsedCommand | ParseFailure) -> None:
+        if isinstance(unit, ParsedCommand) and unit.command.header == "NOTE" and unit.given:
             self.add_action("note", text=str(getattr(unit.given[0], "value", "")))
-        if isinstance(unit, Step) and unit.command.header == "PHOTo<n>:FIDucial?":
+        if isinstance(unit, ParsedCommand) and unit.command.header == "PHOTo<n>:FIDucial?":
             self.add_action("fiducials", str(unit.suffix))
 
     def add_action(self, what: str, name: str = "", before: float = 0.0, after: float = 0.0, text: str = "") -> None:
         """Take note of a deed."""
         if what in PLAIN and before != after:
             self.sides[name] = 1 if after > before else -1
-        self.deeds.append(Deed(len(self.deeds), self.now, self.client, what, name, before, after, text))
+        self.deeds.append(StudentAction(len(self.deeds), self.now, self.client, what, name, before, after, text))
 
     def add_reading(self, autograph: Autograph, made: Registration) -> None:
         """Take note of a registration and of how everything stands."""
@@ -148,7 +148,7 @@ class Witness:
 
 
 class _WitnessedRecorder(Recorder):
-    def __init__(self, autograph: "WitnessedAutograph") -> None:
+    def __init__(self, autograph: "LoggedAutograph") -> None:
         super().__init__()
         self._autograph = autograph
 
@@ -162,12 +162,12 @@ class _WitnessedRecorder(Recorder):
         self._autograph.witness.strike_reading(number)
 
 
-class WitnessedAutograph(Autograph):
+class LoggedAutograph(Autograph):
     """An instrument that does all it is asked exactly as any other, and tells its witness. Refused deeds are none."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.witness = Witness()
+        self.witness = ActionLog()
         self.recorder = _WitnessedRecorder(self)
         self.blind = False
         """Whether pictures are left black, for who only works a journal again: they take longer than all the rest."""

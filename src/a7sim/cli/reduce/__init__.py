@@ -10,11 +10,11 @@ from rich.console import Console
 from a7sim import computing
 from a7sim.cli.options import FILE, HEIGHT, Number, principal_distance
 from a7sim.cli.reduce import options, tables
-from a7sim.computing import Outcome
-from a7sim.computing.interior import Flight
+from a7sim.computing import ProcessingResult
+from a7sim.computing.interior import FlightHeights
 from a7sim.computing.strips import PairCamera
 from a7sim.documents import Document, as_json
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction.strips import JoinMethod
 
 MIN_WIDTH = 80
@@ -81,10 +81,10 @@ def interior(
     Example: a7sim reduce interior counts.csv --camera scenarios/akwanga.toml --out refined
     """
     if flying_height is not None and flying_height <= ground_height:
-        raise Mistake(
+        raise A7SimError(
             f"--flying-height: expected more than the ground height of {ground_height:g} m, got {flying_height:g}"
         )
-    flight = None if flying_height is None else Flight(flying_height, ground_height)
+    flight = None if flying_height is None else FlightHeights(flying_height, ground_height)
     outcome = computing.interior(counts, camera, method, count_mm, correct, flight)
     _deliver(outcome, as_document, out, tables.interior_tables)
 
@@ -275,7 +275,9 @@ def block(
     _deliver(computing.block(models, ground, height_weight, against), as_document, out, tables.block_tables)
 
 
-def _deliver(outcome: Outcome, as_document: bool, out: Path | None, shown: Callable[[Document], list[Any]]) -> None:
+def _deliver(
+    outcome: ProcessingResult, as_document: bool, out: Path | None, shown: Callable[[Document], list[Any]]
+) -> None:
     """Write an outcome where it is wanted and print it, as JSON or as the table a surveyor files."""
     document = outcome.document if out is None else computing.write_result(outcome, out)
     if as_document:

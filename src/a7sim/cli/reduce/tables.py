@@ -13,13 +13,13 @@ from a7sim.wording import pluralize
 ANGLES = ("omega", "phi", "kappa")
 SHIFTS = ("Tx", "Ty", "Tz")
 
-Shown = list[Any]
+Tables = list[Any]
 
 
-def interior_tables(document: Document) -> Shown:
+def interior_tables(document: Document) -> Tables:
     """Show fits, residuals, and what the film did, photograph by photograph."""
     camera = document["camera"]
-    shown: Shown = [
+    shown: Tables = [
         f"Interior orientation, {document['method']}, {camera['name']}, c {camera['c_mm']:.3f} mm",
         f"points in mm about the {document['about']}{_of_corrections(document['corrections'])}",
     ]
@@ -53,7 +53,7 @@ def _of_film(film: Document) -> list[str]:
     return said
 
 
-def relative_tables(document: Document) -> Shown:
+def relative_tables(document: Document) -> Tables:
     """Show elements, parallaxes and model coordinates; the blunders found; and the methods side by side."""
     elements = [
         (name, "mm" if name.startswith("b") else "gon", each["value"], each["sigma"])
@@ -64,7 +64,7 @@ def relative_tables(document: Document) -> Shown:
         (name, *place, f"{1e3 * parallaxes[name]:.1f}" if name in parallaxes else "taken out")
         for name, place in document["points"].items()
     ]
-    shown: Shown = [
+    shown: Tables = [
         f"Relative orientation by {document['method']}",
         "",
         _table(("element", "", "value", "±"), elements),
@@ -94,10 +94,10 @@ def _of_blunders(document: Document) -> list[str]:
     ] or ["no blunders found"]
 
 
-def centres_tables(document: Document) -> Shown:
+def centres_tables(document: Document) -> Tables:
     """Show centres with their precision, and the residuals of the points."""
     method = document["method"]
-    shown: Shown = [f"Perspective centres, {method}", ""]
+    shown: Tables = [f"Perspective centres, {method}", ""]
     if method == "a8":
         rows = [(name, side, *each[side]) for name, each in document["models"].items() for side in ("left", "right")]
         return [*shown, _table(("model", "centre", "X, units", "Y, units", "Z, mm"), rows, 3)]
@@ -119,12 +119,12 @@ def centres_tables(document: Document) -> Shown:
     return [*shown, f"rms {document['rms']:.4f}{of_pointing}, redundancy {document['redundancy']}"]
 
 
-def similarity_tables(document: Document) -> Shown:
+def similarity_tables(document: Document) -> Tables:
     """Show the seven unknowns, the residuals, and the methods side by side."""
     sigma = document["sigma"]
     values = {"scale": document["scale"]} | {f"{name}, gon": value for name, value in document["angles"].items()}
     values |= dict(zip(SHIFTS, document["translation"], strict=True))
-    shown: Shown = [
+    shown: Tables = [
         f"Similarity by {document['method']}",
         "",
         _table(("", "value", "±"), [(name, v, sigma[name.split(",")[0]]) for name, v in values.items()], 6),
@@ -139,7 +139,7 @@ def similarity_tables(document: Document) -> Shown:
     return shown
 
 
-def connection_tables(document: Document) -> Shown:
+def connection_tables(document: Document) -> Tables:
     """Show the joins with their closing differences, and the points of the whole."""
     points = [(point, *place) for point, place in document["points"].items()]
     return [
@@ -152,9 +152,9 @@ def connection_tables(document: Document) -> Shown:
     ]
 
 
-def strip_tables(document: Document) -> Shown:
+def strip_tables(document: Document) -> Tables:
     """Show joins, absolute orientation, residuals, and what the polynomials found the strip to be."""
-    shown: Shown = [
+    shown: Tables = [
         f"Strip of {pluralize(len(document['models']), 'model')} from {document['input']}, "
         f"joined on {document['method']}",
         f"joins in the unit of model {document['models'][0]['model']}{', mm' if document['input'] == 'pairs' else ''}",
@@ -168,7 +168,7 @@ def strip_tables(document: Document) -> Shown:
     return shown
 
 
-def absolute_tables(document: Document, title: str = "Absolute orientation") -> Shown:
+def absolute_tables(document: Document, title: str = "Absolute orientation") -> Tables:
     """Show the scale, the residuals at the ground points and the accuracies, and differences to given coordinates."""
     precision = f", s0 {document['s0_m']:.4f} m" if "s0_m" in document else ""
     return [
@@ -178,7 +178,7 @@ def absolute_tables(document: Document, title: str = "Absolute orientation") -> 
     ]
 
 
-def block_tables(document: Document) -> Shown:
+def block_tables(document: Document) -> Tables:
     """Show the models' scales, the tie residuals, and the residuals and accuracies at the ground points."""
     models = [
         (each["model"], f"{each['scale']:.6f}", *_rms_of(each["residuals_m"].values()), len(each["residuals_m"]))
@@ -201,12 +201,12 @@ def warning_lines(document: Document) -> list[str]:
     return said + [f"{name} is not written: {why}" for name, why in document.get("not_written", {}).items()]
 
 
-def _of_joins(joins: Sequence[Document], differences: bool = False) -> Shown:
+def _of_joins(joins: Sequence[Document], differences: bool = False) -> Tables:
     rows = [
         (" - ".join(join["models"]), len(join["points"]), join["scale"], *join["rms_mm"], join["max_residual_mm"])
         for join in joins
     ]
-    shown: Shown = [_table(("join", "points", "scale", "rms dX", "dY", "dZ", "largest"), rows)]
+    shown: Tables = [_table(("join", "points", "scale", "rms dX", "dY", "dZ", "largest"), rows)]
     if differences:
         closing = [
             (" - ".join(join["models"]), point, *each)
@@ -217,7 +217,7 @@ def _of_joins(joins: Sequence[Document], differences: bool = False) -> Shown:
     return shown
 
 
-def _of_ground(document: Document) -> Shown:
+def _of_ground(document: Document) -> Tables:
     residuals = document["residuals_m"]
     rows = [(point, each["role"], each["X"], each["Y"], each["Z"]) for point, each in residuals.items()]
     return ["", _table(("ground point", "role", "vX, m", "vY", "vZ"), rows, 3), *_of_accuracy(document["accuracy_m"])]
@@ -232,7 +232,7 @@ def _of_accuracy(accuracy: Document) -> list[str]:
     ]
 
 
-def _of_polynomial(document: Document) -> Shown:
+def _of_polynomial(document: Document) -> Tables:
     found = document["deformation"]
     return [
         f"Polynomials of degree {document['degree']}: "
@@ -243,7 +243,7 @@ def _of_polynomial(document: Document) -> Shown:
     ]
 
 
-def _of_comparison(document: Document) -> Shown:
+def _of_comparison(document: Document) -> Tables:
     if "compare" not in document:
         return []
     compared = document["compare"]

@@ -10,13 +10,13 @@ from a7sim.cli import EXIT_DIFFERS, options
 from a7sim.cli.names import exercise_argument
 from a7sim.cli.train.options import last_attempt, progress_in, student_name, student_options
 from a7sim.documents import as_json, document_header
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.session.folder import JOURNAL
 from a7sim.training.attempts import ANSWERS
 from a7sim.training.grading import Grade, grade_folder, grade_lines
-from a7sim.training.handed_in import HandedIn, find_submissions, grade_submissions
+from a7sim.training.handed_in import Submission, find_submissions, grade_submissions
 from a7sim.training.progress import EXAM, Attempt, Progress
-from a7sim.training.room import Unreliable
+from a7sim.training.room import UnreliableJournalError
 from a7sim.training.shelf import find_exercise
 
 EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
@@ -54,7 +54,7 @@ def verify_(
         given = progress.first_grade(attempt) if attempt.mode == EXAM else None
         try:
             grade = given or _graded(progress, attempt)
-        except Unreliable as unreliable:
+        except UnreliableJournalError as unreliable:
             click.echo(f"a7sim: {unreliable}", err=True)
             raise click.exceptions.Exit(EXIT_DIFFERS) from unreliable
         if given is None:
@@ -66,7 +66,7 @@ def verify_(
     raise click.exceptions.Exit(EXIT_PASSED if grade.passed else EXIT_NOT_PASSED)
 
 
-def _tell_of_many(handed_in: list[HandedIn], as_document: bool) -> int:
+def _tell_of_many(handed_in: list[Submission], as_document: bool) -> int:
     """Print what came of attempts that were handed in; return the exit code."""
     if as_document:
         documents = [msgspec.to_builtins(each) for each in handed_in]
@@ -105,7 +105,7 @@ def watch_(exercise: str | None, every: float, home: Path | None, student: str |
     with progress_in(home) as progress:
         attempt = last_attempt(progress, student_name(student), exercise)
         if attempt.mode == EXAM:
-            raise Mistake(f"{attempt.exercise}: expected an attempt for practice, got an exam")
+            raise A7SimError(f"{attempt.exercise}: expected an attempt for practice, got an exam")
         seen: tuple[int, ...] = ()
         while True:
             now = _sizes(attempt)

@@ -8,7 +8,7 @@ import click
 
 from a7sim.cli.options import FOLDER, combine_options
 from a7sim.cli.prompt import data_folder
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.training.progress import Attempt, Progress
 from a7sim.training.shelf import find_exercise
 
@@ -48,7 +48,7 @@ def student_name(student: str | None) -> str:
             student = os.environ.get("USERNAME", "student")
     name = " ".join(student.split())
     if not 1 <= len(name) <= MAX_NAME_LENGTH or not name.isprintable():
-        raise Mistake(f"--student: expected a name of 1 to {MAX_NAME_LENGTH} characters, got {student!r}")
+        raise A7SimError(f"--student: expected a name of 1 to {MAX_NAME_LENGTH} characters, got {student!r}")
     return name
 
 

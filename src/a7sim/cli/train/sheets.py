@@ -9,10 +9,10 @@ from a7sim.cli import options
 from a7sim.cli.names import exercise_argument
 from a7sim.cli.train.options import progress_in, student_name, student_options
 from a7sim.documents import Document, as_json, document_header
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.session.folder import write_atomic
 from a7sim.sheets import text_table
-from a7sim.training.exercise import Shelved
+from a7sim.training.exercise import ExerciseFolder
 from a7sim.training.exports import HOME_PAGE, to_class_document, to_nbgrader, to_xapi
 from a7sim.training.shelf import all_exercises, find_exercise
 from a7sim.wording import pluralize
@@ -53,7 +53,7 @@ def list_(exercise: str | None, as_document: bool, home: Path | None, student: s
     Console().print(table)
 
 
-def _of_exercise(shelved: Shelved) -> Document:
+def _of_exercise(shelved: ExerciseFolder) -> Document:
     exercise = shelved.exercise
     return document_header("train list") | {
         "exercise": shelved.name,
@@ -68,7 +68,7 @@ def _of_exercise(shelved: Shelved) -> Document:
     }
 
 
-def _shown(shelved: Shelved) -> str:
+def _shown(shelved: ExerciseFolder) -> str:
     exercise = shelved.exercise
     steps = [f"  - {each.text}" for each in exercise.steps]
     criteria = [f"  {each.weight:4g}  {each.title}" for each in exercise.criteria]
@@ -102,7 +102,7 @@ def report_(
     with progress_in(home) as progress:
         graded, best, attempts = progress.grades(whose), progress.best(whose), progress.attempts(whose)
     if not attempts:
-        raise Mistake(f"{f'student {whose}' if whose else 'the class'}: expected attempts to report on, found none")
+        raise A7SimError(f"{f'student {whose}' if whose else 'the class'}: expected attempts to report on, found none")
     if to == "csv":
         text = to_nbgrader(best)
     elif to == "json":

@@ -10,18 +10,18 @@ from a7sim.cli.prompt import data_folder
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.opening import TIMEOUT_S
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.session.folder import JOURNAL
 from a7sim.session.lines import Event, read_journal
 from a7sim.training.checklist import Checklist
 from a7sim.training.exercise import OPENING
-from a7sim.training.room import Room
+from a7sim.training.room import AttemptEnvironment
 
 GOAL_WIDTH = 64
 """Columns, so that it has room on every terminal."""
 
 
-def open_console(room: Room, checklist: Checklist, plain: bool) -> None:
+def open_console(room: AttemptEnvironment, checklist: Checklist, plain: bool) -> None:
     """Open the console in the room of an attempt, until whoever sits there leaves. Raises Mistake without a terminal.
 
     The simulated clock goes with the wall's while somebody sits there.
@@ -29,15 +29,15 @@ def open_console(room: Room, checklist: Checklist, plain: bool) -> None:
     try:
         from a7sim.console.app import Console  # only who sits down loads the screen
     except ImportError as error:
-        raise Mistake("start: expected textual to be installed: pip install 'a7sim[console]'") from error
-    from a7sim.console.eyepiece import Drawing
+        raise A7SimError("start: expected textual to be installed: pip install 'a7sim[console]'") from error
+    from a7sim.console.eyepiece import DrawingMode
     from a7sim.console.keymap import default_keymap, load_keymap
-    from a7sim.console.recalling import Said
-    from a7sim.console.seat import Seat
+    from a7sim.console.recalling import LoggedLine
+    from a7sim.console.seat import ConsoleConfig
     from a7sim.console.sheet import JobSheet
 
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        raise Mistake("start: expected a terminal to sit at, got a file or a pipe (--script and --link need none)")
+        raise A7SimError("start: expected a terminal to sit at, got a file or a pipe (--script and --link need none)")
     began, clock, so_far = time.monotonic(), room.clock, room.clock.now
 
     def at_the_instrument() -> float:
@@ -47,17 +47,17 @@ def open_console(room: Room, checklist: Checklist, plain: bool) -> None:
     own_keys = data_folder() / KEYMAP
     title = f"exercise {checklist.exercise.number}"
     Console(
-        Seat(
+        ConsoleConfig(
             lambda: Client(InProcessSerial(desk=room.desk, clock=clock, timeout=TIMEOUT_S)),
             at_the_instrument,
             where=title,
             sheet=JobSheet(title, room.scenario.camera),
             keymap=load_keymap(own_keys) if own_keys.exists() else default_keymap(),
-            drawing=Drawing.WORDS if plain else None,
+            drawing=DrawingMode.WORDS if plain else None,
             theme="contrast" if plain else "enamel",
             tasks=checklist.lines,
             exercise_goal=fill(" ".join(checklist.exercise.goal.split()), GOAL_WIDTH),
-            history=lambda: [Said(each.text, each.dir == "<") for each in _past(checklist)],
+            history=lambda: [LoggedLine(each.text, each.dir == "<") for each in _past(checklist)],
         )
     ).run()
 

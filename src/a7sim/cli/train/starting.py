@@ -8,23 +8,23 @@ import click
 
 from a7sim.cli import options
 from a7sim.cli.names import exercise_argument
-from a7sim.cli.serve import USUAL, Announcements, Served, serve
+from a7sim.cli.serve import USUAL, ServedInstrument, StartupMessages, serve
 from a7sim.cli.train.options import progress_in, student_name, student_options
 from a7sim.cli.train.sitting_down import open_console
 from a7sim.documents import document_header
 from a7sim.link.addresses import Address, parse_address
-from a7sim.link.conversation import Terms
+from a7sim.link.conversation import ServerLimits
 from a7sim.link.loops import run
-from a7sim.link.serving import Doors
-from a7sim.mistakes import Mistake
+from a7sim.link.serving import Endpoints
+from a7sim.mistakes import A7SimError
 from a7sim.session.folder import JOURNAL
 from a7sim.session.journal import Journal
 from a7sim.session.scripts import read_script
 from a7sim.training.attempts import play_script, resume_attempt, start_attempt
 from a7sim.training.checklist import Checklist
-from a7sim.training.exercise import Shelved
+from a7sim.training.exercise import ExerciseFolder
 from a7sim.training.progress import EXAM, PRACTICE, Attempt, Progress
-from a7sim.training.room import Room
+from a7sim.training.room import AttemptEnvironment
 from a7sim.training.shelf import find_exercise
 
 EXAMINATION = "exam"
@@ -62,11 +62,11 @@ def start_(
     Example: a7sim train start 4
     """
     if exercise is None and not exam:
-        raise Mistake(
+        raise A7SimError(
             "train start: expected EXERCISE, such as 4 (a7sim train list), or --exam for the examination, got none"
         )
     if sum((script is not None, link is not None, serves)) > 1:
-        raise Mistake("train start: expected one of --script, --link and --serve, got several")
+        raise A7SimError("train start: expected one of --script, --link and --serve, got several")
     address = _address(link) if link is not None else USUAL if serves else None
     played = read_script(script) if script is not None else None
     shelved = find_exercise(exercise or EXAMINATION)
@@ -80,7 +80,7 @@ def start_(
             trouble = play_script(room, played)
             click.echo("\n".join(checklist.lines()))
             if trouble:
-                raise Mistake(trouble)
+                raise A7SimError(trouble)
         elif address is not None:
             click.echo("\n".join(checklist.lines()))
             _serve(room, address)
@@ -89,19 +89,21 @@ def start_(
     click.echo(f"a7sim train verify {shelved.exercise.number} grades it; a7sim train start goes on with it")
 
 
-def _attempt(progress: Progress, shelved: Shelved, student: str, mode: str, anew: bool, seed: int | None) -> Attempt:
+def _attempt(
+    progress: Progress, shelved: ExerciseFolder, student: str, mode: str, anew: bool, seed: int | None
+) -> Attempt:
     there = progress.open_attempt(student, shelved.name)
     if there is not None and not anew:
         if there.mode == mode and seed in (None, there.seed):
             return there
         if there.mode == EXAM:
-            raise Mistake(
+            raise A7SimError(
                 f"{shelved.name}: expected --exam, since an exam is under way (verify ends it, --anew drops it)"
             )
     return progress.begin(student, shelved, mode, seed)
 
 
-def _entered(shelved: Shelved, attempt: Attempt) -> AbstractContextManager[Room]:
+def _entered(shelved: ExerciseFolder, attempt: Attempt) -> AbstractContextManager[AttemptEnvironment]:
     journal = attempt.folder / JOURNAL
     if journal.exists() and b"\n" in journal.read_bytes():
         return resume_attempt(shelved, attempt.seed, attempt.folder)
@@ -111,10 +113,10 @@ def _entered(shelved: Shelved, attempt: Attempt) -> AbstractContextManager[Room]
 def _address(text: str) -> Address:
     url = re.fullmatch("tcp:(//)?(?P<address>.+)", text)
     if not url:
-        raise Mistake(f"--link: expected tcp://HOST:PORT, got {text!r}")
+        raise A7SimError(f"--link: expected tcp://HOST:PORT, got {text!r}")
     found = parse_address(url["address"], "--link")
     if not found.loopback:
-        raise Mistake(f"--link {text}: expected an address of this machine alone")
+        raise A7SimError(f"--link {text}: expected an address of this machine alone")
     return found
 
 
@@ -124,10 +126,10 @@ def _tell_of_papers(checklist: Checklist) -> None:
         click.echo(f"a7sim train answer {key}=...   {about}")
 
 
-def _serve(room: Room, address: Address) -> None:
+def _serve(room: AttemptEnvironment, address: Address) -> None:
     first = document_header("train start") | {
         "scenario": room.shelved.exercise.title,
         "variant": room.scenario.instrument.variant,
     }
-    served = Served(first, room.desk, room.clock, Journal())
-    run(serve(served, Doors([address]), Terms(), Announcements(first, as_document=False, quiet=False)))
+    served = ServedInstrument(first, room.desk, room.clock, Journal())
+    run(serve(served, Endpoints([address]), ServerLimits(), StartupMessages(first, as_document=False, quiet=False)))

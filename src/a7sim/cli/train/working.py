@@ -8,7 +8,7 @@ from a7sim.cli import options
 from a7sim.cli.names import exercise_argument
 from a7sim.cli.train.options import last_attempt, progress_in, student_name, student_options
 from a7sim.documents import as_json, document_header
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.training.account import parse_answers
 from a7sim.training.attempts import write_answers, write_hint
 from a7sim.training.shelf import find_exercise
@@ -27,7 +27,7 @@ def hint_(exercise: str | None, as_document: bool, home: Path | None, student: s
     with progress_in(home) as progress:
         attempt = last_attempt(progress, student_name(student), exercise)
         if attempt.closed:
-            raise Mistake(f"{attempt.exercise}: expected an attempt that is open, got one that is closed")
+            raise A7SimError(f"{attempt.exercise}: expected an attempt that is open, got one that is closed")
         number, hint = progress.next_hint(attempt, find_exercise(attempt.exercise).exercise)
         write_hint(attempt.folder, number, hint.cost)
     if as_document:
@@ -57,13 +57,13 @@ def answer_(
     with progress_in(home) as progress:
         attempt = last_attempt(progress, student_name(student), exercise)
     if attempt.closed:
-        raise Mistake(f"{attempt.exercise}: expected an attempt that is open, got one that is closed")
+        raise A7SimError(f"{attempt.exercise}: expected an attempt that is open, got one that is closed")
     asked = find_exercise(attempt.exercise).exercise.answers
     for word in answers:
         given = parse_answers([word])
         if not given or next(iter(given)) not in asked:
             known = ", ".join(f"{key}=... ({about})" for key, about in asked.items()) or "no answers at all"
-            raise Mistake(f"{attempt.exercise}: expected {known}, got {word!r}")
+            raise A7SimError(f"{attempt.exercise}: expected {known}, got {word!r}")
     written = write_answers(attempt.folder, parse_answers(answers))
     if as_document:
         told = {"exercise": attempt.exercise, "answers": dict(written)}

@@ -1,6 +1,6 @@
 """The command language of the instrument, without I/O: bytes in, bytes and events out (protocol.md)."""
 
-from a7sim.instrument.language.desk import Desk, LinkEvent, Listener
+from a7sim.instrument.language.desk import LinkEvent, Listener, SharedInstrument
 from a7sim.instrument.language.engine import MAX_BUFFERED_BYTES, MAX_LINE_LENGTH, MAX_REPLY, Engine, loggable_reply
 from a7sim.instrument.language.errors import ErrorNumber, format_entry
 from a7sim.instrument.language.logins import redact_token
@@ -9,11 +9,11 @@ __all__ = [
     "MAX_BUFFERED_BYTES",
     "MAX_LINE_LENGTH",
     "MAX_REPLY",
-    "Desk",
     "Engine",
     "ErrorNumber",
     "LinkEvent",
     "Listener",
+    "SharedInstrument",
     "format_entry",
     "loggable_reply",
     "redact_token",

@@ -32,7 +32,7 @@ Listener = Callable[[LinkEvent], None]
 
 
 @dataclass
-class Desk:
+class SharedInstrument:
     """An instrument with its clients.
 
     Movement lasts, on the simulated clock, as long as each part needs for its way; parts move at the same time, and

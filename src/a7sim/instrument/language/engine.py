@@ -7,22 +7,22 @@ import zlib
 from typing import TYPE_CHECKING, Any
 
 from a7sim.instrument.language.commands import COMMANDS
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.logins import redact_token
 from a7sim.instrument.language.program import (
-    Fault,
+    CachedQuery,
+    ParsedCommand,
+    ParseFailure,
     Program,
-    Question,
-    Step,
     cached_query,
     parse_program,
     strip_line_end,
 )
 from a7sim.instrument.language.status import OPERATION_COMPLETE, SETTLING, Status
-from a7sim.instrument.refusals import OutOfRange, Refusal, SettingsConflict, UnknownName
+from a7sim.instrument.refusals import AutographError, OutOfRangeError, SettingsConflictError, UnknownNameError
 
 if TYPE_CHECKING:
-    from a7sim.instrument.language.desk import Desk
+    from a7sim.instrument.language.desk import SharedInstrument
 
 MAX_LINE_LENGTH = 4096
 """Bytes, its end not counted."""
@@ -42,9 +42,9 @@ _MAX_PENDING_LENGTH = MAX_LINE_LENGTH + 2
 _TOO_MUCH = f"expected replies of at most {MAX_REPLY} bytes a line"
 
 _NUMBER_OF = {
-    OutOfRange: ErrorNumber.DATA_OUT_OF_RANGE,
-    SettingsConflict: ErrorNumber.SETTINGS_CONFLICT,
-    UnknownName: ErrorNumber.ILLEGAL_PARAMETER_VALUE,
+    OutOfRangeError: ErrorNumber.DATA_OUT_OF_RANGE,
+    SettingsConflictError: ErrorNumber.SETTINGS_CONFLICT,
+    UnknownNameError: ErrorNumber.ILLEGAL_PARAMETER_VALUE,
 }
 
 
@@ -56,7 +56,7 @@ class Engine:
     Within a long line it is the present time now and then, so that others may have their turn.
     """
 
-    def __init__(self, desk: "Desk", client: str, cr_ends_line: bool = True) -> None:
+    def __init__(self, desk: "SharedInstrument", client: str, cr_ends_line: bool = True) -> None:
         self.desk = desk
         self.client = client
         self.waits_until: float | None = None
@@ -110,18 +110,18 @@ class Engine:
         self._keep_back(received[start:])
         return replies
 
-    def _answer(self, question: Question) -> list[bytes]:
+    def _answer(self, question: CachedQuery) -> list[bytes]:
         try:
             reply = question.handler(self, question.call)
-        except LanguageError as error:
+        except CommandError as error:
             self._report(error)
-        except Refusal as refusal:
+        except AutographError as refusal:
             self._report(_error_of(refusal, question.text))
         else:
             return [_as_bytes(reply) + b"\n"] if reply is not None else []
         return []
 
-    def _report(self, error: LanguageError) -> None:
+    def _report(self, error: CommandError) -> None:
         self._status.report(error.number, error.detail)
 
     def _one_line(self, received: bytes) -> bool:
@@ -178,7 +178,7 @@ class Engine:
         for place, unit in enumerate(program):
             try:
                 done = self._obey(unit)
-            except LanguageError as error:
+            except CommandError as error:
                 self._report(error)
                 done = True
             if (place >= UNITS_AT_ONCE or self._reply_size > breath) and self.waits_until is None:
@@ -194,23 +194,23 @@ class Engine:
             self._reply_size = 0
             self._overflowed = False
 
-    def _obey(self, unit: Step | Fault) -> bool:
+    def _obey(self, unit: ParsedCommand | ParseFailure) -> bool:
         """Obey a unit; return whether it is done, or is still to come after a wait. Raises LanguageError."""
-        if not self._admitted and (isinstance(unit, Fault) or not unit.command.allowed_before_login):
-            raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "expected SYSTem:LOGin first")
-        if isinstance(unit, Fault):
-            raise LanguageError(unit.number, unit.detail)
+        if not self._admitted and (isinstance(unit, ParseFailure) or not unit.command.allowed_before_login):
+            raise CommandError(ErrorNumber.COMMAND_PROTECTED, "expected SYSTem:LOGin first")
+        if isinstance(unit, ParseFailure):
+            raise CommandError(unit.number, unit.detail)
         command = unit.command
         try:
             call = unit.bare or unit.call(self)
             if command.moves and not self.desk.may_move(self.client):
-                raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "another client holds the lock")
+                raise CommandError(ErrorNumber.COMMAND_PROTECTED, "another client holds the lock")
             if command.waits and self._has_to_wait():
                 return False
             if self._overflowed and command.query:
-                raise LanguageError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
+                raise CommandError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
             reply = command.handler(self, call)
-        except Refusal as refusal:
+        except AutographError as refusal:
             raise _error_of(refusal, unit.text) from refusal
         finally:
             if command.moves:
@@ -233,7 +233,7 @@ class Engine:
     def _answered(self, reply: str | bytes) -> None:
         self._overflowed = self._reply_size + len(reply) > MAX_REPLY
         if self._overflowed:
-            raise LanguageError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
+            raise CommandError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
         self._reply_size += len(reply)
         self._replies.append(reply)
 
@@ -298,12 +298,12 @@ class Engine:
         """Admit the client to an instrument that asks for a token. Raises LanguageError for a wrong one."""
         expected = self.desk.token
         if expected is not None and not hmac.compare_digest(token.encode(), expected.encode()):
-            raise LanguageError(ErrorNumber.COMMAND_PROTECTED, "this is not the token")
+            raise CommandError(ErrorNumber.COMMAND_PROTECTED, "this is not the token")
         self._admitted = True
 
 
-def _error_of(refusal: Refusal, text: str) -> LanguageError:
-    return LanguageError(_NUMBER_OF.get(type(refusal), ErrorNumber.EXECUTION_ERROR), f"{text[:60]}: {refusal}")
+def _error_of(refusal: AutographError, text: str) -> CommandError:
+    return CommandError(_NUMBER_OF.get(type(refusal), ErrorNumber.EXECUTION_ERROR), f"{text[:60]}: {refusal}")
 
 
 def _as_bytes(reply: str | bytes) -> bytes:

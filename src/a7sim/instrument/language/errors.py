@@ -38,7 +38,7 @@ class ErrorNumber(IntEnum):
     QUERY_DEADLOCKED = -430, "Query DEADLOCKED"
 
 
-class LanguageError(Exception):
+class CommandError(Exception):
     """A unit that cannot be obeyed or answered: an entry for the error queue."""
 
     def __init__(self, number: ErrorNumber, detail: str = "") -> None:

@@ -5,7 +5,7 @@ from functools import lru_cache
 from msgspec import Struct
 
 from a7sim.instrument.language.commands import COMMANDS
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import Mnemonic, Parameter, Unit, parse_mnemonics, parse_unit, split_units
 from a7sim.instrument.language.table import Call, Command, Handler
 
@@ -15,7 +15,7 @@ MAX_CACHED_LINE = 100
 LINES_KEPT, HEADERS_KEPT = 256, 512
 
 
-class Step(Struct, frozen=True):
+class ParsedCommand(Struct, frozen=True):
     """A unit whose command is known."""
 
     text: str
@@ -30,7 +30,7 @@ class Step(Struct, frozen=True):
         return self.bare or self.command.call(self.given, self.suffix, client)
 
 
-class Fault(Struct, frozen=True):
+class ParseFailure(Struct, frozen=True):
     """A unit that can be no command's."""
 
     number: ErrorNumber
@@ -42,7 +42,7 @@ def strip_line_end(line: bytes) -> str:
     return line.removesuffix(b"\n").removesuffix(b"\r").decode("latin-1")
 
 
-Program = tuple[Step | Fault, ...]
+Program = tuple[ParsedCommand | ParseFailure, ...]
 Path = tuple[Mnemonic, ...]
 
 
@@ -51,7 +51,7 @@ def parse_program(line: bytes) -> Program:
     return _kept(line) if len(line) <= MAX_CACHED_LINE else _taken_apart(line)
 
 
-class Question(Struct, frozen=True):
+class CachedQuery(Struct, frozen=True):
     """A line that is nothing but a query, always means the same and need not wait: what a client polls."""
 
     text: str
@@ -59,32 +59,32 @@ class Question(Struct, frozen=True):
     call: Call
 
 
-def cached_query(received: bytes, cr_ends_line: bool) -> Question | None:
+def cached_query(received: bytes, cr_ends_line: bool) -> CachedQuery | None:
     """Return the question that what was received is, None where it is anything else."""
     return _kept_question(received, cr_ends_line) if len(received) <= MAX_CACHED_LINE else None
 
 
 @lru_cache(maxsize=LINES_KEPT)
-def _kept_question(received: bytes, cr_ends_line: bool) -> Question | None:
+def _kept_question(received: bytes, cr_ends_line: bool) -> CachedQuery | None:
     if received.find(b"\n") != len(received) - 1 or (cr_ends_line and b"\r" in received):
         return None
     program = parse_program(received)
     step = program[0] if len(program) == 1 else None
-    if not isinstance(step, Step) or step.bare is None or not step.command.query or step.command.may_wait:
+    if not isinstance(step, ParsedCommand) or step.bare is None or not step.command.query or step.command.may_wait:
         return None
-    return Question(step.text, step.command.handler, step.bare)
+    return CachedQuery(step.text, step.command.handler, step.bare)
 
 
 def _taken_apart(line: bytes) -> Program:
-    program: list[Step | Fault] = []
+    program: list[ParsedCommand | ParseFailure] = []
     level: Path = ()
     for text in split_units(strip_line_end(line)):
         try:
             unit = parse_unit(text)
             command, suffix, level = _found(unit.header, unit.query, level)
             program.append(_step(text, unit, command, suffix))
-        except LanguageError as error:
-            program.append(Fault(error.number, error.detail))
+        except CommandError as error:
+            program.append(ParseFailure(error.number, error.detail))
     return tuple(program)
 
 
@@ -100,7 +100,7 @@ def _found(header: str, query: bool, level: Path) -> tuple[Command, int, Path]:
 _kept = lru_cache(maxsize=LINES_KEPT)(_taken_apart)
 
 
-def _step(text: str, unit: Unit, command: Command, suffix: int) -> Step:
+def _step(text: str, unit: Unit, command: Command, suffix: int) -> ParsedCommand:
     given = unit.parameters()
     bare = Call(suffix, ()) if not given and all(each.optional for each in command.parameters) else None
-    return Step(text, command, suffix, given, bare)
+    return ParsedCommand(text, command, suffix, given, bare)

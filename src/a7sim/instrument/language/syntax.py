@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
 
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 
 MAX_NUMBER_LENGTH = 255
 """Digits and signs of a number (IEEE 488.2 7.7.2.4.1)."""
@@ -86,13 +86,13 @@ def parse_unit(text: str) -> Unit:
     """Return a unit with its header taken apart. Raises LanguageError."""
     never = _NEVER.search(text)
     if never is not None:
-        raise LanguageError(ErrorNumber.INVALID_CHARACTER, f"character number {ord(never[0])}")
+        raise CommandError(ErrorNumber.INVALID_CHARACTER, f"character number {ord(never[0])}")
     header = _HEADER.match(text)
     if header is None:
-        raise LanguageError(ErrorNumber.SYNTAX_ERROR, f"expected a header, got {text[:20]}")
+        raise CommandError(ErrorNumber.SYNTAX_ERROR, f"expected a header, got {text[:20]}")
     rest = text[header.end() :]
     if rest and rest[0] not in " \t":
-        raise LanguageError(ErrorNumber.SYNTAX_ERROR, f"expected a blank after {header[0]}, got {rest[:10]}")
+        raise CommandError(ErrorNumber.SYNTAX_ERROR, f"expected a blank after {header[0]}, got {rest[:10]}")
     return Unit(header[1], header[2] == "?", rest.strip())
 
 
@@ -106,30 +106,30 @@ def parse_mnemonics(header: str) -> tuple[Mnemonic, ...]:
 def _mnemonic(text: str) -> Mnemonic:
     found = _MNEMONIC.fullmatch(text)
     if found is None or len(found[2]) > 9:
-        raise LanguageError(ErrorNumber.UNDEFINED_HEADER, text[:20])
+        raise CommandError(ErrorNumber.UNDEFINED_HEADER, text[:20])
     return found[1].upper(), int(found[2]) if found[2] else None
 
 
 def _parameter(text: str) -> Parameter:
     if not text:
-        raise LanguageError(ErrorNumber.SYNTAX_ERROR, "expected a parameter between the commas")
+        raise CommandError(ErrorNumber.SYNTAX_ERROR, "expected a parameter between the commas")
     if text[0] in "\"'":
         return _text(text)
     number = _NUMBER.fullmatch(text)
     if number is not None:
         if len(number[1]) > MAX_NUMBER_LENGTH:
-            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected at most {MAX_NUMBER_LENGTH} digits")
+            raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected at most {MAX_NUMBER_LENGTH} digits")
         return Number(float(number[1]), number[2].upper())
     if _WORD.fullmatch(text):
         return Word(text.upper())
-    raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a number, a word or a text in quotes, got {text[:20]}")
+    raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected a number, a word or a text in quotes, got {text[:20]}")
 
 
 def _text(text: str) -> Text:
     quote = text[0]
     inner = text[1:-1]
     if len(text) < 2 or text[-1] != quote or quote in inner.replace(quote * 2, ""):
-        raise LanguageError(ErrorNumber.SYNTAX_ERROR, f"expected a text in quotes, got {text[:20]}")
+        raise CommandError(ErrorNumber.SYNTAX_ERROR, f"expected a text in quotes, got {text[:20]}")
     return Text(inner.replace(quote * 2, quote))
 
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from msgspec import Struct
 
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import Number, Parameter, Text, Word
 
 _LENGTHS = {"": 1.0, "MM": 1.0, "UM": 1e-3}
@@ -20,7 +20,7 @@ Limits = tuple[float, float, float]
 """MIN, MAX, DEF."""
 
 
-class Client(Protocol):
+class CommandContext(Protocol):
     """Whoever a handler acts for; the engine's session with one client."""
 
 
@@ -34,7 +34,7 @@ class Call(Struct, frozen=True, gc=False):
     arguments: tuple[Any, ...]
 
 
-class Taken(Protocol):
+class ParameterType(Protocol):
     """A kind of parameter: how it reads what came, and how it is describe."""
 
     @property
@@ -65,23 +65,23 @@ class Quantity:
         if isinstance(parameter, Word):
             return self._named(parameter, client, suffix)
         if not isinstance(parameter, Number):
-            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a number, got the text '{parameter.value}'")
+            raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected a number, got the text '{parameter.value}'")
         factors = UNITS[self.unit_there(client) if self.unit_there else self.unit]
         if parameter.unit not in factors:
             if len(factors) == 1:
-                raise LanguageError(ErrorNumber.SUFFIX_NOT_ALLOWED, f"expected a bare number, got {parameter.unit}")
+                raise CommandError(ErrorNumber.SUFFIX_NOT_ALLOWED, f"expected a bare number, got {parameter.unit}")
             known = " or ".join(unit for unit in factors if unit)
-            raise LanguageError(ErrorNumber.INVALID_SUFFIX, f"expected {known}, got {parameter.unit}")
+            raise CommandError(ErrorNumber.INVALID_SUFFIX, f"expected {known}, got {parameter.unit}")
         value = parameter.value * factors[parameter.unit]
         if not abs(value) < 1e12:
-            raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected less than 1E12, got {parameter.value:g}")
+            raise CommandError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected less than 1E12, got {parameter.value:g}")
         return float(round(value)) if self.whole else value
 
     def _named(self, word: Word, client: Any, suffix: int) -> float:
         places = {"MIN": 0, "MINIMUM": 0, "MAX": 1, "MAXIMUM": 1, "DEF": 2, "DEFAULT": 2}
         if self.limits is None or word.value not in places:
             allowed = "a number, MIN, MAX or DEF" if self.limits else "a number"
-            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected {allowed}, got {word.value}")
+            raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected {allowed}, got {word.value}")
         return self.limits(client, suffix)[places[word.value]]
 
     def describe(self) -> str:
@@ -99,11 +99,11 @@ class Choice:
     def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
         """Return the chosen word in lower case, whole."""
         if not isinstance(parameter, Word):
-            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected {self.describe()}")
+            raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected {self.describe()}")
         for word in self.words:
             if parameter.value in (short_form(word), word.upper()):
                 return word.lower()
-        raise LanguageError(ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected {self.describe()}, got {parameter.value}")
+        raise CommandError(ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected {self.describe()}, got {parameter.value}")
 
     def describe(self) -> str:
         """Return the words with a bar between them."""
@@ -120,7 +120,7 @@ class Quoted:
     def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
         """Return the text."""
         if not isinstance(parameter, Text):
-            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a text in quotes, got {parameter.value}")
+            raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected a text in quotes, got {parameter.value}")
         return parameter.value
 
     def describe(self) -> str:
@@ -156,7 +156,7 @@ class AnyWord:
     def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
         """Return the word in capitals."""
         if not isinstance(parameter, Word):
-            raise LanguageError(ErrorNumber.DATA_TYPE_ERROR, f"expected a word, got {parameter.value}")
+            raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected a word, got {parameter.value}")
         return parameter.value
 
     def describe(self) -> str:
@@ -170,8 +170,8 @@ class Command:
 
     header: str
     handler: Handler
-    parameters: tuple[Taken, ...] = ()
-    repeated_parameter: Taken | None = None
+    parameters: tuple[ParameterType, ...] = ()
+    repeated_parameter: ParameterType | None = None
     """A parameter that may follow the others any number of times."""
     moves: bool = False
     """Whether it moves something, which the holder of the lock may do alone."""
@@ -207,13 +207,13 @@ class Command:
         values = [kind.read(parameter, client, suffix) for kind, parameter in zip(taken, given, strict=False)]
         return Call(suffix, tuple(values))
 
-    def _taken(self, given: int) -> Sequence[Taken]:
+    def _taken(self, given: int) -> Sequence[ParameterType]:
         """Return what so many parameters are, one by one; those that are left out stand behind them."""
         if given < sum(not each.optional for each in self.parameters):
-            raise LanguageError(ErrorNumber.MISSING_PARAMETER, f"expected {self.syntax()}")
+            raise CommandError(ErrorNumber.MISSING_PARAMETER, f"expected {self.syntax()}")
         more = max(0, given - len(self.parameters))
         if more and self.repeated_parameter is None:
-            raise LanguageError(ErrorNumber.PARAMETER_NOT_ALLOWED, f"expected {self.syntax()}")
+            raise CommandError(ErrorNumber.PARAMETER_NOT_ALLOWED, f"expected {self.syntax()}")
         return (
             self.parameters
             if self.repeated_parameter is None
@@ -253,14 +253,14 @@ class CommandTable:
         """Return the command of a whole header path and its suffix. Raises LanguageError."""
         found = self._commands.get((tuple([name for name, _ in mnemonics]), query))
         if found is None:
-            raise LanguageError(ErrorNumber.UNDEFINED_HEADER, _shown(mnemonics) + ("?" if query else ""))
+            raise CommandError(ErrorNumber.UNDEFINED_HEADER, _shown(mnemonics) + ("?" if query else ""))
         suffix = 1
         for (_, number), numbered in zip(mnemonics, found.numbered, strict=True):
             if number is not None and not numbered:
-                raise LanguageError(ErrorNumber.UNDEFINED_HEADER, _shown(mnemonics))
+                raise CommandError(ErrorNumber.UNDEFINED_HEADER, _shown(mnemonics))
             if numbered and number is not None:
                 if number not in found.command.suffixes:
-                    raise LanguageError(ErrorNumber.HEADER_SUFFIX_OUT_OF_RANGE, f"expected 1 or 2, got {number}")
+                    raise CommandError(ErrorNumber.HEADER_SUFFIX_OUT_OF_RANGE, f"expected 1 or 2, got {number}")
                 suffix = number
         return found.command, suffix
 

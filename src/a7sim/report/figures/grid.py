@@ -4,14 +4,14 @@ import math
 from collections.abc import Mapping, Sequence
 
 from a7sim.report.drawing import INK, LEFT, RIGHT, SOFT, WIDTH_IN, arrows, drawing, nice_number, scale_arrow
-from a7sim.report.page import Picture
+from a7sim.report.page import PageFigure
 from a7sim.wording import pluralize
 
 _STYLES = ((LEFT, 0.009), (RIGHT, 0.005), (INK, 0.004), (SOFT, 0.009), (LEFT, 0.004))
 """Colour and width of the arrows of each level."""
 
 
-def grid_residuals(rows: Sequence[Mapping[str, str]], projector: str, name: str) -> Picture | None:
+def grid_residuals(rows: Sequence[Mapping[str, str]], projector: str, name: str) -> PageFigure | None:
     """Return the residuals of a projector as arrows at the crosses, a colour for each level."""
     found = [row for row in rows if row["projector"] == projector]
     if not found:

@@ -21,7 +21,7 @@ from a7sim.report.drawing import (
     nice_number,
     scale_arrow,
 )
-from a7sim.report.page import Picture, Sheet
+from a7sim.report.page import PageFigure, TableBlock
 from a7sim.standard_points import PLACES, POSITIONS
 from a7sim.wording import pluralize
 
@@ -37,7 +37,7 @@ OF_PROJECTOR = {"left": ("′", LEFT, "o"), "right": ("″", RIGHT, "s")}
 """Sign, colour and marker of the projectors; with base out the left-hand photograph lies in the right one."""
 
 
-def residual_parallaxes(model: Document, name: str) -> Picture:
+def residual_parallaxes(model: Document, name: str) -> PageFigure:
     """Return the residual y-parallaxes as arrows over the standard points in plan, with their scale."""
     orientation = model["relative_orientation"]
     residuals: Mapping[str, float] = orientation["residual_parallax_mm"]
@@ -80,15 +80,15 @@ def _places(model: Document, labels: Mapping[str, float]) -> tuple[dict[str, tup
     return {label: PLACES[label] for label in labels}, "bases"
 
 
-def parallax_table(model: Document) -> Sheet:
+def parallax_table(model: Document) -> TableBlock:
     """Return the residual parallaxes by standard point."""
     orientation = model["relative_orientation"]
     residuals, names = orientation["residual_parallax_mm"], model["standard_points"]
     rows = [[label, names.get(label, ""), f"{residuals[label]:+.6f}"] for label in POSITIONS if label in residuals]
-    return Sheet("Residual y-parallaxes", ("position", "point", "p, mm"), rows, frozenset({0, 1}))
+    return TableBlock("Residual y-parallaxes", ("position", "point", "p, mm"), rows, frozenset({0, 1}))
 
 
-def iterations(model: Document, name: str) -> Picture:
+def iterations(model: Document, name: str) -> PageFigure:
     """Return rms and mean of the parallaxes of every round on a logarithmic scale."""
     orientation = model["relative_orientation"]
     rounds = orientation["rounds"]
@@ -117,7 +117,7 @@ def _above_zero(values: Iterable[float]) -> list[float]:
     return [value if value > 0.0 else math.nan for value in values]
 
 
-def perspective_centre(model: Document, side: str, rays: Mapping[str, tuple[float, float]], name: str) -> Picture:
+def perspective_centre(model: Document, side: str, rays: Mapping[str, tuple[float, float]], name: str) -> PageFigure:
     """Return a perspective centre with its error ellipse in plan and its height beside, the true one marked.
 
     `rays` are the places (X, Y) at which each point's ray comes through the height of the centre.
@@ -168,7 +168,7 @@ def _ellipses(axes: "Axes", found: Document, colour: str) -> None:
     axes.axvline(at[0], color=FAINT, linewidth=0.8, zorder=0)
 
 
-def centre_residuals(model: Document, rays: Mapping[str, Mapping[str, tuple[float, float]]]) -> Sheet | None:
+def centre_residuals(model: Document, rays: Mapping[str, Mapping[str, tuple[float, float]]]) -> TableBlock | None:
     """Return by how much each point's ray misses the centres, none where that is not to be told from the book."""
     points = list(dict.fromkeys(point for side in rays.values() for point in side))
     if not points:
@@ -184,4 +184,4 @@ def centre_residuals(model: Document, rays: Mapping[str, Mapping[str, tuple[floa
             row += ["" if each is None else f"{each:+.3f}" for each in missed]
         rows.append(row)
     columns = ["point", *(f"{axis}, {side}" for side in rays for axis in ("X", "Y"))]
-    return Sheet("Rays of the points beside the centres found, counter units", columns, rows)
+    return TableBlock("Rays of the points beside the centres found, counter units", columns, rows)

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 from a7sim.documents import Document
 from a7sim.report.drawing import FAINT, FILL, INK, LEFT, PANEL, RIGHT, WIDTH_IN, drawing
-from a7sim.report.page import Picture
+from a7sim.report.page import PageFigure
 
 
-def hours(spent: Mapping[str, float], name: str, title: str) -> Picture:
+def hours(spent: Mapping[str, float], name: str, title: str) -> PageFigure:
     """Return hours as bars, in the order in which they were first spent."""
     said = "; ".join(f"{what} {each:.2f} hours" for what, each in spent.items())
     with drawing(name, title, said, size=(WIDTH_IN, 1.3 + 0.5 * len(spent))) as drawn:
@@ -26,7 +26,7 @@ def _in_two_lines(names: Mapping[str, float]) -> list[str]:
     return [name.replace(" and ", "\nand ").replace("perspective ", "perspective\n") for name in names]
 
 
-def all_strips(strips: Sequence[Document], name: str) -> Picture:
+def all_strips(strips: Sequence[Document], name: str) -> PageFigure:
     """Return the rms residuals at the checks, or at control where there are none, of every strip."""
     on = "checks" if all("checks" in strip["accuracy_m"] for strip in strips) else "control"
     title = f"Rms residuals at {on} by strip"

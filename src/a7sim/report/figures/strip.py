@@ -19,7 +19,7 @@ from a7sim.report.drawing import (
     nice_number,
     scale_arrow,
 )
-from a7sim.report.page import Picture
+from a7sim.report.page import PageFigure
 from a7sim.wording import pluralize
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ _LOOKS = {False: ("^", LEFT, LEFT, "control"), True: ("o", RIGHT, PANEL, "check"
 """Marker, edge, face and word of control and checks."""
 
 
-def residuals_in_plan(strip: Document, places: Places, name: str, of: str) -> Picture | None:
+def residuals_in_plan(strip: Document, places: Places, name: str, of: str) -> PageFigure | None:
     """Return residuals in plan at control and checks as arrows; none where no place is known."""
     residuals = {
         point: each
@@ -79,7 +79,7 @@ def residuals_in_plan(strip: Document, places: Places, name: str, of: str) -> Pi
     return drawn.picture
 
 
-def residuals_in_height(strip: Document, name: str, of: str) -> Picture | None:
+def residuals_in_height(strip: Document, name: str, of: str) -> PageFigure | None:
     """Return residuals in height at control and checks, point by point."""
     residuals = {p: each for p, each in _last(strip)["residuals_m"].items() if each["Z"] is not None}
     if not residuals:
@@ -106,7 +106,7 @@ def residuals_in_height(strip: Document, name: str, of: str) -> Picture | None:
     return drawn.picture
 
 
-def plan_and_profile(places: Places, strip: Document, name: str, of: str) -> Picture | None:
+def plan_and_profile(places: Places, strip: Document, name: str, of: str) -> PageFigure | None:
     """Return the points and centres of a strip in plan, and their heights along it."""
     centres = {point: at for point, at in places.items() if is_centre(point)}
     points = {point: at for point, at in places.items() if point not in centres}

@@ -15,17 +15,17 @@ class Handout:
     hidden: Mapping[str, Any] = field(default_factory=dict)
 
 
-Maker = Callable[..., Handout]
+HandoutMaker = Callable[..., Handout]
 """What takes the scenario, the seed and the options of an exercise."""
 
-HANDOUTS: dict[str, Maker] = {}
+HANDOUTS: dict[str, HandoutMaker] = {}
 """All makers of papers by the names that exercises use."""
 
 
-def handout(name: str) -> Callable[[Maker], Maker]:
+def handout(name: str) -> Callable[[HandoutMaker], HandoutMaker]:
     """Register a maker of papers under a name."""
 
-    def registered(maker: Maker) -> Maker:
+    def registered(maker: HandoutMaker) -> HandoutMaker:
         HANDOUTS[name] = maker
         return maker
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from a7sim.files import to_csv
 from a7sim.geometry import Array, length_of
-from a7sim.mistakes import Mistake
+from a7sim.mistakes import A7SimError
 from a7sim.reduction import Ground, Model
 from a7sim.reduction.strips import formed_strip, is_centre
 from a7sim.scenario import Scenario
@@ -87,7 +87,7 @@ def add_misreading(models: Sequence[Model], given: Ground, seed: int) -> Misread
     for i in order:
         if _stands_out(candidates[i], models):
             return candidates[i]
-    raise Mistake("expected models with ties enough for a misread one to stand out, got too few")
+    raise A7SimError("expected models with ties enough for a misread one to stand out, got too few")
 
 
 def _stands_out(slip: Misread, models: Sequence[Model]) -> bool:

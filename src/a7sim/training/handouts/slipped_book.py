@@ -10,8 +10,8 @@ from typing import get_args
 import numpy as np
 
 from a7sim.manual import POSITIONS_OF
-from a7sim.mistakes import Mistake
-from a7sim.operator.book import Entry
+from a7sim.mistakes import A7SimError
+from a7sim.operator.book import BookEntry
 from a7sim.operator.levers import required_fittings
 from a7sim.operator.relative import GROSS_MM, compute_corrections, unknown_elements
 from a7sim.operator.slips import neighbours, transpositions
@@ -19,7 +19,7 @@ from a7sim.scenario import Scenario
 from a7sim.scenario.schema import SlipKind
 from a7sim.session.running import open_session
 from a7sim.training.handouts.base import Handout, handout
-from a7sim.training.procedures import Seated
+from a7sim.training.procedures import ProcedureContext
 from a7sim.training.variation import TRAINING_STREAM
 
 BOOK = "book.csv"
@@ -38,7 +38,7 @@ _SLIPS = 1
 
 
 @dataclass(frozen=True)
-class Line:
+class BookLine:
     """A line of the fair copy."""
 
     entry: int
@@ -58,7 +58,7 @@ class Line:
 class Slipped:
     """A copy of a line with a slip in it, and what belongs there."""
 
-    line: Line
+    line: BookLine
     right: Sequence[str]
 
 
@@ -67,7 +67,7 @@ def book_with_slip(scenario: Scenario, seed: int, kind: str = "") -> Handout:
     """Return the fair copy of an operator's book in which one slip was made, of a kind that the seed draws."""
     kinds: tuple[str, ...] = get_args(SlipKind)
     if kind and kind not in kinds:
-        raise Mistake(f"handout_options.kind: expected one of {', '.join(kinds)}, got {kind!r}")
+        raise A7SimError(f"handout_options.kind: expected one of {', '.join(kinds)}, got {kind!r}")
     seated, rounds = _worked(scenario, seed)
     lines = _copied(seated, rounds)
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(TRAINING_STREAM, _SLIPS)))
@@ -86,12 +86,12 @@ class _Round:
 
     before: Mapping[str, float]
     after: Mapping[str, float]
-    entries: Sequence[Entry]
+    entries: Sequence[BookEntry]
 
 
-def _worked(scenario: Scenario, seed: int) -> tuple[Seated, list[_Round]]:
+def _worked(scenario: Scenario, seed: int) -> tuple[ProcedureContext, list[_Round]]:
     session = open_session(scenario, seed)
-    seated = Seated.for_model(session.person, session.job, session.job.models[0].name)
+    seated = ProcedureContext.for_model(session.person, session.job, session.job.models[0].name)
     seated.set_up()
     bench, model, plan = seated.bench, seated.model, session.job.plan
     who, elements = bench.crew.active, unknown_elements(plan.method, model)
@@ -112,12 +112,12 @@ def _worked(scenario: Scenario, seed: int) -> tuple[Seated, list[_Round]]:
     return seated, rounds
 
 
-def _copied(seated: Seated, rounds: Sequence[_Round]) -> list[Line]:
+def _copied(seated: ProcedureContext, rounds: Sequence[_Round]) -> list[BookLine]:
     """Return the fair copy without any slip: fittings, and the rounds with their sums."""
-    model, lines = seated.model, list[Line]()
+    model, lines = seated.model, list[BookLine]()
 
     def write(form: str, round_: int, point: str, item: str, reading: str) -> None:
-        lines.append(Line(len(lines) + 1, form, round_, point, item, reading))
+        lines.append(BookLine(len(lines) + 1, form, round_, point, item, reading))
 
     for name, position in required_fittings(seated.bench.seat.manual, model.polarity, model.base).items():
         write("fittings", 0, "", name, position)
@@ -139,27 +139,27 @@ def _copied(seated: Seated, rounds: Sequence[_Round]) -> list[Line]:
     return lines
 
 
-Way = Callable[[Line, Sequence[Line], Seated], list[Slipped]]
+Way = Callable[[BookLine, Sequence[BookLine], ProcedureContext], list[Slipped]]
 
 
-def _misread(line: Line, wrong: float) -> list[Slipped]:
+def _misread(line: BookLine, wrong: float) -> list[Slipped]:
     return [Slipped(replace(line, reading=f"{wrong:.2f}"), [line.reading])]
 
 
-def _last_digit(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+def _last_digit(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
     return _misread(line, float(line.reading) + 0.01) if line.is_reading else []
 
 
-def _gross(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+def _gross(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
     return _misread(line, float(line.reading) + 1.0) if line.is_reading else []
 
 
-def _wrong_sign(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+def _wrong_sign(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
     plain = line.is_reading and abs(float(line.reading)) > PLAINLY_MM
     return _misread(line, -float(line.reading)) if plain else []
 
 
-def _transposed(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+def _transposed(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
     if not line.is_reading:
         return []
     shown = float(line.reading)
@@ -171,7 +171,7 @@ def _transposed(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipp
     ]
 
 
-def _wrong_point(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+def _wrong_point(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
     if not line.is_reading:
         return []
     read = {each.point for each in lines if each.is_reading}
@@ -180,7 +180,7 @@ def _wrong_point(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slip
     return [Slipped(replace(line, point=name), [line.point, position]) for name in neighbours(measured, line.point)]
 
 
-def _forgotten_lever(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+def _forgotten_lever(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
     if line.form != "fittings":
         return []
     return [Slipped(replace(line, reading=other), [line.reading]) for other in _others(line.item, line.reading)]
@@ -190,7 +190,7 @@ def _others(fitting: str, position: str) -> list[str]:
     return [each for each in POSITIONS_OF[fitting] if each != position]
 
 
-def _not_reread(line: Line, lines: Sequence[Line], seated: Seated) -> list[Slipped]:
+def _not_reread(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
     if line.round < 2 or not line.item.endswith(" before"):
         return []
     old = next(each.reading for each in lines if each.round == line.round - 1 and each.item == line.item)
@@ -208,7 +208,7 @@ _WAYS: Mapping[str, Way] = {
 }
 
 
-def _as_csv(lines: Sequence[Line]) -> str:
+def _as_csv(lines: Sequence[BookLine]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)

@@ -1,12 +1,12 @@
 """The measures that exercises are graded by."""
 
 from a7sim.training.measures import answers, centres, clearing, deeds, grid, ground, numerical, readings, truth
-from a7sim.training.measures.base import MEASURES, Found, Measure, make_metric
+from a7sim.training.measures.base import MEASURES, Metric, MetricResult, make_metric
 
 __all__ = [
     "MEASURES",
-    "Found",
-    "Measure",
+    "Metric",
+    "MetricResult",
     "answers",
     "centres",
     "clearing",

@@ -6,28 +6,30 @@ from collections.abc import Sequence
 from msgspec import field
 
 from a7sim.scenario import Scenario
-from a7sim.training.account import Account
-from a7sim.training.measures.base import HALF_A_COUNT, Found, Measure, join_words, register_metric
+from a7sim.training.account import AttemptRecord
+from a7sim.training.measures.base import HALF_A_COUNT, Metric, MetricResult, join_words, register_metric
 from a7sim.training.measures.truth import y_parallax_at
 from a7sim.training.witness import Reading
 
 
 @register_metric("not-answered")
-class NotAnswered(Measure, frozen=True, kw_only=True):
+class MissingAnswers(Metric, frozen=True, kw_only=True):
     """How many answers are missing."""
 
     unit = "answers"
     keys: list[str] = field(default_factory=list)
     """All that the exercise asks for, where none are named."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         missing = [key for key in self.keys or account.exercise.answers if not account.answers.get(key)]
-        return Found(float(len(missing)), f"not answered: {join_words(missing)}" if missing else "all is answered")
+        return MetricResult(
+            float(len(missing)), f"not answered: {join_words(missing)}" if missing else "all is answered"
+        )
 
 
 @register_metric("answer-off")
-class AnswerOff(Measure, frozen=True, kw_only=True):
+class AnswerDeviation(Metric, frozen=True, kw_only=True):
     """How far a number that was answered is from the truth.
 
     `true` is 'play X' (of a carriage or an element, mm), 'parallax 3' (the y-parallax at a point as the instrument
@@ -40,18 +42,18 @@ class AnswerOff(Measure, frozen=True, kw_only=True):
     least: float = 0.0
     """What can be read of it: no tolerance is below."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         answered = account.answers.get(self.key, "")
         try:
             number = float(answered)
         except ValueError:
             said = f"expected a number, got {answered!r}" if answered else "not answered"
-            return Found(None, f"{self.key}: {said}")
+            return MetricResult(None, f"{self.key}: {said}")
         value = abs(number - self._truth(account))
-        return Found(round(value, 4) if math.isfinite(value) else None, f"{self.key} was answered {answered}")
+        return MetricResult(round(value, 4) if math.isfinite(value) else None, f"{self.key} was answered {answered}")
 
-    def _truth(self, account: Account) -> float:
+    def _truth(self, account: AttemptRecord) -> float:
         what, _, name = self.true.partition(" ")
         if what == "play":
             return account.autograph.play(name)
@@ -65,7 +67,7 @@ class AnswerOff(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("answers-off")
-class AnswersOff(Measure, frozen=True, kw_only=True):
+class MaxAnswerDeviation(Metric, frozen=True, kw_only=True):
     """The largest difference of several answered numbers from what the maker of the papers kept back."""
 
     truth = True
@@ -73,7 +75,7 @@ class AnswersOff(Measure, frozen=True, kw_only=True):
     least: float = 0.0
     """What can be read of them: no tolerance is below."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         off: dict[str, float] = {}
         for key in self.keys:
@@ -82,11 +84,11 @@ class AnswersOff(Measure, frozen=True, kw_only=True):
             except (ValueError, KeyError):
                 answered = account.answers.get(key, "")
                 said = f"expected a number, got {answered!r}" if answered else "not answered"
-                return Found(None, f"{key}: {said}")
+                return MetricResult(None, f"{key}: {said}")
         worst = max(off, key=lambda key: off[key])
         if not math.isfinite(off[worst]):
-            return Found(None, f"{worst}: expected a number, got {account.answers[worst]!r}")
-        return Found(round(off[worst], 4), f"{worst} was answered {account.answers[worst]}, the furthest off")
+            return MetricResult(None, f"{worst}: expected a number, got {account.answers[worst]!r}")
+        return MetricResult(round(off[worst], 4), f"{worst} was answered {account.answers[worst]}, the furthest off")
 
     def floor(self, scenario: Scenario) -> float:
         """Return what can be read of them."""
@@ -94,29 +96,29 @@ class AnswersOff(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("answer-wrong")
-class AnswerWrong(Measure, frozen=True, kw_only=True):
+class WrongAnswers(Metric, frozen=True, kw_only=True):
     """How many answers are not the words that the maker of the papers kept back under the same keys."""
 
     unit = "answers"
     truth = True
     keys: list[str]
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         missing = [key for key in self.keys if not account.answers.get(key)]
         wrong = [key for key in self.keys if key not in missing and not self._right(account, key)]
         told = [f"not answered: {join_words(missing)}"] if missing else []
         told += [f"{key} is not {account.answers[key]}" for key in wrong]
-        return Found(float(len(missing) + len(wrong)), "; ".join(told) or f"{join_words(self.keys)}: right")
+        return MetricResult(float(len(missing) + len(wrong)), "; ".join(told) or f"{join_words(self.keys)}: right")
 
-    def _right(self, account: Account, key: str) -> bool:
+    def _right(self, account: AttemptRecord, key: str) -> bool:
         right = account.hidden.get(key, ())
         allowed = [right] if isinstance(right, str | int | float) else right
         return _plain(account.answers[key]) in {_plain(str(each)) for each in allowed}
 
 
 @register_metric("place-by-scales")
-class PlaceByScales(Measure, frozen=True, kw_only=True):
+class PlaceByScales(Metric, frozen=True, kw_only=True):
     """How far answered coordinates of a point are from what its registered scales give (P 3.1), mm."""
 
     unit = "mm"
@@ -124,28 +126,30 @@ class PlaceByScales(Measure, frozen=True, kw_only=True):
     keys: list[str]
     """Of the answers for x and y."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return the distance from the nearest registration of the point."""
         try:
             answered = [float(account.answers.get(key, "")) for key in self.keys]
         except ValueError:
-            return Found(None, f"expected numbers for {join_words(self.keys)}")
+            return MetricResult(None, f"expected numbers for {join_words(self.keys)}")
         readings = [each for each in account.readings if each.point == account.name_of(self.point)]
         if not readings:
-            return Found(None, f"nothing was registered at {self.point}")
+            return MetricResult(None, f"nothing was registered at {self.point}")
         off = {self._off(account, each, answered): each for each in readings}
         nearest = min(off)
         x, y = self._place(account, off[nearest])
-        return Found(round(nearest, 4), f"answered {answered[0]:g}, {answered[1]:g}; the scales gave {x:.2f}, {y:.2f}")
+        return MetricResult(
+            round(nearest, 4), f"answered {answered[0]:g}, {answered[1]:g}; the scales gave {x:.2f}, {y:.2f}"
+        )
 
-    def _place(self, account: Account, reading: Reading) -> tuple[float, float]:
+    def _place(self, account: AttemptRecord, reading: Reading) -> tuple[float, float]:
         variant = account.autograph.variant
         x, y = (
             (reading.shown[axis] - variant.scales[axis].at_origin) / variant.scales[axis].units_per_mm for axis in "XY"
         )
         return x - variant.centres_on_base[0] * reading.shown["bx"], y
 
-    def _off(self, account: Account, reading: Reading, answered: Sequence[float]) -> float:
+    def _off(self, account: AttemptRecord, reading: Reading, answered: Sequence[float]) -> float:
         x, y = self._place(account, reading)
         return math.hypot(answered[0] - x, answered[1] - y)
 

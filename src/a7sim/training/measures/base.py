@@ -7,8 +7,8 @@ from typing import ClassVar, TypeVar
 import msgspec
 
 from a7sim.scenario import Scenario
-from a7sim.training.account import Account
-from a7sim.training.exercise import Measured
+from a7sim.training.account import AttemptRecord
+from a7sim.training.exercise import MetricSpec
 from a7sim.training.witness import Reading
 
 BEST_PARALLAX_UM = 2.2
@@ -31,14 +31,14 @@ HALF_A_COUNT = 0.005
 
 
 @dataclass(frozen=True)
-class Found:
+class MetricResult:
     """What a measure came to: its value, None where there was nothing to measure, and why, in words with numbers."""
 
     value: float | None
     reason: str
 
 
-class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Metric(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A measure with its options. A smaller value is a better one, unless `more_is_better`."""
 
     unit: ClassVar[str] = ""
@@ -46,7 +46,7 @@ class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Whether it looks at what cannot be seen at the link."""
     more_is_better: ClassVar[bool] = False
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return what it comes to."""
         raise NotImplementedError
 
@@ -61,10 +61,10 @@ class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return value >= limit - 1e-9 if self.more_is_better else value <= limit + 1e-9
 
 
-MEASURES: dict[str, type[Measure]] = {}
+MEASURES: dict[str, type[Metric]] = {}
 """All measures by the names that exercises use."""
 
-Kind = TypeVar("Kind", bound=type[Measure])
+Kind = TypeVar("Kind", bound=type[Metric])
 
 
 def register_metric(name: str) -> Callable[[Kind], Kind]:
@@ -77,7 +77,7 @@ def register_metric(name: str) -> Callable[[Kind], Kind]:
     return registered
 
 
-def make_metric(measured: Measured) -> Measure:
+def make_metric(measured: MetricSpec) -> Metric:
     """Return the measure of a step or a criterion. Raises msgspec.ValidationError for options that are none."""
     return msgspec.convert(measured.options, MEASURES[measured.measure])
 
@@ -98,7 +98,7 @@ def handle_label(handle: str) -> str:
     return handle
 
 
-def readings_with(account: Account, element: str, points: Sequence[str] = ()) -> list[Reading]:
+def readings_with(account: AttemptRecord, element: str, points: Sequence[str] = ()) -> list[Reading]:
     """Return the registrations of an element, or any, at points given by position or name, or anywhere."""
     names = [account.name_of(point) for point in points]
     return [
@@ -108,7 +108,7 @@ def readings_with(account: Account, element: str, points: Sequence[str] = ()) ->
     ]
 
 
-def describe_points(readings: Iterable[Reading], account: Account) -> str:
+def describe_points(readings: Iterable[Reading], account: AttemptRecord) -> str:
     """Return at which points readings were made, as positions of the model where they have one."""
     positions = {name: position for position, name in account.model.standard_points.items()}
     names = list(dict.fromkeys(positions.get(each.point, each.point) for each in readings))

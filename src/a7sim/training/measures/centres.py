@@ -11,12 +11,12 @@ from a7sim.geometry import Array
 from a7sim.reduction import PerspectiveCentre, Undetermined, perspective_centre
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES, PLACES
-from a7sim.training.account import Account
+from a7sim.training.account import AttemptRecord
 from a7sim.training.measures.base import (
     BEST_POINTING_UM,
     HALF_A_COUNT,
-    Found,
-    Measure,
+    Metric,
+    MetricResult,
     describe_points,
     handle_label,
     join_words,
@@ -33,14 +33,14 @@ AT_LEVEL = 0.1
 AXES = ("X", "Y", "Z")
 
 
-class _Centres(Measure, frozen=True, kw_only=True):
+class _Centres(Metric, frozen=True, kw_only=True):
     """Registered with an element of its projector, by1 or by2, that says which eye pointed; two levels of Z."""
 
     levels: tuple[float, float]
     points: list[str] = field(default_factory=lambda: list(CASES["A"]))
     elements: list[str] = field(default_factory=lambda: ["by1", "by2"])
 
-    def _pointings(self, account: Account, element: str) -> dict[tuple[str, float], list[Reading]]:
+    def _pointings(self, account: AttemptRecord, element: str) -> dict[tuple[str, float], list[Reading]]:
         """Return the registrations by point and level, those that belong to no level left out."""
         found: dict[tuple[str, float], list[Reading]] = {}
         for reading in account.readings:
@@ -49,7 +49,7 @@ class _Centres(Measure, frozen=True, kw_only=True):
                 found.setdefault((reading.point, level), []).append(reading)
         return found
 
-    def _centre(self, account: Account, element: str) -> PerspectiveCentre | None:
+    def _centre(self, account: AttemptRecord, element: str) -> PerspectiveCentre | None:
         """Return the centre that follows from one's own pointings, None where they are too few or do not move."""
         found = self._pointings(account, element)
         names = [account.name_of(point) for point in self.points]
@@ -65,24 +65,24 @@ class _Centres(Measure, frozen=True, kw_only=True):
         except Undetermined:
             return None
 
-    def _centres(self, account: Account) -> dict[str, PerspectiveCentre]:
+    def _centres(self, account: AttemptRecord) -> dict[str, PerspectiveCentre]:
         found = {element: self._centre(account, element) for element in self.elements}
         return {element: centre for element, centre in found.items() if centre is not None}
 
-    def _few(self, there: Mapping[str, object]) -> Found:
+    def _few(self, there: Mapping[str, object]) -> MetricResult:
         lacking = [
             f"the {'left' if each.endswith('1') else 'right'} one" for each in self.elements if each not in there
         ]
-        return Found(None, f"too few points were registered at both levels for a centre: {join_words(lacking)}")
+        return MetricResult(None, f"too few points were registered at both levels for a centre: {join_words(lacking)}")
 
 
 @register_metric("levels-missing")
-class LevelsMissing(_Centres, frozen=True, kw_only=True):
+class MissingLevels(_Centres, frozen=True, kw_only=True):
     """How many registrations are missing: of every point, with each eye, at each level."""
 
     unit = "registrations"
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         short = []
         for element in self.elements:
@@ -92,9 +92,9 @@ class LevelsMissing(_Centres, frozen=True, kw_only=True):
                 short += [(element, level, point) for point in missing]
         wanted = len(self.elements) * len(self.levels) * len(self.points)
         if not short:
-            return Found(0.0, "no registration is missing")
+            return MetricResult(0.0, "no registration is missing")
         told = join_words(f"{point} with {handle_label(element)} at {level:.0f}" for element, level, point in short)
-        return Found(float(len(short)), f"{len(short)} of {pluralize(wanted, 'registration')} missing: {told}")
+        return MetricResult(float(len(short)), f"{len(short)} of {pluralize(wanted, 'registration')} missing: {told}")
 
 
 @register_metric("pointing-rms")
@@ -104,7 +104,7 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
     unit = "um"
     truth = True
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it, over all registrations at the levels."""
         off: list[float] = []
         worst = (0.0, "")
@@ -114,18 +114,18 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
                 seen = each.eyes[eye - 1]
                 if seen is None:
                     side = "left" if eye == 1 else "right"
-                    return Found(
+                    return MetricResult(
                         None, f"where {each.point} was registered with {handle_label(element)} the {side} eye saw none"
                     )
                 off += seen
                 place = f"{describe_points([each], account)} with {handle_label(element)} at {each.shown['Z']:.0f}"
                 worst = max(worst, (math.hypot(*seen), place))
         if not off:
-            return Found(None, "nothing was registered at the levels")
+            return MetricResult(None, "nothing was registered at the levels")
         rms = math.sqrt(fmean(each**2 for each in off))
         told = f"over {pluralize(len(off) // 2, 'pointing')} the images stood {rms:.1f} um (rms) beside the mark, "
         told += f"most of all by {worst[0]:.0f} um at {worst[1]}"
-        return Found(round(rms, 2), told)
+        return MetricResult(round(rms, 2), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye leaves."""
@@ -133,12 +133,12 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
 
 
 @register_metric("pointings-apart")
-class PointingsApart(_Centres, frozen=True, kw_only=True):
+class PointingDisagreement(_Centres, frozen=True, kw_only=True):
     """By how much one's pointings miss a common centre: the larger rms of both centres, mm at their height."""
 
     unit = "mm"
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         centres = self._centres(account)
         if len(centres) < len(self.elements):
@@ -146,7 +146,7 @@ class PointingsApart(_Centres, frozen=True, kw_only=True):
         element = max(centres, key=lambda each: float(centres[each].rms))
         rms = float(centres[element].rms)
         side = "left" if element.endswith("1") else "right"
-        return Found(round(rms, 4), f"the lines to the {side} centre miss each other, rms {rms:.3f}")
+        return MetricResult(round(rms, 4), f"the lines to the {side} centre miss each other, rms {rms:.3f}")
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye's pointings come to."""
@@ -182,7 +182,7 @@ class _Answered(_Centres, frozen=True, kw_only=True):
     truth = True
     axes: list[str] = field(default_factory=lambda: ["X", "Y"])
 
-    def _against(self, account: Account, right: Mapping[str, Mapping[str, float]], rightly: str) -> Found:
+    def _against(self, account: AttemptRecord, right: Mapping[str, Mapping[str, float]], rightly: str) -> MetricResult:
         off: list[tuple[float, str]] = []
         for element, coordinates in right.items():
             for axis in self.axes:
@@ -190,18 +190,20 @@ class _Answered(_Centres, frozen=True, kw_only=True):
                 try:
                     number = float(account.answers.get(key, ""))
                 except ValueError:
-                    return Found(None, f"{key}: expected a number, got {account.answers.get(key) or 'no answer'}")
+                    return MetricResult(
+                        None, f"{key}: expected a number, got {account.answers.get(key) or 'no answer'}"
+                    )
                 by = abs(number - coordinates[axis])
                 off.append((by, f"{key} was answered {number:.2f}, {rightly} {by:.2f} off"))
         value, told = max(off)
-        return Found(round(value, 4) if math.isfinite(value) else None, told)
+        return MetricResult(round(value, 4) if math.isfinite(value) else None, told)
 
 
 @register_metric("centre-sums-off")
-class CentreSumsOff(_Answered, frozen=True, kw_only=True):
+class CentreComputationDeviation(_Answered, frozen=True, kw_only=True):
     """The largest difference of answered coordinates from those that follow from one's own registrations."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         centres = self._centres(account)
         if len(centres) < len(self.elements):
@@ -217,10 +219,10 @@ class CentreSumsOff(_Answered, frozen=True, kw_only=True):
 
 
 @register_metric("centre-off")
-class CentreOff(_Answered, frozen=True, kw_only=True):
+class CentreDeviation(_Answered, frozen=True, kw_only=True):
     """The largest difference of answered coordinates from where the centres truly are, in counter units."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it; counters are as they stood at the registrations."""
         readings = {element: self._pointings(account, element) for element in self.elements}
         if not all(readings.values()):
@@ -229,7 +231,7 @@ class CentreOff(_Answered, frozen=True, kw_only=True):
         return self._against(account, right, "by the truth")
 
     def _truly(
-        self, account: Account, element: str, found: Mapping[tuple[str, float], list[Reading]]
+        self, account: AttemptRecord, element: str, found: Mapping[tuple[str, float], list[Reading]]
     ) -> dict[str, float]:
         autograph = account.autograph
         centre = autograph.readings_at(autograph.pose(int(element[-1]))[0])

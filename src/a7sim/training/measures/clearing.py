@@ -6,14 +6,14 @@ import numpy as np
 
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array
 from a7sim.operator.empirical import clearing_coefficients, over_correction_by_coefficients
-from a7sim.reduction import Stand
+from a7sim.reduction import ProjectorPose
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES
-from a7sim.training.account import Account
+from a7sim.training.account import AttemptRecord
 from a7sim.training.measures.base import (
     HALF_A_COUNT,
-    Found,
-    Measure,
+    Metric,
+    MetricResult,
     describe_points,
     handle_label,
     join_words,
@@ -22,25 +22,25 @@ from a7sim.training.measures.base import (
 from a7sim.training.witness import Reading
 
 
-def projector_poses(account: Account, reading: Reading) -> tuple[Stand, Stand]:
+def projector_poses(account: AttemptRecord, reading: Reading) -> tuple[ProjectorPose, ProjectorPose]:
     """Return how the projectors of the left-hand and the right-hand photograph stood by their counters."""
     zero = {name: account.autograph.element_data(name).zero for name in account.autograph.variant.elements}
 
-    def stand(projector: int, x: float) -> Stand:
+    def stand(projector: int, x: float) -> ProjectorPose:
         tilts = [reading.shown[f"{name}{projector}"] - zero[f"{name}{projector}"] for name in ("omega", "phi", "kappa")]
         centre = [x, -reading.shown[f"by{projector}"], reading.shown[f"bz{projector}"]]
-        return Stand(np.array(centre)[:, None], GON * np.array(tilts)[:, None])
+        return ProjectorPose(np.array(centre)[:, None], GON * np.array(tilts)[:, None])
 
     model = account.model
     return stand(model.left_projector, 0.0), stand(model.right_projector, abs(reading.shown["bx"]))
 
 
-class _Clearing(Measure, frozen=True, kw_only=True):
+class _Clearing(Metric, frozen=True, kw_only=True):
     """Steps by point and element, such as { "2" = "kappa1" }, in groups within which their order is free."""
 
     steps: list[dict[str, str]]
 
-    def _step_of(self, account: Account, reading: Reading) -> str | None:
+    def _step_of(self, account: AttemptRecord, reading: Reading) -> str | None:
         """Return the point of the step that a registration belongs to, None where it belongs to none."""
         for group in self.steps:
             for point, element in group.items():
@@ -53,12 +53,12 @@ class _Clearing(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("steps-missing")
-class StepsMissing(_Clearing, frozen=True, kw_only=True):
+class MissingSteps(_Clearing, frozen=True, kw_only=True):
     """How many steps were not registered, were done before those they rest on, or with their element elsewhere."""
 
     unit = "steps"
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         first: dict[str, int] = {}
         elsewhere: list[Reading] = []
@@ -79,7 +79,7 @@ class StepsMissing(_Clearing, frozen=True, kw_only=True):
         told += [f"registered before those it rests on: {self._told(early)}"] if early else []
         told += [f"registered where it does not belong: {self._strayed(elsewhere, account)}"] if elsewhere else []
         strays = len({(each.point, each.named) for each in elsewhere})
-        return Found(
+        return MetricResult(
             float(len(missing) + len(early) + strays),
             "; ".join(told) or f"cleared in their order: {self._told(list(elements))}",
         )
@@ -88,7 +88,7 @@ class StepsMissing(_Clearing, frozen=True, kw_only=True):
         elements = self._elements()
         return join_words(f"{handle_label(elements[point])} at {point}" for point in points)
 
-    def _strayed(self, readings: list[Reading], account: Account) -> str:
+    def _strayed(self, readings: list[Reading], account: AttemptRecord) -> str:
         return join_words(
             dict.fromkeys(
                 f"{join_words(map(handle_label, each.named))} at {describe_points([each], account)}"
@@ -98,7 +98,7 @@ class StepsMissing(_Clearing, frozen=True, kw_only=True):
 
 
 @dataclass(frozen=True)
-class Turn:
+class OmegaTurn:
     """A turn of omega at the last point: where it stood, where the point was clear, and where it was left."""
 
     reading: Reading
@@ -120,7 +120,7 @@ class Turn:
 
 
 @register_metric("over-correction-off")
-class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
+class OverCorrectionDeviation(_Clearing, frozen=True, kw_only=True):
     """What share of the last point's parallax is left after a round, since omega was turned too far or not enough.
 
     The last step is omega's. It counts where the turn that cleared it was `least` or more, and the worst of these.
@@ -132,23 +132,23 @@ class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
     least: float = 0.15
     """Gon."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         turns = self._turns(account)
         last, omega = list(self._elements().items())[-1]
         if not turns:
-            return Found(
+            return MetricResult(
                 None, f"{handle_label(omega)} was never turned at {last} by {self.least:g} gon or more and registered"
             )
         worst = max(turns, key=lambda each: each.remains)
-        return Found(
+        return MetricResult(
             round(worst.remains, 3),
             f"at point {last} {handle_label(omega)} was turned {worst.times:.2f} times as far as cleared it, "
             "and it takes "
             f"{worst.needed:.2f} times: {worst.remains:.0%} of the parallax is left after the next round",
         )
 
-    def _turns(self, account: Account) -> list[Turn]:
+    def _turns(self, account: AttemptRecord) -> list[OmegaTurn]:
         *_, (last, omega) = self._elements().items()
         begun = [each.before for each in account.actions if each.name == omega and each.what in ("set", "turn")]
         before = begun[0] if begun else account.autograph.element(omega)
@@ -171,16 +171,16 @@ class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
         return [each for each in turns if each is not None]
 
     def _turn(
-        self, account: Account, latest: dict[str, Reading], cleared: Reading, before: float, left: float
-    ) -> Turn | None:
+        self, account: AttemptRecord, latest: dict[str, Reading], cleared: Reading, before: float, left: float
+    ) -> OmegaTurn | None:
         *_, (_, omega) = self._elements().items()
         if abs(cleared.shown[omega] - before) < self.least or set(latest) != set(self._elements()):
             return None
         marks = np.array([latest[point].mark for point in self._elements()]).T[..., None]
         needed = float(over_correction_by_coefficients(self._coefficients(account, marks, cleared))[0])
-        return Turn(cleared, before, cleared.shown[omega], left, needed)
+        return OmegaTurn(cleared, before, cleared.shown[omega], left, needed)
 
-    def _coefficients(self, account: Account, marks: Array, reading: Reading) -> Array:
+    def _coefficients(self, account: AttemptRecord, marks: Array, reading: Reading) -> Array:
         hands = [f"{name[:-1]}{account.model.side_of(int(name[-1]))}" for name in self._elements().values()]
         rows = [PARALLAX_ELEMENTS.index(name) for name in hands]
         return clearing_coefficients(marks, *projector_poses(account, reading))[rows]
@@ -191,21 +191,21 @@ class OverCorrectionOff(_Clearing, frozen=True, kw_only=True):
 
 
 @register_metric("missing-point-wrong")
-class MissingPointWrong(Measure, frozen=True, kw_only=True):
+class WrongMissingPoints(Metric, frozen=True, kw_only=True):
     """How many of the positions 1 to 6 were wrongly answered to be missing, or not answered though they are."""
 
     unit = "points"
     truth = True
     key: str
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         answered = account.answers.get(self.key, "")
         if not answered:
-            return Found(None, f"{self.key}: not answered")
+            return MetricResult(None, f"{self.key}: not answered")
         said = set(answered.replace(",", " ").replace("+", " ").split())
         gone = set(CASES["A"]) - set(account.model.standard_points)
         wrong = sorted(said ^ gone)
         if not wrong:
-            return Found(0.0, f"{self.key} was answered {answered}: right")
-        return Found(float(len(wrong)), f"{self.key} was answered {answered}: {join_words(wrong)} is not so")
+            return MetricResult(0.0, f"{self.key} was answered {answered}: right")
+        return MetricResult(float(len(wrong)), f"{self.key} was answered {answered}: {join_words(wrong)} is not so")

@@ -6,11 +6,11 @@ from msgspec import field
 from a7sim.manual import REQUIRED_FITTINGS
 from a7sim.operator import ModelJob
 from a7sim.scenario import Scenario
-from a7sim.training.account import Account
+from a7sim.training.account import AttemptRecord
 from a7sim.training.measures.base import (
     HALF_A_COUNT,
-    Found,
-    Measure,
+    Metric,
+    MetricResult,
     describe_points,
     handle_label,
     join_words,
@@ -21,7 +21,7 @@ from a7sim.training.witness import AXES, PLAIN, Reading
 
 
 @register_metric("out-of-order")
-class OutOfOrder(Measure, frozen=True, kw_only=True):
+class ActionsOutOfOrder(Metric, frozen=True, kw_only=True):
     """How many deeds of a procedure are missing or came too early: in each of some chains, its own order.
 
     Deeds are written 'load 1', 'fiducials 1', 'centre 1', 'set c1', 'turn by1', 'record 3': what, and of what where it
@@ -32,7 +32,7 @@ class OutOfOrder(Measure, frozen=True, kw_only=True):
     unit = "deeds"
     chains: list[list[str]]
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         missing: list[str] = []
         early: list[str] = []
@@ -48,9 +48,9 @@ class OutOfOrder(Measure, frozen=True, kw_only=True):
                     last, before = place, deed
         told = [f"not done: {join_words(dict.fromkeys(missing))}"] if missing else []
         told += [f"done too early: {join_words(dict.fromkeys(early))}"] if early else []
-        return Found(float(len(missing) + len(early)), "; ".join(told) or "everything was done, in its order")
+        return MetricResult(float(len(missing) + len(early)), "; ".join(told) or "everything was done, in its order")
 
-    def _place(self, account: Account, deed: str) -> int | None:
+    def _place(self, account: AttemptRecord, deed: str) -> int | None:
         what, _, name = deed.removesuffix("!").partition(" ")
         kinds = {"move": PLAIN, "adjust": ("set", "turn")}.get(what, (what,))
         places = [
@@ -67,42 +67,42 @@ def _plainly(deed: str) -> str:
 
 
 @register_metric("run-by-motor")
-class RunByMotor(Measure, frozen=True, kw_only=True):
+class MotorDrivenReadings(Metric, frozen=True, kw_only=True):
     """How many registrations were made with a carriage that was last run there, not turned there by hand."""
 
     unit = "registrations"
     handles: list[str]
     points: list[str] = field(default_factory=list)
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         readings = readings_with(account, "", self.points)
         if not readings:
-            return Found(None, "nothing was registered")
+            return MetricResult(None, "nothing was registered")
         ran = [each for each in readings if any(self._ran(account, each, handle) for handle in self.handles)]
         told = f"run there at {describe_points(ran, account)}" if ran else "turned there by hand every time"
-        return Found(float(len(ran)), f"{join_words(map(handle_label, self.handles))}: {told}")
+        return MetricResult(float(len(ran)), f"{join_words(map(handle_label, self.handles))}: {told}")
 
-    def _ran(self, account: Account, reading: Reading, handle: str) -> bool:
+    def _ran(self, account: AttemptRecord, reading: Reading, handle: str) -> bool:
         before = [each for each in account.actions if each.name == handle and each.index < reading.place]
         return bool(before) and before[-1].what in ("drive", "set")
 
 
 @register_metric("handles-moved")
-class HandlesMoved(Measure, frozen=True, kw_only=True):
+class MovedElements(Metric, frozen=True, kw_only=True):
     """How many elements do not stand in the end where the opening left them."""
 
     unit = "elements"
     handles: list[str]
     within: float = HALF_A_COUNT
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         moved = [handle for handle in self.handles if self._by_how_much(account, handle) > self.within + 1e-9]
         told = f"{join_words(map(handle_label, moved))} moved" if moved else "all of it stands where it stood"
-        return Found(float(len(moved)), told)
+        return MetricResult(float(len(moved)), told)
 
-    def _by_how_much(self, account: Account, handle: str) -> float:
+    def _by_how_much(self, account: AttemptRecord, handle: str) -> float:
         deeds = [each for each in account.actions if each.name == handle and each.what in PLAIN]
         if not deeds:
             return 0.0
@@ -111,13 +111,13 @@ class HandlesMoved(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("not-looked")
-class NotLooked(Measure, frozen=True, kw_only=True):
+class UnviewedPoints(Metric, frozen=True, kw_only=True):
     """How many points were registered without a look through an eyepiece since the last lever was put over."""
 
     unit = "points"
     points: list[str]
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         blind = []
         for point in self.points:
@@ -128,38 +128,38 @@ class NotLooked(Measure, frozen=True, kw_only=True):
             if not readings or max(looks, default=-1) < max(levers, default=0):
                 blind.append(point)
         told = f"at {join_words(blind)} nobody looked after the last lever" if blind else "looked every time"
-        return Found(float(len(blind)), told)
+        return MetricResult(float(len(blind)), told)
 
 
 @register_metric("minutes")
-class Minutes(Measure, frozen=True, kw_only=True):
+class Minutes(Metric, frozen=True, kw_only=True):
     """Minutes at the simulated clock since the student sat down."""
 
     unit = "min"
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return them."""
         minutes = account.seconds / 60.0
-        return Found(
+        return MetricResult(
             round(minutes, 2), f"{minutes:.1f} of {account.exercise.minutes:g} minutes at the instrument's clock"
         )
 
 
 @register_metric("element-off")
-class ElementOff(Measure, frozen=True, kw_only=True):
+class ElementDeviation(Metric, frozen=True, kw_only=True):
     """The largest difference of elements, or counters, from what they should show in the end."""
 
     unit = "mm or gon"
     wanted: dict[str, float]
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         shown = {
             name: account.autograph.counter(name) if name in AXES else account.autograph.element(name)
             for name in self.wanted
         }
         name = max(self.wanted, key=lambda each: abs(shown[each] - self.wanted[each]))
-        return Found(
+        return MetricResult(
             round(abs(shown[name] - self.wanted[name]), 4),
             f"{handle_label(name)} stands at {shown[name]:.2f} and belongs at {self.wanted[name]:.2f}",
         )
@@ -170,7 +170,7 @@ class ElementOff(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("wrong-fittings")
-class WrongFittings(Measure, frozen=True, kw_only=True):
+class WrongFittings(Metric, frozen=True, kw_only=True):
     """How many fittings do not belong to the pictures and the base: in the end, or at the registrations of a point.
 
     Base and picture as they are, unless they are named.
@@ -185,7 +185,7 @@ class WrongFittings(Measure, frozen=True, kw_only=True):
     by_job: bool = False
     """Whether base and pictures must be those of the exercise's model on the job sheet."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number, the base counted where it is not as it should be."""
         if self.by_job:
             return self._as_ordered(account.model).evaluate(account)
@@ -195,7 +195,7 @@ class WrongFittings(Measure, frozen=True, kw_only=True):
         if self.point:
             readings = readings_with(account, "", [self.point])
             if not readings:
-                return Found(None, f"nothing was registered as {self.point}")
+                return MetricResult(None, f"nothing was registered as {self.point}")
             fittings, base, lying = dict(readings[-1].fittings), readings[-1].base, readings[-1].pictures
         polarity = self.polarity or account.model.polarity
         right = REQUIRED_FITTINGS[polarity, self.base or base].as_words()
@@ -208,7 +208,7 @@ class WrongFittings(Measure, frozen=True, kw_only=True):
             if there != wanted
         ]
         picture = f"{'at ' + self.point + ' ' if self.point else ''}for a {polarity} with base {self.base or base}"
-        return Found(float(len(wrong)), f"{picture}: {join_words(wrong) if wrong else 'all is as it belongs'}")
+        return MetricResult(float(len(wrong)), f"{picture}: {join_words(wrong) if wrong else 'all is as it belongs'}")
 
     def _as_ordered(self, model: ModelJob) -> "WrongFittings":
         """Return the measure with what the job sheet orders of a model."""

@@ -6,22 +6,22 @@ from msgspec import field
 
 from a7sim.scenario import Scenario
 from a7sim.session.grid_test import true_errors
-from a7sim.training.account import Account
+from a7sim.training.account import AttemptRecord
 from a7sim.training.measures.base import (
     BEST_POINTING_UM,
     HALF_A_COUNT,
     MAX_OF_SEVERAL,
-    Found,
-    Measure,
+    Metric,
+    MetricResult,
     join_words,
     register_metric,
 )
-from a7sim.training.measures.truth import AtReadings
+from a7sim.training.measures.truth import MaxAtReadings
 from a7sim.training.witness import Reading
 
 
 @register_metric("cross-missed")
-class CrossMissed(AtReadings, frozen=True, kw_only=True):
+class CrossDistance(MaxAtReadings, frozen=True, kw_only=True):
     """The largest distance of the mark from a point where it was registered, by the eye that saw it, um."""
 
     def _um(self, reading: Reading) -> float | None:
@@ -38,23 +38,23 @@ class CrossMissed(AtReadings, frozen=True, kw_only=True):
 
 
 @register_metric("levels-near")
-class LevelsNear(Measure, frozen=True, kw_only=True):
+class LevelDepthRatio(Metric, frozen=True, kw_only=True):
     """The depth of the highest level of pointings below the centres as a share of that of the lowest."""
 
     points: list[str]
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it, by the counter of Z, which counts mm from the base line in a grid test."""
         names = [account.name_of(point) for point in self.points]
         depths = [-each.mark[2] for each in account.readings if each.point in names]
         if not depths:
-            return Found(None, f"nothing was registered at {join_words(self.points)}")
+            return MetricResult(None, f"nothing was registered at {join_words(self.points)}")
         high, low = min(depths), max(depths)
-        return Found(round(high / low, 3), f"pointed at from {high:.0f} to {low:.0f} mm below the centre")
+        return MetricResult(round(high / low, 3), f"pointed at from {high:.0f} to {low:.0f} mm below the centre")
 
 
 @register_metric("errors-answered")
-class ErrorsAnswered(Measure, frozen=True, kw_only=True):
+class AnsweredErrorDeviation(Metric, frozen=True, kw_only=True):
     """The largest difference of answered errors of elements, such as c1 or phi2, from what truly stands there."""
 
     unit = "mm or gon"
@@ -65,7 +65,7 @@ class ErrorsAnswered(Measure, frozen=True, kw_only=True):
     reach_mm: float = 100.0
     """How far from the middle of the plate the crosses lie."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it: what stands minus what the counter shows."""
         off: dict[str, float] = {}
         for element in self.elements:
@@ -73,7 +73,7 @@ class ErrorsAnswered(Measure, frozen=True, kw_only=True):
             try:
                 found = float(answered)
             except ValueError:
-                return Found(
+                return MetricResult(
                     None, f"{element}: {f'expected a number, got {answered!r}' if answered else 'not answered'}"
                 )
             autograph = account.autograph
@@ -81,8 +81,8 @@ class ErrorsAnswered(Measure, frozen=True, kw_only=True):
             off[element] = abs(found - truth[element[:-1]])
         worst = max(off, key=lambda element: off[element])
         if not math.isfinite(off[worst]):
-            return Found(None, f"{worst}: expected a number, got {account.answers[worst]!r}")
-        return Found(round(off[worst], 4), f"{worst} was answered {account.answers[worst]}, the furthest off")
+            return MetricResult(None, f"{worst}: expected a number, got {account.answers[worst]!r}")
+        return MetricResult(round(off[worst], 4), f"{worst} was answered {account.answers[worst]}, the furthest off")
 
     def floor(self, scenario: Scenario) -> float:
         """Return what local errors of eight crosses let be known of c in mm, or of a tilt in gon."""

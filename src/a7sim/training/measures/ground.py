@@ -10,19 +10,19 @@ from msgspec import field
 
 from a7sim.geometry import Array, length_of
 from a7sim.scenario import ModelPlan, Scenario
-from a7sim.training.account import Account
+from a7sim.training.account import AttemptRecord
 from a7sim.training.measures.base import (
     BEST_HEIGHT_UM,
     BEST_PARALLAX_UM,
     BEST_POINTING_UM,
     HALF_A_COUNT,
-    Found,
-    Measure,
+    Metric,
+    MetricResult,
     handle_label,
     join_words,
     register_metric,
 )
-from a7sim.training.witness import AXES, PLAIN, Deed, Reading
+from a7sim.training.witness import AXES, PLAIN, Reading, StudentAction
 from a7sim.wording import pluralize
 
 PLAN_AXES = ("X", "Y")
@@ -34,7 +34,7 @@ LAST = 2
 """So many registrations of a point are its reading: a point is pointed at twice."""
 
 
-def last_readings(account: Account, points: Iterable[str], base: str = "") -> dict[str, list[Reading]]:
+def last_readings(account: AttemptRecord, points: Iterable[str], base: str = "") -> dict[str, list[Reading]]:
     """Return the last two pointings at points, with a base where it is named; points without any are left out."""
     found = {}
     for point in points:
@@ -45,14 +45,14 @@ def last_readings(account: Account, points: Iterable[str], base: str = "") -> di
     return found
 
 
-def pointings(account: Account, name: str, base: str = "") -> list[Reading]:
+def pointings(account: AttemptRecord, name: str, base: str = "") -> list[Reading]:
     """Return the registrations of a point's coordinates: those that are no readings of an element just turned there."""
     deeds = [each for each in account.actions if each.what in PLAIN]
     there = [each for each in account.readings if each.point == name and base in ("", each.base)]
     return [each for each in there if not _turned_there(deeds, each)]
 
 
-def _turned_there(deeds: Sequence[Deed], reading: Reading) -> bool:
+def _turned_there(deeds: Sequence[StudentAction], reading: Reading) -> bool:
     """Whether an element that was registered had been turned after the mark came to the point.
 
     At the console whatever is in hand is registered, so that it is named says nothing.
@@ -83,7 +83,7 @@ def metres_per_um(scenario: Scenario, scale_number: float) -> float:
 
 
 @register_metric("missing-pointings")
-class MissingPointings(Measure, frozen=True, kw_only=True):
+class MissingPointings(Metric, frozen=True, kw_only=True):
     """How many pointings are missing: at every point so many, with each of some bases."""
 
     unit = "registrations"
@@ -91,7 +91,7 @@ class MissingPointings(Measure, frozen=True, kw_only=True):
     each: int = 1
     bases: list[str] = field(default_factory=lambda: [""])
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         lacking = {
             f"{point}{f' with base {base}' if base else ''}": self.each
@@ -102,12 +102,14 @@ class MissingPointings(Measure, frozen=True, kw_only=True):
         lacking = {where: lacks for where, lacks in lacking.items() if lacks > 0}
         missing, wanted = sum(lacking.values()), len(self.points) * self.each * len(self.bases)
         if not missing:
-            return Found(0.0, "no registration is missing")
-        return Found(float(missing), f"{missing} of {pluralize(wanted, 'registration')} missing: {join_words(lacking)}")
+            return MetricResult(0.0, "no registration is missing")
+        return MetricResult(
+            float(missing), f"{missing} of {pluralize(wanted, 'registration')} missing: {join_words(lacking)}"
+        )
 
 
 @register_metric("heights-off")
-class HeightsOff(Measure, frozen=True, kw_only=True):
+class HeightDeviation(Metric, frozen=True, kw_only=True):
     """By how much heights that the Z counter showed differ from the ground: rms or the largest, m."""
 
     unit = "m"
@@ -117,18 +119,18 @@ class HeightsOff(Measure, frozen=True, kw_only=True):
     """Of the model, by which the counter reads metres."""
     largest: bool = False
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it, by the last two registrations of each point."""
         readings = last_readings(account, self.points)
         missing = [point for point in self.points if account.name_of(point) not in readings]
         if missing:
-            return Found(None, f"nothing was registered at {join_words(missing)}")
+            return MetricResult(None, f"nothing was registered at {join_words(missing)}")
         truth = account.scene.ground_points
         off = {name: float(mean_display(some)[2] - truth[name][2]) for name, some in readings.items()}
         worst = max(off, key=lambda name: abs(off[name]))
         rms = math.sqrt(sum(each**2 for each in off.values()) / len(off))
         told = f"heights are off by {rms:.2f} m (rms), the largest {off[worst]:+.2f} m at {worst}"
-        return Found(round(abs(off[worst]) if self.largest else rms, 4), told)
+        return MetricResult(round(abs(off[worst]) if self.largest else rms, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye and the film allow, and half a count."""
@@ -136,7 +138,7 @@ class HeightsOff(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("distances-off")
-class DistancesOff(Measure, frozen=True, kw_only=True):
+class DistanceDeviation(Metric, frozen=True, kw_only=True):
     """The largest share by which distances in plan that the counters showed differ from the ground, in a thousand."""
 
     unit = "per mille"
@@ -146,7 +148,7 @@ class DistancesOff(Measure, frozen=True, kw_only=True):
     shortest_m: float = 500.0
     """Distances shorter than that tell little of the scale."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return the share in the mean of all pairs, by the last two registrations of each point."""
         readings = last_readings(account, self.points)
         truth = account.scene.ground_points
@@ -158,10 +160,10 @@ class DistancesOff(Measure, frozen=True, kw_only=True):
                 shown = mean_display(readings[other]) - mean_display(readings[one])
                 shares.append(metres * float(length_of(shown[:2])) / true - 1.0)
         if not shares:
-            return Found(None, f"no two of {join_words(self.points)} were registered")
+            return MetricResult(None, f"no two of {join_words(self.points)} were registered")
         share = 1e3 * sum(shares) / len(shares)
         told = f"the model is {abs(share):.2f} per mille too {'large' if share > 0 else 'small'}"
-        return Found(round(abs(share), 4), told)
+        return MetricResult(round(abs(share), 4), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return what two pointings allow over the width of the model."""
@@ -170,7 +172,7 @@ class DistancesOff(Measure, frozen=True, kw_only=True):
         return um / (1.5 * scenario.plan.half_width)
 
 
-def element_at(account: Account, name: str, place: int) -> float:
+def element_at(account: AttemptRecord, name: str, place: int) -> float:
     """Return where an element stood before a deed."""
     moved = [each for each in account.witness.deeds if each.what in ("set", "turn") and each.name == name]
     before = [each.after for each in moved if each.index < place]
@@ -178,14 +180,14 @@ def element_at(account: Account, name: str, place: int) -> float:
     return before[-1] if before else later[0] if later else account.autograph.element(name)
 
 
-def change_of_base(account: Account, mode: str) -> Deed | None:
+def change_of_base(account: AttemptRecord, mode: str) -> StudentAction | None:
     """Return the student's deed by which the base was last changed over to a mode, None where it never was."""
     changes = [each for each in account.actions if each.what == "base" and each.text == mode]
     return changes[-1] if changes else None
 
 
 @register_metric("moved-since")
-class MovedSince(Measure, frozen=True, kw_only=True):
+class ElementChange(Metric, frozen=True, kw_only=True):
     """The largest difference of elements from how they stood when the base was changed over, mm or gon."""
 
     unit = "mm or gon"
@@ -193,18 +195,18 @@ class MovedSince(Measure, frozen=True, kw_only=True):
     base: str = "outside"
     """To which it was changed."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         change = change_of_base(account, self.base)
         if change is None:
-            return Found(None, f"the base was never set {self.base}")
+            return MetricResult(None, f"the base was never set {self.base}")
         moved = {}
         for name in self.elements:
             off = account.autograph.element(name) - element_at(account, name, change.index)
             moved[name] = abs((off + 200.0) % 400.0 - 200.0) if name.startswith("kappa") else abs(off)
         worst = max(moved, key=lambda name: moved[name])
         told = [f"{handle_label(name)} by {amount:.2f}" for name, amount in moved.items() if amount > HALF_A_COUNT]
-        return Found(round(moved[worst], 4), f"moved since: {join_words(told)}")
+        return MetricResult(round(moved[worst], 4), f"moved since: {join_words(told)}")
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -212,7 +214,7 @@ class MovedSince(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("ties-apart")
-class TiesApart(Measure, frozen=True, kw_only=True):
+class TiePointDisagreement(Metric, frozen=True, kw_only=True):
     """The largest difference of a counter between the readings of common points in two models, mm.
 
     The two are the one with base in and the one with base out.
@@ -222,12 +224,12 @@ class TiesApart(Measure, frozen=True, kw_only=True):
     points: list[str]
     axes: list[str] = field(default_factory=lambda: list(AXES))
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it, by the last two registrations of each point in either model."""
         inside, outside = (last_readings(account, self.points, base) for base in ("inside", "outside"))
         missing = [point for point in self.points if account.name_of(point) not in inside.keys() & outside.keys()]
         if missing:
-            return Found(None, f"not registered both with base in and with base out: {join_words(missing)}")
+            return MetricResult(None, f"not registered both with base in and with base out: {join_words(missing)}")
         units = {"Z": account.autograph.z_units_per_mm}
         apart = []
         for name, some in inside.items():
@@ -237,7 +239,7 @@ class TiesApart(Measure, frozen=True, kw_only=True):
                     mm = by / units.get(axis, 1.0)
                     apart.append((abs(mm), f"{axis} at {name} reads {mm:+.3f} mm more than in the model before"))
         worst, told = max(apart)
-        return Found(round(worst, 4), told)
+        return MetricResult(round(worst, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye allows of heights in two models."""
@@ -247,7 +249,7 @@ class TiesApart(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("scale-not-carried")
-class ScaleNotCarried(Measure, frozen=True, kw_only=True):
+class ScaleTransferDeviation(Metric, frozen=True, kw_only=True):
     """By how much the second model's scale differs from the first's, per mille: by the bases, beside the flight."""
 
     unit = "per mille"
@@ -255,19 +257,19 @@ class ScaleNotCarried(Measure, frozen=True, kw_only=True):
     first: str = "1"
     base: str = "outside"
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         change = change_of_base(account, self.base)
         if change is None:
-            return Found(None, f"the base was never set {self.base}")
+            return MetricResult(None, f"the base was never set {self.base}")
         models = {each.name: each for each in account.scenario.models}
         before = self._scale(account, models[self.first], change.index)
         after = self._scale(account, models[account.model.name], account.witness.deeds[-1].index + 1)
         share = 1e3 * (after / before - 1.0)
         told = f"the second model is {abs(share):.2f} per mille {'larger' if share > 0 else 'smaller'} than the first"
-        return Found(round(abs(share), 4), told)
+        return MetricResult(round(abs(share), 4), told)
 
-    def _scale(self, account: Account, model: ModelPlan, place: int) -> float:
+    def _scale(self, account: AttemptRecord, model: ModelPlan, place: int) -> float:
         at = {
             name: element_at(account, name, place)
             for name in ("bx", "by1", "by2", "bz1", "bz2")

@@ -13,13 +13,13 @@ from a7sim.geometry import GON, Array
 from a7sim.reduction import Undetermined, element_corrections
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES
-from a7sim.training.account import Account
+from a7sim.training.account import AttemptRecord
 from a7sim.training.forms import FIVE, multipliers
 from a7sim.training.measures.base import (
     BEST_PARALLAX_UM,
     HALF_A_COUNT,
-    Found,
-    Measure,
+    Metric,
+    MetricResult,
     handle_label,
     join_words,
     register_metric,
@@ -32,10 +32,10 @@ BYS = ("by1", "by2")
 
 
 @dataclass(frozen=True)
-class Round:
+class MeasuredRound:
     """Readings of by' and by\" made with the same settings of the five elements."""
 
-    account: Account
+    account: AttemptRecord
     readings: Sequence[Reading]
 
     @cached_property
@@ -89,7 +89,7 @@ class Round:
         return self.readings[0].shown[element]
 
 
-def find_rounds(account: Account) -> list[Round]:
+def find_rounds(account: AttemptRecord) -> list[MeasuredRound]:
     """Return the rounds of measuring by' and by\"; turning one of the five elements begins a new one."""
     rounds: list[list[Reading]] = []
     for each in (each for each in account.readings if set(each.named) & set(BYS)):
@@ -97,11 +97,11 @@ def find_rounds(account: Account) -> list[Round]:
             rounds[-1].append(each)
         else:
             rounds.append([each])
-    return [Round(account, readings) for readings in rounds]
+    return [MeasuredRound(account, readings) for readings in rounds]
 
 
 @dataclass(frozen=True)
-class Worked:
+class AnsweredCase:
     """A case as it was worked: what was measured, what follows, what was answered, what was set."""
 
     sums: Sequence[Mapping[str, float]]
@@ -110,7 +110,7 @@ class Worked:
     set: Mapping[str, float]
 
 
-def answered_case(account: Account, case: str) -> Worked | None:
+def answered_case(account: AttemptRecord, case: str) -> AnsweredCase | None:
     """Return the first round that has all of a case, and what came of it; None where there is none."""
     rounds = find_rounds(account)
     place = next((i for i, each in enumerate(rounds) if each.has(case)), None)
@@ -126,7 +126,7 @@ def answered_case(account: Account, case: str) -> Worked | None:
     answered = {name: value for name, value in answers.items() if value is not None}
     moved = {name: after(name) - this.shows(name) for name in elements}
     changed = {name: math.remainder(value, 400.0) for name, value in moved.items()}
-    return Worked(sums, answered if len(answered) == len(FIVE) else {}, changed)
+    return AnsweredCase(sums, answered if len(answered) == len(FIVE) else {}, changed)
 
 
 def _number(text: str) -> float | None:
@@ -144,7 +144,7 @@ def _apart(given: Mapping[str, float], ways: Sequence[Mapping[str, float]]) -> t
 
 
 @register_metric("sums-off")
-class SumsOff(Measure, frozen=True, kw_only=True):
+class ComputationDeviation(Metric, frozen=True, kw_only=True):
     """The largest difference of corrections from those that follow from one's own readings, gon.
 
     Of the corrections as they were answered, CASE-ELEMENT such as a-kappa1, or else as they were set.
@@ -154,16 +154,18 @@ class SumsOff(Measure, frozen=True, kw_only=True):
     truth = True
     case: str
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         found = answered_case(account, self.case)
         if found is None:
-            return Found(None, f"not all points of case {self.case} were read with by' and by\" at the same settings")
+            return MetricResult(
+                None, f"not all points of case {self.case} were read with by' and by\" at the same settings"
+            )
         off, name, right = _apart(found.answered or found.set, found.sums)
         given = (found.answered or found.set)[name]
         how = "answered" if found.answered else "set"
         told = f"case {self.case}: {handle_label(name)} was {how} as {given:+.2f} and your readings give {right:+.2f}"
-        return Found(round(off, 4), told)
+        return MetricResult(round(off, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -171,18 +173,18 @@ class SumsOff(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("set-otherwise")
-class SetOtherwise(Measure, frozen=True, kw_only=True):
+class SettingDeviation(Metric, frozen=True, kw_only=True):
     """The largest difference of the corrections that were set from those worked out, gon, over some cases."""
 
     unit = "gon"
     truth = True
     cases: list[str] = field(default_factory=lambda: ["A"])
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         there = {case: each for case in self.cases if (each := answered_case(account, case)) is not None}
         if len(there) < len(self.cases):
-            return Found(None, f"case {join_words(set(self.cases) - set(there))} was not measured whole")
+            return MetricResult(None, f"case {join_words(set(self.cases) - set(there))} was not measured whole")
         all_off = [
             (_apart(each.set, [each.answered] if each.answered else each.sums), case) for case, each in there.items()
         ]
@@ -191,7 +193,7 @@ class SetOtherwise(Measure, frozen=True, kw_only=True):
             f"case {case}: {handle_label(name)} was turned by {there[case].set[name]:+.2f} and should be by "
             f"{right:+.2f}"
         )
-        return Found(round(off, 4), told)
+        return MetricResult(round(off, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return a count: both what is set and what it is set from are full counts."""
@@ -199,14 +201,14 @@ class SetOtherwise(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("parallax-rms")
-class ParallaxRms(Measure, frozen=True, kw_only=True):
+class ParallaxRms(Metric, frozen=True, kw_only=True):
     """The rms of the y-parallaxes that were left where readings of elements were registered, um at photo scale."""
 
     unit = "um"
     truth = True
     elements: list[str] = field(default_factory=lambda: list(BYS))
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         left = [
             each.stereo[1]
@@ -214,9 +216,9 @@ class ParallaxRms(Measure, frozen=True, kw_only=True):
             if set(each.named) & set(self.elements) and each.stereo is not None
         ]
         if not left:
-            return Found(None, "nothing was registered with both images in view")
+            return MetricResult(None, "nothing was registered with both images in view")
         rms = math.sqrt(fmean(each**2 for each in left))
-        return Found(
+        return MetricResult(
             round(rms, 2), f"over {pluralize(len(left), 'reading')} y-parallaxes of {rms:.1f} um (rms) were left"
         )
 

@@ -6,11 +6,11 @@ from statistics import fmean
 from msgspec import field
 
 from a7sim.scenario import Scenario
-from a7sim.training.account import Account
+from a7sim.training.account import AttemptRecord
 from a7sim.training.measures.base import (
     HALF_A_COUNT,
-    Found,
-    Measure,
+    Metric,
+    MetricResult,
     describe_points,
     handle_label,
     join_words,
@@ -22,7 +22,7 @@ from a7sim.wording import pluralize
 
 
 @register_metric("missing-readings")
-class MissingReadings(Measure, frozen=True, kw_only=True):
+class MissingReadings(Metric, frozen=True, kw_only=True):
     """How many registrations are missing: of every point, and of each element there, so many."""
 
     unit = "registrations"
@@ -32,7 +32,7 @@ class MissingReadings(Measure, frozen=True, kw_only=True):
     after: list[str] = field(default_factory=list)
     """Only those count that were made after the last movement of these handles."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         short: dict[str, list[str]] = {}
         missing = 0
@@ -49,15 +49,15 @@ class MissingReadings(Measure, frozen=True, kw_only=True):
                     )
         wanted = len(self.points) * max(1, len(self.elements)) * self.each
         if not missing:
-            return Found(0.0, "no registration is missing")
+            return MetricResult(0.0, "no registration is missing")
         late = f" after the last turn of {join_words(map(handle_label, self.after))}" if self.after else ""
-        return Found(
+        return MetricResult(
             float(missing), f"{missing} of {pluralize(wanted, 'registration')} missing{late}: {join_words(short)}"
         )
 
 
 @register_metric("wrong-approach")
-class WrongApproach(Measure, frozen=True, kw_only=True):
+class WrongApproach(Metric, frozen=True, kw_only=True):
     """How many registrations were made with a handle whose last movement came from the other side."""
 
     unit = "registrations"
@@ -68,22 +68,22 @@ class WrongApproach(Measure, frozen=True, kw_only=True):
     besides: list[str] = field(default_factory=list)
     """Points at which it does not matter."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         spared = {account.name_of(point) for point in self.besides}
         readings = [each for each in readings_with(account, "", self.points) if each.point not in spared]
         if not readings:
-            return Found(None, "nothing was registered")
+            return MetricResult(None, "nothing was registered")
         wrong = {
             handle: [each for each in readings if each.sides.get(handle, self.side) != self.side]
             for handle in self.handles
         }
         bad = {each.number for some in wrong.values() for each in some}
         if not bad:
-            return Found(0.0, f"{join_words(map(handle_label, self.handles))} always came from the same side")
+            return MetricResult(0.0, f"{join_words(map(handle_label, self.handles))} always came from the same side")
         from_where = "larger" if self.side > 0 else "smaller"
         told = [f"{handle_label(handle)} at {describe_points(some, account)}" for handle, some in wrong.items() if some]
-        return Found(
+        return MetricResult(
             float(len(bad)),
             f"{len(bad)} of {pluralize(len(readings), 'registration')} came from {from_where} readings: "
             f"{join_words(told)}",
@@ -91,29 +91,31 @@ class WrongApproach(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("one-side-only")
-class OneSideOnly(Measure, frozen=True, kw_only=True):
+class OneSidedReadings(Metric, frozen=True, kw_only=True):
     """How many handles were not registered at a point both coming from smaller readings and from larger ones."""
 
     unit = "handles"
     point: str
     handles: list[str]
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         readings = readings_with(account, "", [self.point])
         if not readings:
-            return Found(None, f"nothing was registered at {self.point}")
+            return MetricResult(None, f"nothing was registered at {self.point}")
         lacking = {handle: {each.sides.get(handle, 0) for each in readings} for handle in self.handles}
         told = [
             f"{handle_label(handle)} never came from {'smaller' if 1 not in sides else 'larger'} readings"
             for handle, sides in lacking.items()
             if not {1, -1} <= sides
         ]
-        return Found(float(len(told)), f"at {self.point}: {join_words(told) if told else 'both sides were registered'}")
+        return MetricResult(
+            float(len(told)), f"at {self.point}: {join_words(told) if told else 'both sides were registered'}"
+        )
 
 
 @register_metric("not-left-between")
-class NotLeftBetween(Measure, frozen=True, kw_only=True):
+class ReadingsWithoutReturn(Metric, frozen=True, kw_only=True):
     """How many points have no second registration for which a handle had gone away and come back."""
 
     unit = "points"
@@ -122,7 +124,7 @@ class NotLeftBetween(Measure, frozen=True, kw_only=True):
     away: float = 0.1
     """By how much it must have gone away, in units of its counter."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         lazy = {
             point: [handle for handle in self.handles if not self._came_back(account, point, handle)]
@@ -130,19 +132,19 @@ class NotLeftBetween(Measure, frozen=True, kw_only=True):
         }
         lazy = {point: handles for point, handles in lazy.items() if handles}
         if not lazy:
-            return Found(0.0, f"at {join_words(self.points)} the second reading is one of its own")
+            return MetricResult(0.0, f"at {join_words(self.points)} the second reading is one of its own")
         handles = [handle_label(each) for each in self.handles if any(each in some for some in lazy.values())]
-        return Found(
+        return MetricResult(
             float(len(lazy)),
             f"at {join_words(lazy)} there are no two readings of {join_words(handles)} between which it went away "
             f"by {self.away:g} and came back",
         )
 
-    def _came_back(self, account: Account, point: str, handle: str) -> bool:
+    def _came_back(self, account: AttemptRecord, point: str, handle: str) -> bool:
         readings = readings_with(account, "" if handle in AXES else handle, [point])
         return any(self._left(account, handle, *pair) for pair in pairwise(readings))
 
-    def _left(self, account: Account, handle: str, first: Reading, then: Reading) -> bool:
+    def _left(self, account: AttemptRecord, handle: str, first: Reading, then: Reading) -> bool:
         stood = [
             each.after for each in account.actions if each.name == handle and first.place < each.index < then.place
         ]
@@ -150,14 +152,14 @@ class NotLeftBetween(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("off-target")
-class OffTarget(Measure, frozen=True, kw_only=True):
+class TargetDeviation(Metric, frozen=True, kw_only=True):
     """The largest difference of a counter from what it should show where a point was registered."""
 
     unit = "mm"
     targets: dict[str, dict[str, float]]
     """By point, by counter or element."""
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it, by the last registration of each point."""
         off: list[tuple[float, str]] = []
         missing = []
@@ -173,9 +175,9 @@ class OffTarget(Measure, frozen=True, kw_only=True):
                         (abs(shown - reading), f"{handle_label(handle)} at {point} read {shown:.2f} for {reading:.2f}")
                     )
         if missing:
-            return Found(None, f"nothing was registered at {join_words(missing)}")
+            return MetricResult(None, f"nothing was registered at {join_words(missing)}")
         worst, told = max(off)
-        return Found(round(worst, 4), told)
+        return MetricResult(round(worst, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -183,7 +185,7 @@ class OffTarget(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("other-not-at-rest")
-class OtherNotAtRest(Measure, frozen=True, kw_only=True):
+class OtherElementDisplaced(Metric, frozen=True, kw_only=True):
     """How many readings of an element were made while another did not stand where it rests."""
 
     unit = "readings"
@@ -192,7 +194,7 @@ class OtherNotAtRest(Measure, frozen=True, kw_only=True):
     at: float = 0.0
     within: float = 0.005
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return their number."""
         told, count, all_read = [], 0, 0
         for read, other in self.pairs.items():
@@ -206,22 +208,22 @@ class OtherNotAtRest(Measure, frozen=True, kw_only=True):
                     f"at {describe_points(wrong, account)}"
                 )
         if not all_read:
-            return Found(None, f"no reading of {join_words(map(handle_label, self.pairs))} was registered")
-        return Found(
+            return MetricResult(None, f"no reading of {join_words(map(handle_label, self.pairs))} was registered")
+        return MetricResult(
             float(count),
             join_words(told) if told else f"the other one stood at rest at {pluralize(all_read, 'reading')}",
         )
 
 
 @register_metric("spread")
-class Spread(Measure, frozen=True, kw_only=True):
+class ReadingSpread(Metric, frozen=True, kw_only=True):
     """The largest difference between readings of the same element, or counter, at the same point."""
 
     unit = "mm"
     handles: list[str]
     points: list[str] = field(default_factory=list)
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         spreads: list[tuple[float, str]] = []
         for handle in self.handles:
@@ -239,8 +241,8 @@ class Spread(Measure, frozen=True, kw_only=True):
                     )
                     spreads.append((round(spread, 4), told))
         if not spreads:
-            return Found(None, "nothing was read twice")
-        return Found(*max(spreads))
+            return MetricResult(None, "nothing was read twice")
+        return MetricResult(*max(spreads))
 
     def floor(self, scenario: Scenario) -> float:
         """Return a count: two readings of the same setting may fall on either side of a half."""
@@ -248,7 +250,7 @@ class Spread(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("not-opposed")
-class NotOpposed(Measure, frozen=True, kw_only=True):
+class OppositionDeviation(Metric, frozen=True, kw_only=True):
     """By how much the mean readings of two elements at a point differ from being opposite: by' reads +p, by\" -p."""
 
     unit = "mm"
@@ -256,7 +258,7 @@ class NotOpposed(Measure, frozen=True, kw_only=True):
     other: str = "by2"
     points: list[str] = field(default_factory=list)
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return the largest sum at a point."""
         sums: list[tuple[float, str]] = []
         for point in dict.fromkeys(each.point for each in readings_with(account, self.one, self.points)):
@@ -268,8 +270,10 @@ class NotOpposed(Measure, frozen=True, kw_only=True):
                 told = f"at {describe_points(ones, account)} {read}"
                 sums.append((round(abs(left + right), 4), told))
         if not sums:
-            return Found(None, f"no point was read with both {handle_label(self.one)} and {handle_label(self.other)}")
-        return Found(*max(sums))
+            return MetricResult(
+                None, f"no point was read with both {handle_label(self.one)} and {handle_label(self.other)}"
+            )
+        return MetricResult(*max(sums))
 
     def floor(self, scenario: Scenario) -> float:
         """Return a count."""

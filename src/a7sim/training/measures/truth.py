@@ -8,7 +8,7 @@ from msgspec import field
 from a7sim.geometry import GON, Array, plane_rotation
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES
-from a7sim.training.account import Account
+from a7sim.training.account import AttemptRecord
 from a7sim.training.measures.base import (
     BEST_FIDUCIAL_UM,
     BEST_HEIGHT_UM,
@@ -16,14 +16,14 @@ from a7sim.training.measures.base import (
     BEST_POINTING_UM,
     HALF_A_COUNT,
     MAX_OF_SEVERAL,
-    Found,
-    Measure,
+    Metric,
+    MetricResult,
     describe_points,
     handle_label,
     join_words,
     register_metric,
 )
-from a7sim.training.witness import Reading, WitnessedAutograph
+from a7sim.training.witness import LoggedAutograph, Reading
 
 MAX_STEPS = 20
 
@@ -34,7 +34,7 @@ def half_a_count_um(scenario: Scenario) -> float:
     return 1e3 * HALF_A_COUNT * scenario.camera.c / plan.projection_height
 
 
-class AtReadings(Measure, frozen=True, kw_only=True):
+class MaxAtReadings(Metric, frozen=True, kw_only=True):
     """The largest of something at the registrations, in um at photo scale."""
 
     unit = "um"
@@ -43,7 +43,7 @@ class AtReadings(Measure, frozen=True, kw_only=True):
     """Only where one of these was registered."""
     points: list[str] = field(default_factory=list)
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         names = [account.name_of(point) for point in self.points]
         readings = [
@@ -52,14 +52,16 @@ class AtReadings(Measure, frozen=True, kw_only=True):
             if (not self.elements or set(self.elements) & set(each.named)) and (not names or each.point in names)
         ]
         if not readings:
-            return Found(None, "nothing was registered")
+            return MetricResult(None, "nothing was registered")
         lost = [each for each in readings if self._um(each) is None]
         if lost:
-            return Found(None, f"at {describe_points(lost, account)} the point was not in view")
+            return MetricResult(None, f"at {describe_points(lost, account)} the point was not in view")
         worst = max(readings, key=lambda each: self._um(each) or 0.0)
         value = self._um(worst) or 0.0
         named = join_words(map(handle_label, worst.named)) if worst.named else "the mark"
-        return Found(round(value, 1), f"{self._called(value)} at {describe_points([worst], account)} with {named}")
+        return MetricResult(
+            round(value, 1), f"{self._called(value)} at {describe_points([worst], account)} with {named}"
+        )
 
     def _um(self, reading: Reading) -> float | None:
         raise NotImplementedError
@@ -69,7 +71,7 @@ class AtReadings(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("parallax-left")
-class ParallaxLeft(AtReadings, frozen=True, kw_only=True):
+class RemainingParallax(MaxAtReadings, frozen=True, kw_only=True):
     """The largest y-parallax that was left where a reading was registered, um at photo scale."""
 
     def _um(self, reading: Reading) -> float | None:
@@ -84,7 +86,7 @@ class ParallaxLeft(AtReadings, frozen=True, kw_only=True):
 
 
 @register_metric("off-the-ground")
-class OffTheGround(AtReadings, frozen=True, kw_only=True):
+class HeightParallax(MaxAtReadings, frozen=True, kw_only=True):
     """The largest x-parallax where a reading was registered: the mark was above or below the ground, um."""
 
     def _um(self, reading: Reading) -> float | None:
@@ -99,7 +101,7 @@ class OffTheGround(AtReadings, frozen=True, kw_only=True):
 
 
 @register_metric("beside-the-point")
-class BesideThePoint(AtReadings, frozen=True, kw_only=True):
+class PlanDeviation(MaxAtReadings, frozen=True, kw_only=True):
     """The largest distance of the mark from the point in plan where a reading was registered, um at photo scale."""
 
     eye: int = 0
@@ -120,7 +122,7 @@ class BesideThePoint(AtReadings, frozen=True, kw_only=True):
         return MAX_OF_SEVERAL * BEST_POINTING_UM
 
 
-def y_parallax_at(account: Account, point: str) -> float | None:
+def y_parallax_at(account: AttemptRecord, point: str) -> float | None:
     """Return the y-parallax in um at photo scale of a point as the projectors stand, None where it is on no picture.
 
     It is what both eyes would see with the mark on the ground there.
@@ -145,7 +147,7 @@ def y_parallax_at(account: Account, point: str) -> float | None:
     return float(1e3 * _misses(autograph, images, mark)[3])
 
 
-def _misses(autograph: WitnessedAutograph, images: list[tuple[int, Array]], mark: Array) -> Array:
+def _misses(autograph: LoggedAutograph, images: list[tuple[int, Array]], mark: Array) -> Array:
     """Return how images stand to a mark ``(4,)`` in mm at photo scale: x and y in the mean, px, py."""
     seen = []
     for projector, place in images:
@@ -156,7 +158,7 @@ def _misses(autograph: WitnessedAutograph, images: list[tuple[int, Array]], mark
 
 
 @register_metric("residual-parallax")
-class ResidualParallax(Measure, frozen=True, kw_only=True):
+class ResidualParallax(Metric, frozen=True, kw_only=True):
     """The y-parallax that is left at the standard points in the end: rms, or the largest, um at photo scale."""
 
     unit = "um"
@@ -164,17 +166,17 @@ class ResidualParallax(Measure, frozen=True, kw_only=True):
     points: list[str] = field(default_factory=lambda: list(CASES["A"]))
     largest: bool = False
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         names = {point: account.name_of(point) for point in self.points if point in account.model.standard_points}
         found = {point: y_parallax_at(account, name) for point, name in names.items()}
         seen = {point: value for point, value in found.items() if value is not None}
         if len(seen) < len(found) or not seen:
-            return Found(None, "the pictures of the model do not lie in their projectors")
+            return MetricResult(None, "the pictures of the model do not lie in their projectors")
         worst = max(seen, key=lambda point: abs(seen[point]))
         rms = math.sqrt(sum(each**2 for each in seen.values()) / len(seen))
         told = f"y-parallaxes of {rms:.0f} um (rms) are left, the largest {seen[worst]:+.0f} um at point {worst}"
-        return Found(round(abs(seen[worst]) if self.largest else rms, 1), told)
+        return MetricResult(round(abs(seen[worst]) if self.largest else rms, 1), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the best eye leaves, the film's irregular deformation, and half a count."""
@@ -184,32 +186,32 @@ class ResidualParallax(Measure, frozen=True, kw_only=True):
 
 
 @register_metric("picture-off-centre")
-class PictureOffCentre(Measure, frozen=True, kw_only=True):
+class CentringDeviation(Metric, frozen=True, kw_only=True):
     """How far pictures lie from centred: the largest shift or, at the fiducials, turn that is left, mm."""
 
     unit = "mm"
     truth = True
     projectors: list[int] = field(default_factory=lambda: [1, 2])
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         left: list[tuple[float, str]] = []
         for projector in self.projectors:
             name = account.autograph.loaded(projector)
             if name is None or name not in account.scene.photographs:
-                return Found(None, f"no photograph lies in projector {projector}")
+                return MetricResult(None, f"no photograph lies in projector {projector}")
             shift, turned, _ = _lie(account, projector)
             left.append((shift, f"{name} lies {shift:.3f} mm beside the principal point"))
             left.append((turned, f"{name} is turned by {turned:.3f} mm at its fiducials"))
         value, told = max(left)
-        return Found(round(value, 4), told)
+        return MetricResult(round(value, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return what the mean of four fiducials allows."""
         return 1e-3 * MAX_OF_SEVERAL * BEST_FIDUCIAL_UM / 2.0
 
 
-def _lie(account: Account, projector: int) -> tuple[float, float, float]:
+def _lie(account: AttemptRecord, projector: int) -> tuple[float, float, float]:
     """Return shift and turn in mm by which a picture lies off, and by how much its film is larger than it was."""
     camera = account.scenario.camera
     displaced = account.autograph.carrier(projector).fiducial_displacements()
@@ -225,19 +227,19 @@ def _lie(account: Account, projector: int) -> tuple[float, float, float]:
 
 
 @register_metric("principal-distance-off")
-class PrincipalDistanceOff(Measure, frozen=True, kw_only=True):
+class PrincipalDistanceDeviation(Metric, frozen=True, kw_only=True):
     """The largest difference of a principal distance from that of the camera with the film as it has shrunk, mm."""
 
     unit = "mm"
     truth = True
     projectors: list[int] = field(default_factory=lambda: [1, 2])
 
-    def evaluate(self, account: Account) -> Found:
+    def evaluate(self, account: AttemptRecord) -> MetricResult:
         """Return it."""
         off: list[tuple[float, str]] = []
         for projector in self.projectors:
             if account.autograph.loaded(projector) is None:
-                return Found(None, f"no photograph lies in projector {projector}")
+                return MetricResult(None, f"no photograph lies in projector {projector}")
             wanted = account.scenario.camera.c * (1.0 + _lie(account, projector)[2])
             shown = account.autograph.element(f"c{projector}")
             side = "long" if shown > wanted else "short"
@@ -247,7 +249,7 @@ class PrincipalDistanceOff(Measure, frozen=True, kw_only=True):
             )
             off.append((abs(shown - wanted), told))
         value, told = max(off)
-        return Found(round(value, 4), told)
+        return MetricResult(round(value, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count, and what four fiducials say of a scale."""

@@ -1,6 +1,6 @@
 """The procedures of the virtual operator that exercises name."""
 
 from a7sim.training.procedures import cards, models, orienting, testing
-from a7sim.training.procedures.base import PROCEDURES, Seated, procedure, run_procedure
+from a7sim.training.procedures.base import PROCEDURES, ProcedureContext, procedure, run_procedure
 
-__all__ = ["PROCEDURES", "Seated", "cards", "models", "orienting", "procedure", "run_procedure", "testing"]
+__all__ = ["PROCEDURES", "ProcedureContext", "cards", "models", "orienting", "procedure", "run_procedure", "testing"]

@@ -9,19 +9,19 @@ from a7sim.link.client import Client
 from a7sim.link.headers import quote_text, registration_word
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.manual import VARIANTS
-from a7sim.mistakes import Mistake
-from a7sim.operator import DoesNotFit, Job, ModelJob, Person, measure_models
-from a7sim.operator.bench import Bench
-from a7sim.operator.book import Entry
-from a7sim.operator.crew import Crew
-from a7sim.operator.interior import InteriorOrientations
-from a7sim.operator.line_hands import LineHands
+from a7sim.mistakes import A7SimError
+from a7sim.operator import Job, ModelJob, OperatorGaveUp, Person, measure_models
+from a7sim.operator.bench import Workstation
+from a7sim.operator.book import BookEntry
+from a7sim.operator.crew import OperatorBatch
+from a7sim.operator.interior import InteriorOrientationBatch
+from a7sim.operator.line_hands import ScpiDriver
 from a7sim.operator.work import load_prints, mount_photographs, orient_model, set_base_and_fittings
 from a7sim.reduction import Undetermined
 from a7sim.session.running import make_job
 from a7sim.training.account import ANSWER
-from a7sim.training.exercise import Played
-from a7sim.training.room import Room
+from a7sim.training.exercise import PlayedRun
+from a7sim.training.room import AttemptEnvironment
 from a7sim.training.variation import scenario_for
 
 ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)
@@ -34,19 +34,19 @@ _REGISTERED = (*_POINTED.values(), "parallax seen")
 
 
 @dataclass(frozen=True)
-class Seated:
+class ProcedureContext:
     """The virtual operator at the instrument of an exercise."""
 
     person: Person
-    bench: Bench
+    bench: Workstation
     model: ModelJob
     papers: Mapping[str, str] = field(default_factory=dict)
     """What was handed out, by file name."""
 
     @classmethod
-    def for_model(cls, person: Person, job: Job, model: str) -> "Seated":
+    def for_model(cls, person: Person, job: Job, model: str) -> "ProcedureContext":
         """Return an operator who is to work on a model of a job."""
-        bench = Bench(Crew.single(person), LineHands(person), job)
+        bench = Workstation(OperatorBatch.single(person), ScpiDriver(person), job)
         return cls(person, bench, next(each for each in job.models if each.name == model))
 
     def points(self) -> list[str]:
@@ -62,7 +62,7 @@ class Seated:
         bench.seat.prepare(who)
         self.begin("interior orientation")
         set_base_and_fittings(bench, self.model.base, self.model.polarity)
-        found: dict[str, InteriorOrientations] = {}
+        found: dict[str, InteriorOrientationBatch] = {}
         mount_photographs(bench, self.model, found)
         bench.begin(who, self.model, load_prints(bench, self.model))
 
@@ -84,14 +84,14 @@ class Seated:
         self.person.note(f"{self.model.name}: {form}")
 
 
-def perturb_elements(seated: Seated, elements: Mapping[str, float]) -> None:
+def perturb_elements(seated: ProcedureContext, elements: Mapping[str, float]) -> None:
     """Turn elements by so much, by mistake."""
     who = seated.bench.crew.active
     standing = seated.bench.seat.elements(who, list(elements))
     seated.bench.seat.turn_elements(who, {name: standing[name] + amount for name, amount in elements.items()})
 
 
-def misplace_fittings(seated: Seated, fittings: Mapping[str, str]) -> None:
+def misplace_fittings(seated: ProcedureContext, fittings: Mapping[str, str]) -> None:
     """Put fittings into positions, by mistake."""
     for name, position in fittings.items():
         seated.bench.hands.set_fitting(np.asarray(seated.bench.crew.active), name, position)
@@ -114,7 +114,9 @@ def procedure(name: str) -> Callable[[Procedure], Procedure]:
     return registered
 
 
-def run_procedure(room: Room, played: Played, client: str, papers: Mapping[str, str] | None = None) -> str:
+def run_procedure(
+    room: AttemptEnvironment, played: PlayedRun, client: str, papers: Mapping[str, str] | None = None
+) -> str:
     """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake.
 
     `papers` are what was handed out, by file name.
@@ -122,16 +124,16 @@ def run_procedure(room: Room, played: Played, client: str, papers: Mapping[str, 
     port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
     observer = scenario_for(room.shelved, room.seed, played.observer).observer
     person = Person(Client(port), room.clock, observer, room.seed)
-    seated = Seated.for_model(person, make_job(room.scenario, room.scene), room.shelved.exercise.model)
+    seated = ProcedureContext.for_model(person, make_job(room.scenario, room.scene), room.shelved.exercise.model)
     person.book.listener = _Button(person.client, seated.model).written
     try:
         PROCEDURES[played.procedure](replace(seated, papers=papers or {}), **played.options)
-    except (DoesNotFit, Undetermined) as trouble:
+    except (OperatorGaveUp, Undetermined) as trouble:
         return str(trouble) or type(trouble).__name__
     except TypeError as error:
         if "argument" not in str(error):
             raise
-        raise Mistake(f"{played.procedure}: expected the options of this procedure: {error}") from error
+        raise A7SimError(f"{played.procedure}: expected the options of this procedure: {error}") from error
     finally:
         port.close()
     return ""
@@ -155,7 +157,7 @@ class _Button:
             _POINTED[2]: f"by{model.right_projector}",
         }
 
-    def written(self, entry: Entry) -> None:
+    def written(self, entry: BookEntry) -> None:
         if entry.struck:
             if entry.number in self._numbers:
                 self._client.send(f"REC:STR {self._numbers[entry.number]},{quote_text(entry.struck[:60])}")
@@ -172,13 +174,13 @@ class _Button:
 
 
 @procedure("interior orientation")
-def interior_orientation(seated: Seated) -> None:
+def interior_orientation(seated: ProcedureContext) -> None:
     """Fittings, both pictures mounted and centred, principal distances."""
     seated.set_up()
 
 
 @procedure("measure parallaxes")
-def measure_parallaxes(seated: Seated, readings: int = 2) -> None:
+def measure_parallaxes(seated: ProcedureContext, readings: int = 2) -> None:
     """Clear the y-parallax at the standard points with by', then with by\", coming back to each so many times."""
     seated.take_over()
     seated.begin("y-parallaxes")
@@ -187,7 +189,7 @@ def measure_parallaxes(seated: Seated, readings: int = 2) -> None:
 
 
 @procedure("relative orientation")
-def relative_orientation(seated: Seated) -> None:
+def relative_orientation(seated: ProcedureContext) -> None:
     """Relative orientation as the scenario's plan has it, of pictures that lie ready; then a look at every point."""
     seated.take_over()
     seated.begin("relative orientation")
@@ -197,7 +199,7 @@ def relative_orientation(seated: Seated) -> None:
 
 
 @procedure("day's work")
-def full_day(seated: Seated) -> None:
+def full_day(seated: ProcedureContext) -> None:
     """All models of the scenario from the first picture to the last centre."""
     for _ in measure_models(seated.person, seated.bench.job):
         pass

@@ -12,12 +12,12 @@ from a7sim.documents import Document
 from a7sim.reduction import Ground, Model, deck_lines
 from a7sim.reduction.strips import is_centre
 from a7sim.training.account import ANSWER
-from a7sim.training.procedures.base import Seated, procedure
+from a7sim.training.procedures.base import ProcedureContext, procedure
 
 
 @procedure("strip by cards")
 def strip_by_cards(
-    seated: Seated,
+    seated: ProcedureContext,
     wanted: list[str],
     z_units_per_mm: float = 8.0,
     leave_out: bool = True,

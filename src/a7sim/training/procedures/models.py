@@ -11,17 +11,17 @@ from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import relative_orientation
 from a7sim.operator.work import load_prints, mount_photographs, orient_model, set_base_and_fittings
 from a7sim.training.account import ANSWER
-from a7sim.training.procedures.base import Seated, misplace_fittings, perturb_elements, procedure
+from a7sim.training.procedures.base import ProcedureContext, misplace_fittings, perturb_elements, procedure
 
 
 @procedure("prepared model")
-def prepared_model(seated: Seated, model: str = "", orient: bool = True) -> None:
+def prepared_model(seated: ProcedureContext, model: str = "", orient: bool = True) -> None:
     """Set a model up and `orient` it relatively, as somebody does who leaves it to the next operator.
 
     The Z counter is left so that it reads from the base line.
     """
     bench, chosen = seated.bench, find_model(seated, model)
-    Seated(seated.person, bench, chosen).set_up()
+    ProcedureContext(seated.person, bench, chosen).set_up()
     if orient:
         orient_model(bench, chosen)
     who = bench.crew.active
@@ -29,7 +29,7 @@ def prepared_model(seated: Seated, model: str = "", orient: bool = True) -> None
     bench.seat.shift_counter(who, "Z", bench.seat.units_per_mm * heights - bench.seat.centre(who, 1)[2])
 
 
-def take_over(seated: Seated, model: ModelJob) -> None:
+def take_over(seated: ProcedureContext, model: ModelJob) -> None:
     """Go on at an instrument that somebody else left, a model mounted in it and its counters not preset."""
     bench = seated.bench
     who = bench.crew.active
@@ -38,14 +38,14 @@ def take_over(seated: Seated, model: ModelJob) -> None:
     bench.begin(who, model, load_prints(bench, model))
 
 
-def find_model(seated: Seated, name: str) -> ModelJob:
+def find_model(seated: ProcedureContext, name: str) -> ModelJob:
     """Return a model of the job sheet, that of the exercise where none is named."""
     return next((each for each in seated.bench.job.models if each.name == name), seated.model)
 
 
 @procedure("absolute orientation")
 def absolute_orientation(
-    seated: Seated,
+    seated: ProcedureContext,
     misread: Mapping[str, Sequence[float]] | None = None,
     points: Sequence[str] | None = None,
     knocked: Mapping[str, float] | None = None,
@@ -64,7 +64,7 @@ def absolute_orientation(
 
 @procedure("A8 model")
 def a8_model(
-    seated: Seated,
+    seated: ProcedureContext,
     level: bool = True,
     doubled: bool = True,
     place: str = "3",
@@ -115,7 +115,7 @@ def misread_control(
 
 @procedure("base change")
 def base_change(
-    seated: Seated,
+    seated: ProcedureContext,
     kept: bool = True,
     counters: bool = True,
     scale: bool = True,

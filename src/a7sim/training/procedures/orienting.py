@@ -14,14 +14,14 @@ from a7sim.operator.seat import side_name
 from a7sim.operator.work import orient_model
 from a7sim.standard_points import CASES
 from a7sim.training.account import ANSWER
-from a7sim.training.procedures.base import Seated, misplace_fittings, perturb_elements, procedure
+from a7sim.training.procedures.base import ProcedureContext, misplace_fittings, perturb_elements, procedure
 
 INDEPENDENT = "independent"
 
 
 @procedure("clear the model")
 def clear_the_model(
-    seated: Seated,
+    seated: ProcedureContext,
     method: str = INDEPENDENT,
     over_correction: float | str = "computed",
     case: str = "A",
@@ -52,7 +52,7 @@ def clear_the_model(
 
 @procedure("numerical orientation")
 def numerical_orientation(
-    seated: Seated,
+    seated: ProcedureContext,
     cases: str = "AE",
     readings: int = 3,
     sense: float = 1.0,
@@ -86,7 +86,7 @@ def numerical_orientation(
         _put_on_by(seated, _parallaxes(seated, "A", readings).parallax_mm.mean(axis=0))
 
 
-def _parallaxes(seated: Seated, case: str, readings: int) -> Parallaxes:
+def _parallaxes(seated: ProcedureContext, case: str, readings: int) -> Parallaxes:
     bench, model = seated.bench, seated.model
     points = [model.standard_points[label] for label in model.points_of_case(case)]
     seen = bench.parallaxes(bench.crew.active, points, readings)
@@ -94,7 +94,7 @@ def _parallaxes(seated: Seated, case: str, readings: int) -> Parallaxes:
     return seen
 
 
-def _put_on_by(seated: Seated, mean: Array) -> None:
+def _put_on_by(seated: ProcedureContext, mean: Array) -> None:
     """Set by of the left-hand photograph's projector on by a mean parallax."""
     bench, by = seated.bench, f"by{seated.model.left_projector}"
     who = bench.crew.active
@@ -103,7 +103,7 @@ def _put_on_by(seated: Seated, mean: Array) -> None:
 
 @procedure("perspective centres")
 def perspective_centres(
-    seated: Seated, hands: Sequence[int] = (1, 2), swapped: bool = False, height_in_mm: bool = False
+    seated: ProcedureContext, hands: Sequence[int] = (1, 2), swapped: bool = False, height_in_mm: bool = False
 ) -> None:
     """Preset the counters on the ground at point 1, point at two levels with each eye, and answer both centres.
 
@@ -116,7 +116,7 @@ def perspective_centres(
 
 @procedure("model with its centres")
 def model_with_its_centres(
-    seated: Seated,
+    seated: ProcedureContext,
     hands: Sequence[int] = (1, 2),
     swapped: bool = False,
     height_in_mm: bool = False,
@@ -135,7 +135,7 @@ def model_with_its_centres(
     misplace_fittings(seated, wrong_fittings or {})
 
 
-def find_centres(seated: Seated, hands: Sequence[int], swapped: bool, height_in_mm: bool) -> None:
+def find_centres(seated: ProcedureContext, hands: Sequence[int], swapped: bool, height_in_mm: bool) -> None:
     """Preset the counters at point 1, point at both levels and answer the centres."""
     bench, model, plan = seated.bench, seated.model, seated.bench.job.plan
     seated.begin("model coordinates")

@@ -1,17 +1,17 @@
 """The grid test of a projector by few crosses."""
 
 from a7sim.geometry import GON
-from a7sim.operator.bench import Bench
-from a7sim.operator.grid_test import GridTestOrder, measure_grid_batch
+from a7sim.operator.bench import Workstation
+from a7sim.operator.grid_test import GridTestPlan, measure_grid_batch
 from a7sim.training.account import ANSWER
-from a7sim.training.procedures.base import Seated, procedure
+from a7sim.training.procedures.base import ProcedureContext, procedure
 
 ANSWERED = ("c", "phi", "omega")
 
 
 @procedure("grid test")
 def grid_test(
-    seated: Seated,
+    seated: ProcedureContext,
     crosses: int = 9,
     levels: int = 2,
     pointings: int = 2,
@@ -24,8 +24,8 @@ def grid_test(
     By mistake errors are answered in the other `sense`, tilts in radians, or fewer `projectors` are tested.
     """
     job = seated.bench.job
-    order = GridTestOrder(job.certificate, job.grid_plate, crosses, levels, pointings, seated.model.polarity)
-    bench = Bench(seated.bench.crew, seated.bench.hands, order.job)
+    order = GridTestPlan(job.certificate, job.grid_plate, crosses, levels, pointings, seated.model.polarity)
+    bench = Workstation(seated.bench.crew, seated.bench.hands, order.job)
     for sheet in measure_grid_batch(bench, order):
         for name in ANSWERED:
             error = sense * float(sheet.test.errors[name][0])

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from a7sim.instrument.language.commands.parts import autograph_for
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.table import (
     Call,
     Command,
@@ -45,7 +45,7 @@ def _axis(axis: str) -> list[Command]:
 
     def preset(engine: "Engine", call: Call) -> None:
         if abs(call.arguments[0]) > MAX_READING:
-            raise LanguageError(
+            raise CommandError(
                 ErrorNumber.DATA_OUT_OF_RANGE, f"expected at most {MAX_READING}, got {call.arguments[0]:.10g}"
             )
         autograph_for(engine).preset(axis, call.arguments[0])

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from a7sim.instrument.language.commands.parts import ELEMENT_NODES, LIMIT, autograph_for, format_fixed, text_argument
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
     Call,
@@ -96,7 +96,7 @@ def _height_gear(engine: "Engine", call: Call) -> None:
 def _plan_gear(engine: "Engine", call: Call) -> None:
     gear = call.arguments[0]
     if isinstance(gear, float) and not 0.0 < gear <= 100.0:
-        raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected more than 0 to 100, got {gear:g}")
+        raise CommandError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected more than 0 to 100, got {gear:g}")
     autograph_for(engine).plan_gear = text_argument(gear) if isinstance(gear, str) else f"{gear:.10g}"
 
 

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.table import Choice
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def format_fixed(value: float, decimals: int = 2) -> str:
 def text_argument(text: str) -> str:
     """Return a text. Raises LanguageError for an empty one and for one that is too long."""
     if not 1 <= len(text) <= MAX_TEXT_LENGTH:
-        raise LanguageError(
+        raise CommandError(
             ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {MAX_TEXT_LENGTH} characters, got {len(text)}"
         )
     return text

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from a7sim.instrument.language.commands.parts import autograph_for, format_fixed
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
     Call,
@@ -83,9 +83,9 @@ def _picture(engine: "Engine", call: Call) -> bytes:
     columns, rows, magnification = call.arguments
     for name, value, largest in (("columns", columns, MAX_PICTURE), ("rows", rows, MAX_PICTURE)):
         if not 1 <= value <= largest:
-            raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {largest} {name}, got {value:g}")
+            raise CommandError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {largest} {name}, got {value:g}")
     if not 0.1 <= magnification <= 100.0:
-        raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 0.1 to 100 times, got {magnification:g}")
+        raise CommandError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 0.1 to 100 times, got {magnification:g}")
     grey = autograph_for(engine).picture(call.suffix, int(columns), int(rows), magnification)
     pixels = np.round(255.0 * grey).astype(np.uint8).tobytes()
     length = str(len(pixels))

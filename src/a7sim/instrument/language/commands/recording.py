@@ -4,7 +4,7 @@ import re
 from typing import TYPE_CHECKING
 
 from a7sim.instrument.language.commands.parts import ELEMENT_NODES, autograph_for, format_fixed, text_argument
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
     AnyWord,
@@ -33,7 +33,7 @@ def recorded_element(word: str) -> str:
         return _COMMON_TO_BOTH[word]
     found = re.fullmatch(r"([A-Z]+)([12])", word)
     if found is None or found[1] not in _RECORDED:
-        raise LanguageError(
+        raise CommandError(
             ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected BX, CPHI or an element such as BY1, got {word}"
         )
     return f"{_RECORDED[found[1]]}{found[2]}"
@@ -50,7 +50,7 @@ def _record(engine: "Engine", call: Call) -> None:
 def _last_record(engine: "Engine", call: Call) -> str:
     registrations = autograph_for(engine).recorder.registrations
     if not registrations:
-        raise LanguageError(ErrorNumber.EXECUTION_ERROR, "nothing is registered yet")
+        raise CommandError(ErrorNumber.EXECUTION_ERROR, "nothing is registered yet")
     return _shown(registrations[-1])
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from a7sim.instrument.language.commands.parts import autograph_for
-from a7sim.instrument.language.errors import ErrorNumber, LanguageError
+from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.status import Register
 from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
@@ -40,7 +40,7 @@ def _reset(engine: "Engine", call: Call) -> None:
 def _mask(call: Call, largest: int) -> int:
     value = call.arguments[0]
     if not 0 <= value <= largest:
-        raise LanguageError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 0 to {largest}, got {value:g}")
+        raise CommandError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected 0 to {largest}, got {value:g}")
     return int(value)
 
 
