@@ -39,7 +39,7 @@ def timed(work: Callable[[], object], times: int = 40) -> float:
 
 def frame_times(columns: int, rows: int) -> tuple[float, float]:
     """Return ms to render both eyes' pictures over the language, and to draw them in half-blocks."""
-    from a7sim.console.eyepiece import apply_vignette, half_blocks, overlay_mark
+    from a7sim.console.rasterize import apply_vignette, half_blocks, overlay_mark
     from a7sim.link.client import Client
 
     with Client.open("a7sim://akwanga?seed=7") as client:

@@ -13,7 +13,7 @@ from figures import Figure, Target, tell
 from a7sim.operator import measure_models
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session
-from a7sim.session.crowd import open_batch
+from a7sim.session.session_batch import open_batch
 
 SESSIONS = (1, 50, 200, 800)
 RECORDED = 20

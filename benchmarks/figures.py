@@ -16,7 +16,7 @@ import msgspec
 from rich.console import Console
 from rich.text import Text
 
-from a7sim.sheets import text_table
+from a7sim.text_tables import text_table
 
 COLUMNS = ("measured", "value", "against", "ratio", "target", "")
 NUMBERS = (1, 3)

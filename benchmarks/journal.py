@@ -19,9 +19,9 @@ from a7sim.instrument.language import SharedInstrument
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import run
-from a7sim.session.durable import DURABILITIES
+from a7sim.session.append_file import DURABILITIES
 from a7sim.session.journal import Journal, JournalOptions, make_header
-from a7sim.session.lines import read_journal
+from a7sim.session.journal_format import read_journal
 from a7sim.session.replaying import Replay, replay_lines
 
 ASKED_OF = 100_000

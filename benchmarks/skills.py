@@ -18,11 +18,11 @@ from statistics import median
 from figures import Figure, Target, tell
 from msgspec.structs import replace
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.training.attempts import run_attempt
+from a7sim.training.catalogue import all_exercises, find_exercise
 from a7sim.training.exercise import PlayedRun
 from a7sim.training.grading import grade_folder
-from a7sim.training.shelf import all_exercises, find_exercise
 
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 

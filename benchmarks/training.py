@@ -9,13 +9,13 @@ from pathlib import Path
 
 from figures import Figure, Target, tell
 
-from a7sim.session.lines import read_journal
+from a7sim.session.journal_format import read_journal
 from a7sim.training.attempts import run_attempt
+from a7sim.training.catalogue import find_exercise
+from a7sim.training.environment import replay_environment
 from a7sim.training.exercise import PlayedRun
 from a7sim.training.grading import grade_folder
-from a7sim.training.handed_in import grade_submissions
-from a7sim.training.room import replay_environment
-from a7sim.training.shelf import find_exercise
+from a7sim.training.submissions import grade_submissions
 from a7sim.training.variation import attempt_seed
 
 STUDENTS, CORES = 200, 2

@@ -13,11 +13,11 @@ from a7sim.geometry import GON
 from a7sim.link.client import Client
 from a7sim.link.headers import header, registration_word, short_form
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.manual import REQUIRED_FITTINGS
+from a7sim.plotters import REQUIRED_FITTINGS
 from a7sim.training.attempts import run_opening
+from a7sim.training.catalogue import find_exercise
+from a7sim.training.environment import open_environment
 from a7sim.training.handouts import make_handout
-from a7sim.training.room import open_environment
-from a7sim.training.shelf import find_exercise
 
 LOOKS = 8
 

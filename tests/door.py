@@ -5,8 +5,8 @@ from functools import cache
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Listener, SharedInstrument
 from a7sim.link.clock import Clock
-from a7sim.link.waiting import feed_until_idle
-from a7sim.manual import VARIANTS
+from a7sim.link.simulated_wait import feed_until_idle
+from a7sim.plotters import VARIANTS
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.scene.photograph import Photograph

@@ -10,11 +10,11 @@ from textual.pilot import Pilot
 from textual.widgets import Input, OptionList
 
 from a7sim.console.app import Console
-from a7sim.console.eyepiece import DrawingMode, picture_size
-from a7sim.console.hands import STEP_SIZES
-from a7sim.console.seat import ConsoleConfig
-from a7sim.console.sheet import JobSheet
-from a7sim.console.window import EyepieceWidget
+from a7sim.console.config import ConsoleConfig
+from a7sim.console.eyepiece_widget import EyepieceWidget
+from a7sim.console.job_sheet import JobSheet
+from a7sim.console.rasterize import DrawingMode, picture_size
+from a7sim.console.selection import STEP_SIZES
 from a7sim.instrument.language import Listener
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial

@@ -12,7 +12,7 @@ import a7sim
 from a7sim.geometry import GON, image_of, rotation
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
-from a7sim.manual import A7, A8
+from a7sim.plotters import A7, A8
 from a7sim.reduction.modelling import a8_model_coordinates
 from tests.door import Door
 from tests.test_instrument import photograph

@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from a7sim.errors import A7SimError
 from a7sim.instrument.local_errors import powers_at, smooth_local_errors
-from a7sim.mistakes import A7SimError
 from a7sim.reduction import Undetermined
 from a7sim.reduction.absolute import root_mean_square
 from a7sim.reduction.strips import is_centre
@@ -16,8 +16,8 @@ from a7sim.scenario.schema import FilmDeformation
 from a7sim.scene import build_scene
 from a7sim.session import a8_strip
 from a7sim.session.a8_strip import strip_on_a8
-from a7sim.session.analytical import strip_by_comparator
-from a7sim.session.two_ways import compare_a8_to_comparator
+from a7sim.session.a8_vs_comparator import compare_a8_to_comparator
+from a7sim.session.comparator import strip_by_comparator
 
 MILLIMETRE = 0.001
 

@@ -5,10 +5,10 @@ import struct
 import threading
 from contextlib import contextmanager
 
-from a7sim.link import between
-from a7sim.link.between import POLL_INTERVAL_S, RecordingProxy
+from a7sim.errors import A7SimError
+from a7sim.link import recording_proxy
 from a7sim.link.clock import WallClock
-from a7sim.mistakes import A7SimError
+from a7sim.link.recording_proxy import POLL_INTERVAL_S, RecordingProxy
 from tests.served import PATIENCE
 
 AT_ONCE = struct.pack("ii", 1, 0)
@@ -108,7 +108,7 @@ class Broken:
 
 
 def test_a_line_to_the_instrument_that_breaks_ends_it_in_a_sentence(monkeypatch):
-    monkeypatch.setattr(between, "open_port", lambda *_: Broken())
+    monkeypatch.setattr(recording_proxy, "open_port", lambda *_: Broken())
     with recording() as recorder, recorder.client() as client:
         client.sendall(b"*OPC?\n")
         recorder.thread.join(PATIENCE)

@@ -7,17 +7,17 @@ import msgspec
 import numpy as np
 import pytest
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.operator import bridging
-from a7sim.operator.bench import Parallaxes, Workstation
 from a7sim.operator.bridging import bridge_strip_batch
-from a7sim.operator.crew import AllGaveUpError
+from a7sim.operator.operator_batch import AllGaveUpError
+from a7sim.operator.workstation import Parallaxes, Workstation
 from a7sim.reduction import similarity_by_quaternion
 from a7sim.scenario import ScenarioError, load_scenario
 from a7sim.scenario.schema import GroundPoint
+from a7sim.session.all_methods import run_all_methods, run_all_methods_batch
 from a7sim.session.bridge import run_bridge, strip_points
-from a7sim.session.crowd import open_batch
-from a7sim.session.ways import run_all_methods, run_all_methods_batch
+from a7sim.session.session_batch import open_batch
 from a7sim.study.loading import load_study
 from tests.processes import a7sim_here
 from tests.sessions import without_errors
@@ -226,7 +226,7 @@ def with_control():
 @pytest.mark.slow
 def test_the_command_bridges_to_its_end_and_shows_what_polynomials_do_beside_the_similarity(monkeypatch, with_control):
     """In both ways, and with more unknowns the control never fits worse; where nothing is to be kept, nothing is."""
-    monkeypatch.setattr("a7sim.cli.operators.chosen", lambda *_: (with_control, 1))
+    monkeypatch.setattr("a7sim.cli.run_options.chosen", lambda *_: (with_control, 1))
     said = a7sim_here("bridge", "bridge")
     assert (said.returncode, said.stderr) == (0, "")
     rows = {

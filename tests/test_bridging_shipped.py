@@ -6,11 +6,11 @@ from itertools import islice
 import pytest
 
 from a7sim.operator.bridging import bridge_strip_batch
-from a7sim.report.kept import read_session
-from a7sim.report.writing import render_report
+from a7sim.report.render import render_report
+from a7sim.report.session_folder import read_session
 from a7sim.scenario import load_scenario
 from a7sim.session.bridge import bridge_tables, run_bridge
-from a7sim.session.crowd import open_batch
+from a7sim.session.session_batch import open_batch
 from tests.pages import Page
 
 

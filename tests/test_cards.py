@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.reduction.absolute import Ground, absolute_orientation
 from a7sim.reduction.cards import deck_lines, free_format_lines, is_deck, output_lines, read_cards, write_cards
 from a7sim.reduction.strips import Model, formed_strip, is_centre

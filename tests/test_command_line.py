@@ -13,12 +13,12 @@ import click
 import pytest
 from click.shell_completion import BashComplete
 
+from a7sim.bundled import bundled_names
 from a7sim.cli import cli, doctor, main
+from a7sim.cli.lazy_group import LazyGroup
 from a7sim.cli.options import PLOTTERS
 from a7sim.cli.prompt import data_folder
-from a7sim.cli.verbs import LazyGroup
-from a7sim.manual import VARIANTS
-from a7sim.shelves import bundled_names
+from a7sim.plotters import VARIANTS
 from tests.processes import a7sim_here
 
 ROOT = Path(__file__).parents[1]
@@ -246,7 +246,7 @@ sys.argv = {['a7sim', *words]!r}; from a7sim.cli import main; main()"
 
 def test_listing_the_commands_imports_none_of_them():
     imported = {name for name in modules_of("--help") if name.startswith("a7sim")}
-    assert imported == {"a7sim", "a7sim.cli", "a7sim.cli.verbs", "a7sim.cli.complaints", "a7sim.mistakes"}
+    assert imported == {"a7sim", "a7sim.cli", "a7sim.cli.lazy_group", "a7sim.cli.usage_errors", "a7sim.errors"}
 
 
 @pytest.mark.parametrize("verb", LIGHT)

@@ -16,7 +16,7 @@ from a7sim.instrument.language import SharedInstrument
 from a7sim.instrument.local_errors import smooth_local_errors
 from a7sim.instrument.projection import attitude_from_angles, eccentric_offset, place_on_carrier, pose
 from a7sim.instrument.spindles import Counter, PeriodicError, Spindle
-from a7sim.manual import A7, VARIANTS
+from a7sim.plotters import A7, VARIANTS
 from a7sim.scenario import (
     Condition,
     Instrument,

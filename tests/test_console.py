@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 
 from a7sim.console.app import Console
+from a7sim.console.config import ConsoleConfig
 from a7sim.console.drum_panels import DrumScrolled, ElementsPanel
-from a7sim.console.eyepiece import DrawingMode
+from a7sim.console.eyepiece_widget import EyepieceWidget
 from a7sim.console.keymap import actions_for
-from a7sim.console.looking import MAGNIFICATIONS
 from a7sim.console.panels import BookPanel
-from a7sim.console.prints import PointClicked
-from a7sim.console.seat import ConsoleConfig
-from a7sim.console.window import EyepieceWidget
+from a7sim.console.rasterize import DrawingMode
+from a7sim.console.sketch_panel import PointClicked
+from a7sim.console.view_actions import MAGNIFICATIONS
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import LinkEvent, SharedInstrument
 from a7sim.link.addresses import Address

@@ -9,16 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.cli import main
-from a7sim.console import eyepiece
+from a7sim.console import rasterize
+from a7sim.console.config import best_drawing, speaks_utf8
+from a7sim.console.descriptions import describe_image, describe_parallax
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolling_frame
-from a7sim.console.eyepiece import DrawingMode, Run
-from a7sim.console.hands import STEP_SIZES, ControlSelection
 from a7sim.console.keymap import actions_for, default_keymap, key_name, load_keymap, sample
-from a7sim.console.seat import best_drawing, speaks_utf8
-from a7sim.console.sketches import draw_points, overlay_mark
-from a7sim.console.words import describe_image, describe_parallax
-from a7sim.manual import VARIANTS
-from a7sim.mistakes import A7SimError
+from a7sim.console.rasterize import DrawingMode, Run
+from a7sim.console.selection import STEP_SIZES, ControlSelection
+from a7sim.console.sketch import draw_points, overlay_mark
+from a7sim.errors import A7SimError
+from a7sim.plotters import VARIANTS
 
 STAIRS = np.array([[0, 7, 8, 255], [0, 8, 8, 0]], dtype=np.uint8)
 """Two rows of pixels: one row of cells."""
@@ -29,46 +29,46 @@ def text(rows: list[list[Run]]) -> list[str]:
 
 
 def test_half_blocks_show_two_pixels_a_cell_at_32_greys() -> None:
-    assert eyepiece.half_blocks(STAIRS) == [
+    assert rasterize.half_blocks(STAIRS) == [
         [Run(" ", 0, 0), Run("▀", 0, 1), Run(" ", 1, 1), Run("▀", 31, 0)],
     ]
 
 
 def test_neighbours_that_look_alike_are_one_run() -> None:
-    assert eyepiece.half_blocks(np.full((2, 9), 128, dtype=np.uint8)) == [[Run(" " * 9, 16, 16)]]
+    assert rasterize.half_blocks(np.full((2, 9), 128, dtype=np.uint8)) == [[Run(" " * 9, 16, 16)]]
 
 
 def test_shades_and_ascii_go_from_dark_to_light() -> None:
     ramp = np.tile(np.linspace(0, 255, 64).astype(np.uint8), (2, 1))
-    assert text(eyepiece.shades(ramp))[0].startswith("   ") and text(eyepiece.shades(ramp))[0].endswith("█")
-    steps = [" .:-=+*#%@".index(each) for each in text(eyepiece.ascii_shades(ramp))[0]]
+    assert text(rasterize.shades(ramp))[0].startswith("   ") and text(rasterize.shades(ramp))[0].endswith("█")
+    steps = [" .:-=+*#%@".index(each) for each in text(rasterize.ascii_shades(ramp))[0]]
     assert max(np.diff(steps)) <= 2 and steps[0] == 0 and steps[-1] >= 8
 
 
 def test_braille_lights_the_dots_of_the_pixels() -> None:
     dots = np.zeros((4, 4), dtype=np.uint8)
     dots[0, 0] = dots[3, 3] = 255
-    assert text(eyepiece.braille(dots)) == ["\u2801\u2880"]
+    assert text(rasterize.braille(dots)) == ["\u2801\u2880"]
 
 
 @given(st.integers(1, 90), st.integers(1, 50))
 def test_the_mark_has_the_middle_cell(width: int, height: int) -> None:
-    columns, rows = eyepiece.window(width, height)
+    columns, rows = rasterize.window(width, height)
     assert columns % 2 and rows % 2 and width - columns <= 1 and height - rows <= 1
-    across, down = eyepiece.picture_size(DrawingMode.HALVES, columns, rows)
-    shown = eyepiece.overlay_mark(eyepiece.half_blocks(np.zeros((down, across), dtype=np.uint8)), "o")
+    across, down = rasterize.picture_size(DrawingMode.HALVES, columns, rows)
+    shown = rasterize.overlay_mark(rasterize.half_blocks(np.zeros((down, across), dtype=np.uint8)), "o")
     assert text(shown)[rows // 2] == " " * (columns // 2) + "o" + " " * (columns // 2)
-    assert sum(run.ink == eyepiece.MARK for row in shown for run in row) == 1
+    assert sum(run.ink == rasterize.MARK for row in shown for run in row) == 1
 
 
 def test_an_anaglyph_holds_both_eyes() -> None:
     left, right = np.full((2, 1), 255, dtype=np.uint8), np.zeros((2, 1), dtype=np.uint8)
-    assert eyepiece.anaglyph(left, right) == [[Run(" ", 240, 240)]]
-    assert eyepiece.anaglyph(right, left) == [[Run(" ", 15, 15)]]
+    assert rasterize.anaglyph(left, right) == [[Run(" ", 240, 240)]]
+    assert rasterize.anaglyph(right, left) == [[Run(" ", 15, 15)]]
 
 
 def test_the_optics_darken_the_corners_alone() -> None:
-    seen = eyepiece.apply_vignette(np.full((31, 31), 200, dtype=np.uint8))
+    seen = rasterize.apply_vignette(np.full((31, 31), 200, dtype=np.uint8))
     assert seen[15, 15] == 200 and seen[0, 0] < 120 and seen[0, 0] == seen[30, 30]
 
 
@@ -244,12 +244,12 @@ SLOPE = (np.add.outer(np.arange(8), np.arange(8)) * 18).astype(np.uint8)
     ],
 )
 def test_a_slope_in_every_drawing_without_colours(drawing: DrawingMode, golden: list[str]) -> None:
-    assert text(eyepiece.render(drawing, SLOPE)) == golden
+    assert text(rasterize.render(drawing, SLOPE)) == golden
 
 
 def test_a_slope_in_an_eyepiece_at_32_greys() -> None:
     """Levels of ink and paper by cell; the corners are darkened."""
-    shown = eyepiece.half_blocks(eyepiece.apply_vignette(SLOPE))
+    shown = rasterize.half_blocks(rasterize.apply_vignette(SLOPE))
     cells = [[(run.ink, run.paper) for run in row for _ in run.text] for row in shown]
     assert cells == [
         [(0, 1), (1, 3), (3, 6), (5, 8), (7, 10), (9, 12), (10, 13), (8, 13)],

@@ -9,26 +9,26 @@ from typing import Any
 import pytest
 from textual.widgets import Static
 
-from a7sim.cli.seats import is_url, playback_console, remote_console
+from a7sim.cli.console_setup import is_url, playback_console, remote_console
 from a7sim.console.app import Console
-from a7sim.console.dials import parse_readouts, readouts_query
 from a7sim.console.drum_panels import DrumScrolled
-from a7sim.console.eyepiece import DrawingMode
-from a7sim.console.sheet import JobSheet
-from a7sim.console.window import EyepieceWidget
+from a7sim.console.eyepiece_widget import EyepieceWidget
+from a7sim.console.job_sheet import JobSheet
+from a7sim.console.rasterize import DrawingMode
+from a7sim.console.readouts import parse_readouts, readouts_query
+from a7sim.errors import A7SimError
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import SharedInstrument
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.manual import VARIANTS
-from a7sim.mistakes import A7SimError
+from a7sim.plotters import VARIANTS
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from a7sim.session import film as film_module
 from a7sim.session import journal as journal_module
-from a7sim.session.film import Recording, open_recording
+from a7sim.session import recording as film_module
 from a7sim.session.journal import Journal, make_header
-from a7sim.session.lines import read_journal
+from a7sim.session.journal_format import read_journal
+from a7sim.session.recording import Recording, open_recording
 from tests.door import with_model
 from tests.served import Served
 from tests.sitting_down import Person

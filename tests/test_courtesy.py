@@ -2,7 +2,7 @@
 
 import pytest
 
-from a7sim.link import courtesy
+from a7sim.link import cpu_yield
 
 
 class Machine:
@@ -21,28 +21,28 @@ class Machine:
 @pytest.fixture
 def machine(monkeypatch):
     machine = Machine()
-    monkeypatch.setattr(courtesy, "monotonic", lambda: machine.now)
-    monkeypatch.setattr(courtesy.os, "sched_yield", machine.give_up)
+    monkeypatch.setattr(cpu_yield, "monotonic", lambda: machine.now)
+    monkeypatch.setattr(cpu_yield.os, "sched_yield", machine.give_up)
     return machine
 
 
 def test_the_processor_is_given_up_as_long_as_it_comes_back_soon(machine):
-    server = courtesy.YieldPolicy()
+    server = cpu_yield.YieldPolicy()
     assert all(server.yield_cpu() for _ in range(100))
     assert machine.given_up == 100
 
 
 def test_where_others_want_it_it_is_kept_for_a_second(machine):
-    server = courtesy.YieldPolicy()
+    server = cpu_yield.YieldPolicy()
     machine.away = 3e-3
     assert [server.yield_cpu() for _ in range(100)] == [True] * 2 + [False] * 98
-    machine.now += courtesy.UNTIL_ALONE
+    machine.now += cpu_yield.UNTIL_ALONE
     assert server.yield_cpu()
 
 
 def test_being_away_once_says_nothing(machine):
     """A server that was stopped, or had to wait for a page, is not in company."""
-    server = courtesy.YieldPolicy()
+    server = cpu_yield.YieldPolicy()
     for away in [3e-3, 1e-5] * 50:
         machine.away = away
         assert server.yield_cpu()

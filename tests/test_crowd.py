@@ -7,7 +7,7 @@ from a7sim.operator import OperatorGaveUp, measure_models
 from a7sim.scenario import load_scenario
 from a7sim.scenario.schema import Condition, ProjectorCondition
 from a7sim.session import open_session, run
-from a7sim.session.crowd import BatchDriver, open_batch
+from a7sim.session.session_batch import BatchDriver, open_batch
 from tests.sessions import read_once, tilted_flight, without_errors
 
 SEEDS = (1985, 7)

@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from a7sim.report.forms import make_forms
-from a7sim.report.kept import read_session
+from a7sim.report.session_folder import read_session
 
 
 @pytest.fixture(scope="module")

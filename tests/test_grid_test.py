@@ -10,21 +10,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import GON, at_level, ray_of, rotation
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import SharedInstrument
-from a7sim.manual import VARIANTS
-from a7sim.mistakes import A7SimError
 from a7sim.operator import measure_models
-from a7sim.operator.bench import Workstation
 from a7sim.operator.grid_test import GridTestPlan, level_heights, measure_grid, measure_grid_batch
+from a7sim.operator.workstation import Workstation
+from a7sim.plotters import VARIANTS
 from a7sim.reduction import Elements, Undetermined, grid_test, perspective_centre_of_levels, plate_placement
 from a7sim.reduction.grid_test import HELD_AT_ONE_LEVEL, UNKNOWNS
 from a7sim.scenario import GridPlate, ScenarioError, load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import open_session, run
-from a7sim.session.crowd import open_batch
 from a7sim.session.grid_test import run_grid_test
+from a7sim.session.session_batch import open_batch
 from tests.door import Door
 from tests.examples import examples
 from tests.processes import a7sim_here

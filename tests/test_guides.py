@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from a7sim.training.attempts import run_attempt, seed_for
-from a7sim.training.shelf import all_exercises, find_exercise
+from a7sim.training.catalogue import all_exercises, find_exercise
 from tests.guides import ROOT, blocks, commands, not_shown, page, steps, type_in
 
 GUIDES = {name: page(f"{name}-guide") for name in ("student", "teacher")}

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from a7sim.geometry import GON, at_level, ray_of, rotation
 from a7sim.instrument import Autograph, OutOfRangeError, SettingsConflictError, build_autograph
 from a7sim.instrument.spindles import Counter, Spindle
-from a7sim.manual import A7, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Element
+from a7sim.plotters import A7, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Element
 from a7sim.scenario import Condition, ProjectorCondition, load_scenario
 from a7sim.scenario.schema import Camera, Fiducial
 from a7sim.scene import NamedPoints, Photograph, build_scene

@@ -16,16 +16,16 @@ import pytest
 
 from a7sim import __version__
 from a7sim.cli.replay import PlaybackClock
+from a7sim.errors import A7SimError
 from a7sim.instrument.language import LinkEvent
 from a7sim.link.clock import Clock
-from a7sim.mistakes import A7SimError
 from a7sim.scenario import find_scenario, from_data, hash_scenario, load_scenario, to_data
 from a7sim.scene import PICTURES
-from a7sim.session import combinations, durable, run
+from a7sim.session import append_file, run, strip_combinations
+from a7sim.session.append_file import AppendOnlyFile, JournalWriteError
 from a7sim.session.checkpoints import read_checkpoints
-from a7sim.session.durable import AppendOnlyFile, JournalWriteError
 from a7sim.session.journal import Header, Journal, JournalOptions, make_header, make_header_without_scenario
-from a7sim.session.lines import ChecksumChain, read_journal
+from a7sim.session.journal_format import ChecksumChain, read_journal
 from a7sim.session.replaying import Replay, replay_lines
 from a7sim.session.resuming import find_resumable
 from a7sim.session.running import ProgressCallbacks
@@ -292,11 +292,11 @@ def test_a_session_that_is_being_written_is_not_resumed(copied):
 @pytest.mark.slow
 def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch):
     """Interrupted in the second of two sessions, here of one model each."""
-    monkeypatch.setattr(combinations, "CASES", {case: combinations.CASES[case] for case in "AB"})
+    monkeypatch.setattr(strip_combinations, "CASES", {case: strip_combinations.CASES[case] for case in "AB"})
     light = load_scenario("akwanga", LIGHT)
     light = msgspec.structs.replace(light, models=light.models[:1])
     whole, cut = tmp_path / "whole", tmp_path / "cut"
-    combinations.run_combinations(light, 1985, whole)
+    strip_combinations.run_combinations(light, 1985, whole)
     begun = iter(["no", "yes"])
 
     def interrupt(activity):
@@ -304,11 +304,11 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        combinations.run_combinations(light, 1985, cut, ProgressCallbacks(on_activity=interrupt))
+        strip_combinations.run_combinations(light, 1985, cut, ProgressCallbacks(on_activity=interrupt))
     assert not (cut / "results.json").exists()
     session = find_resumable(cut, "run")
     assert session.setting("strips") == "all"
-    combinations.run_combinations(session.scenario, session.seed, cut, keeping=JournalOptions(resumes=True))
+    strip_combinations.run_combinations(session.scenario, session.seed, cut, keeping=JournalOptions(resumes=True))
     assert {name: files_of(cut / name) for name in ("case-A", "case-B")} == {
         name: files_of(whole / name) for name in ("case-A", "case-B")
     }
@@ -423,12 +423,12 @@ def test_a_line_half_written_is_taken_back(tmp_path, monkeypatch):
         return real(handle, data[:outcome])
 
     real = os.write
-    monkeypatch.setattr(durable.os, "write", failing)
+    monkeypatch.setattr(append_file.os, "write", failing)
     with pytest.raises(
         JournalWriteError, match="f: it can no longer be written, so the session stops here: No space left"
     ):
         file.add(b"two\n")
-    monkeypatch.setattr(durable.os, "write", real)
+    monkeypatch.setattr(append_file.os, "write", real)
     with pytest.raises(JournalWriteError, match="No space left"):
         file.add(b"three\n")
     with pytest.raises(JournalWriteError):
@@ -452,7 +452,7 @@ def test_a_journal_on_a_read_only_disk_is_said_in_a_sentence(tmp_path, monkeypat
     def refused(*_):
         raise OSError(errno.EROFS, "Read-only file system")
 
-    monkeypatch.setattr(durable.os, call, refused)
+    monkeypatch.setattr(append_file.os, call, refused)
     with pytest.raises(
         A7SimError, match=r"session\.jsonl: expected a journal that can be written: Read-only file system"
     ):
@@ -465,7 +465,7 @@ def test_a_journal_on_a_read_only_disk_is_said_in_a_sentence(tmp_path, monkeypat
 def synced(tmp_path, monkeypatch, durability, lines, waits=False):
     """Return how often the file was brought to the disk by lines that register (True) or not, before it was closed."""
     times = []
-    monkeypatch.setattr(durable, "_on_disk", lambda handle: times.append(time.monotonic()))
+    monkeypatch.setattr(append_file, "_on_disk", lambda handle: times.append(time.monotonic()))
     file = AppendOnlyFile(tmp_path / "f", durability)
     began = time.monotonic()
     for registers in lines:
@@ -482,7 +482,7 @@ def test_registrations_are_on_the_disk_at_once_and_all_else_within_a_fifth_of_a_
     assert synced(tmp_path, monkeypatch, "records", [False, True, False, True])[0] == 2
     count, first = synced(tmp_path, monkeypatch, "records", [False], waits=True)
     assert count == 0
-    assert first < durable.SYNCED_WITHIN_S
+    assert first < append_file.SYNCED_WITHIN_S
 
 
 def test_always_and_none_are_what_they_say(tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 import a7sim
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import LinkEvent, SharedInstrument
-from a7sim.manual import VARIANTS
+from a7sim.plotters import VARIANTS
 from a7sim.scenario.schema import Condition, ProjectorCondition
 from tests.door import Door, with_model, with_photographs
 

@@ -5,7 +5,7 @@ import string
 from hypothesis import given
 from hypothesis import strategies as st
 
-from a7sim.manual import LEAST_COUNT, VARIANTS
+from a7sim.plotters import LEAST_COUNT, VARIANTS
 from tests.door import Door
 from tests.examples import examples
 from tests.test_language import ELEMENTS, EXAMPLES, in_full, in_short

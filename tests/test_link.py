@@ -14,7 +14,7 @@ from a7sim.instrument.language import SharedInstrument
 from a7sim.link.client import Client, InstrumentError
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.manual import VARIANTS
+from a7sim.plotters import VARIANTS
 from tests.door import MODEL_1
 
 URL = "a7sim://scenarios/akwanga.toml?seed=7"

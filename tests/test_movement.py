@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import MAX_BUFFERED_BYTES, SharedInstrument
-from a7sim.instrument.language.desk import POLL_SECONDS
+from a7sim.instrument.language.shared_instrument import POLL_SECONDS
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.manual import VARIANTS, Rates
+from a7sim.plotters import VARIANTS, Rates
 from tests.door import Door, with_photographs
 
 RATES = Rates()

@@ -13,10 +13,10 @@ import pytest
 
 from a7sim.geometry import GON
 from a7sim.operator import OperatorGaveUp, measure_models
-from a7sim.operator.seat import wrap_gon
+from a7sim.operator.controls import wrap_gon
 from a7sim.scenario import Observer, load_scenario
 from a7sim.session import open_session, run
-from a7sim.session.crowd import open_batch
+from a7sim.session.session_batch import open_batch
 from tests.sessions import element_errors, read_once, tampered_session, tilted_flight, without_errors
 
 CASES = "ABCDE"

@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 
 import a7sim
+from a7sim.bundled import bundled_names
 from a7sim.cli.doctor import NOT_FOR_USERS
-from a7sim.shelves import bundled_names
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from a7sim.operator import OperatorGaveUp, measure_models
-from a7sim.operator.skill import HOUR, acuity_factor, slip_factor
+from a7sim.operator.fatigue import HOUR, acuity_factor, slip_factor
 from a7sim.operator.slips import neighbours, transpositions
 from a7sim.scenario import PROFILES, Observer, ScenarioError, load_scenario, observer_of_skill, scenario_schema
 from a7sim.scenario.schema import FilmDeformation, PlannedSlip
 from a7sim.session import open_session, run
-from a7sim.session.crowd import open_batch
+from a7sim.session.session_batch import open_batch
 from tests.processes import a7sim_here
 from tests.sessions import read_once
 

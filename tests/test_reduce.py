@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from a7sim import computing
+from a7sim.errors import A7SimError
 from a7sim.geometry import GON, rotation
-from a7sim.mistakes import A7SimError
 from tests.processes import a7sim_here
 
 ROOT = Path(__file__).parents[1]

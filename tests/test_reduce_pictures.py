@@ -8,8 +8,8 @@ import pytest
 
 from a7sim import computing
 from a7sim.computing.interior import FlightHeights
+from a7sim.errors import A7SimError
 from a7sim.geometry import GON, radially_displaced, refracted, rotation
-from a7sim.mistakes import A7SimError
 from tests.test_reduce import pair_file, reduce, toml
 
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from a7sim import computing
 from a7sim.computing.strips import PairCamera
+from a7sim.errors import A7SimError
 from a7sim.geometry import rotation
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground
 from a7sim.reduction.cards import deck_lines, read_cards
 from a7sim.reduction.strips import Model

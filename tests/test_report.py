@@ -9,9 +9,9 @@ import sys
 
 import pytest
 
-from a7sim.report.kept import read_session
-from a7sim.report.rays import pointing_rays
-from a7sim.report.writing import render_report
+from a7sim.report.pointing_rays import pointing_rays
+from a7sim.report.render import render_report
+from a7sim.report.session_folder import read_session
 from tests.pages import Page
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

@@ -7,14 +7,14 @@ import re
 import numpy as np
 import pytest
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.reduction import Ground, absolute_orientation, formed_strip, read_cards
-from a7sim.report.kept import read_session
-from a7sim.report.writing import render_report
+from a7sim.report.render import render_report
+from a7sim.report.session_folder import read_session
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import run
-from a7sim.session.combinations import run_combinations
+from a7sim.session.strip_combinations import run_combinations
 from a7sim.session.strips import (
     card_numbers,
     ground_control,

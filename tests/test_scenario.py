@@ -6,10 +6,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from a7sim.files import read_rows
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.scenario import ScenarioError, build_scenario, load_scenario, scenario_schema
-from a7sim.session.ways import run_all_methods
+from a7sim.session.all_methods import run_all_methods
+from a7sim.table_files import read_rows
 
 SCENARIOS = sorted((Path(__file__).parents[1] / "scenarios").glob("*.toml"))
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import GON, image_of, rotation
-from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
 from a7sim.scenario.schema import Air, Camera, Fiducial, FilmDeformation, Measured, Terrain
 from a7sim.scene import build_scene

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from a7sim.mistakes import A7SimError
-from a7sim.session.playing import ScriptRunner
+from a7sim.errors import A7SimError
+from a7sim.session.script_runner import ScriptRunner
 from a7sim.session.scripts import Expect, SourceLocation, find_script, read_script
 
 SCRIPTS = Path(__file__).parents[1] / "scenarios" / "scripts"

@@ -96,7 +96,7 @@ from a7sim.scene import build_scene
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import Desk
 from a7sim.link.clock import Clock
-from a7sim.link.waiting import obeyed
+from a7sim.link.simulated_wait import obeyed
 scenario = load_scenario("akwanga")
 engine = Desk(build_autograph(scenario.instrument, build_scene(scenario, 7).drawer, 7)).open()
 clock = Clock()

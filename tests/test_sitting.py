@@ -5,7 +5,7 @@ import json
 import msgspec
 import pytest
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.operator.grid_test import GridTestPlan
 from a7sim.scenario import load_scenario
 from a7sim.session import run

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import image_of, ray_of, rotation, stereoscopic_intersection
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground, absolute_orientation, max_abs_residual, root_mean_square
 from a7sim.reduction.block import block_adjustment
 from a7sim.reduction.coplanarity import relative_orientation

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.study.cells import make_cells
 from a7sim.study.checkpoint import save
 from a7sim.study.executors import open_executor

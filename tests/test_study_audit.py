@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from a7sim.session import crowd
-from a7sim.session.fleet_hands import BatchDriver
+from a7sim.session import session_batch
+from a7sim.session.batch_driver import BatchDriver
 from a7sim.study.auditing import audit_study
 from a7sim.study.executors import InProcess
 from a7sim.study.loading import build_study
@@ -88,7 +88,7 @@ def test_a_least_count_too_much_anywhere_on_the_bench_is_found_out(worked, monke
 
 
 def test_a_strip_that_is_off_by_a_millimetre_on_the_bench_is_found_out(worked, monkeypatch):
-    truly = crowd.strip_document
+    truly = session_batch.strip_document
 
     def a_millimetre_off(scenario, ground, models):
         document, strip = truly(scenario, ground, models)
@@ -96,7 +96,7 @@ def test_a_strip_that_is_off_by_a_millimetre_on_the_bench_is_found_out(worked, m
         residuals = document["residuals_m"] | {"C1": document["residuals_m"]["C1"] | {"X": x}}
         return document | {"residuals_m": residuals}, strip
 
-    monkeypatch.setattr(crowd, "strip_of", a_millimetre_off)
+    monkeypatch.setattr(session_batch, "strip_of", a_millimetre_off)
     (found,) = audit_study(*worked, 1)
     assert (found.place, found.others) == ("strip.residuals_m.C1.X", 0)
 

@@ -13,9 +13,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from a7sim.documents import as_json
-from a7sim.mistakes import A7SimError
-from a7sim.study import by_mpi
+from a7sim.errors import A7SimError
+from a7sim.result_documents import as_json
+from a7sim.study import mpi_executor
 from a7sim.study.checkpoint import checkpoint_path, save
 from a7sim.study.executors import open_executor
 from a7sim.study.findings import findings_document
@@ -153,7 +153,7 @@ def test_a_wrong_executor_is_one_sentence_and_exit_code_2(capsys, name):
 
 
 def test_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch, capsys, nobody):
-    monkeypatch.setattr("a7sim.study.by_dask.PATIENCE_S", 0.5)
+    monkeypatch.setattr("a7sim.study.dask_executor.PATIENCE_S", 0.5)
     told = said_here(capsys, "study", "levels", "--executor", "dask", "--scheduler", nobody)
     assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
     assert f"--scheduler: expected one that answers at {nobody}" in told.stderr
@@ -192,13 +192,13 @@ def the_world_of(monkeypatch, processes, executor):
         "mpi4py.MPI": SimpleNamespace(COMM_WORLD=world),
         "mpi4py.futures": SimpleNamespace(MPICommExecutor=pool),
     }
-    monkeypatch.setattr(by_mpi, "import_module", there.__getitem__)
+    monkeypatch.setattr(mpi_executor, "import_module", there.__getitem__)
 
 
 def test_over_mpi_the_first_process_asks_all_the_others(monkeypatch):
     executor = object()
     the_world_of(monkeypatch, 5, executor)
-    with by_mpi.open_mpi_executor({"THREADS": "1"}) as asked:
+    with mpi_executor.open_mpi_executor({"THREADS": "1"}) as asked:
         assert asked == (executor, 4)
 
 
@@ -206,7 +206,7 @@ def test_over_mpi_another_process_works_and_ends_without_a_word(monkeypatch):
     """It must not go on: the first one alone says what comes of the study."""
     the_world_of(monkeypatch, 5, None)
     with pytest.raises(SystemExit) as ended, ExitStack() as stack:
-        stack.enter_context(by_mpi.open_mpi_executor({"THREADS": "1"}))
+        stack.enter_context(mpi_executor.open_mpi_executor({"THREADS": "1"}))
     assert ended.value.code == 0
 
 
@@ -216,4 +216,4 @@ def test_a_process_that_was_started_alone_is_told_how_to_start_more(monkeypatch)
         pytest.raises(A7SimError, match=r"two processes or more \(mpiexec -n 5 .*\), got this one alone"),
         ExitStack() as stack,
     ):
-        stack.enter_context(by_mpi.open_mpi_executor({"THREADS": "1"}))
+        stack.enter_context(mpi_executor.open_mpi_executor({"THREADS": "1"}))

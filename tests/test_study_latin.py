@@ -6,8 +6,8 @@ from scipy.stats import qmc
 
 from a7sim.study.cells import make_cells
 from a7sim.study.findings import findings_document
-from a7sim.study.latin import MIN_CELLS, main_effects, noise_share
 from a7sim.study.loading import build_study
+from a7sim.study.main_effects import MIN_CELLS, main_effects, noise_share
 from a7sim.study.page import study_page
 from a7sim.study.tables import study_tables
 from a7sim.study.tally import Tally

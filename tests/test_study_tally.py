@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.study import checkpoint
 from a7sim.study.checkpoint import KINDS, checkpoint_path, load, newest_checkpoint, save
-from a7sim.study.sketch import CAPACITY, QuantileSketch
+from a7sim.study.quantile_sketch import CAPACITY, QuantileSketch
 from a7sim.study.statistics import quantile_with_interval
 from a7sim.study.tally import Tally
 from tests.examples import examples

@@ -7,10 +7,10 @@ import pytest
 from rich.console import Console
 
 from a7sim.geometry import GON
-from a7sim.manual import LEAST_COUNT
+from a7sim.plotters import LEAST_COUNT
 from a7sim.reduction import perspective_centre
 from a7sim.scenario import load_scenario
-from a7sim.session.crowd import open_batch
+from a7sim.session.session_batch import open_batch
 from a7sim.study import theory
 from a7sim.study.findings import findings_document
 from a7sim.study.loading import build_study

@@ -5,9 +5,9 @@ import shutil
 import pytest
 from msgspec.structs import replace as changed
 
+from a7sim.training.catalogue import find_exercise
 from a7sim.training.checking import check_exercise
 from a7sim.training.exercise import ChecklistItem, ExerciseFolder, FaultyRun, PlayedRun
-from a7sim.training.shelf import find_exercise
 
 
 @pytest.fixture(scope="module")

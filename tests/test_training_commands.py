@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
+from a7sim.errors import A7SimError
 from a7sim.link.client import Client
-from a7sim.mistakes import A7SimError
 from a7sim.training.attempts import run_attempt
+from a7sim.training.catalogue import find_exercise
 from a7sim.training.exercise import PlayedRun
-from a7sim.training.handed_in import grade_submission, grade_submissions
 from a7sim.training.progress import FILE, MIGRATIONS, Progress
-from a7sim.training.shelf import find_exercise
+from a7sim.training.submissions import grade_submission, grade_submissions
 from a7sim.training.variation import attempt_seed
 
 EXERCISES = Path(__file__).parents[1] / "exercises"
@@ -161,7 +161,7 @@ def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
 
 
 def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path, monkeypatch):
-    monkeypatch.setattr("a7sim.training.handed_in.ALONE", 2)
+    monkeypatch.setattr("a7sim.training.submissions.ALONE", 2)
     shelved = find_exercise("14")
     folders = []
     for i in range(4):

@@ -4,14 +4,14 @@ import asyncio
 from pathlib import Path
 
 from a7sim.console.app import Console
-from a7sim.console.eyepiece import DrawingMode
-from a7sim.console.seat import ConsoleConfig
+from a7sim.console.config import ConsoleConfig
+from a7sim.console.rasterize import DrawingMode
 from a7sim.link.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.training.attempts import start_attempt
+from a7sim.training.catalogue import find_exercise
 from a7sim.training.checklist import Checklist
 from a7sim.training.progress import Progress
-from a7sim.training.shelf import find_exercise
 from tests.sitting_down import Person
 
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from a7sim.training.catalogue import ExerciseError, find_exercise, read_exercise
+from a7sim.training.environment import open_environment
 from a7sim.training.exercise import MetricSpec
 from a7sim.training.measures import make_metric
 from a7sim.training.progress import Progress
-from a7sim.training.room import open_environment
-from a7sim.training.shelf import ExerciseError, find_exercise, read_exercise
 from a7sim.training.variation import scenario_for
 
 EXERCISES = Path(__file__).parents[1] / "exercises"

@@ -12,12 +12,12 @@ from a7sim.reduction.hallert import regular_corrections
 from a7sim.scenario import load_scenario
 from a7sim.standard_points import CASES
 from a7sim.training.attempts import run_attempt
+from a7sim.training.catalogue import find_exercise
 from a7sim.training.exercise import PlayedRun
 from a7sim.training.forms import FIVE, computation_form, multipliers
 from a7sim.training.grading import grade_folder
 from a7sim.training.measures.centres import sigmas_of_centre
 from a7sim.training.measures.clearing import OmegaTurn
-from a7sim.training.shelf import find_exercise
 
 heights = st.floats(min_value=290.0, max_value=360.0)
 widths = st.floats(min_value=160.0, max_value=195.0)

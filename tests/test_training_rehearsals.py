@@ -3,9 +3,9 @@
 import pytest
 
 from a7sim.training.attempts import run_attempt, seed_for
+from a7sim.training.catalogue import find_exercise
+from a7sim.training.dry_runs import DryRuns
 from a7sim.training.grading import evaluate_metrics, load_record
-from a7sim.training.rehearsing import DryRuns
-from a7sim.training.shelf import find_exercise
 
 
 def seen(account):

@@ -8,8 +8,8 @@ from typing import get_args
 import pytest
 
 from a7sim.scenario.schema import SlipKind
+from a7sim.training.catalogue import find_exercise
 from a7sim.training.handouts import make_handout
-from a7sim.training.shelf import find_exercise
 from a7sim.training.variation import scenario_for
 
 RIGHT = {"dove": "outside", "triangulation": "back", "diapositive": "left", "xcollar": "in", "ycollar": "out"}

@@ -10,20 +10,20 @@ from click.testing import CliRunner
 
 from a7sim.cli import cli
 from a7sim.operator import OperatorGaveUp, measure_models
-from a7sim.operator.bench import Workstation
 from a7sim.operator.compilation import Compilation
-from a7sim.operator.crew import OperatorBatch
 from a7sim.operator.level_model import level_model
-from a7sim.operator.line_hands import ScpiDriver
 from a7sim.operator.map_lines import Area, Tracing
+from a7sim.operator.models import measure_models_batch
+from a7sim.operator.operator_batch import OperatorBatch
+from a7sim.operator.scpi_driver import ScpiDriver
 from a7sim.operator.stereo_view import StereoView
-from a7sim.operator.work import measure_models_batch
+from a7sim.operator.workstation import Workstation
 from a7sim.scenario import load_scenario
 from a7sim.scenario.schema import Water
 from a7sim.scene import build_scene
 from a7sim.scene.content import WATER_TONE
 from a7sim.session import open_session
-from a7sim.session.crowd import open_batch
+from a7sim.session.session_batch import open_batch
 from a7sim.session.strips import ground_control
 from a7sim.standard_points import CASES, determine_orientation
 from tests.sessions import read_once, without_errors

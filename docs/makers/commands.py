@@ -6,7 +6,7 @@ from inspect import cleandoc
 import click
 
 from a7sim.cli import cli
-from a7sim.cli.complaints import describe_range
+from a7sim.cli.usage_errors import describe_range
 
 OPENING = """# Commands
 

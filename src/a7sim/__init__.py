@@ -15,11 +15,11 @@ _HOMES = {
     "Autograph": "a7sim.instrument",
     "Client": "a7sim.link.client",
     "InstrumentError": "a7sim.link.client",
-    "A7SimError": "a7sim.mistakes",
-    "Operator": "a7sim.scripting",
+    "A7SimError": "a7sim.errors",
+    "Operator": "a7sim.api",
     "Scenario": "a7sim.scenario",
-    "Study": "a7sim.scripting",
-    "connect": "a7sim.scripting",
+    "Study": "a7sim.api",
+    "connect": "a7sim.api",
 }
 _ROOMS = ("computing", "reduction")
 

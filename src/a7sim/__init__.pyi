@@ -1,13 +1,13 @@
 from a7sim import computing as computing
 from a7sim import reduction as reduction
+from a7sim.api import Operator as Operator
+from a7sim.api import Study as Study
+from a7sim.api import connect as connect
+from a7sim.errors import A7SimError as A7SimError
 from a7sim.instrument import Autograph as Autograph
 from a7sim.link.client import Client as Client
 from a7sim.link.client import InstrumentError as InstrumentError
-from a7sim.mistakes import A7SimError as A7SimError
 from a7sim.scenario import Scenario as Scenario
-from a7sim.scripting import Operator as Operator
-from a7sim.scripting import Study as Study
-from a7sim.scripting import connect as connect
 
 __version__: str
 __all__ = [

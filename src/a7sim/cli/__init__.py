@@ -7,9 +7,9 @@ import click
 from click.exceptions import NoArgsIsHelpError
 
 import a7sim
-from a7sim.cli.complaints import format_usage_error
-from a7sim.cli.verbs import LazyCommand, LazyGroup
-from a7sim.mistakes import A7SimError
+from a7sim.cli.lazy_group import LazyCommand, LazyGroup
+from a7sim.cli.usage_errors import format_usage_error
+from a7sim.errors import A7SimError
 
 EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_DIFFERS, EXIT_INTERRUPTED = 1, 2, 3, 130
 

@@ -2,8 +2,8 @@
 
 import click
 
-from a7sim.cli.names import scenario_argument
-from a7sim.cli.operators import (
+from a7sim.cli.completers import scenario_argument
+from a7sim.cli.run_options import (
     DisplayOptions,
     OutputOptions,
     ScenarioOptions,

@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 from a7sim.cli.options import Number
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 
 PORT, IDLE_MIN = 8515, 30.0
 

@@ -2,8 +2,8 @@
 
 import click
 
-from a7sim.cli.names import scenario_argument
-from a7sim.cli.operators import (
+from a7sim.cli.completers import scenario_argument
+from a7sim.cli.run_options import (
     DisplayOptions,
     OutputOptions,
     ScenarioOptions,
@@ -14,7 +14,7 @@ from a7sim.cli.operators import (
     scenario_options,
     show_results,
 )
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 
 PROJECTORS = 2
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 
 
 @click.command("compare")
@@ -19,9 +19,9 @@ def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> N
     """
     from rich.console import Console
 
-    from a7sim.documents import as_json
     from a7sim.report.comparison import compare_sessions, comparison_document, comparison_table
-    from a7sim.report.kept import read_session
+    from a7sim.report.session_folder import read_session
+    from a7sim.result_documents import as_json
 
     if len(folders) < 2:
         raise A7SimError(f"compare: expected two folders of sessions or more, got one: {folders[0]}")

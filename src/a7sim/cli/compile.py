@@ -3,8 +3,8 @@
 import click
 
 from a7sim.cli import options
-from a7sim.cli.names import scenario_argument
-from a7sim.cli.operators import (
+from a7sim.cli.completers import scenario_argument
+from a7sim.cli.run_options import (
     DisplayOptions,
     OutputOptions,
     ScenarioOptions,
@@ -51,8 +51,8 @@ def command(
 
     Example: a7sim compile akwanga --model 1 --contour 460 --interval 10 --line road1 --out runs/sheet
     """
-    from a7sim.session.compiled_tables import map_tables
     from a7sim.session.compiling import CompilationRequest, compile_model
+    from a7sim.session.map_tables import map_tables
 
     order = resolve_request(scenario, asked, kept)
     wanted = CompilationRequest(name, contours, interval, lines, map_scale, tremor)

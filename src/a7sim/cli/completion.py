@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from click.shell_completion import get_completion_class
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 
 SHELLS = ("bash", "zsh", "fish")
 VARIABLE = "_A7SIM_COMPLETE"

@@ -10,11 +10,11 @@ import click
 
 from a7sim.cli import options
 from a7sim.cli.browser import browser_options, is_browser_child, serve_in_browser
-from a7sim.cli.names import scenario_argument
+from a7sim.cli.completers import scenario_argument
 from a7sim.cli.prompt import data_folder
-from a7sim.console.eyepiece import DrawingMode
-from a7sim.console.words import ACUITY_UM
-from a7sim.mistakes import A7SimError
+from a7sim.console.descriptions import ACUITY_UM
+from a7sim.console.rasterize import DrawingMode
+from a7sim.errors import A7SimError
 from a7sim.scenario import load_scenario
 
 USUAL = "akwanga"
@@ -87,10 +87,10 @@ def command(
     Example: a7sim console akwanga
     """
     _see_that_textual_is_there()
-    from a7sim.cli.seats import LocalConsole, is_url, playback_console, remote_console  # only who sits down
+    from a7sim.cli.console_setup import LocalConsole, is_url, playback_console, remote_console  # only who sits down
     from a7sim.console.app import Console
+    from a7sim.console.job_sheet import JobSheet
     from a7sim.console.keymap import default_keymap, load_keymap, sample
-    from a7sim.console.sheet import JobSheet
 
     _refuse_beside("--watch", watch, connect=connect, seed=seed, variant=variant, out=out, go_on=go_on)
     _refuse_beside("--connect", connect, seed=seed, variant=variant, out=out, go_on=go_on)

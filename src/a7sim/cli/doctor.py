@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import click
 
 import a7sim
+from a7sim.bundled import Kind, bundled_names
 from a7sim.cli import options
-from a7sim.mistakes import A7SimError
-from a7sim.shelves import Kind, bundled_names
+from a7sim.errors import A7SimError
 
 EXIT_MISSING = 1
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
-from a7sim.mistakes import A7SimError
-from a7sim.report.cast import make_cast
-from a7sim.report.decks import strip_deck
+from a7sim.errors import A7SimError
+from a7sim.report.asciicast import make_cast
+from a7sim.report.card_decks import strip_deck
 from a7sim.report.forms import forms_text
-from a7sim.report.kept import SessionFolder, read_session
-from a7sim.session.folder import BOOK, write_atomic
+from a7sim.report.session_folder import SessionFolder, read_session
+from a7sim.session.session_files import BOOK, write_atomic
 
 _OPTION_OF = {"speed": "asciicast", "way": "cards"}
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
-from a7sim.cli.links import link_options, token_from
-from a7sim.cli.names import scenario_argument
-from a7sim.cli.operators import (
+from a7sim.cli.completers import scenario_argument
+from a7sim.cli.link_options import link_options, token_from
+from a7sim.cli.run_options import (
     POINTS_A_MODEL,
     SESSION,
     DisplayOptions,
@@ -48,7 +48,7 @@ def command(
 
     Example: a7sim operate akwanga --link tcp://127.0.0.1:5025
     """
-    from a7sim.scripting import Operator
+    from a7sim.api import Operator
     from a7sim.session.tables import session_tables
 
     loaded, seed = resolve_scenario(scenario, asked, {"plan.case": case, "plan.method": method})

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-from a7sim.cli.names import CaseInsensitiveChoice, scenario_argument
+from a7sim.cli.completers import CaseInsensitiveChoice, scenario_argument
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Option = Callable[[Command], Command]

@@ -8,10 +8,10 @@ from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from a7sim.cli import options
-from a7sim.documents import as_json, document_header
-from a7sim.manual import VARIANTS
 from a7sim.operator.preparation import FlightPlan, FlightSettings, ModelScale, choose_settings
-from a7sim.sheets import text_table
+from a7sim.plotters import VARIANTS
+from a7sim.result_documents import as_json, document_header
+from a7sim.text_tables import text_table
 
 
 @click.command("prepare")

@@ -7,20 +7,20 @@ from pathlib import Path
 import click
 
 from a7sim.cli import EXIT_DIFFERS, options
-from a7sim.cli.names import session_argument
-from a7sim.documents import as_json, document_header
-from a7sim.mistakes import A7SimError
+from a7sim.cli.completers import session_argument
+from a7sim.errors import A7SimError
+from a7sim.result_documents import as_json, document_header
 from a7sim.scenario import load_scenario
 from a7sim.session.checkpoints import StateDifference
-from a7sim.session.conversation import TranscriptListener, format_event
-from a7sim.session.folder import JOURNAL, prepare_folder
+from a7sim.session.find_line import find_line
 from a7sim.session.journal import Journal, make_header
-from a7sim.session.lines import JournalFile, read_journal
-from a7sim.session.playing import ScriptRunner
+from a7sim.session.journal_format import JournalFile, read_journal
 from a7sim.session.replaying import Replay, ReplayDifference, knows_scenario, replay_lines
+from a7sim.session.script_runner import ScriptRunner
 from a7sim.session.scripts import SUFFIX, find_script, read_script
-from a7sim.session.seeking import find_line
-from a7sim.wording import pluralize
+from a7sim.session.session_files import JOURNAL, prepare_folder
+from a7sim.session.transcript import TranscriptListener, format_event
+from a7sim.text import pluralize
 
 _MAX_PARTS = 20
 

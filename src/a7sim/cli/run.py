@@ -2,8 +2,8 @@
 
 import click
 
-from a7sim.cli.names import scenario_argument
-from a7sim.cli.operators import (
+from a7sim.cli.completers import scenario_argument
+from a7sim.cli.run_options import (
     POINTS_A_MODEL,
     DisplayOptions,
     OutputOptions,
@@ -16,7 +16,7 @@ from a7sim.cli.operators import (
     scenario_options,
     show_results,
 )
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.standard_points import CASES
 
 
@@ -46,9 +46,9 @@ def command(
 
     Example: a7sim run akwanga --case E --seed 7 --out runs/akwanga-e
     """
-    from a7sim.session.combinations import run_combinations
+    from a7sim.session.all_methods import run_all_methods
+    from a7sim.session.strip_combinations import run_combinations
     from a7sim.session.tables import session_tables, strips_table
-    from a7sim.session.ways import run_all_methods
 
     order = resolve_request(scenario, asked, kept, {"plan.case": case, "plan.method": method})
     every_case = order.setting("strips", strips) == "all"

@@ -3,12 +3,12 @@
 import click
 
 from a7sim.cli import EXIT_MISTAKE, options
-from a7sim.cli.names import scenario_argument
-from a7sim.documents import as_json, document_header
-from a7sim.mistakes import A7SimError
+from a7sim.cli.completers import scenario_argument
+from a7sim.errors import A7SimError
+from a7sim.result_documents import as_json, document_header
 from a7sim.scenario import ScenarioError, load_scenario, scenario_schema
 from a7sim.scene import build_scene
-from a7sim.wording import pluralize
+from a7sim.text import pluralize
 
 
 @click.group("scenario")

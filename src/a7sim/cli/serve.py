@@ -10,9 +10,10 @@ from typing import Any
 import click
 
 from a7sim.cli import options
-from a7sim.cli.links import token_from
-from a7sim.cli.names import scenario_argument
-from a7sim.cli.operators import (
+from a7sim.cli.completers import scenario_argument
+from a7sim.cli.link_options import token_from
+from a7sim.cli.options import TOKEN_VARIABLE
+from a7sim.cli.run_options import (
     OutputOptions,
     ScenarioOptions,
     output_options,
@@ -20,20 +21,19 @@ from a7sim.cli.operators import (
     resolve_scenario,
     scenario_options,
 )
-from a7sim.cli.options import TOKEN_VARIABLE
-from a7sim.documents import Document, as_json, document_header
+from a7sim.errors import A7SimError
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
-from a7sim.instrument.language.desk import POLL_SECONDS
+from a7sim.instrument.language.shared_instrument import POLL_SECONDS
 from a7sim.link.addresses import Address, parse_address
+from a7sim.link.client_session import ServerLimits
 from a7sim.link.clock import Clock, WallClock
-from a7sim.link.conversation import ServerLimits
+from a7sim.link.event_loop import run
 from a7sim.link.faults import EXAMPLE, parse_faults
-from a7sim.link.loops import run
 from a7sim.link.serving import Endpoints, Server
-from a7sim.mistakes import A7SimError
+from a7sim.result_documents import Document, as_json, document_header
 from a7sim.scenario import Scenario
-from a7sim.session.durable import JournalWriteError
+from a7sim.session.append_file import JournalWriteError
 from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.resuming import ResumableSession, restore_instrument
 

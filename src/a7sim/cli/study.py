@@ -20,9 +20,9 @@ from rich.progress import (
 from rich.text import Text
 
 from a7sim.cli import EXIT_DIFFERS, options
-from a7sim.cli.names import study_argument
-from a7sim.documents import Document, as_json
-from a7sim.mistakes import A7SimError
+from a7sim.cli.completers import study_argument
+from a7sim.errors import A7SimError
+from a7sim.result_documents import Document, as_json
 from a7sim.study.auditing import audit_study
 from a7sim.study.checkpoint import checkpoint_path
 from a7sim.study.executors import KINDS, Kind, open_executor
@@ -32,7 +32,7 @@ from a7sim.study.loading import LoadedStudy, load_study
 from a7sim.study.running import run_study
 from a7sim.study.tables import study_tables
 from a7sim.study.tally import Tally
-from a7sim.wording import pluralize
+from a7sim.text import pluralize
 
 
 @click.command("study")

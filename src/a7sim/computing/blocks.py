@@ -19,10 +19,10 @@ from a7sim.computing.outcome import (
 )
 from a7sim.computing.reading import read_ground, read_models, short_list, sort_along_strip
 from a7sim.computing.strips import number_models
-from a7sim.documents import Document, accuracy_document, document_header, points_as_rows, residuals_document
 from a7sim.geometry import GON
 from a7sim.reduction.block import BlockAdjustment, block_adjustment
 from a7sim.reduction.strips import Model
+from a7sim.result_documents import Document, accuracy_document, document_header, points_as_rows, residuals_document
 
 SIGMAS = ("scale", "turn_X", "turn_Y", "turn_Z", "TX", "TY", "TZ")
 """Of every model, turns in gon, translation at the model's middle."""

@@ -8,10 +8,8 @@ import numpy as np
 
 from a7sim.computing.outcome import ProcessingResult, errors_for, points_csv
 from a7sim.computing.reading import point_columns, point_names, read_points
-from a7sim.documents import Document, document_header, points_as_rows, statistics_document
-from a7sim.files import natural_sort_key, read_table, rows_by_key, to_csv
+from a7sim.errors import A7SimError
 from a7sim.geometry import GON, Array
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.centres import (
     PerspectiveCentre,
     a8_centres,
@@ -21,6 +19,8 @@ from a7sim.reduction.centres import (
 )
 from a7sim.reduction.resection import ELEMENTS
 from a7sim.reduction.strips import CENTRE
+from a7sim.result_documents import Document, document_header, points_as_rows, statistics_document
+from a7sim.table_files import natural_sort_key, read_table, rows_by_key, to_csv
 
 CentreMethod = Literal["two-levels", "levels", "grid", "a8"]
 

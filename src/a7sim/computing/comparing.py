@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from a7sim.computing.reading import point_columns, point_names, read_points
-from a7sim.documents import Document, points_as_rows
-from a7sim.files import to_csv
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import max_abs_residual, root_mean_square
+from a7sim.result_documents import Document, points_as_rows
+from a7sim.table_files import to_csv
 
 Quantities = Mapping[tuple[str, str], Mapping[str, float]]
 """Values by method, by name and unit of what they are of."""

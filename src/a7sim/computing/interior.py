@@ -10,14 +10,14 @@ import numpy as np
 
 from a7sim.computing.outcome import ProcessingResult, errors_for
 from a7sim.computing.reading import group_rows, point_columns, point_names
-from a7sim.documents import Document, document_header, points_as_rows, statistics_document
-from a7sim.files import Row, natural_sort_key, read_table, read_toml, to_csv
+from a7sim.errors import A7SimError
 from a7sim.geometry import GON, Array
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.corrections import corrected_image
 from a7sim.reduction.interior import PlaneFit, plane_fit, principal_distance_for_film
+from a7sim.result_documents import Document, document_header, points_as_rows, statistics_document
 from a7sim.scenario import Camera
 from a7sim.scenario.validation import schema_errors
+from a7sim.table_files import Row, natural_sort_key, read_table, read_toml, to_csv
 
 CORRECTIONS = ("lens", "refraction", "curvature")
 """Corrections of image coordinates; any of them brings these to the principal point."""

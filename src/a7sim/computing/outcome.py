@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from a7sim.documents import Document, as_json
-from a7sim.files import to_csv, write_files
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import GroundFit
 from a7sim.reduction.cards import free_format_lines, output_lines
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.strips import Model, Strip
+from a7sim.result_documents import Document, as_json
+from a7sim.table_files import to_csv, write_files
 
 MODEL_COLUMNS = ("model", "point", "X", "Y", "Z")
 POINT_COLUMNS = ("point", "X", "Y", "Z")

@@ -9,16 +9,16 @@ import numpy as np
 from a7sim.computing.comparing import compare_methods, methods_csv
 from a7sim.computing.outcome import ProcessingResult, errors_for, models_csv
 from a7sim.computing.reading import StereoPair, model_photographs, read_pairs
-from a7sim.documents import Document, document_header, elements_document, points_as_rows, statistics_document
-from a7sim.files import read_table, to_csv
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array, ray_of, stereoscopic_intersection
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, relative_orientation
 from a7sim.reduction.hallert import orientation_by_parallaxes
 from a7sim.reduction.modelling import model_coordinates
 from a7sim.reduction.schut import orientation_by_schut
 from a7sim.reduction.snooping import SnoopedOrientation, snooped_orientation
 from a7sim.reduction.strips import CENTRE, Model
+from a7sim.result_documents import Document, document_header, elements_document, points_as_rows, statistics_document
+from a7sim.table_files import read_table, to_csv
 
 RelativeMethod = Literal["coplanarity", "parallax", "schut", "robust", "all"]
 

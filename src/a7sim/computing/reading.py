@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from a7sim.files import Row, Table, natural_sort_key, read_table, read_text, rows_by_key
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import ROLES, Ground
 from a7sim.reduction.cards import is_deck, read_cards
 from a7sim.reduction.strips import CENTRE, Model, in_order
+from a7sim.table_files import Row, Table, natural_sort_key, read_table, read_text, rows_by_key
 
 PAIR_COLUMNS = ("xl", "yl", "xr", "yr")
 

@@ -6,10 +6,10 @@ from typing import Literal
 from a7sim.computing.comparing import compare_methods, methods_csv
 from a7sim.computing.outcome import ProcessingResult, errors_for
 from a7sim.computing.reading import point_columns, point_names, read_points
-from a7sim.documents import Document, document_header, points_as_rows, similarity_document, statistics_document
-from a7sim.files import to_csv
 from a7sim.geometry import GON
 from a7sim.reduction.similarity import Similarity, similarity_by_iteration, similarity_by_quaternion
+from a7sim.result_documents import Document, document_header, points_as_rows, similarity_document, statistics_document
+from a7sim.table_files import to_csv
 
 SimilarityMethod = Literal["iteration", "quaternion", "both"]
 

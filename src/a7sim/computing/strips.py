@@ -25,7 +25,15 @@ from a7sim.computing.reading import (
     short_list,
     sort_along_strip,
 )
-from a7sim.documents import (
+from a7sim.errors import A7SimError
+from a7sim.reduction.absolute import AbsoluteOrientation, Ground, GroundFit, absolute_orientation
+from a7sim.reduction.cards import Deck, is_deck, read_cards
+from a7sim.reduction.coplanarity import relative_orientation
+from a7sim.reduction.least_squares import Undetermined
+from a7sim.reduction.polynomials import Degree, StripAdjustment, strip_adjustment
+from a7sim.reduction.similarity import SIMILARITY_UNKNOWNS
+from a7sim.reduction.strips import JoinMethod, Model, Strip, formed_strip
+from a7sim.result_documents import (
     Document,
     absolute_document,
     adjustment_document,
@@ -34,15 +42,7 @@ from a7sim.documents import (
     points_as_rows,
     statistics_document,
 )
-from a7sim.files import Table, read_table, read_text
-from a7sim.mistakes import A7SimError
-from a7sim.reduction.absolute import AbsoluteOrientation, Ground, GroundFit, absolute_orientation
-from a7sim.reduction.cards import Deck, is_deck, read_cards
-from a7sim.reduction.coplanarity import relative_orientation
-from a7sim.reduction.least_squares import Undetermined
-from a7sim.reduction.polynomials import Degree, StripAdjustment, strip_adjustment
-from a7sim.reduction.similarity import SIMILARITY_UNKNOWNS
-from a7sim.reduction.strips import JoinMethod, Model, Strip, formed_strip
+from a7sim.table_files import Table, read_table, read_text
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,9 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal
 from textual.timer import Timer
 
-from a7sim.console.eyepiece import (
+from a7sim.console.eyepiece_widget import EyepieceWidget
+from a7sim.console.messages import ViewRequest, ViewResult
+from a7sim.console.rasterize import (
     DrawingMode,
     anaglyph,
     apply_vignette,
@@ -16,8 +18,6 @@ from a7sim.console.eyepiece import (
     picture_size,
     render,
 )
-from a7sim.console.news import ViewRequest, ViewResult
-from a7sim.console.window import EyepieceWidget
 
 FLICKER_S = 0.25
 

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from a7sim.console.dials import values
-from a7sim.console.hands import element_label
+from a7sim.console.readouts import values
+from a7sim.console.selection import element_label
 from a7sim.link.client import Client
 from a7sim.link.headers import quote_text, registration_word
 from a7sim.link.replies import part_as_text
-from a7sim.manual import VARIANTS
+from a7sim.plotters import VARIANTS
 
 ELEMENTS = tuple(dict.fromkeys(name for variant in VARIANTS.values() for name in variant.elements))
 

@@ -12,9 +12,9 @@ from textual.strip import Strip
 from textual.timer import Timer
 
 from a7sim.console.drums import ROLLING_FRAMES, bar, rolling_frame
-from a7sim.console.hands import SIDELESS_ELEMENTS, ControlSelection
 from a7sim.console.panels import Panel
-from a7sim.manual import Variant
+from a7sim.console.selection import SIDELESS_ELEMENTS, ControlSelection
+from a7sim.plotters import Variant
 
 ROLLING_S = 0.04
 """Between two frames of a drum that rolls."""

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from textual.keys import Keys
 
-from a7sim.files import read_toml
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
+from a7sim.table_files import read_toml
 
 Keymap = Mapping[str, tuple[str, ...]]
 """Names of keys, by deed."""

@@ -8,8 +8,8 @@ from rich.text import Text
 from textual.widget import Widget
 
 from a7sim.console.book import RecordedEntry
-from a7sim.console.dials import Readouts
-from a7sim.manual import POSITIONS_OF, Variant
+from a7sim.console.readouts import Readouts
+from a7sim.plotters import POSITIONS_OF, Variant
 
 
 class Panel(Widget):

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from time import monotonic
 from typing import TYPE_CHECKING, Protocol
 
-from a7sim.console.margins import format_elapsed
+from a7sim.console.header_footer import format_elapsed
+from a7sim.errors import A7SimError
 from a7sim.link.client import Client
-from a7sim.mistakes import A7SimError
 
 if TYPE_CHECKING:
-    from a7sim.session.film import Frame, Recording
+    from a7sim.session.recording import Frame, Recording
 
 SPEEDS = (1.0, 10.0, 60.0, math.inf)
 """How many times as fast as it happened; the last as fast as it can be worked."""

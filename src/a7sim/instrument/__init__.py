@@ -1,7 +1,7 @@
 """The plotter: its parts as frozen data, the assembled Autograph, and the language it is worked in."""
 
 from a7sim.instrument.autograph import Autograph, build_autograph
-from a7sim.instrument.refusals import AutographError, OutOfRangeError, SettingsConflictError, UnknownNameError
+from a7sim.instrument.errors import AutographError, OutOfRangeError, SettingsConflictError, UnknownNameError
 
 __all__ = [
     "Autograph",

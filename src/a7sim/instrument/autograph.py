@@ -12,12 +12,12 @@ import numpy as np
 from a7sim.geometry import GON, Array, length_of, mxv, transposed
 from a7sim.instrument.carriers import Carrier
 from a7sim.instrument.condition import INSTRUMENT_STREAM, draw_condition, local_coefficients, zero_error
+from a7sim.instrument.errors import OutOfRangeError, SettingsConflictError, UnknownNameError
 from a7sim.instrument.optics import effective_fittings, handwheel_senses, projector_in_view, view_matrix
 from a7sim.instrument.projection import CameraAttitude, attitude_from_angles, place_on_carrier, pose, projection_centre
 from a7sim.instrument.recorder import Recorder, Registration
-from a7sim.instrument.refusals import OutOfRangeError, SettingsConflictError, UnknownNameError
 from a7sim.instrument.spindles import Counter, PeriodicError, Spindle
-from a7sim.manual import LEAST_COUNT, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Element, Fittings, Gear, Variant
+from a7sim.plotters import LEAST_COUNT, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Element, Fittings, Gear, Variant
 from a7sim.scenario.schema import FORMAT_MM, Condition, Instrument, ProjectorCondition, Scenario
 from a7sim.scene import build_scene
 from a7sim.scene.photograph import Photograph

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from a7sim.geometry import GON, Array, plane_rotation
-from a7sim.manual import REQUIRED_FITTINGS, Fittings
+from a7sim.plotters import REQUIRED_FITTINGS, Fittings
 
 VIEW_CACHE_SIZE = 64
 

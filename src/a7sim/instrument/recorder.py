@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from a7sim.instrument.refusals import OutOfRangeError, SettingsConflictError
+from a7sim.instrument.errors import OutOfRangeError, SettingsConflictError
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.instrument.refusals import OutOfRangeError
-from a7sim.manual import COUNTER_DECIMALS, Element
+from a7sim.instrument.errors import OutOfRangeError
+from a7sim.plotters import COUNTER_DECIMALS, Element
 
 APPROXIMATIONS = 20
 """Each is better than the last by the slope of the error, some hundredths."""

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, NamedTuple, Protocol, Self
 
-from a7sim.link.opening import TIMEOUT_S, open_port
+from a7sim.link.ports import TIMEOUT_S, open_port
 from a7sim.link.replies import MalformedReplyError, Part, parse_reply
 
 

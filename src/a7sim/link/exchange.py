@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
+from a7sim.errors import A7SimError
 from a7sim.link.client import Client
 from a7sim.link.replies import Part, part_as_text
-from a7sim.manual import SCPI_VERSION
-from a7sim.mistakes import A7SimError
+from a7sim.plotters import SCPI_VERSION
 
 _MARKER = ":SYST:ERR:COUN?;:SYST:VERS?"
 """Sent behind every line: what it answers shows that the line had no reply, or that its reply is whole."""

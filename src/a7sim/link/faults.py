@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 
 EXAMPLE = "drop-reply:0.01,delay:50ms,garble:0.001,disconnect:0.0005"
 

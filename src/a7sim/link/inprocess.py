@@ -7,7 +7,7 @@ from serial import PortNotOpenError, SerialBase, SerialException, to_bytes
 
 from a7sim.instrument.language import MAX_BUFFERED_BYTES, Engine, SharedInstrument
 from a7sim.link.clock import Clock
-from a7sim.link.waiting import feed_until_idle
+from a7sim.link.simulated_wait import feed_until_idle
 
 
 class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped

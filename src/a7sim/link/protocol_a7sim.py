@@ -10,10 +10,10 @@ from urllib.parse import unquote
 
 from serial import SerialException
 
+from a7sim.errors import A7SimError
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.mistakes import A7SimError
 from a7sim.scenario import load_scenario
 
 _EXAMPLE = "a7sim://scenarios/akwanga.toml?seed=7"

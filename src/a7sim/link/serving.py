@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from a7sim.errors import A7SimError
 from a7sim.instrument.language import ErrorNumber, SharedInstrument, format_entry
 from a7sim.link.addresses import Address
+from a7sim.link.client_session import ClientSession, ServerLimits, Transport
 from a7sim.link.clock import Clock, WallClock
-from a7sim.link.conversation import ClientSession, ServerLimits, Transport
-from a7sim.link.pty_wire import PtyConnection
-from a7sim.link.wires import MAX_READ, TcpConnection, TelnetConnection
-from a7sim.mistakes import A7SimError
-from a7sim.wording import pluralize
+from a7sim.link.connections import MAX_READ, TcpConnection, TelnetConnection
+from a7sim.link.pty_connection import PtyConnection
+from a7sim.text import pluralize
 
 MAX_REJECTION_NOTICES = 64
 """Clients at a time that are told why they are turned away; the others are just turned away."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.among import Indices
+from a7sim.batch import Indices
 from a7sim.geometry import Array, length_of
-from a7sim.operator.bench import Workstation
+from a7sim.operator.controls import counter_value
 from a7sim.operator.job import ModelJob
 from a7sim.operator.levelling import MAX_ROUNDS, Control, Fit, Levelling, LevellingRound, Settings
-from a7sim.operator.seat import counter_value
+from a7sim.operator.workstation import Workstation
 
 TOLERATED_SHARE = 2e-4
 """Of the flying height, within which heights at control agree (the trade's 0.02 %)."""

@@ -10,13 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.among import Indices, exclude
+from a7sim.batch import Indices, exclude
 from a7sim.geometry import Array
-from a7sim.operator.bench import Workstation
-from a7sim.operator.crew import AllGaveUpError, OperatorBatch
 from a7sim.operator.interior import InteriorOrientationBatch
 from a7sim.operator.job import Job, ModelJob
-from a7sim.operator.line_hands import ScpiDriver
+from a7sim.operator.models import (
+    begin_form,
+    load_prints,
+    model_coordinates,
+    mount_photographs,
+    preset_counters,
+    require_active,
+    set_base_and_fittings,
+)
+from a7sim.operator.operator_batch import AllGaveUpError, OperatorBatch
 from a7sim.operator.person import Person
 from a7sim.operator.relative import (
     OrientationRecordBatch,
@@ -26,15 +33,8 @@ from a7sim.operator.relative import (
     relative_orientation,
     unknown_elements,
 )
-from a7sim.operator.work import (
-    begin_form,
-    load_prints,
-    model_coordinates,
-    mount_photographs,
-    preset_counters,
-    require_active,
-    set_base_and_fittings,
-)
+from a7sim.operator.scpi_driver import ScpiDriver
+from a7sim.operator.workstation import Workstation
 
 MAX_SCALINGS = 4
 MAX_REFINEMENTS = 4

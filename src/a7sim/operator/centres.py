@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Indices
+from a7sim.batch import Indices
 from a7sim.geometry import Array
-from a7sim.manual import LEAST_COUNT
-from a7sim.operator.bench import Workstation
+from a7sim.operator.controls import side_name
 from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import ModelJob
 from a7sim.operator.plate import Crosses, cross_positions, locate_plate, point_at_crosses, sketch_positions
-from a7sim.operator.seat import side_name
+from a7sim.operator.workstation import Workstation
+from a7sim.plotters import LEAST_COUNT
 from a7sim.reduction import (
     PerspectiveCentre,
     PlatePlacement,

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array, length_of
-from a7sim.operator.bench import Workstation
 from a7sim.operator.level_model import LevelModel
 from a7sim.operator.map_lines import (
     CONTOUR,
@@ -37,7 +36,8 @@ from a7sim.operator.stereo_view import (
     StereoView,
     rectify,
 )
-from a7sim.wording import pluralize
+from a7sim.operator.workstation import Workstation
+from a7sim.text import pluralize
 
 MAX_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
 """From vertex to vertex."""

@@ -14,9 +14,8 @@ from functools import partial
 
 import numpy as np
 
-from a7sim.among import Indices, exclude
+from a7sim.batch import Indices, exclude
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, parallax_coefficients, rotation
-from a7sim.operator.bench import Workstation
 from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import (
     OrientationRecordBatch,
@@ -27,6 +26,7 @@ from a7sim.operator.relative import (
     projector_pose,
     unknown_elements,
 )
+from a7sim.operator.workstation import Workstation
 from a7sim.reduction import ProjectorPose
 from a7sim.standard_points import CASES, FIGURE_4_1, PLACES, POSITIONS
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Indices, exclude, put, take
+from a7sim.batch import Indices, exclude, put, take
 from a7sim.geometry import Array
-from a7sim.operator.eyes import MAX_LOOKS, DivergenceMonitor, Pointing
-from a7sim.operator.hands import BoolArray
-from a7sim.operator.levers import correct_fittings
+from a7sim.operator.driver import BoolArray
+from a7sim.operator.fittings import correct_fittings
+from a7sim.operator.pointing import MAX_LOOKS, DivergenceMonitor, Pointing
 
 MAX_RISE_MM = 20.0
 """The foot disc is not turned further than this between two looks."""

@@ -6,18 +6,18 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from a7sim.among import Indices
+from a7sim.batch import Indices
 from a7sim.geometry import GON, Array
-from a7sim.manual import Variant
-from a7sim.operator.bench import Workstation
-from a7sim.operator.crew import OperatorBatch
+from a7sim.operator.controls import side_name, wrap_gon
 from a7sim.operator.interior import centre_picture
 from a7sim.operator.job import Job, ModelJob
-from a7sim.operator.line_hands import ScpiDriver
+from a7sim.operator.models import set_base_and_fittings
+from a7sim.operator.operator_batch import OperatorBatch
 from a7sim.operator.person import Person
 from a7sim.operator.plate import Crosses, cross_positions, locate_plate, point_at_crosses, sketch_positions
-from a7sim.operator.seat import side_name, wrap_gon
-from a7sim.operator.work import set_base_and_fittings
+from a7sim.operator.scpi_driver import ScpiDriver
+from a7sim.operator.workstation import Workstation
+from a7sim.plotters import Variant
 from a7sim.reduction import Elements, PlatePlacement, ProjectorTest, grid_test
 from a7sim.scenario import Camera, GridPlate, Plan
 

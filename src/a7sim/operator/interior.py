@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Indices
+from a7sim.batch import Indices
 from a7sim.geometry import GON, Array
-from a7sim.operator.bench import Workstation
+from a7sim.operator.workstation import Workstation
 from a7sim.reduction import PicturePlacement, Undetermined, picture_placement
 from a7sim.scenario import Camera
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import GON, Array
-from a7sim.operator.bench import Workstation
 from a7sim.operator.levelling import Control, Levelling
 from a7sim.operator.stereo_view import StereoView
+from a7sim.operator.workstation import Workstation
 from a7sim.reduction import AbsoluteOrientation, Ground, Model, Undetermined, absolute_orientation
 
 Place = tuple[float, float, float]

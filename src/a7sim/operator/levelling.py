@@ -12,13 +12,13 @@ from itertools import combinations
 
 import numpy as np
 
-from a7sim.among import Indices
+from a7sim.batch import Indices
 from a7sim.geometry import GON, Array, angles_of, length_of, mxm, mxv, rotation
-from a7sim.manual import Variant
-from a7sim.operator.bench import Workstation
-from a7sim.operator.hands import BoolArray
+from a7sim.operator.driver import BoolArray
 from a7sim.operator.job import ModelJob
 from a7sim.operator.relative import expand_to_batch
+from a7sim.operator.workstation import Workstation
+from a7sim.plotters import Variant
 from a7sim.reduction import Ground, Undetermined, solve_least_squares
 
 MAX_ROUNDS = 6

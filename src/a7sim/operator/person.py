@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from a7sim.link.client import Client
 from a7sim.link.clock import Clock
-from a7sim.operator.book import ObservationBook
-from a7sim.operator.dice import OperatorRandom
+from a7sim.operator.observation_book import ObservationBook
+from a7sim.operator.random_draws import OperatorRandom
 from a7sim.operator.slips import Slip
 from a7sim.operator.timesheet import Timesheet
 from a7sim.scenario import Observer

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Indices
+from a7sim.batch import Indices
 from a7sim.geometry import Array
-from a7sim.operator.bench import Workstation
 from a7sim.operator.interior import view_fiducials
+from a7sim.operator.workstation import Workstation
 from a7sim.reduction import PlatePlacement, plane_fit, plate_placement
 from a7sim.scenario import Camera
 

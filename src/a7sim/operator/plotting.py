@@ -7,19 +7,19 @@ from types import MappingProxyType
 
 import numpy as np
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array, length_of
-from a7sim.mistakes import A7SimError
-from a7sim.operator.bench import Workstation
 from a7sim.operator.compilation import Compilation
-from a7sim.operator.crew import OperatorBatch
 from a7sim.operator.job import Job
 from a7sim.operator.level_model import LevelModel, level_model, orient_model
-from a7sim.operator.line_hands import ScpiDriver
 from a7sim.operator.map_lines import Area, LineTarget, SpotHeights, TracedLine, Tracing
+from a7sim.operator.models import ModelRecord, begin_form, measure_models_batch
+from a7sim.operator.operator_batch import OperatorBatch
 from a7sim.operator.person import Person
 from a7sim.operator.preparation import PLAN_GEARS
+from a7sim.operator.scpi_driver import ScpiDriver
 from a7sim.operator.stereo_view import StereoView
-from a7sim.operator.work import ModelRecord, begin_form, measure_models_batch
+from a7sim.operator.workstation import Workstation
 from a7sim.reduction import Ground
 
 TABLE_GEARS: Mapping[str, float] = MappingProxyType({"1-1-1": 1.0, **PLAN_GEARS})

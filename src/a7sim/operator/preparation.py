@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from a7sim.manual import Variant
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
+from a7sim.plotters import Variant
 
 PLAN_GEARS: Mapping[str, float] = MappingProxyType({"3-1-1": 4.0 / 3.0, "1-2-1": 1.5})
 """How many times larger than the model a horizontal gear draws: 1:3333 and 1:3750 into 1:2500 (thesis table 3.3).

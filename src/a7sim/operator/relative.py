@@ -9,14 +9,14 @@ from typing import overload
 import numpy as np
 import numpy.typing as npt
 
-from a7sim.among import Indices, exclude
+from a7sim.batch import Indices, exclude
 from a7sim.geometry import GON, Array
-from a7sim.manual import TILTS
-from a7sim.operator.bench import Workstation
-from a7sim.operator.crew import AllGaveUpError
-from a7sim.operator.hands import BoolArray
+from a7sim.operator.controls import wrap_gon
+from a7sim.operator.driver import BoolArray
 from a7sim.operator.job import ModelJob
-from a7sim.operator.seat import wrap_gon
+from a7sim.operator.operator_batch import AllGaveUpError
+from a7sim.operator.workstation import Workstation
+from a7sim.plotters import TILTS
 from a7sim.reduction import ProjectorPose, Undetermined, element_corrections
 from a7sim.reduction.hallert import REGULAR_POINTS, regular_corrections
 from a7sim.standard_points import CASES, POSITIONS, determine_orientation

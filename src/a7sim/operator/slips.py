@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from a7sim.operator.dice import OperatorRandom
+from a7sim.operator.random_draws import OperatorRandom
 from a7sim.scenario import Observer
 from a7sim.scenario.schema import PlannedSlip, SlipKind
 from a7sim.standard_points import PLACES

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import GON, Array, image_of, plane_rotation, rotation
-from a7sim.operator.bench import Workstation
 from a7sim.operator.person import Person
+from a7sim.operator.workstation import Workstation
 
 SIDE = 48
 """Columns and rows of a look."""

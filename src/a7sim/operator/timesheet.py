@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from a7sim.among import Indices, add_at
+from a7sim.batch import Indices, add_at
 from a7sim.geometry import Array
 
 Act = Literal["looking", "turning", "reading", "setting", "driving", "mounting", "computing", "resting", "other"]

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.similarity import (
     Similarity,

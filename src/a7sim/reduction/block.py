@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array, length_of, rotation
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground, GroundFit
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.similarity import rotation_from_vector, similarity_columns
 from a7sim.reduction.strips import Model
-from a7sim.wording import pluralize
+from a7sim.text import pluralize
 
 MAX_MODELS = 500
 MAX_ITERATIONS = 30

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from a7sim.files import first_line, read_text
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground
 from a7sim.reduction.strips import CENTRE, Model, Strip, in_order, is_centre
+from a7sim.table_files import first_line, read_text
 
 FIELDS = (
     ("strip or model", 1, 4),

@@ -21,7 +21,7 @@ from a7sim.geometry import Array, angles_of, dots, length_of, mxm, mxv, rotation
 from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 from a7sim.reduction.normal_equations import MAX_CONDITION
 from a7sim.reduction.relative_poses import RelativePoses, relative_poses
-from a7sim.wording import pluralize
+from a7sim.text import pluralize
 
 Unknowns = Literal["independent", "dependent"]
 

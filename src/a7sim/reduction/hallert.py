@@ -18,7 +18,7 @@ from a7sim.reduction.coplanarity import RelativeOrientation, Unknowns, coplanari
 from a7sim.reduction.least_squares import Undetermined, solve_least_squares
 from a7sim.reduction.normal_equations import MAX_CONDITION
 from a7sim.reduction.relative_poses import MAX_ITERATIONS, MIN_POINTS, TOLERANCE
-from a7sim.wording import pluralize
+from a7sim.text import pluralize
 
 Scalars = float | Array
 """One number, or one for each pair of a batch ``(...)``."""

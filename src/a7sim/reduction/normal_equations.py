@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array, mxv
-from a7sim.reduction.turns import RotationWorkspace, aligned_array
+from a7sim.reduction.batched_rotations import RotationWorkspace, aligned_array
 
 MAX_CONDITION = 3e5
 """Of the scaled normal equations for turns about the axes of the base. Six standard points have some 3e2, the weak pair

@@ -13,8 +13,8 @@ from typing import Literal
 
 import numpy as np
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.absolute import Ground, GroundFit
 from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 from a7sim.reduction.strips import Model, is_centre

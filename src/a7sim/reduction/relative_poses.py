@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from a7sim.geometry import Array, dots, mxm, rotation, transposed
+from a7sim.reduction.batched_rotations import aligned_array, rotate_by
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.normal_equations import (
     MAX_CONDITION,
@@ -30,7 +31,6 @@ from a7sim.reduction.normal_equations import (
     solve,
     symmetrize,
 )
-from a7sim.reduction.turns import aligned_array, rotate_by
 
 MIN_POINTS = 5
 MAX_ITERATIONS = 30

@@ -3,12 +3,12 @@
 import numpy as np
 
 from a7sim.geometry import Array, mxm
+from a7sim.reduction.batched_rotations import rotation_about
 from a7sim.reduction.coplanarity import RelativeOrientation, coplanarity, finish_orientation, rays_of
 from a7sim.reduction.least_squares import Undetermined, solve_least_squares
 from a7sim.reduction.normal_equations import MAX_CONDITION
 from a7sim.reduction.relative_poses import MAX_ITERATIONS, MIN_POINTS, TOLERANCE
-from a7sim.reduction.turns import rotation_about
-from a7sim.wording import pluralize
+from a7sim.text import pluralize
 
 
 def orientation_by_schut(image1: Array, image2: Array, c1: float, c2: float, bx: float = 1.0) -> RelativeOrientation:

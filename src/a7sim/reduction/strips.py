@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array, length_of, mxv
-from a7sim.mistakes import A7SimError
 from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.similarity import Similarity, similarity_by_quaternion
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from rich.text import Text
 
-from a7sim.documents import Document
 from a7sim.reduction.strips import is_centre
 from a7sim.report.figures.grid import grid_residuals
 from a7sim.report.figures.model import (
@@ -20,16 +19,17 @@ from a7sim.report.figures.model import (
 from a7sim.report.figures.sessions import all_strips, hours
 from a7sim.report.figures.strip import Places, plan_and_profile, residuals_in_height, residuals_in_plan
 from a7sim.report.forms import make_forms
-from a7sim.report.kept import SessionFolder
 from a7sim.report.page import Chapter, Details, PageFigure, Part, TableBlock
-from a7sim.report.rays import pointing_rays
+from a7sim.report.pointing_rays import pointing_rays
+from a7sim.report.session_folder import SessionFolder
 from a7sim.report.terminal import terminal_parts
+from a7sim.result_documents import Document
 from a7sim.session import tables
 from a7sim.session.bridge import INDEPENDENT
 from a7sim.session.bridge import bridge_tables as of_bridge
-from a7sim.session.compiled_tables import map_tables
-from a7sim.session.folder import RESIDUALS, STRIP, STRIP_OF_WAY, SVG
 from a7sim.session.grid_test import report_tables as of_grid_test
+from a7sim.session.map_tables import map_tables
+from a7sim.session.session_files import RESIDUALS, STRIP, STRIP_OF_WAY, SVG
 
 Chapters = Iterator[Chapter]
 

@@ -10,11 +10,11 @@ import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from a7sim.documents import Document, document_header
-from a7sim.mistakes import A7SimError
-from a7sim.report.kept import SessionFolder
-from a7sim.sheets import text_table
-from a7sim.wording import pluralize
+from a7sim.errors import A7SimError
+from a7sim.report.session_folder import SessionFolder
+from a7sim.result_documents import Document, document_header
+from a7sim.text import pluralize
+from a7sim.text_tables import text_table
 
 EXCLUDED_KEYS = frozenset(
     {

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.report.page import PageFigure
 
 if TYPE_CHECKING:

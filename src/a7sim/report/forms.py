@@ -8,12 +8,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from a7sim.documents import Document
-from a7sim.mistakes import A7SimError
-from a7sim.operator.book import BookEntry
-from a7sim.report.kept import SessionFolder
+from a7sim.errors import A7SimError
+from a7sim.operator.observation_book import BookEntry
 from a7sim.report.page import Paragraph, Part, TableBlock
-from a7sim.session.folder import BOOK
+from a7sim.report.session_folder import SessionFolder
+from a7sim.result_documents import Document
+from a7sim.session.session_files import BOOK
 
 PAGE_BREAK = "\f"
 

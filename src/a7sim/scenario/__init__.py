@@ -1,6 +1,5 @@
 """Scenarios: what a file may say about a flight, photographs, an instrument and an operator."""
 
-from a7sim.scenario.carried import from_data, hash_scenario, to_data
 from a7sim.scenario.loading import (
     ScenarioError,
     build_scenario,
@@ -9,7 +8,7 @@ from a7sim.scenario.loading import (
     scenario_name,
     scenario_schema,
 )
-from a7sim.scenario.requests import Provenance, ScenarioWithProvenance, amend_provenance, with_provenance
+from a7sim.scenario.provenance import Provenance, ScenarioWithProvenance, amend_provenance, with_provenance
 from a7sim.scenario.schema import (
     SCHEMA_VERSION,
     Camera,
@@ -26,6 +25,7 @@ from a7sim.scenario.schema import (
     StripPlan,
 )
 from a7sim.scenario.schema import ModelPlan as ModelPlan
+from a7sim.scenario.serialization import from_data, hash_scenario, to_data
 from a7sim.scenario.skills import PROFILES, observer_of_skill
 
 __all__ = [

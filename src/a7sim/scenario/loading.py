@@ -10,13 +10,13 @@ from typing import Any
 
 import msgspec
 
-from a7sim.files import describe_missing_file, read_toml
-from a7sim.mistakes import A7SimError
-from a7sim.scenario.references import cross_check_errors
+from a7sim.bundled import bundled_dirs, bundled_names
+from a7sim.errors import A7SimError
+from a7sim.scenario.cross_checks import cross_check_errors
 from a7sim.scenario.schema import Scenario
 from a7sim.scenario.skills import PROFILES
 from a7sim.scenario.validation import schema_errors
-from a7sim.shelves import bundled_dirs, bundled_names
+from a7sim.table_files import describe_missing_file, read_toml
 
 SEARCH_PATH = bundled_dirs("scenarios")
 """Where the scenarios are that come with a7sim."""

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 from msgspec import Meta, Struct, field
 from msgspec.structs import replace
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 
 SCHEMA_VERSION = 1
 

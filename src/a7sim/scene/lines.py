@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array, dots
-from a7sim.mistakes import A7SimError
 from a7sim.scenario.schema import LinePlan
 from a7sim.scene.coverage import within_band
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from a7sim.files import read_rows, rows_by_key
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array
-from a7sim.mistakes import A7SimError
 from a7sim.scenario.schema import FORMAT_MM, Camera, Measured
 from a7sim.scene.camera import fiducial_places
 from a7sim.scene.photograph import NamedPoints
+from a7sim.table_files import read_rows, rows_by_key
 
 MIN_FIDUCIALS = 3
 

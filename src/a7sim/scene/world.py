@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from a7sim.errors import A7SimError
 from a7sim.geometry import GON, Array, image_of, length_of, mxm, mxv, rotation, transposed
-from a7sim.mistakes import A7SimError
 from a7sim.scenario.schema import Measured, ModelPlan, Photo, Published, Scenario
 from a7sim.scene.camera import distorted, fiducial_places, lowered_by_curvature, refracted
 from a7sim.scene.content import GroundAppearance, GroundImage, marks_image, point_sampled

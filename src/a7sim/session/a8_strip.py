@@ -10,11 +10,12 @@ import numpy as np
 
 from a7sim.geometry import Array, plane_rotation
 from a7sim.instrument.condition import INSTRUMENT_STREAM
-from a7sim.operator.dice import OPERATOR_STREAM
+from a7sim.operator.random_draws import OPERATOR_STREAM
 from a7sim.reduction import Model, Undetermined, a8_centres, a8_model_coordinates, picture_placement
 from a7sim.scenario import ModelPlan, Observer, Scenario
 from a7sim.scene import Photograph, Scene
-from a7sim.session.analytical import (
+from a7sim.session.a8_projector import Projector
+from a7sim.session.comparator import (
     StripResult,
     add_centres,
     calibrated_fiducials,
@@ -26,8 +27,7 @@ from a7sim.session.analytical import (
     pointing_errors,
     round_to_count,
 )
-from a7sim.session.clearing import ClearedPair, clear_parallaxes
-from a7sim.session.projectors import Projector
+from a7sim.session.parallax_clearing import ClearedPair, clear_parallaxes
 from a7sim.standard_points import CASES
 
 POINTINGS = 2

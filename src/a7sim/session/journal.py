@@ -10,15 +10,15 @@ from typing import Any
 import msgspec
 
 import a7sim
+from a7sim.errors import A7SimError
 from a7sim.instrument.language import LinkEvent, SharedInstrument
-from a7sim.mistakes import A7SimError
-from a7sim.operator.book import BookEntry
+from a7sim.operator.observation_book import BookEntry
 from a7sim.scenario import Scenario, hash_scenario, to_data
 from a7sim.scene import PICTURES
+from a7sim.session.append_file import AppendOnlyFile, Durability, JournalWriteError, write_failure_message
 from a7sim.session.checkpoints import LINES_PER_CHECKPOINT, Checkpoint, state_hash, to_lines
-from a7sim.session.durable import AppendOnlyFile, Durability, JournalWriteError, write_failure_message
-from a7sim.session.folder import JOURNAL, SCENARIO_SUFFIX, STATES, TORN, prepare_folder
-from a7sim.session.lines import SCHEMA_VERSION, ChecksumChain, Event, JournalFile, has_header, read_journal
+from a7sim.session.journal_format import SCHEMA_VERSION, ChecksumChain, Event, JournalFile, has_header, read_journal
+from a7sim.session.session_files import JOURNAL, SCENARIO_SUFFIX, STATES, TORN, prepare_folder
 
 _REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
 

@@ -7,18 +7,18 @@ from typing import Any
 
 import msgspec
 
+from a7sim.errors import A7SimError
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import MAX_LINE_LENGTH, LinkEvent, SharedInstrument
-from a7sim.instrument.language.desk import POLL_SECONDS
-from a7sim.instrument.language.logins import TOKEN_PLACEHOLDER
+from a7sim.instrument.language.shared_instrument import POLL_SECONDS
+from a7sim.instrument.language.token_redaction import TOKEN_PLACEHOLDER
 from a7sim.link.clock import Clock
-from a7sim.link.waiting import feed_until_idle
-from a7sim.mistakes import A7SimError
+from a7sim.link.simulated_wait import feed_until_idle
 from a7sim.scenario import Scenario, from_data, hash_scenario
 from a7sim.scene import build_scene
 from a7sim.session.checkpoints import Checkpoint, StateDifference, differences, read_checkpoints, state_hash
-from a7sim.session.folder import SCENARIO_SUFFIX, STATES
-from a7sim.session.lines import Event, JournalFile
+from a7sim.session.journal_format import Event, JournalFile
+from a7sim.session.session_files import SCENARIO_SUFFIX, STATES
 
 RECORDED = "record"
 """The command whose journals hold what crossed a line, and nothing of how the instrument waited."""

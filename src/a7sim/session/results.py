@@ -7,16 +7,16 @@ from typing import Any
 import msgspec
 
 import a7sim
-from a7sim.documents import Document, document_header
-from a7sim.files import to_csv
 from a7sim.geometry import Array
 from a7sim.operator import ModelRecord, Person
 from a7sim.operator.absolute import GroundOrientation
 from a7sim.operator.timesheet import Timesheet
 from a7sim.reduction import Model, PerspectiveCentre
+from a7sim.result_documents import Document, document_header
 from a7sim.scenario import Scenario, ScenarioWithProvenance
 from a7sim.scenario.schema import Published
 from a7sim.session.truth import TruthComparison
+from a7sim.table_files import to_csv
 
 SIDES = {1: "left", 2: "right"}
 

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from a7sim.errors import A7SimError
 from a7sim.instrument.language import SharedInstrument
-from a7sim.mistakes import A7SimError
 from a7sim.scenario import Scenario
-from a7sim.session.folder import JOURNAL
 from a7sim.session.journal import Journal, software_version
-from a7sim.session.lines import SCHEMA_VERSION, JournalFile, read_journal
+from a7sim.session.journal_format import SCHEMA_VERSION, JournalFile, read_journal
 from a7sim.session.replaying import Replay, ReplayDifference, replay_lines, scenario_of_journal
+from a7sim.session.session_files import JOURNAL
 
 
 @dataclass(frozen=True)

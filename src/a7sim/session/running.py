@@ -5,20 +5,21 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from a7sim.documents import Document, as_json
-from a7sim.files import to_csv
+from a7sim.errors import A7SimError
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Listener, SharedInstrument
 from a7sim.link.client import Client, Port
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.mistakes import A7SimError
 from a7sim.operator import Job, ModelJob, Person, measure_models
 from a7sim.reduction import Ground, Model, Undetermined
+from a7sim.result_documents import Document, as_json
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene, build_scene
 from a7sim.session import results
-from a7sim.session.folder import (
+from a7sim.session.journal import Journal, JournalOptions, make_header
+from a7sim.session.lifecycle import recorded_session
+from a7sim.session.session_files import (
     CARD_KEY,
     CARDS,
     MODELS,
@@ -27,8 +28,6 @@ from a7sim.session.folder import (
     STRIP,
     write_atomic,
 )
-from a7sim.session.journal import Journal, JournalOptions, make_header
-from a7sim.session.sitting import recorded_session
 from a7sim.session.strips import (
     OrientedStrip,
     given_control,
@@ -39,6 +38,7 @@ from a7sim.session.strips import (
     strip_cards,
 )
 from a7sim.session.truth import TruthComparison
+from a7sim.table_files import to_csv
 
 PortAdapter = Callable[[InProcessSerial], Port]
 """What lies between instrument and operator: it takes the instrument's end and returns the operator's."""

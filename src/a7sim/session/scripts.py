@@ -13,10 +13,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from a7sim.files import read_text
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
 from a7sim.scenario.loading import SEARCH_PATH
+from a7sim.table_files import read_text
 
 SUFFIX = ".a7s"
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.documents import Document, absolute_document, adjustment_document, joins_document
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.reduction import (
     AbsoluteOrientation,
     Ground,
@@ -21,6 +20,7 @@ from a7sim.reduction import (
 )
 from a7sim.reduction.polynomials import Degree
 from a7sim.reduction.strips import CENTRE, JoinMethod, is_centre
+from a7sim.result_documents import Document, absolute_document, adjustment_document, joins_document
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
 

@@ -8,9 +8,9 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
-from a7sim.sheets import text_table
 from a7sim.standard_points import FIGURE_4_1, POSITIONS
-from a7sim.wording import pluralize
+from a7sim.text import pluralize
+from a7sim.text_tables import text_table
 
 _ELEMENTS = (
     ("κ", "kappa", "gon"),

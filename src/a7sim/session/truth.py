@@ -7,8 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from a7sim.geometry import GON, Array, angle_between, angles_of, length_of, mxm, mxv, rotation, transposed, turn_of
-from a7sim.manual import Variant
 from a7sim.operator import ModelJob, ModelRecord
+from a7sim.plotters import Variant
 from a7sim.scene import RelativeTruth
 
 ElementValues = Mapping[str, Any]

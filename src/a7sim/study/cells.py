@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from a7sim.mistakes import A7SimError
-from a7sim.session.crossing import cases_of_strips
+from a7sim.errors import A7SimError
+from a7sim.session.combination_batch import cases_of_strips
 from a7sim.standard_points import CASES
 from a7sim.study.schema import MAX_CELLS, Factor, Settings, Study
 

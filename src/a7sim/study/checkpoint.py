@@ -13,9 +13,9 @@ from zipfile import BadZipFile
 import numpy as np
 
 import a7sim
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array
-from a7sim.mistakes import A7SimError
-from a7sim.study.sketch import Counts, QuantileSketch
+from a7sim.study.quantile_sketch import Counts, QuantileSketch
 from a7sim.study.tally import Tally
 
 PARQUET, NPZ = "checkpoint.parquet", "checkpoint.npz"

@@ -7,9 +7,9 @@ from itertools import combinations
 
 import numpy as np
 
-from a7sim.documents import Document
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array
-from a7sim.mistakes import A7SimError
+from a7sim.result_documents import Document
 from a7sim.study.cells import Cell
 from a7sim.study.schema import Hypothesis, Study
 from a7sim.study.statistics import CONFIDENCE, binned, compare_cells, holm, regress_on

@@ -10,7 +10,7 @@ from multiprocessing.connection import Connection
 from threading import Thread
 from typing import Any, Literal, ParamSpec, TypeVar, get_args
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 
 Kind = Literal["process", "pool", "dask", "mpi"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -58,12 +58,12 @@ def open_executor(
         with _pool(workers) as pool:
             yield pool, workers
     elif kind == "dask":
-        from a7sim.study.by_dask import open_dask_executor  # noqa: PLC0415
+        from a7sim.study.dask_executor import open_dask_executor  # noqa: PLC0415
 
         with open_dask_executor(scheduler, workers) as working:
             yield working
     else:
-        from a7sim.study.by_mpi import open_mpi_executor  # noqa: PLC0415
+        from a7sim.study.mpi_executor import open_mpi_executor  # noqa: PLC0415
 
         with open_mpi_executor(dict.fromkeys(_ONE_THREAD, "1")) as working:
             yield working

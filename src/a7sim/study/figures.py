@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from a7sim.documents import Document
 from a7sim.report.drawing import FAINT, FILL, INK, LEFT, PANEL, RIGHT, SOFT, TRUE, drawing
 from a7sim.report.page import PageFigure
+from a7sim.result_documents import Document
 from a7sim.study.claims import SMALL_CORRELATION, SMALL_EFFECT
 from a7sim.study.findings import cell_label
 from a7sim.study.responses import OF_MODEL

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 import a7sim
-from a7sim.documents import Document, document_header
 from a7sim.geometry import Array
+from a7sim.result_documents import Document, document_header
+from a7sim.study.axis_positions import axis_positions
 from a7sim.study.cells import Cell
 from a7sim.study.claims import format_probability, test_claims
-from a7sim.study.latin import main_effects, noise_share
 from a7sim.study.loading import LoadedStudy
-from a7sim.study.places import axis_positions
+from a7sim.study.main_effects import main_effects, noise_share
 from a7sim.study.running import precision_reached
 from a7sim.study.statistics import (
     CONFIDENCE,

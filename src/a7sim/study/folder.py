@@ -4,15 +4,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryFile
 
-from a7sim.documents import Document, as_json
-from a7sim.files import to_csv
-from a7sim.mistakes import A7SimError
-from a7sim.session.folder import RESULTS, write_atomic
+from a7sim.errors import A7SimError
+from a7sim.result_documents import Document, as_json
+from a7sim.session.session_files import RESULTS, write_atomic
 from a7sim.study import checkpoint
 from a7sim.study.loading import LoadedStudy
 from a7sim.study.page import study_page
 from a7sim.study.simulating import replicate_seed
 from a7sim.study.tally import Tally
+from a7sim.table_files import to_csv
 
 CELLS, COMPARISONS, REPLICATES, PAGE = (
     "cells.csv",

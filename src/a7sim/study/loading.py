@@ -10,18 +10,18 @@ from typing import Any
 import msgspec
 
 import a7sim
-from a7sim.files import describe_missing_file, read_toml
-from a7sim.mistakes import A7SimError
+from a7sim.bundled import bundled_dirs
+from a7sim.errors import A7SimError
 from a7sim.scenario import Scenario, ScenarioError, load_scenario
 from a7sim.scenario.validation import schema_errors
-from a7sim.session.combinations import check_strips_possible
-from a7sim.shelves import bundled_dirs
+from a7sim.session.strip_combinations import check_strips_possible
 from a7sim.study.cells import Cell, make_cells, make_strip_cells
 from a7sim.study.claims import validate_claims
-from a7sim.study.reach import settings_out_of_range
 from a7sim.study.responses import Response, find_response
 from a7sim.study.schema import Study
+from a7sim.study.setting_limits import settings_out_of_range
 from a7sim.study.simulating import Task
+from a7sim.table_files import describe_missing_file, read_toml
 
 SEARCH_PATH = bundled_dirs("studies")
 """Where the studies are that come with a7sim."""

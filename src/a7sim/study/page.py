@@ -3,9 +3,9 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from a7sim.documents import Document
 from a7sim.report.markdown import markdown
 from a7sim.report.page import Chapter, Details, Heading, Paragraph, Part, TableBlock, page
+from a7sim.result_documents import Document
 from a7sim.study import figures
 from a7sim.study.findings import cell_label
 

@@ -7,8 +7,8 @@ from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Any
 
-from a7sim.documents import Document
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
+from a7sim.result_documents import Document
 
 Reader = Callable[[Document], float]
 

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.documents import Document
 from a7sim.geometry import Array
+from a7sim.result_documents import Document
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.combinations import with_case
-from a7sim.session.crossing import Cases, Replicate, cases_of_strips, combine_strips
+from a7sim.session.all_methods import run_all_methods, run_all_methods_batch
+from a7sim.session.combination_batch import Cases, Replicate, cases_of_strips, combine_strips
+from a7sim.session.strip_combinations import with_case
 from a7sim.session.strips import ground_control
-from a7sim.session.ways import run_all_methods, run_all_methods_batch
 from a7sim.standard_points import CASES
 from a7sim.study.responses import find_response, is_path, needs_strip
 

@@ -8,9 +8,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from a7sim.documents import Document
-from a7sim.sheets import text_table
+from a7sim.result_documents import Document
 from a7sim.study.findings import cell_label
+from a7sim.text_tables import text_table
 
 
 def study_tables(document: Document) -> RenderableType:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.study.sketch import Counts, QuantileSketch
+from a7sim.study.quantile_sketch import Counts, QuantileSketch
 
 SAMPLE = 10_000
 """Replicates of a cell that are kept one by one: the first, since replicates come in no order."""

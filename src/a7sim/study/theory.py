@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a7sim.documents import Document
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, near_vertical_parallax_coefficients
-from a7sim.manual import LEAST_COUNT, VARIANTS
 from a7sim.operator import ModelJob
 from a7sim.operator.relative import unknown_elements
+from a7sim.plotters import LEAST_COUNT, VARIANTS
 from a7sim.reduction import perspective_centre
 from a7sim.reduction.least_squares import solve_least_squares
+from a7sim.result_documents import Document
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene, build_scene
 from a7sim.session.running import make_job

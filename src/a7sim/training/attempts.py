@@ -5,17 +5,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from a7sim.files import read_text
-from a7sim.mistakes import A7SimError
-from a7sim.session.folder import JOURNAL, write_atomic
-from a7sim.session.lines import read_journal
-from a7sim.session.playing import ScriptRunner
+from a7sim.errors import A7SimError
+from a7sim.session.journal_format import read_journal
+from a7sim.session.script_runner import ScriptRunner
 from a7sim.session.scripts import Script, read_script
-from a7sim.training.account import parse_answers
+from a7sim.session.session_files import JOURNAL, write_atomic
+from a7sim.table_files import read_text
+from a7sim.training.attempt_record import parse_answers
+from a7sim.training.environment import AttemptEnvironment, open_environment, resume_environment
 from a7sim.training.exercise import OPENING, ExerciseFolder, PlayedRun
 from a7sim.training.handouts import make_handout
 from a7sim.training.procedures import run_procedure
-from a7sim.training.room import AttemptEnvironment, open_environment, resume_environment
 from a7sim.training.variation import scenario_for
 
 ANSWERS = "answers.txt"

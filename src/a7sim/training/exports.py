@@ -6,8 +6,8 @@ from typing import Any
 
 import msgspec
 
-from a7sim.documents import Document, document_header
-from a7sim.files import to_csv
+from a7sim.result_documents import Document, document_header
+from a7sim.table_files import to_csv
 from a7sim.training.exercise import FULL_MARKS
 from a7sim.training.progress import Attempt, GradeRecord
 

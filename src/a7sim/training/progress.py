@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 import msgspec
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.training.exercise import Exercise, ExerciseFolder, Hint
 from a7sim.training.grading import Grade, HintsTaken
 from a7sim.training.variation import attempt_seed

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.scenario import Scenario, load_scenario
 from a7sim.training.exercise import ExerciseFolder
 

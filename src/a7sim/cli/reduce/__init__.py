@@ -13,9 +13,9 @@ from a7sim.cli.reduce import options, tables
 from a7sim.computing import ProcessingResult
 from a7sim.computing.interior import FlightHeights
 from a7sim.computing.strips import PairCamera
-from a7sim.documents import Document, as_json
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
 from a7sim.reduction.strips import JoinMethod
+from a7sim.result_documents import Document, as_json
 
 MIN_WIDTH = 80
 """Columns that every table fits."""

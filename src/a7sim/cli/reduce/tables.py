@@ -6,9 +6,9 @@ from typing import Any
 
 from rich.table import Table
 
-from a7sim.documents import Document
-from a7sim.sheets import text_table
-from a7sim.wording import pluralize
+from a7sim.result_documents import Document
+from a7sim.text import pluralize
+from a7sim.text_tables import text_table
 
 ANGLES = ("omega", "phi", "kappa")
 SHIFTS = ("Tx", "Ty", "Tz")

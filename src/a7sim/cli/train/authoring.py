@@ -5,12 +5,12 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
-from a7sim.cli.names import exercise_argument
-from a7sim.documents import as_json, document_header
+from a7sim.cli.completers import exercise_argument
+from a7sim.result_documents import as_json, document_header
+from a7sim.text import pluralize
+from a7sim.training.catalogue import all_exercises, find_exercise
 from a7sim.training.checking import check_exercise
-from a7sim.training.shelf import all_exercises, find_exercise
-from a7sim.training.skeleton import write_template
-from a7sim.wording import pluralize
+from a7sim.training.template import write_template
 
 EXIT_FAULTY = 1
 

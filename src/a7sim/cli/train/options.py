@@ -8,9 +8,9 @@ import click
 
 from a7sim.cli.options import FOLDER, combine_options
 from a7sim.cli.prompt import data_folder
-from a7sim.mistakes import A7SimError
+from a7sim.errors import A7SimError
+from a7sim.training.catalogue import find_exercise
 from a7sim.training.progress import Attempt, Progress
-from a7sim.training.shelf import find_exercise
 
 HOME_VARIABLE, STUDENT_VARIABLE = "A7SIM_HOME", "A7SIM_STUDENT"
 

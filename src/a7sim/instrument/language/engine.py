@@ -6,9 +6,9 @@ import re
 import zlib
 from typing import TYPE_CHECKING, Any
 
+from a7sim.instrument.errors import AutographError, OutOfRangeError, SettingsConflictError, UnknownNameError
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
-from a7sim.instrument.language.logins import redact_token
 from a7sim.instrument.language.program import (
     CachedQuery,
     ParsedCommand,
@@ -19,10 +19,10 @@ from a7sim.instrument.language.program import (
     strip_line_end,
 )
 from a7sim.instrument.language.status import OPERATION_COMPLETE, SETTLING, Status
-from a7sim.instrument.refusals import AutographError, OutOfRangeError, SettingsConflictError, UnknownNameError
+from a7sim.instrument.language.token_redaction import redact_token
 
 if TYPE_CHECKING:
-    from a7sim.instrument.language.desk import SharedInstrument
+    from a7sim.instrument.language.shared_instrument import SharedInstrument
 
 MAX_LINE_LENGTH = 4096
 """Bytes, its end not counted."""

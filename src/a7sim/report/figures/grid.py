@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from a7sim.report.drawing import INK, LEFT, RIGHT, SOFT, WIDTH_IN, arrows, drawing, nice_number, scale_arrow
 from a7sim.report.page import PageFigure
-from a7sim.wording import pluralize
+from a7sim.text import pluralize
 
 _STYLES = ((LEFT, 0.009), (RIGHT, 0.005), (INK, 0.004), (SOFT, 0.009), (LEFT, 0.004))
 """Colour and width of the arrows of each level."""

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from a7sim.documents import Document
 from a7sim.report.drawing import (
     FAINT,
     FILL,
@@ -22,8 +21,9 @@ from a7sim.report.drawing import (
     scale_arrow,
 )
 from a7sim.report.page import PageFigure, TableBlock
+from a7sim.result_documents import Document
 from a7sim.standard_points import PLACES, POSITIONS
-from a7sim.wording import pluralize
+from a7sim.text import pluralize
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

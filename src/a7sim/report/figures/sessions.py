@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
-from a7sim.documents import Document
 from a7sim.report.drawing import FAINT, FILL, INK, LEFT, PANEL, RIGHT, WIDTH_IN, drawing
 from a7sim.report.page import PageFigure
+from a7sim.result_documents import Document
 
 
 def hours(spent: Mapping[str, float], name: str, title: str) -> PageFigure:

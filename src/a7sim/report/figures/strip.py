@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from a7sim.documents import Document
 from a7sim.reduction.strips import CENTRE, is_centre
 from a7sim.report.drawing import (
     FAINT,
@@ -20,7 +19,8 @@ from a7sim.report.drawing import (
     scale_arrow,
 )
 from a7sim.report.page import PageFigure
-from a7sim.wording import pluralize
+from a7sim.result_documents import Document
+from a7sim.text import pluralize
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

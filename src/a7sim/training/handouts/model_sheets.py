@@ -6,15 +6,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from a7sim.files import to_csv
+from a7sim.errors import A7SimError
 from a7sim.geometry import Array, length_of
-from a7sim.mistakes import A7SimError
 from a7sim.reduction import Ground, Model
 from a7sim.reduction.strips import formed_strip, is_centre
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.analytical import strip_by_comparator
+from a7sim.session.comparator import strip_by_comparator
 from a7sim.session.strips import given_control, orient_strip
+from a7sim.table_files import to_csv
 from a7sim.training.handouts.base import Handout, handout
 from a7sim.training.handouts.control import control_csv
 

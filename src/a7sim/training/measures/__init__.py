@@ -1,16 +1,16 @@
 """The measures that exercises are graded by."""
 
-from a7sim.training.measures import answers, centres, clearing, deeds, grid, ground, numerical, readings, truth
+from a7sim.training.measures import actions, answers, centres, clearing, grid, ground, numerical, readings, truth
 from a7sim.training.measures.base import MEASURES, Metric, MetricResult, make_metric
 
 __all__ = [
     "MEASURES",
     "Metric",
     "MetricResult",
+    "actions",
     "answers",
     "centres",
     "clearing",
-    "deeds",
     "grid",
     "ground",
     "make_metric",

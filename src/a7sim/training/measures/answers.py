@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from msgspec import field
 
 from a7sim.scenario import Scenario
-from a7sim.training.account import AttemptRecord
+from a7sim.training.action_log import Reading
+from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.measures.base import HALF_A_COUNT, Metric, MetricResult, join_words, register_metric
 from a7sim.training.measures.truth import y_parallax_at
-from a7sim.training.witness import Reading
 
 
 @register_metric("not-answered")

@@ -7,9 +7,9 @@ from typing import ClassVar, TypeVar
 import msgspec
 
 from a7sim.scenario import Scenario
-from a7sim.training.account import AttemptRecord
+from a7sim.training.action_log import Reading
+from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.exercise import MetricSpec
-from a7sim.training.witness import Reading
 
 BEST_PARALLAX_UM = 2.2
 """Of one setting on vanishing y-parallax, at photo scale: the best of the organisations of 1960 (geometry.md)."""

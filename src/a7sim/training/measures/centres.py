@@ -11,7 +11,9 @@ from a7sim.geometry import Array
 from a7sim.reduction import PerspectiveCentre, Undetermined, perspective_centre
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES, PLACES
-from a7sim.training.account import AttemptRecord
+from a7sim.text import pluralize
+from a7sim.training.action_log import Reading
+from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.measures.base import (
     BEST_POINTING_UM,
     HALF_A_COUNT,
@@ -22,8 +24,6 @@ from a7sim.training.measures.base import (
     join_words,
     register_metric,
 )
-from a7sim.training.witness import Reading
-from a7sim.wording import pluralize
 
 MIN_POINTS = 3
 

@@ -9,7 +9,8 @@ from a7sim.operator.empirical import clearing_coefficients, over_correction_by_c
 from a7sim.reduction import ProjectorPose
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES
-from a7sim.training.account import AttemptRecord
+from a7sim.training.action_log import Reading
+from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.measures.base import (
     HALF_A_COUNT,
     Metric,
@@ -19,7 +20,6 @@ from a7sim.training.measures.base import (
     join_words,
     register_metric,
 )
-from a7sim.training.witness import Reading
 
 
 def projector_poses(account: AttemptRecord, reading: Reading) -> tuple[ProjectorPose, ProjectorPose]:

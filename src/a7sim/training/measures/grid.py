@@ -6,7 +6,8 @@ from msgspec import field
 
 from a7sim.scenario import Scenario
 from a7sim.session.grid_test import true_errors
-from a7sim.training.account import AttemptRecord
+from a7sim.training.action_log import Reading
+from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.measures.base import (
     BEST_POINTING_UM,
     HALF_A_COUNT,
@@ -17,7 +18,6 @@ from a7sim.training.measures.base import (
     register_metric,
 )
 from a7sim.training.measures.truth import MaxAtReadings
-from a7sim.training.witness import Reading
 
 
 @register_metric("cross-missed")

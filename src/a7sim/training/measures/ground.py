@@ -10,7 +10,9 @@ from msgspec import field
 
 from a7sim.geometry import Array, length_of
 from a7sim.scenario import ModelPlan, Scenario
-from a7sim.training.account import AttemptRecord
+from a7sim.text import pluralize
+from a7sim.training.action_log import AXES, PLAIN, Reading, StudentAction
+from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.measures.base import (
     BEST_HEIGHT_UM,
     BEST_PARALLAX_UM,
@@ -22,8 +24,6 @@ from a7sim.training.measures.base import (
     join_words,
     register_metric,
 )
-from a7sim.training.witness import AXES, PLAIN, Reading, StudentAction
-from a7sim.wording import pluralize
 
 PLAN_AXES = ("X", "Y")
 

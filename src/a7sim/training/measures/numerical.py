@@ -13,7 +13,9 @@ from a7sim.geometry import GON, Array
 from a7sim.reduction import Undetermined, element_corrections
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES
-from a7sim.training.account import AttemptRecord
+from a7sim.text import pluralize
+from a7sim.training.action_log import Reading
+from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.forms import FIVE, multipliers
 from a7sim.training.measures.base import (
     BEST_PARALLAX_UM,
@@ -25,8 +27,6 @@ from a7sim.training.measures.base import (
     register_metric,
 )
 from a7sim.training.measures.clearing import projector_poses
-from a7sim.training.witness import Reading
-from a7sim.wording import pluralize
 
 BYS = ("by1", "by2")
 

@@ -6,7 +6,9 @@ from statistics import fmean
 from msgspec import field
 
 from a7sim.scenario import Scenario
-from a7sim.training.account import AttemptRecord
+from a7sim.text import pluralize
+from a7sim.training.action_log import AXES, PLAIN, Reading
+from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.measures.base import (
     HALF_A_COUNT,
     Metric,
@@ -17,8 +19,6 @@ from a7sim.training.measures.base import (
     readings_with,
     register_metric,
 )
-from a7sim.training.witness import AXES, PLAIN, Reading
-from a7sim.wording import pluralize
 
 
 @register_metric("missing-readings")

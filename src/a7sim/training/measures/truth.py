@@ -8,7 +8,8 @@ from msgspec import field
 from a7sim.geometry import GON, Array, plane_rotation
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES
-from a7sim.training.account import AttemptRecord
+from a7sim.training.action_log import LoggedAutograph, Reading
+from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.measures.base import (
     BEST_FIDUCIAL_UM,
     BEST_HEIGHT_UM,
@@ -23,7 +24,6 @@ from a7sim.training.measures.base import (
     join_words,
     register_metric,
 )
-from a7sim.training.witness import LoggedAutograph, Reading
 
 MAX_STEPS = 20
 

@@ -5,23 +5,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from a7sim.errors import A7SimError
 from a7sim.link.client import Client
 from a7sim.link.headers import quote_text, registration_word
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.manual import VARIANTS
-from a7sim.mistakes import A7SimError
 from a7sim.operator import Job, ModelJob, OperatorGaveUp, Person, measure_models
-from a7sim.operator.bench import Workstation
-from a7sim.operator.book import BookEntry
-from a7sim.operator.crew import OperatorBatch
 from a7sim.operator.interior import InteriorOrientationBatch
-from a7sim.operator.line_hands import ScpiDriver
-from a7sim.operator.work import load_prints, mount_photographs, orient_model, set_base_and_fittings
+from a7sim.operator.models import load_prints, mount_photographs, orient_model, set_base_and_fittings
+from a7sim.operator.observation_book import BookEntry
+from a7sim.operator.operator_batch import OperatorBatch
+from a7sim.operator.scpi_driver import ScpiDriver
+from a7sim.operator.workstation import Workstation
+from a7sim.plotters import VARIANTS
 from a7sim.reduction import Undetermined
 from a7sim.session.running import make_job
-from a7sim.training.account import ANSWER
+from a7sim.training.attempt_record import ANSWER
+from a7sim.training.environment import AttemptEnvironment
 from a7sim.training.exercise import PlayedRun
-from a7sim.training.room import AttemptEnvironment
 from a7sim.training.variation import scenario_for
 
 ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)

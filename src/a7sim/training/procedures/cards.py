@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from a7sim.computing.strips import strip
-from a7sim.documents import Document
 from a7sim.reduction import Ground, Model, deck_lines
 from a7sim.reduction.strips import is_centre
-from a7sim.training.account import ANSWER
+from a7sim.result_documents import Document
+from a7sim.training.attempt_record import ANSWER
 from a7sim.training.procedures.base import ProcedureContext, procedure
 
 

@@ -1,9 +1,9 @@
 """The grid test of a projector by few crosses."""
 
 from a7sim.geometry import GON
-from a7sim.operator.bench import Workstation
 from a7sim.operator.grid_test import GridTestPlan, measure_grid_batch
-from a7sim.training.account import ANSWER
+from a7sim.operator.workstation import Workstation
+from a7sim.training.attempt_record import ANSWER
 from a7sim.training.procedures.base import ProcedureContext, procedure
 
 ANSWERED = ("c", "phi", "omega")

@@ -1,7 +1,7 @@
 """Every command of the language: protocol.md as frozen data, each with the few lines that carry it out."""
 
 from a7sim.instrument.language.commands.carriages import CARRIAGES
-from a7sim.instrument.language.commands.handles import ELEMENT_COMMANDS
+from a7sim.instrument.language.commands.elements import ELEMENT_COMMANDS
 from a7sim.instrument.language.commands.pictures import PICTURES
 from a7sim.instrument.language.commands.recording import RECORDING
 from a7sim.instrument.language.commands.system import SYSTEM

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from a7sim.instrument.language.commands.parts import autograph_for
+from a7sim.instrument.language.commands.common import autograph_for
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.table import (
     Call,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from a7sim.instrument.language.commands.parts import autograph_for, format_fixed
+from a7sim.instrument.language.commands.common import autograph_for, format_fixed
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
@@ -15,7 +15,7 @@ from a7sim.instrument.language.table import (
     Quantity,
     Quoted,
 )
-from a7sim.manual import NOT_VISIBLE
+from a7sim.plotters import NOT_VISIBLE
 
 if TYPE_CHECKING:
     from a7sim.instrument.language.engine import Engine

@@ -3,7 +3,7 @@
 import re
 from typing import TYPE_CHECKING
 
-from a7sim.instrument.language.commands.parts import ELEMENT_NODES, autograph_for, format_fixed, text_argument
+from a7sim.instrument.language.commands.common import ELEMENT_NODES, autograph_for, format_fixed, text_argument
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (

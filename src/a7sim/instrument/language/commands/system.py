@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from a7sim.instrument.language.commands.parts import autograph_for
+from a7sim.instrument.language.commands.common import autograph_for
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.status import Register
 from a7sim.instrument.language.syntax import quote_text
@@ -13,7 +13,7 @@ from a7sim.instrument.language.table import (
     Quantity,
     Quoted,
 )
-from a7sim.manual import SCPI_VERSION
+from a7sim.plotters import SCPI_VERSION
 
 if TYPE_CHECKING:
     from a7sim.instrument.language.engine import Engine

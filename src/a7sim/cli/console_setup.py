@@ -1,0 +1,162 @@
+"""Where somebody sits down: at an instrument in this process, at a line, or before what others do."""
+
+from collections.abc import Callable, Iterable
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from a7sim.cli.link_options import token_from
+from a7sim.cli.prompt import data_folder
+from a7sim.console.config import ConsoleConfig, ResumeOffer
+from a7sim.console.header_footer import format_elapsed
+from a7sim.console.job_sheet import JobSheet
+from a7sim.console.preset_recovery import LoggedLine
+from a7sim.errors import A7SimError
+from a7sim.link.client import Client
+from a7sim.link.clock import Clock, WallClock
+from a7sim.scenario import Scenario, scenario_name
+
+if TYPE_CHECKING:
+    from a7sim.session.interactive import InteractiveSession
+    from a7sim.session.session_store import SavedSession
+
+SESSIONS_FOLDER = "sessions"
+
+
+class LocalConsole:
+    """A seat at the instrument of a scenario in this process. What imports the instrument waits for the screen."""
+
+    def __init__(self, name: str, scenario: Scenario, seed: int | None, out: Path | None, go_on: bool | None) -> None:
+        self._name, self._scenario = name, scenario
+        self._seed = scenario.seed if seed is None else seed
+        self._folder = out or data_folder() / SESSIONS_FOLDER / scenario_name(name)
+        self._go_on = go_on
+        self._clock, self._wall = Clock(), WallClock()
+        self._left: SavedSession | None = None
+        self._chair: InteractiveSession | None = None
+        self._greeting = ""
+        if go_on is not None or (out is not None and out.exists()):
+            self._answered_beforehand(out)
+
+    def _answered_beforehand(self, out: Path | None) -> None:
+        last = self._last()
+        if self._go_on:
+            if last is None or last.begun is None:
+                found = last.trouble if last else "found none"
+                raise A7SimError(
+                    f"--go-on: expected a session of {self._name} at seed {self._seed} in {self._folder}: {found}"
+                )
+            self._decide(last, True)
+        elif last is None and out is not None and out.exists():
+            raise A7SimError(
+                f"{out}: expected a folder that does not exist yet, or that of a session of {self._name} at seed "
+                f"{self._seed}, got another"
+            )
+
+    @property
+    def config(self) -> ConsoleConfig:
+        """The seat, as it is before anybody has sat down."""
+        return ConsoleConfig(
+            self._opened,
+            self._time,
+            where=self._name,
+            sheet=JobSheet(self._scenario.title, self._scenario.camera),
+            resumable=self._resumable,
+            greeting=lambda: self._greeting,
+            history=self._past,
+        )
+
+    def _last(self) -> "SavedSession | None":
+        if not self._folder.exists():
+            return None
+        from a7sim.session.session_store import last_session  # only where there may be one
+
+        return last_session(self._folder, self._scenario, self._seed)
+
+    def _resumable(self) -> ResumeOffer | None:
+        if self._go_on is not None:
+            return None
+        last = self._last()
+        if last is None:
+            return None
+        if last.begun is None:
+            self._greeting = f"begun anew, since the last session cannot be gone on with: {last.trouble}"
+            return None
+        if not last.has_changes:
+            self._decide(last, True)
+            self._greeting = ""
+            return None
+        when = datetime.fromtimestamp(last.last_activity).strftime("%Y-%m-%d %H:%M")  # as the person's clock shows it
+        about = f"{format_elapsed(last.ended_at_s)} at the instrument, left {when}, kept in {last.folder}"
+        return ResumeOffer(about, lambda goes_on: self._decide(last, goes_on))
+
+    def _decide(self, last: "SavedSession", goes_on: bool) -> None:
+        if goes_on:
+            self._left = last
+            self._wall = WallClock(now=last.ended_at_s)
+            self._greeting = f"where it stood, {format_elapsed(last.ended_at_s)} at the instrument; ? is help"
+
+    def _opened(self) -> Client:
+        """Sit down in the chair, which is built when the instrument is first spoken to."""
+        if self._chair is None:
+            from a7sim.session.interactive import InteractiveSession  # beside the first paint of the screen
+
+            begun = self._left.begun if self._left else None
+            self._chair = InteractiveSession(self._scenario, self._seed, self._folder, self._clock, begun)
+        return self._chair.open()
+
+    def _past(self) -> Iterable[LoggedLine]:
+        return (LoggedLine(each.text, each.dir == "<") for each in self._chair.history()) if self._chair else ()
+
+    def _time(self) -> float:
+        self._clock.advance_to(self._wall.now)
+        return self._clock.now
+
+    def close(self) -> Path | None:
+        """End the journal; return the folder where it is, None where nothing was begun."""
+        if self._chair is None:
+            return None
+        self._chair.close()
+        return self._chair.folder
+
+
+def remote_console(url: str, sheet: JobSheet, token_file: Path | None, watching: bool = False) -> ConsoleConfig:
+    """Return a seat at a served instrument. Raises Mistake where nobody answers there."""
+    token = token_from(token_file)
+    Client.open(url, token=token).close()
+    wall = WallClock()
+    return ConsoleConfig(
+        lambda: Client.open(url, token=token),
+        lambda: wall.now,
+        alone=False,
+        where=url,
+        sheet=sheet,
+        watching=watching,
+        greeting=_watching_now(url) if watching else lambda: "",
+    )
+
+
+def _watching_now(url: str) -> Callable[[], str]:
+    return lambda: f"watching {url}; ? is help"
+
+
+def playback_console(session: str) -> ConsoleConfig:
+    """Return a seat from which a session that is over is watched. Raises Mistake where there is none."""
+    from a7sim.session.recording import open_recording  # only for who watches one
+
+    film = open_recording(session)
+    title = str(film.journalled.header.get("title", ""))
+    return ConsoleConfig(
+        film.open_client,
+        lambda: film.frame.time,
+        where=session,
+        sheet=JobSheet(title),
+        watching=True,
+        film=film,
+        greeting=lambda: "hands off: space plays, . steps, g jumps; ? is help",
+    )
+
+
+def is_url(watched: str) -> bool:
+    """Whether what is to be watched is an instrument at work rather than a session that is over."""
+    return "://" in watched or Path(watched).is_char_device()

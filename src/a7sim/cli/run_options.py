@@ -1,0 +1,244 @@
+"""What the commands that seat an operator share: options, the scenario that they choose, and how they end."""
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import msgspec
+from click.core import ParameterSource
+
+from a7sim.cli import EXIT_DOES_NOT_FIT, options
+from a7sim.cli.completers import CaseInsensitiveChoice
+from a7sim.cli.usage_errors import parameter_label
+from a7sim.errors import A7SimError
+from a7sim.scenario import PROFILES, Observer, Provenance, Scenario, load_scenario, scenario_name, with_provenance
+from a7sim.session.append_file import DURABILITIES, Durability
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from a7sim.result_documents import Document
+    from a7sim.session import ProgressCallbacks
+    from a7sim.session.journal import JournalOptions
+    from a7sim.session.resuming import ResumableSession
+
+DURABILITY = click.option(
+    "--durability",
+    type=click.Choice(DURABILITIES),
+    default="records",
+    show_default=True,
+    help="When the journal is on the disk: every line, every registration and the rest within 0.2 s, or never.",
+)
+_RESUME = click.option(
+    "--resume",
+    type=options.PLACE,
+    metavar="DIR",
+    help="Go on with the session in DIR, cut off; its journal says what was asked for.",
+)
+
+
+@dataclass(frozen=True)
+class ScenarioOptions:
+    """What is asked for beside a scenario: seed, overrides of its values, and how good the operator is."""
+
+    seed: int | None
+    settings: tuple[str, ...]
+    skill: str | None
+    perfect_observer: bool
+
+
+@dataclass(frozen=True)
+class OutputOptions:
+    """Where a session is left, or went on from, and when its journal is on the disk."""
+
+    out: Path | None
+    force: bool
+    resume: Path | None
+    durability: Durability
+
+    @property
+    def folder(self) -> Path | None:
+        """Where the files are."""
+        return self.resume or self.out
+
+    @property
+    def keeping(self) -> "JournalOptions":
+        """How the journal is kept."""
+        from a7sim.session.journal import JournalOptions
+
+        return JournalOptions(self.durability, self.resume is not None)
+
+
+@dataclass(frozen=True)
+class DisplayOptions:
+    """How results are told: as tables, as a document, or not at all."""
+
+    as_document: bool
+    quiet: bool
+
+
+scenario_options = options.group_options(
+    "asked",
+    ScenarioOptions,
+    options.seed(),
+    click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario."),
+    click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
+    click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error."),
+)
+"""--seed, --set, --skill, --perfect-observer, as `asked`."""
+
+orientation_options = options.combine_options(
+    click.option("--case", type=CaseInsensitiveChoice("ABCDE"), help="Standard points used (thesis)."),
+    click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one."),
+)
+"""--case, --method."""
+
+SESSION = "journal, book, tables and results"
+
+
+def output_options(of: str = SESSION) -> options.Option[Any]:
+    """Return --out, --force, --resume, --durability, as `kept`, for a folder of what `of` says."""
+    return options.group_options("kept", OutputOptions, options.new_folder(of), _RESUME, DURABILITY)
+
+
+display_options = options.group_options("told", DisplayOptions, options.as_document, options.quiet())
+"""--json, --quiet, as `told`."""
+
+_NOT_OF_THE_RESULTS = {
+    *("seed", "out", "force", "resume", "durability", "as_document", "quiet"),
+    *("url", "timeout", "token_file"),
+}
+_SAME_RESULTS_AS = {"operate": "run"}
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What an operator is to do: a scenario, its seed, and, where that goes on, what its journal says beside them."""
+
+    scenario: Scenario
+    seed: int
+    begun_with: Mapping[str, Any] | None = None
+
+    def setting(self, name: str, asked: Any) -> Any:
+        """Return what the journal of a session that goes on says under a name, or what is asked for of a new one."""
+        return asked if self.begun_with is None else self.begun_with.get(name)
+
+
+def resolve_request(
+    scenario: str | None, asked: ScenarioOptions, kept: OutputOptions, others: Mapping[str, str | None] | None = None
+) -> RunRequest:
+    """Return what the options order: a new session, or with --resume the one in its folder. Raises Mistake.
+
+    `others` are overrides of the scenario as texts by path.
+    """
+    if kept.resume is None:
+        return RunRequest(*resolve_scenario(scenario, asked, others))
+    session = resolve_resume(kept.resume)
+    return RunRequest(session.scenario, session.seed, session.settings)
+
+
+def resolve_scenario(
+    scenario: str | None, asked: ScenarioOptions, others: Mapping[str, str | None] | None = None
+) -> tuple[Scenario, int]:
+    """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
+    if scenario is None:
+        raise A7SimError(f"{click.get_current_context().info_name}: expected SCENARIO or --resume DIR, got none")
+    overrides = _overrides(asked.settings, {**(others or {}), "observer.skill": asked.skill})
+    loaded = load_scenario(scenario, overrides)
+    if asked.perfect_observer:
+        loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
+        overrides["observer"] = "perfect"
+    seed = loaded.seed if asked.seed is None else asked.seed
+    return with_provenance(
+        loaded, Provenance(command_line=_command_line(scenario_name(scenario), seed), settings=overrides)
+    ), seed
+
+
+def _command_line(scenario: str, seed: int) -> str:
+    """Return the command under way as anybody could type it for the same results."""
+    ctx = click.get_current_context()
+    verb = ctx.info_name or ""
+    words = ["a7sim", _SAME_RESULTS_AS.get(verb, verb), scenario, "--seed", str(seed)]
+    for option in ctx.command.params:
+        name = option.name or ""
+        given = ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
+        if given and isinstance(option, click.Option) and name not in _NOT_OF_THE_RESULTS:
+            value = ctx.params[name]
+            flag = max(option.opts, key=len)
+            for each in value if option.multiple else [value]:
+                words += [flag] if option.is_flag else [flag, f"{each:.12g}" if isinstance(each, float) else str(each)]
+    return shlex.join(words)
+
+
+def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> dict[str, str]:
+    overrides = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not equals or not key:
+            raise A7SimError(f"--set: expected PATH=VALUE such as plan.bx=190.0, got {setting!r}")
+        overrides[key] = value
+    return overrides | {key: f'"{value}"' for key, value in texts.items() if value is not None}
+
+
+def resolve_resume(folder: Path, *beside: str) -> "ResumableSession":
+    """Return the session of the command under way that --resume goes on with.
+
+    Raises Mistake where anything but what is named stands `beside` it, since the journal says what was asked for.
+    """
+    from a7sim.session.resuming import find_resumable
+
+    _see_that_resume_stands_alone(beside)
+    return find_resumable(folder, click.get_current_context().info_name or "")
+
+
+def _see_that_resume_stands_alone(beside: tuple[str, ...]) -> None:
+    ctx = click.get_current_context()
+    allowed = {"resume", "durability", "as_document", "quiet", *beside}
+    for name in ctx.params:
+        if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            said = next(each for each in ctx.command.params if each.name == name)
+            raise A7SimError(
+                f"--resume: expected no {parameter_label(said)} beside it, since the journal says what was asked for"
+            )
+
+
+POINTS_A_MODEL = 130
+"""About how many points an operator works on in a model; the bar only needs the order of it."""
+
+
+@contextmanager
+def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbacks]":
+    """Show on a terminal how the operator gets on with about so many points."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from a7sim.session import ProgressCallbacks
+
+    columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
+    unwatched = told.quiet or told.as_document or not sys.stderr.isatty()
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
+        task = progress.add_task("sitting down", total=points)
+        yield ProgressCallbacks(
+            lambda activity: progress.update(task, description=activity),
+            lambda: progress.advance(task),
+        )
+
+
+def show_results(document: "Document", told: DisplayOptions, tables: "Callable[[Document], RenderableType]") -> None:
+    """Show the results, and end with exit code 1 where the operator gave up."""
+    from rich.console import Console
+
+    from a7sim.result_documents import as_json
+
+    if told.as_document:
+        click.echo(as_json(document), nl=False)
+    elif not told.quiet:
+        Console().print(tables(document))
+    if document["status"] != "complete":
+        click.echo(f"a7sim: the operator gave up: {document['message']}", err=True)
+        raise click.exceptions.Exit(EXIT_DOES_NOT_FIT)

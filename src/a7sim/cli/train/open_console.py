@@ -1,0 +1,71 @@
+"""The console at an exercise's instrument, its checklist on the screen."""
+
+import sys
+import time
+from collections.abc import Iterator
+from textwrap import fill
+
+from a7sim.cli.console import KEYMAP
+from a7sim.cli.prompt import data_folder
+from a7sim.errors import A7SimError
+from a7sim.link.client import Client
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.link.ports import TIMEOUT_S
+from a7sim.session.journal_format import Event, read_journal
+from a7sim.session.session_files import JOURNAL
+from a7sim.training.checklist import Checklist
+from a7sim.training.environment import AttemptEnvironment
+from a7sim.training.exercise import OPENING
+
+GOAL_WIDTH = 64
+"""Columns, so that it has room on every terminal."""
+
+
+def open_console(room: AttemptEnvironment, checklist: Checklist, plain: bool) -> None:
+    """Open the console in the room of an attempt, until whoever sits there leaves. Raises Mistake without a terminal.
+
+    The simulated clock goes with the wall's while somebody sits there.
+    """
+    try:
+        from a7sim.console.app import Console  # only who sits down loads the screen
+    except ImportError as error:
+        raise A7SimError("start: expected textual to be installed: pip install 'a7sim[console]'") from error
+    from a7sim.console.config import ConsoleConfig
+    from a7sim.console.job_sheet import JobSheet
+    from a7sim.console.keymap import default_keymap, load_keymap
+    from a7sim.console.preset_recovery import LoggedLine
+    from a7sim.console.rasterize import DrawingMode
+
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        raise A7SimError("start: expected a terminal to sit at, got a file or a pipe (--script and --link need none)")
+    began, clock, so_far = time.monotonic(), room.clock, room.clock.now
+
+    def at_the_instrument() -> float:
+        clock.advance_to(so_far + time.monotonic() - began)
+        return clock.now
+
+    own_keys = data_folder() / KEYMAP
+    title = f"exercise {checklist.exercise.number}"
+    Console(
+        ConsoleConfig(
+            lambda: Client(InProcessSerial(desk=room.desk, clock=clock, timeout=TIMEOUT_S)),
+            at_the_instrument,
+            where=title,
+            sheet=JobSheet(title, room.scenario.camera),
+            keymap=load_keymap(own_keys) if own_keys.exists() else default_keymap(),
+            drawing=DrawingMode.WORDS if plain else None,
+            theme="contrast" if plain else "enamel",
+            tasks=checklist.lines,
+            exercise_goal=fill(" ".join(checklist.exercise.goal.split()), GOAL_WIDTH),
+            history=lambda: [LoggedLine(each.text, each.dir == "<") for each in _past(checklist)],
+        )
+    ).run()
+
+
+def _past(checklist: Checklist) -> Iterator[Event]:
+    """Yield what was said and answered in an attempt so far, but for its opening."""
+    there = read_journal(checklist.attempt.folder / JOURNAL)
+    for number in range(2, len(there) + 1):
+        event = there.event(number)
+        if event.dir in ("<", ">") and event.client != OPENING:
+            yield event

@@ -1,0 +1,121 @@
+"""`a7sim train list` and `report`: where students stand."""
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from a7sim.cli import options
+from a7sim.cli.completers import exercise_argument
+from a7sim.cli.train.options import progress_in, student_name, student_options
+from a7sim.errors import A7SimError
+from a7sim.result_documents import Document, as_json, document_header
+from a7sim.session.session_files import write_atomic
+from a7sim.text import pluralize
+from a7sim.text_tables import text_table
+from a7sim.training.catalogue import all_exercises, find_exercise
+from a7sim.training.exercise import ExerciseFolder
+from a7sim.training.exports import HOME_PAGE, to_class_document, to_nbgrader, to_xapi
+
+
+@click.command("list")
+@click.argument("exercise", required=False, shell_complete=exercise_argument)
+@options.as_document
+@student_options
+def list_(exercise: str | None, as_document: bool, home: Path | None, student: str | None) -> None:
+    """List the exercises and how far they are done; or show what EXERCISE is about.
+
+    Example: a7sim train list 4
+    """
+    if exercise is not None:
+        shelved = find_exercise(exercise)
+        click.echo(as_json(_of_exercise(shelved)) if as_document else f"{_shown(shelved)}\n", nl=False)
+        return
+    name = student_name(student)
+    with progress_in(home) as progress:
+        best = progress.best(name)
+        attempts = progress.attempts(name)
+    rows = []
+    for shelved in all_exercises():
+        mine = [each for each in attempts if each.exercise == shelved.name]
+        grade = best.get((name, shelved.name))
+        state = "passed" if grade and grade.grade.passed else "under way" if mine and not mine[-1].closed else ""
+        points = grade.grade.points if grade else None
+        rows.append((shelved.exercise.number, shelved.exercise.title, state, points, len(mine)))
+    if as_document:
+        keys = ("number", "title", "state", "points", "attempts")
+        exercises = [dict(zip(keys, row, strict=True)) for row in rows]
+        click.echo(as_json(document_header("train list") | {"student": name, "exercises": exercises}), nl=False)
+        return
+    table = text_table("", "exercise", "state", "points", "attempts", left=(1, 2), fold=(1,))
+    for number, title, state, points, tries in rows:
+        table.add_row(str(number), title, state, "" if points is None else f"{points:g}", str(tries or ""))
+    Console().print(table)
+
+
+def _of_exercise(shelved: ExerciseFolder) -> Document:
+    exercise = shelved.exercise
+    return document_header("train list") | {
+        "exercise": shelved.name,
+        "number": exercise.number,
+        "title": exercise.title,
+        "text": shelved.text.strip(),
+        "minutes": exercise.minutes,
+        "pass_points": exercise.pass_points,
+        "hints": len(exercise.hints),
+        "steps": [each.text for each in exercise.steps],
+        "criteria": [{"title": each.title, "points": each.weight} for each in exercise.criteria],
+    }
+
+
+def _shown(shelved: ExerciseFolder) -> str:
+    exercise = shelved.exercise
+    steps = [f"  - {each.text}" for each in exercise.steps]
+    criteria = [f"  {each.weight:4g}  {each.title}" for each in exercise.criteria]
+    minutes, hints = pluralize(exercise.minutes, "minute"), pluralize(len(exercise.hints), "hint")
+    facts = f"{minutes}, {exercise.pass_points:g} of 100 points pass, {hints}"
+    return "\n".join([shelved.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
+
+
+@click.command("report")
+@click.option("--class", "whole_class", is_flag=True, help="Of all students; otherwise of one.")
+@click.option(
+    "--to",
+    type=click.Choice(["html", "csv", "json", "xapi"]),
+    default="html",
+    show_default=True,
+    help="A page, nbgrader's table, a document, or statements for a learning record store.",
+)
+@options.out_file("the sheet", "standard output")
+@click.option(
+    "--home-page", metavar="URL", default=HOME_PAGE, show_default=True, help="Of the students' accounts, for xapi."
+)
+@student_options
+def report_(
+    whole_class: bool, to: str, out: Path | None, home_page: str, home: Path | None, student: str | None
+) -> None:
+    """Write the sheet of a student or of the class: HTML with figures, CSV as nbgrader's, JSON, or xAPI statements.
+
+    Example: a7sim train report --class --to html --out class.html
+    """
+    whose = None if whole_class else student_name(student)
+    with progress_in(home) as progress:
+        graded, best, attempts = progress.grades(whose), progress.best(whose), progress.attempts(whose)
+    if not attempts:
+        raise A7SimError(f"{f'student {whose}' if whose else 'the class'}: expected attempts to report on, found none")
+    if to == "csv":
+        text = to_nbgrader(best)
+    elif to == "json":
+        text = as_json(to_class_document(graded, best, attempts))
+    elif to == "xapi":
+        text = to_xapi(graded, home_page)
+    else:
+        from a7sim.training.html_sheets import class_sheet, student_sheet  # only pages need figures
+
+        shelf = all_exercises()
+        text = class_sheet(shelf, best, attempts) if whose is None else student_sheet(whose, shelf, best, graded)
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        write_atomic(out, text)
+        click.echo(str(out))

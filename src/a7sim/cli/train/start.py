@@ -1,0 +1,135 @@
+"""`a7sim train start`: sit down at an exercise, play a script of it, or serve it."""
+
+import re
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import click
+
+from a7sim.cli import options
+from a7sim.cli.completers import exercise_argument
+from a7sim.cli.serve import USUAL, ServedInstrument, StartupMessages, serve
+from a7sim.cli.train.open_console import open_console
+from a7sim.cli.train.options import progress_in, student_name, student_options
+from a7sim.errors import A7SimError
+from a7sim.link.addresses import Address, parse_address
+from a7sim.link.client_session import ServerLimits
+from a7sim.link.event_loop import run
+from a7sim.link.serving import Endpoints
+from a7sim.result_documents import document_header
+from a7sim.session.journal import Journal
+from a7sim.session.scripts import read_script
+from a7sim.session.session_files import JOURNAL
+from a7sim.training.attempts import play_script, resume_attempt, start_attempt
+from a7sim.training.catalogue import find_exercise
+from a7sim.training.checklist import Checklist
+from a7sim.training.environment import AttemptEnvironment
+from a7sim.training.exercise import ExerciseFolder
+from a7sim.training.progress import EXAM, PRACTICE, Attempt, Progress
+
+EXAMINATION = "exam"
+"""The exercise that an exam is about where none is named: a part of the name of its folder."""
+
+
+@click.command("start")
+@click.argument("exercise", required=False, shell_complete=exercise_argument)
+@click.option(
+    "--exam",
+    is_flag=True,
+    help="No hints, nothing ticks, one grading; another seed than for practice. Without EXERCISE, the examination.",
+)
+@click.option("--anew", is_flag=True, help="Begin anew where an attempt is under way; that one is kept.")
+@options.seed("your own")
+@click.option("--script", type=options.FILE, help="Do it by a script (.a7s).")
+@click.option("--link", metavar="tcp://HOST:PORT", help="Serve it there for any client instead of opening the console.")
+@click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp://{USUAL}.")
+@options.plain
+@student_options
+def start_(
+    exercise: str | None,
+    exam: bool,
+    anew: bool,
+    seed: int | None,
+    script: Path | None,
+    link: str | None,
+    serves: bool,
+    plain: bool,
+    home: Path | None,
+    student: str | None,
+) -> None:
+    """Sit down at EXERCISE, or go on with the attempt under way: its goal, a checklist that ticks itself, the console.
+
+    Example: a7sim train start 4
+    """
+    if exercise is None and not exam:
+        raise A7SimError(
+            "train start: expected EXERCISE, such as 4 (a7sim train list), or --exam for the examination, got none"
+        )
+    if sum((script is not None, link is not None, serves)) > 1:
+        raise A7SimError("train start: expected one of --script, --link and --serve, got several")
+    address = _address(link) if link is not None else USUAL if serves else None
+    played = read_script(script) if script is not None else None
+    shelved = find_exercise(exercise or EXAMINATION)
+    with progress_in(home) as progress:
+        attempt = _attempt(progress, shelved, student_name(student), EXAM if exam else PRACTICE, anew, seed)
+    with _entered(shelved, attempt) as room:
+        checklist = Checklist(room, attempt)
+        if shelved.exercise.paper and played is None:
+            _tell_of_papers(checklist)
+        elif played is not None:
+            trouble = play_script(room, played)
+            click.echo("\n".join(checklist.lines()))
+            if trouble:
+                raise A7SimError(trouble)
+        elif address is not None:
+            click.echo("\n".join(checklist.lines()))
+            _serve(room, address)
+        else:
+            open_console(room, checklist, plain)
+    click.echo(f"a7sim train verify {shelved.exercise.number} grades it; a7sim train start goes on with it")
+
+
+def _attempt(
+    progress: Progress, shelved: ExerciseFolder, student: str, mode: str, anew: bool, seed: int | None
+) -> Attempt:
+    there = progress.open_attempt(student, shelved.name)
+    if there is not None and not anew:
+        if there.mode == mode and seed in (None, there.seed):
+            return there
+        if there.mode == EXAM:
+            raise A7SimError(
+                f"{shelved.name}: expected --exam, since an exam is under way (verify ends it, --anew drops it)"
+            )
+    return progress.begin(student, shelved, mode, seed)
+
+
+def _entered(shelved: ExerciseFolder, attempt: Attempt) -> AbstractContextManager[AttemptEnvironment]:
+    journal = attempt.folder / JOURNAL
+    if journal.exists() and b"\n" in journal.read_bytes():
+        return resume_attempt(shelved, attempt.seed, attempt.folder)
+    return start_attempt(shelved, attempt.seed, attempt.folder, attempt.student, attempt.mode)
+
+
+def _address(text: str) -> Address:
+    url = re.fullmatch("tcp:(//)?(?P<address>.+)", text)
+    if not url:
+        raise A7SimError(f"--link: expected tcp://HOST:PORT, got {text!r}")
+    found = parse_address(url["address"], "--link")
+    if not found.loopback:
+        raise A7SimError(f"--link {text}: expected an address of this machine alone")
+    return found
+
+
+def _tell_of_papers(checklist: Checklist) -> None:
+    click.echo("\n".join([*checklist.lines(), "", checklist.room.shelved.text.strip(), ""]))
+    for key, about in checklist.exercise.answers.items():
+        click.echo(f"a7sim train answer {key}=...   {about}")
+
+
+def _serve(room: AttemptEnvironment, address: Address) -> None:
+    first = document_header("train start") | {
+        "scenario": room.shelved.exercise.title,
+        "variant": room.scenario.instrument.variant,
+    }
+    served = ServedInstrument(first, room.desk, room.clock, Journal())
+    run(serve(served, Endpoints([address]), ServerLimits(), StartupMessages(first, as_document=False, quiet=False)))

@@ -1,0 +1,563 @@
+"""Many plotters of one kind held as arrays, each with its own pictures and faults: the twin of `Autograph`.
+
+`who` are the indices ``(m,)`` of the instruments that are worked; what comes in and goes out has them as its last axis.
+An instrument that cannot do something does not do it, and says why when asked by `refused`.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from a7sim.batch import Indices, put, take
+from a7sim.geometry import GON, Array, length_of, mxm, mxv, plane_rotation, rotation
+from a7sim.instrument.autograph import COUNTED_FROM_ZERO, MOVE_CENTRES, guide_matrix
+from a7sim.instrument.batch_parts import AXES, BoolArray, Carriages, Carriers, Drums, PeriodicErrors, round_like_counter
+from a7sim.instrument.condition import INSTRUMENT_STREAM, draw_condition, local_coefficients, zero_error
+from a7sim.instrument.projection import place_on_carrier, projection_centre
+from a7sim.instrument.spindles import UNITS_A_DRUM
+from a7sim.plotters import COUNTER_DECIMALS, LEAST_COUNT, POSITIONS_OF, REQUIRED_FITTINGS, VARIANTS, Variant
+from a7sim.scenario.schema import Condition, Instrument, ProjectorCondition
+from a7sim.scene.photograph import Photograph
+
+SHIFTS = ("bx", "by1", "by2", "bz1", "bz2")
+"""Elements that turn no projector."""
+
+
+_RIGHT = {
+    arrangement: {name: POSITIONS_OF[name].index(position) for name, position in fittings.as_words().items()}
+    for arrangement, fittings in REQUIRED_FITTINGS.items()
+}
+"""Which of its two positions each fitting has by rights, by polarity and base."""
+
+
+@dataclass(frozen=True)
+class FittingEffects:
+    """What base, levers, prisms and collars of every instrument come to."""
+
+    uncrossed: BoolArray
+    """Where the left eye sees the left picture ``(instruments,)``."""
+    signs: Mapping[int, Array]
+    """Of what is seen of the picture in a projector ``(2, instruments)``, in um for a mm."""
+    senses: Array
+    """Of the handwheels X, Y and Z ``(3, instruments)``."""
+
+
+_OF_A_BUNDLE = 19
+"""Numbers that make the bundle of a projector."""
+
+
+class ProjectorBundles:
+    """The bundles of the projectors of many instruments, in rows of one array, so that a look picks them out once."""
+
+    def __init__(self, rows: Array) -> None:
+        self._rows = rows
+        sessions = rows.shape[-1]
+        self.turned = rows[:9].reshape(3, 3, sessions)
+        self.centre = rows[9:12]
+        self.swung = rows[12:16].reshape(2, 2, sessions)
+        """By the swing of the projector, which its picture is seen with."""
+        self.principal_point = rows[16:18]
+        self.c = rows[18]
+
+    def take(self, who: Indices) -> "ProjectorBundles":
+        """Return those of some, to be read at once and not written to."""
+        return self if who.size == self.c.size else ProjectorBundles(take(self._rows, who))
+
+
+class AutographBatch:
+    """Plotters worked by their handles, all together. Lengths in mm, angles in gon, as the counters count them."""
+
+    def __init__(
+        self,
+        variant: Variant,
+        conditions: Sequence[Condition],
+        photographs: Sequence[Mapping[str, Photograph]],
+        laying_sigmas: tuple[float, float],
+        rngs: Sequence[np.random.Generator],
+    ) -> None:
+        self.variant = variant
+        self.instruments = len(conditions)
+        self._conditions = conditions
+        self._photographs = photographs
+        self._laying_sigmas = laying_sigmas
+        self._rngs = rngs
+        self._refusals: dict[int, list[str]] = {}
+        everywhere = np.arange(self.instruments)
+        self._drums = {name: self._element_drums(name) for name in variant.elements}
+        carriage_play = self._of_conditions(lambda condition: condition.carriage_backlash_mm)
+        self._carriages = Carriages(variant, carriage_play, self._carriage_runouts())
+        self._slip_shares = self._of_conditions(lambda condition: condition.counter_slip_share)
+        self._no_slips = not self._slip_shares.any()
+        self._units = np.array([variant.scales[axis].units_per_mm for axis in AXES])
+        self._decimals = [COUNTER_DECIMALS] * len(AXES)
+        self._offsets = np.empty((len(AXES), self.instruments))
+        self._reset_offsets(everywhere)
+        self._guides = np.stack([guide_matrix(condition) for condition in conditions], axis=-1)
+        self._rods = {n: self._where_any(1e-3 * self._of_projectors(n, lambda each: each.rod_um)) for n in (1, 2)}
+        self._local = {n: self._local_errors(n) for n in (1, 2)}
+        self._axes = {n: 1e-3 * self._of_projectors(n, lambda projector: projector.axes_um) for n in (1, 2)}
+        self._carriers: dict[int, Carriers] = {}
+        self._base_inside = np.ones(self.instruments, dtype=bool)
+        self._fittings = {name: np.zeros(self.instruments, dtype=np.intp) for name in POSITIONS_OF}
+        self._levers: FittingEffects | None = None
+        self._put_right_fittings(everywhere)
+        self._bundles = {n: ProjectorBundles(np.zeros((_OF_A_BUNDLE, self.instruments))) for n in (1, 2)}
+        for n, each in self._bundles.items():
+            each.principal_point[:] = 1e-3 * self._of_projectors(n, lambda projector: projector.principal_point_um)
+        self._missed = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
+        """By how much the axes miss the centre, in the frame (see `pose`)."""
+        self._common = np.zeros((3, 3, self.instruments))
+        """The rotation by the common Phi, where there is one."""
+        self._told = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
+        """Where the drums say that the centres stand."""
+        for n in (1, 2):
+            self._stand(everywhere, n)
+
+    def _of_conditions(self, value: Callable[[Condition], float]) -> Array:
+        return np.array([value(condition) for condition in self._conditions])
+
+    def _of_projectors(self, n: int, values: Callable[[ProjectorCondition], Sequence[float]]) -> Array:
+        each_row = np.array([values(each.left if n == 1 else each.right) for each in self._conditions])
+        return np.ascontiguousarray(each_row.T)
+
+    def _local_errors(self, n: int) -> Array | None:
+        found = [local_coefficients(each.left if n == 1 else each.right) for each in self._conditions]
+        shape = next((each.shape for each in found if each is not None), None)
+        if shape is None:
+            return None
+        return np.stack([np.zeros(shape) if each is None else each for each in found], axis=-1)
+
+    def _where_any(self, values: Array) -> Array | None:
+        return values if values.any() else None
+
+    def _carriage_runouts(self) -> PeriodicErrors | None:
+        amplitude = 1e-3 * np.array([condition.carriage_periodic_um for condition in self._conditions]).T.copy()
+        phase = GON * np.array([condition.carriage_periodic_phase_gon for condition in self._conditions]).T.copy()
+        return PeriodicErrors(amplitude, self.variant.carriage_lead_mm, phase) if amplitude.any() else None
+
+    def _element_drums(self, name: str) -> Drums:
+        element = self.variant.elements[name]
+        angular = element.unit == "gon"
+        play = self._of_conditions(lambda each: each.backlash_gon if angular else each.backlash_mm)
+        sigma = self._of_conditions(lambda each: each.setting_sigma_gon if angular else each.setting_sigma_mm)
+        fault = self._of_conditions(lambda each: zero_error(each, name))
+        return Drums(element.zero, element.low, element.high, element.endless, play, sigma, fault)
+
+    # --- refusals -------------------------------------------------------------------------------------
+
+    def pop_errors(self, who: Indices) -> dict[int, list[str]]:
+        """Return what was refused since the last asking, by instrument."""
+        return {int(each): self._refusals.pop(int(each)) for each in who if int(each) in self._refusals}
+
+    def _refuse(self, who: Indices, why: str, number: int = -222) -> None:
+        for each in who:
+            self._refusals.setdefault(int(each), []).append(f'{number},"{why}"')
+
+    # --- elements -------------------------------------------------------------------------------------
+
+    def elements(self, who: Indices, names: Sequence[str]) -> dict[str, Array]:
+        """Return what the counters of elements show ``(m,)``."""
+        return {name: self._drums[name].shown(who) for name in names}
+
+    def set_element(self, who: Indices, name: str, values: Array) -> None:
+        """Set an element through its counters to values ``(m,)``, to the least count."""
+        self._run_element(who, name, np.round(values / LEAST_COUNT) * LEAST_COUNT, self._rngs)
+
+    def turn_element(self, who: Indices, name: str, amounts: Array) -> None:
+        """Turn the drums of an element by so much ``(m,)``, to wherever between two counts that is."""
+        self._run_element(
+            who, name, self._drums[name].value_after_turn(who, amounts) if name in self._drums else amounts
+        )
+
+    def _run_element(self, who: Indices, name: str, targets: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
+        if name not in self._drums:
+            self._refuse(who, f"an {self.variant.name} has no {name}", -221)
+            return
+        drums = self._drums[name]
+        allowed = drums.within_range(targets)
+        moved = [n for n in (1, 2) if name in ("bx", "common_phi") or name.endswith(str(n))]
+        told: dict[int, Array] = {}
+        if name in MOVE_CENTRES:
+            told = {n: self._centres_told(who, n, {name: targets}) for n in moved}
+            allowed &= self._rods_can(who, told)
+        if not allowed.all():
+            self._refuse(who[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
+            who, targets = who[allowed], targets[allowed]
+            told = {n: each.compress(allowed, axis=-1) for n, each in told.items()}
+        drums.turn_to(who, targets, rngs)
+        for n in moved:
+            if name in SHIFTS:
+                self._shift(who, n, told[n])
+            else:
+                self._stand(who, n)
+
+    def set_base_mode(self, who: Indices, mode: str) -> None:
+        """Set base inside or outside."""
+        inside = mode == "inside"
+        base_inside = np.full(who.size, inside)
+        able = self._rods_can(who, {n: self._centres_told(who, n, base_inside=base_inside) for n in (1, 2)})
+        self._refuse(who[~able], f"Data out of range;base {mode}: beyond the range of the rods")
+        self._base_inside[who[able]] = inside
+        self._levers = None
+        for n in (1, 2):
+            self._stand(who, n)
+
+    def fitting(self, who: Indices, name: str) -> npt.NDArray[np.str_]:
+        """Return the positions ``(m,)`` in which a fitting stands."""
+        return np.array(POSITIONS_OF[name])[self._fittings[name][who]]
+
+    def set_fitting(self, who: Indices, name: str, position: str) -> None:
+        """Put a fitting into one of its two positions."""
+        self._fittings[name][who] = POSITIONS_OF[name].index(position)
+        self._levers = None
+
+    def reset(self, who: Indices) -> None:
+        """Run every element that has a counter zero to it, base inside, fittings for a positive, presets off."""
+        for name, drums in self._drums.items():
+            if name not in ("c1", "c2"):
+                drums.turn_to(who, np.full(who.size, self.variant.elements[name].zero), self._rngs)
+        self._base_inside[who] = True
+        self._put_right_fittings(who)
+        self._reset_offsets(who)
+        for n in (1, 2):
+            self._stand(who, n)
+
+    def _reset_offsets(self, who: Indices) -> None:
+        for axis, scale in self.variant.scales.items():
+            self._offsets[AXES.index(axis), who] = scale.at_origin
+
+    def _put_right_fittings(self, who: Indices) -> None:
+        for name, position in REQUIRED_FITTINGS["positive", "inside"].as_words().items():
+            self.set_fitting(who, name, position)
+
+    # --- carriages, counters, gears -------------------------------------------------------------------
+
+    def counter(self, who: Indices, axis: str) -> Array:
+        """Return what the X, Y or Z counters show ``(m,)``."""
+        row = AXES.index(axis)
+        return round_like_counter(self._unrounded(who, row, self._carriages.at[row][who]), self._decimals[row])
+
+    def counters(self, who: Indices) -> Array:
+        """Return what the X, Y and Z counters show ``(3, m)``."""
+        readings = take(self._offsets, who) + self._units[:, None] * take(self._carriages.at, who)
+        if len(set(self._decimals)) == 1:
+            return round_like_counter(readings, self._decimals[0])
+        return np.array(
+            [round_like_counter(each, decimals) for each, decimals in zip(readings, self._decimals, strict=True)]
+        )
+
+    def _unrounded(self, who: Indices, row: int, position: Array) -> Array:
+        return np.asarray(self._offsets[row][who] + self._units[row] * position)
+
+    def preset(self, who: Indices, axis: str, reading: float) -> None:
+        """Make the counters show a reading where their carriages stand."""
+        row = AXES.index(axis)
+        shown = round(reading, self._decimals[row])
+        self._offsets[row, who] = shown - self._units[row] * self._carriages.at[row][who]
+
+    def set_height_gear(self, who: Indices, gear: str | float) -> None:
+        """Engage a height gear; all instruments have the same."""
+        units, decimals = float(gear) if not isinstance(gear, str) else 0.0, COUNTER_DECIMALS
+        if isinstance(gear, str):
+            engaged = self.variant.height_gears[gear]
+            units, decimals = engaged.units_per_mm, engaged.decimals
+        row = AXES.index("Z")
+        position = self._carriages.at[row][who]
+        reading = self._unrounded(who, row, position)
+        self._units[row], self._decimals[row] = units, decimals
+        self._offsets[row, who] = round_like_counter(reading, decimals) - units * position
+
+    def drive(self, who: Indices, axis: str, readings: Array) -> BoolArray:
+        """Run carriages until their counters show readings ``(m,)``; return which went."""
+        row = AXES.index(axis)
+        wanted = round_like_counter(readings, self._decimals[row])
+        went = self._move(who, row, (wanted - self._offsets[row][who]) / self._units[row])
+        slipping = went & (self._slip_shares[who] > 0.0)
+        if slipping.any():
+            again = (wanted[slipping] - self._offsets[row][who[slipping]]) / self._units[row]
+            off = np.abs(again - self._carriages.at[row][who[slipping]]) > self._half_a_count(row)
+            self._move(who[slipping][off], row, again[off], silently=True)
+        return went
+
+    def _half_a_count(self, row: int) -> float:
+        return float(0.5000001 * 10.0 ** -self._decimals[row] / self._units[row])
+
+    def turn_handwheels(self, who: Indices, amounts: Array) -> None:
+        """Turn the handwheels X, Y and, where there is a third, Z by so many counter units ``(k, m)``, in that order.
+
+        Their collars decide which way the carriages go.
+        """
+        k = len(amounts)
+        before = take(self._carriages.at, who)
+        steps = take(self._levers_stand.senses[:k], who) * amounts / self._units[:k, None]
+        after = before[:k] + steps
+        if self._no_slips and who.size:
+            low, high = after.min(axis=1), after.max(axis=1)
+            if self._carriages.range_contains(low, high) and self._rods_surely_can(who, before, low, high):
+                self._carriages.move_to(who, 0, after)
+                return
+        for row, each in enumerate(after):
+            self._move(who, row, each)
+
+    def _move(self, who: Indices, row: int, positions: Array, silently: bool = False) -> BoolArray:
+        positions = self._carriages.snap_to_end(row, positions, self._half_a_count(row))
+        before = self._carriages.at[row, who]
+        mark = take(self._carriages.at, who).copy()
+        mark[row] = positions
+        allowed = self._carriages.within_range(row, positions) & self._rods_can(who, mark=mark)
+        if not silently:
+            self._refuse(who[~allowed], f"Data out of range;{AXES[row]}: beyond its range or that of the rods")
+        who, positions = who[allowed], positions[allowed]
+        self._slip(who, row, before[allowed], positions)
+        self._carriages.move_to(who, row, positions[None])
+        return np.asarray(allowed)
+
+    def _slip(self, who: Indices, row: int, before: Array, after: Array) -> None:
+        """Let counters miss carries on the way from one position ``(m,)`` to another (see `Counter.passed`)."""
+        if self._no_slips:
+            return
+        for i in np.flatnonzero(self._slip_shares[who] > 0.0):
+            each = who[i]
+            first, last = (
+                math.floor((self._offsets[row, each] + self._units[row] * position[i]) / UNITS_A_DRUM)
+                for position in (before, after)
+            )
+            if first != last:
+                missed = self._rngs[each].binomial(abs(last - first), self._slip_shares[each])
+                self._offsets[row, each] -= math.copysign(missed * UNITS_A_DRUM, last - first)
+
+    def _rods_can(
+        self, who: Indices, centres: Mapping[int, Array] | None = None, mark: Array | None = None
+    ) -> BoolArray:
+        """Return where no rod comes beyond its limit, nor further beyond it, with other centres or marks ``(3, m)``."""
+        now = take(self._carriages.at, who)
+        mark = now if mark is None else mark
+        able = np.ones(who.size, dtype=bool)
+        for n in (1, 2) if centres is None else centres:
+            beside, below = _reach(take(self._told[n], who) if centres is None else centres[n], mark)
+            if (beside < self._surely_within * below).all():
+                continue
+            then = np.arctan2(beside, below) / GON
+            beyond = then > self.variant.rod_limit_gon
+            if beyond.any():
+                able &= ~beyond | (then <= np.arctan2(*_reach(take(self._told[n], who), now)) / GON)
+        return able
+
+    def _rods_surely_can(self, who: Indices, before: Array, low: Array, high: Array) -> bool:
+        """Return whether all carriages can go from marks ``(3, m)`` to between others ``(k,)``, one axis after another.
+
+        Looks at the box that holds all marks, seen from that which holds all centres.
+        """
+        k = len(low)
+        lowest, highest = before.min(axis=1), before.max(axis=1)
+        lowest[:k], highest[:k] = np.minimum(lowest[:k], low), np.maximum(highest[:k], high)
+        for n in (1, 2):
+            told = take(self._told[n], who)
+            least, most = told.min(axis=1), told.max(axis=1)
+            x, y, _ = np.maximum(highest - least, most - lowest)
+            if not math.hypot(x, y) < self._surely_within * (least[2] - highest[2]):
+                return False
+        return True
+
+    @property
+    def _surely_within(self) -> float:
+        """How far to the side a rod may reach for all the depth, well within its limit."""
+        return 0.99 * math.tan(self.variant.rod_limit_gon * GON)
+
+    def _centres_told(
+        self,
+        who: Indices,
+        n: int,
+        elements: Mapping[str, Array] = MappingProxyType({}),
+        base_inside: BoolArray | None = None,
+    ) -> Array:
+        """Return where the drums say ``(3, m)`` that centres stand, or would with other elements or another base."""
+
+        def drum(name: str) -> Array:
+            if name in elements:
+                return elements[name]
+            return take(self._drums[name].at, who) if name in self._drums else np.zeros(who.size)
+
+        inside = take(self._base_inside, who) if base_inside is None else base_inside
+        x, y, z = self._shares(n, inside) * drum("bx"), -drum(f"by{n}"), drum(f"bz{n}")
+        if "common_phi" in self._drums:
+            tilt = (drum("common_phi") - self.variant.elements["common_phi"].zero) * GON
+            x, z = x * np.cos(tilt) + z * np.sin(tilt), z * np.cos(tilt) - x * np.sin(tilt)
+        return np.array([x, y, z])
+
+    def _shares(self, n: int, inside: BoolArray) -> Array:
+        """Return where projectors stand along X ``(m,)``, as shares of bx."""
+        left, right = self.variant.centres_on_base
+        return np.where(inside == (n == 1), left, right)
+
+    # --- pictures -------------------------------------------------------------------------------------
+
+    def load(self, who: Indices, projector: int, name: str) -> None:
+        """Put a photograph on the carriers of a projector, by hand."""
+        photographs = [each[name] for each in self._photographs]
+        laid = np.zeros((3, self.instruments))
+        shift, turn = self._laying_sigmas
+        for each in who:
+            upside_down = 200.0 if photographs[each].placement == "upside down" else 0.0
+            laid[:, each] = self._rngs[each].standard_normal(3) * (shift, shift, turn) + (0.0, 0.0, upside_down)
+        self._carriers[projector] = Carriers(photographs, laid)
+        self._levers = None
+
+    def unload(self, who: Indices, projector: int) -> None:
+        """Take the photographs off the carriers of a projector."""
+        del self._carriers[projector]
+        self._levers = None
+
+    def loaded(self, projector: int) -> str:
+        """Return the name of the photograph in a projector, empty for none."""
+        carriers = self._carriers.get(projector)
+        return carriers.name if carriers else ""
+
+    def carriers(self, projector: int) -> Carriers:
+        """Return the carriers of a projector, which hold pictures."""
+        return self._carriers[projector]
+
+    # --- the space rods and the view ------------------------------------------------------------------
+
+    def _stand(self, who: Indices, n: int) -> None:
+        """Put the projectors where their elements, the base and their faults bring them."""
+        omega, phi, kappa = (self._really(who, f"{name}{n}") * GON for name in ("omega", "phi", "kappa"))
+        turned = rotation(omega, phi, kappa)
+        self._missed[n][:, who] = mxv(turned, take(self._axes[n], who))
+        if "common_phi" in self._drums:
+            common = rotation(0.0, self._really(who, "common_phi") * GON, 0.0)
+            self._common[:, :, who] = common
+            turned = mxm(common, turned)
+        bundles = self._bundles[n]
+        bundles.turned[:, :, who] = turned
+        bundles.swung[:, :, who] = plane_rotation(kappa)
+        put(self._drums[f"c{n}"].position(who), who, bundles.c)
+        self._shift(who, n, self._centres_told(who, n))
+
+    def _shift(self, who: Indices, n: int, told: Array) -> None:
+        """Put the projectors, turned as they stand, where base, by and bz bring them and these are told ``(3, m)``."""
+        base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
+        place = projection_centre(self._shares(n, take(self._base_inside, who)), *base)
+        centre = place + take(self._missed[n], who) - take(self._axes[n], who)
+        if "common_phi" in self._drums:
+            centre = mxv(take(self._common, who), centre)
+        put(centre, who, self._bundles[n].centre)
+        put(told, who, self._told[n])
+
+    def _really(self, who: Indices, name: str) -> Array:
+        if name not in self._drums:
+            return np.zeros(who.size)
+        position = self._drums[name].position(who)
+        return position - self.variant.elements[name].zero if name in COUNTED_FROM_ZERO else position
+
+    def pose(self, who: Indices, projector: int) -> tuple[Array, Array]:
+        """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
+        bundles = self._bundles[projector].take(who)
+        return bundles.centre, bundles.turned
+
+    def readings_at(self, who: Indices, place: Array) -> dict[str, Array]:
+        """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
+        guides = np.moveaxis(self._guides[:, :, who], -1, 0)
+        carriage = np.asarray(np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T, dtype=float)
+        free = self._carriages.position_without_periodic_error(who, carriage)
+        return {axis: self._unrounded(who, row, free[row]) for row, axis in enumerate(AXES)}
+
+    def mark(self, who: Indices) -> Array:
+        """Return where the floating marks really stand ``(3, m)``."""
+        return mxv(take(self._guides, who), self._carriages.position(who))
+
+    def _mark_on_carrier(self, who: Indices, projector: int, bundles: ProjectorBundles, mark: Array) -> Array:
+        """Return the places ``(2, m)`` in mm on carriers where the space rods bring floating marks ``(3, m)``."""
+        local, rods = self._local[projector], self._rods[projector]
+        return place_on_carrier(
+            mark,
+            bundles.centre,
+            bundles.turned,
+            bundles.c,
+            bundles.principal_point,
+            None if local is None else take(local, who),
+            None if rods is None else take(rods, who),
+        )
+
+    def eyepiece(self, who: Indices, eye: int, name: str) -> Array:
+        """Return dx, dy ``(2, m)`` in um at photo scale of an image point from the mark, nan outside the field."""
+        return self._in_eyepiece(who, eye, name, self.mark(who))
+
+    def both_eyepieces(self, who: Indices, name: str) -> Array:
+        """Return dx, dy in the left eyepiece and dx, dy in the right one ``(4, m)``, as `eyepiece` does."""
+        mark = self.mark(who)
+        return np.concatenate([self._in_eyepiece(who, eye, name, mark) for eye in (1, 2)])
+
+    def _in_eyepiece(self, who: Indices, eye: int, name: str, mark: Array) -> Array:
+        straight = take(self._levers_stand.uncrossed, who)
+        ways = ((eye, straight), (3 - eye, ~straight))
+        for projector, looking in ways:
+            if projector in self._carriers and looking.all():
+                return self._seen_in(who, projector, name, mark)
+        seen = np.full((2, who.size), np.nan)
+        for projector, looking in ways:
+            if projector in self._carriers and looking.any():
+                seen[:, looking] = self._seen_in(who[looking], projector, name, mark[:, looking])
+        return seen
+
+    def _seen_in(self, who: Indices, projector: int, name: str, mark: Array) -> Array:
+        bundles = self._bundles[projector].take(who)
+        displacement = self._carriers[projector].point(who, name) - self._mark_on_carrier(who, projector, bundles, mark)
+        turned = mxv(bundles.swung, displacement)
+        shown = take(self._levers_stand.signs[projector], who) * turned
+        return np.where(length_of(displacement) <= self.variant.field_radius_mm, shown, np.nan)
+
+    # --- levers, prisms, collars ----------------------------------------------------------------------
+
+    @property
+    def _levers_stand(self) -> FittingEffects:
+        if self._levers is None:
+            signs = {n: 1e3 * self._mirrored(carriers.polarity) for n, carriers in self._carriers.items()}
+            self._levers = FittingEffects(
+                self._straight(), signs, np.array([self._wheel_senses(axis) for axis in AXES])
+            )
+        return self._levers
+
+    def _straight(self) -> BoolArray:
+        if "triangulation" in self.variant.fittings:
+            return np.asarray(self._fittings["triangulation"] == POSITIONS_OF["triangulation"].index("back"))
+        return self._base_inside.copy()
+
+    def _mirrored(self, polarity: str) -> Array:
+        signs = np.ones((2, self.instruments))
+        for row, name in enumerate(("diapositive", "dove")):
+            if name not in self.variant.fittings:
+                continue
+            right = np.where(self._base_inside, _RIGHT[polarity, "inside"][name], _RIGHT[polarity, "outside"][name])
+            signs[row, self._fittings[name] != right] = -1.0
+        return signs
+
+    def _wheel_senses(self, axis: str) -> Array:
+        collar = f"{axis.lower()}collar"
+        if collar not in self.variant.fittings:
+            return np.ones(self.instruments)
+        polarity = next((carriers.polarity for carriers in self._carriers.values()), "positive")
+        return np.where(self._fittings[collar] == _RIGHT[polarity, "inside"][collar], 1.0, -1.0)
+
+
+def _reach(centre: Array, mark: Array) -> tuple[Array, Array]:
+    """Return how far marks ``(3, m)`` lie beside centres ``(3, m)`` and below them ``(m,)``."""
+    return np.hypot(mark[0] - centre[0], mark[1] - centre[1]), centre[2] - mark[2]
+
+
+def build_batch(
+    instrument: Instrument, photographs: Sequence[Mapping[str, Photograph]], seeds: Sequence[int]
+) -> AutographBatch:
+    """Return the instruments of a scenario, one a seed, with their photographs in their drawers."""
+    rngs = [np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM,))) for seed in seeds]
+    return AutographBatch(
+        VARIANTS[instrument.variant],
+        [draw_condition(instrument, seed) for seed in seeds],
+        photographs,
+        (instrument.laying_sigma_mm, instrument.laying_sigma_gon),
+        rngs,
+    )

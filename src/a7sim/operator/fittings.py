@@ -1,0 +1,47 @@
+"""The levers, prisms and collars: where they belong, and looking at them when the picture is plainly wrong."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from a7sim.batch import Indices
+from a7sim.operator.controls import Controls
+from a7sim.operator.driver import BoolArray
+from a7sim.plotters import REQUIRED_FITTINGS, Variant
+
+FITTING_NAMES: Mapping[str, str] = MappingProxyType(
+    {
+        "dove": "Dove prisms",
+        "triangulation": "triangulation lever",
+        "diapositive": "diapositive lever",
+        "xcollar": "collar of the X wheel",
+        "ycollar": "collar of the Y wheel",
+    }
+)
+
+
+def required_fittings(manual: Variant, polarity: str, base: str) -> dict[str, str]:
+    """Return by name where the fittings that a plotter has belong, for pictures of a polarity and a base."""
+    words = REQUIRED_FITTINGS[polarity, base].as_words()
+    return {name: position for name, position in words.items() if name in manual.fittings}
+
+
+def correct_fittings(seat: Controls, who: Indices) -> BoolArray:
+    """Look at every lever and put right those that were forgotten, with a remark.
+
+    Return for whom there was one ``(m,)`` and all now stands as the table asks; a lever that does not stay is no help.
+    """
+    crew, hands, model = seat.crew, seat.hands, seat.model
+    mended, astray = np.zeros((2, who.size), dtype=bool)
+    for name, position in required_fittings(seat.manual, model.polarity, model.base).items():
+        crew.spend(who, crew.observer.seconds_to_look, "looking")
+        wrong = hands.fitting(who, name) != position
+        if wrong.any():
+            them = who[wrong]
+            seat.spend_setting(them)
+            hands.set_fitting(them, name, position)
+            astray[wrong] |= hands.fitting(them, name) != position
+            mended |= wrong
+            crew.remark(them, f"{model.name}: the {FITTING_NAMES[name]} had been forgotten: put {position}")
+    return mended & ~astray

@@ -1,0 +1,129 @@
+"""A file that is only added to, a whole line at a time, and is on the disk when it has to be."""
+
+import fcntl
+import os
+import threading
+from contextlib import suppress
+from pathlib import Path
+from typing import Literal, get_args
+
+from a7sim.errors import A7SimError
+
+Durability = Literal["always", "records", "none"]
+"""When a line is on the disk before anybody goes on: always, where it registers something, or when it pleases the
+operating system."""
+
+DURABILITIES: tuple[Durability, ...] = get_args(Durability)
+
+SYNCED_WITHIN_S = 0.2
+"""Wall-clock s after which all lines are on the disk, but for 'none'."""
+
+_on_disk = getattr(os, "fdatasync", os.fsync)
+
+
+class JournalWriteError(A7SimError):
+    """A journal that can no longer be written, while its session goes on."""
+
+
+class AppendOnlyFile:
+    """A file of lines. What `add` has returned from, the operating system has: no end of this process loses it."""
+
+    def __init__(self, path: Path, durability: Durability = "records", size: int = 0) -> None:
+        """Open a file, new or to go on behind its first `size` bytes. Raises Mistake where it cannot be written."""
+        self._path = path
+        self._durability = durability
+        self._size = size
+        self._trouble: JournalWriteError | None = None
+        self._pending = threading.Event()
+        self._closing = threading.Event()
+        try:
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.ftruncate(self._file, size)
+            _sync_folder(path.parent)
+        except BlockingIOError as error:
+            raise A7SimError(f"{path}: expected a session that is over, got one that is being written") from error
+        except OSError as error:
+            raise A7SimError(f"{path}: expected a journal that can be written: {error.strerror}") from error
+        self._syncing = threading.Thread(target=self._sync_now_and_then, name="journal", daemon=True)
+        if durability == "records":
+            self._syncing.start()
+
+    def add(self, line: bytes, at_once: bool = False) -> None:
+        """Add a line, with its end; `at_once` where it is to be on the disk before this returns.
+
+        Raises JournalStopped where that fails: then the line is not there, and no other can be added.
+        """
+        if self._trouble is not None:
+            raise self._trouble
+        try:
+            written = os.write(self._file, line)
+            while written < len(line):
+                written += os.write(self._file, line[written:])
+            self._size += written
+            if self._durability == "always" or (at_once and self._durability == "records"):
+                _on_disk(self._file)
+            elif not self._pending.is_set():
+                self._pending.set()
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def close(self) -> None:
+        """Bring everything to the disk and close the file."""
+        self._closing.set()
+        self._pending.set()
+        if self._syncing.is_alive():
+            self._syncing.join()
+        if self._durability != "none" and self._trouble is None:
+            self._sync()
+        os.close(self._file)
+        if self._trouble is not None:
+            raise self._trouble
+
+    def _sync_now_and_then(self) -> None:
+        while not self._closing.is_set():
+            self._pending.wait()
+            self._closing.wait(SYNCED_WITHIN_S / 2.0)
+            self._pending.clear()
+            self._sync()
+
+    def _sync(self) -> None:
+        try:
+            _on_disk(self._file)
+        except OSError as error:
+            self._failed(error)
+
+    def _failed(self, error: OSError) -> JournalWriteError:
+        self._trouble = write_failure_message(self._path, error)
+        with suppress(OSError):
+            os.ftruncate(self._file, self._size)
+        return self._trouble
+
+
+def is_being_written(path: Path) -> bool:
+    """Return whether somebody writes a file of lines now."""
+    try:
+        file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(file)
+    return False
+
+
+def write_failure_message(path: Path, error: OSError) -> JournalWriteError:
+    """Return what is said where a file of a journal can no longer be written."""
+    return JournalWriteError(f"{path}: it can no longer be written, so the session stops here: {error.strerror}")
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring the name of a new file to the disk."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

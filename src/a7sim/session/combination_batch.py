@@ -1,0 +1,146 @@
+"""Strips of every case of one model with every case of the next, for many sessions at once on arrays (thesis 4.3)."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from a7sim.errors import A7SimError
+from a7sim.geometry import Array
+from a7sim.reduction import Ground, GroundFit, Model, Strip, Undetermined, formed_strip
+from a7sim.reduction.absolute import fitted_to_ground, root_mean_square
+from a7sim.result_documents import Document
+from a7sim.scenario.schema import StripPlan
+from a7sim.session.strips import models_from_documents, orient_strip, oriented_strip_document
+
+CHUNK_SIZE = 64
+"""Replicates on one array, so that memory stays small."""
+
+Replicate = Mapping[str, Document]
+"""The documents of the sessions of one seed, by case."""
+Cases = tuple[str, ...]
+"""Of a strip's models."""
+
+
+def cases_of_strips(cases: Sequence[str], models: int) -> list[Cases]:
+    """Return the cases of the models of every strip, in the order in which `combinations` numbers them."""
+    return list(product(cases, repeat=models))
+
+
+def combine_strips(
+    replicates: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan
+) -> Iterator[list[Document]]:
+    """Yield a document for each strip of each replicate, as if one session had worked its models in these cases.
+
+    It holds models, hours, and the strip with its joins and accuracy; its `status` is that of the session that gave up,
+    if a model is of such a one. No digit of a replicate depends on those beside it. Raises Mistake for models that make
+    no strip.
+    """
+    for first in range(0, len(replicates), CHUNK_SIZE):
+        some = replicates[first : first + CHUNK_SIZE]
+        strips = _on_arrays(some, models, ground, plan)
+        for i, each in enumerate(some):
+            yield [
+                _document(each, cases, strips.get((i, cases)) or _by_itself(each, cases, ground, plan))
+                for cases in cases_of_strips(tuple(each), models)
+            ]
+
+
+def _on_arrays(
+    some: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan
+) -> dict[tuple[int, Cases], Document]:
+    """Return the strips of replicates of which every session has the same points and the control is full."""
+    groups: dict[tuple[Cases, ...], list[tuple[int, dict[str, list[Model]]]]] = defaultdict(list)
+    for i, replicate in enumerate(some):
+        if plan.polynomial is None and all(each["status"] == "complete" for each in replicate.values()):
+            by_case = {case: models_from_documents(each["models"]) for case, each in replicate.items()}
+            alike = {tuple(model.points for model in each) for each in by_case.values()}
+            if len(alike) == 1:
+                groups[alike.pop()].append((i, by_case))
+    return {key: strip for group in groups.values() for key, strip in _of_group(group, models, ground, plan)}
+
+
+def _of_group(
+    group: Sequence[tuple[int, Mapping[str, Sequence[Model]]]], models: int, ground: Ground, plan: StripPlan
+) -> Iterator[tuple[tuple[int, Cases], Document]]:
+    first = group[0][1]
+    of_strips = cases_of_strips(tuple(first), models)
+    stacked = []
+    for place, model in enumerate(next(iter(first.values()))):
+        by_case = {case: np.stack([each[case][place].coordinates for _, each in group], axis=-1) for case in first}
+        each_strip = np.stack([by_case[cases[place]] for cases in of_strips], axis=-1)
+        stacked.append(Model(model.name, model.points, each_strip.reshape((*each_strip.shape[:2], -1))))
+    if not _full_control(stacked, ground):
+        return
+    try:
+        strip = formed_strip(stacked, plan.join)
+        fit = fitted_to_ground(strip.as_model, ground)[1]
+    except Undetermined as undetermined:
+        raise A7SimError(f"strips of all cases: {undetermined}") from undetermined
+    keys = [(i, cases) for i, _ in group for cases in of_strips]
+    yield from zip(keys, _documents(strip, fit), strict=True)
+
+
+def _full_control(models: Sequence[Model], ground: Ground) -> bool:
+    """Return whether a strip is fitted to its control in closed form, member by member."""
+    names = {name for model in models for name in model.points}
+    return all(role in ("control", "check") for role in ground.among(tuple(names)).roles)
+
+
+def _documents(strip: Strip, fit: GroundFit) -> Iterator[Document]:
+    """Yield a document a member of a batch: what `of_grounded` says of joins and accuracy, without single points."""
+    joins = [(join.before, join.after, join.scale.tolist(), join.max_residual.tolist()) for join in strip.joins]
+    on = {
+        which: _accuracy(residuals)
+        for which, residuals in (("control", fit.at_control), ("checks", fit.at_checks))
+        if np.isfinite(residuals).any()
+    }
+    for member in range(fit.computed.shape[-1]):
+        yield {
+            "joins": [
+                {"models": [before, after], "scale": scale[member], "max_residual_mm": worst[member]}
+                for before, after, scale, worst in joins
+            ],
+            "accuracy_m": {
+                which: {"rms": {"X": x[member], "Y": y[member], "Z": z[member]}, "plan": p[member], "height": z[member]}
+                for which, (x, y, z, p) in on.items()
+            },
+        }
+
+
+def _accuracy(residuals: Array) -> tuple[list[float], ...]:
+    """Return the rms in X, Y and Z and in plan of residuals ``(3, m, members)``."""
+    x, y, z = root_mean_square(residuals)
+    return tuple(each.tolist() for each in (x, y, z, np.hypot(x, y)))
+
+
+def _by_itself(replicate: Replicate, cases: Cases, ground: Ground, plan: StripPlan) -> Document:
+    if any(replicate[case]["status"] != "complete" for case in cases):
+        return {}
+    models = [models_from_documents(replicate[case]["models"])[place] for place, case in enumerate(cases)]
+    try:
+        return oriented_strip_document(orient_strip(models, ground, plan.join, plan.polynomial))
+    except Undetermined as undetermined:
+        raise A7SimError(f"strip of the cases {' and '.join(cases)}: {undetermined}") from undetermined
+
+
+def _document(replicate: Replicate, cases: Cases, strip: Document) -> Document:
+    gave_up = next((replicate[case] for case in cases if replicate[case]["status"] != "complete"), None)
+    if gave_up is not None:
+        return {"status": gave_up["status"], "message": gave_up["message"]}
+    models = [replicate[case]["models"][place] for place, case in enumerate(cases)]
+    seconds = sum(_seconds(replicate[case]["models"], place) for place, case in enumerate(cases))
+    return {
+        "status": "complete",
+        "message": "",
+        "models": models,
+        "strip": strip,
+        "operator": {"hours": round(seconds / 3600.0, 3)},
+    }
+
+
+def _seconds(models: Sequence[Document], place: int) -> float:
+    """Return how long a model took in its session, s."""
+    before = models[place - 1]["finished_at_s"] if place else 0.0
+    return float(models[place]["finished_at_s"] - before)

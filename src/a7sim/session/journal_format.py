@@ -1,0 +1,153 @@
+"""The lines of a journal: JSON, each with a checksum that follows from all before it; how they are made and read."""
+
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from a7sim.errors import A7SimError
+
+SCHEMA_VERSION = 3
+
+READABLE_VERSIONS = (2, 3)
+"""Schema versions that are read; version 2 had the whole scenario in its header."""
+
+_END_OF_LINE = b',"crc":"%08x"}'
+_LENGTH_OF_END = len(_END_OF_LINE % 0)
+
+
+class Event(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What a journal holds of one moment, `t` being the simulated time in s.
+
+    Where `kind` is empty, something that happened on the link (`LinkEvent`). Else 'entry', an entry of the
+    observation book; 'strike', the striking out of one; 'state', the hash of the instrument's state as it is then.
+    """
+
+    t: float
+    client: str = ""
+    dir: str = ""
+    text: str = ""
+    kind: str = ""
+    number: int = 0
+    model: str = ""
+    form: str = ""
+    round: int = 0
+    point: str = ""
+    item: str = ""
+    reading: str = ""
+    remark: str = ""
+    struck: str = ""
+    hash: str = ""
+
+
+@dataclass
+class ChecksumChain:
+    """The checksum that goes from line to line: one that is changed, lost or moved breaks it."""
+
+    crc: int = 0
+
+    def line(self, data: Any) -> bytes:
+        """Return the next line of a journal, without its end."""
+        body = msgspec.json.encode(data)[:-1]
+        self.crc = zlib.crc32(body, self.crc)
+        return body + _END_OF_LINE % self.crc
+
+    def accepts(self, line: bytes) -> bool:
+        """Whether a line is the next one; if so it is counted as that."""
+        crc = zlib.crc32(line[:-_LENGTH_OF_END], self.crc)
+        if line[-_LENGTH_OF_END:] != _END_OF_LINE % crc:
+            return False
+        self.crc = crc
+        return True
+
+
+@dataclass(frozen=True)
+class JournalFile:
+    """What a journal holds: its lines as they stand there, and what of a last one was not written to its end."""
+
+    path: Path
+    header: dict[str, Any]
+    lines: list[bytes]
+    """Without their ends, the header first."""
+    truncated_tail: bytes
+    crc: int
+    """Of the last line."""
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def event(self, number: int) -> Event:
+        """Return the event of a line, counted from 1 as editors do; line 1 is the header."""
+        return _DECODER.decode(self.lines[number - 1])
+
+    def location(self, number: int) -> str:
+        """Return the place of a line, for people."""
+        return f"{self.path}, line {number}"
+
+    @property
+    def size(self) -> int:
+        """Bytes of the whole lines with their ends."""
+        return sum(map(len, self.lines)) + len(self.lines)
+
+
+_DECODER = msgspec.json.Decoder(Event)
+
+
+def read_journal(path: Path) -> JournalFile:
+    """Return what a journal holds. Raises Mistake for one that cannot be read, or is damaged, naming the line.
+
+    A last line without an end is torn: it was being written when everything stopped, and nobody was told of it.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise A7SimError(f"{path}: expected the journal of a session: {error.strerror}") from error
+    *lines, torn = data.split(b"\n")
+    chain = ChecksumChain()
+    for number, line in enumerate(lines, start=1):
+        if not chain.accepts(line):
+            raise A7SimError(f"{path}, line {number}: {_damage(line, number)}")
+    crc = chain.crc
+    if not lines:
+        raise A7SimError(f"{path}: expected the journal of a session, got no whole line: nothing was observed yet")
+    if chain.accepts(torn[:-1]):
+        raise A7SimError(
+            f"{path}, line {len(lines) + 1}: expected a line end, got another byte: the journal is damaged"
+        )
+    return JournalFile(path, _header(path, lines[0]), lines, torn, crc)
+
+
+def has_header(path: Path) -> bool:
+    """Return whether there is a journal with a whole line: its header, from which a session goes on."""
+    try:
+        with path.open("rb") as file:
+            return file.readline().endswith(b"\n")
+    except FileNotFoundError:
+        return False
+
+
+def _header(path: Path, line: bytes) -> dict[str, Any]:
+    header = msgspec.json.decode(line)
+    if header.get("schema_version") not in READABLE_VERSIONS:
+        raise A7SimError(f"{path}, line 1: {_other_version(header)}")
+    return dict(header)
+
+
+def _damage(line: bytes, number: int) -> str:
+    if number == 1:
+        try:
+            header = msgspec.json.decode(line)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            header = None
+        if isinstance(header, dict) and header.get("schema_version", SCHEMA_VERSION) not in READABLE_VERSIONS:
+            return _other_version(header)
+    return "expected the checksum that follows from the lines before and this one, got another: the journal is damaged"
+
+
+def _other_version(header: dict[str, Any]) -> str:
+    return (
+        f"expected a journal of schema_version {' or '.join(map(str, READABLE_VERSIONS))}, "
+        f"got {header['schema_version']!r}: this version of a7sim cannot replay or resume it"
+    )

@@ -1,0 +1,74 @@
+"""A session from sitting down to the files it leaves, whatever is done in it."""
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Protocol
+
+from a7sim.errors import A7SimError
+from a7sim.instrument.language import SharedInstrument
+from a7sim.operator import OperatorGaveUp, Person
+from a7sim.reduction import Undetermined
+from a7sim.result_documents import Document, as_json
+from a7sim.session.journal import Header, Journal
+from a7sim.session.results import operator_document, slips_document
+from a7sim.session.session_files import BOOK, RESULTS, write_atomic
+
+
+class SeatedOperator(Protocol):
+    """An operator at the desk of an instrument."""
+
+    person: Person
+    desk: SharedInstrument
+
+
+@contextmanager
+def recorded_session(
+    document: Document,
+    seated: SeatedOperator,
+    journal: Journal,
+    header: Header,
+    out: Path | None = None,
+    leaves: Callable[[], Mapping[str, str]] = dict,
+    called: str = "session",
+) -> Iterator[None]:
+    """Let an operator work in the body, and say in the document how it ended and what the operator did.
+
+    `status` becomes 'complete', 'does not fit' with the operator's `message`, 'interrupted', or 'failed' for what else
+    the body raises; only that it does not fit goes no further. However it ends, with `out` the journal, the book, what
+    `leaves` returns by file name, and the results are left there, whole.
+    """
+    document |= {"status": "failed", "message": ""}
+    person = seated.person
+    with journal.recording(out, header, seated.desk):
+        person.book.listener = lambda entry: journal.on_book_entry(entry, person.clock.now)
+        try:
+            yield
+            document["status"] = "complete"
+        except (OperatorGaveUp, Undetermined) as trouble:
+            document |= {"status": "does not fit", "message": str(trouble)}
+        except A7SimError as mistake:
+            document["message"] = str(mistake)
+            raise
+        except KeyboardInterrupt:
+            document |= {"status": "interrupted", "message": f"the {called} was interrupted"}
+            raise
+        finally:
+            document |= {
+                "operator": operator_document(person, journal.lines_over_the_link),
+                "truth": {"slips": slips_document(person)},
+            }
+            if out is not None:
+                _leave(out, {BOOK: person.book.as_csv(), **leaves(), RESULTS: as_json(document)})
+
+
+def _leave(out: Path, files: Mapping[str, str]) -> None:
+    """Leave files in a folder; where that cannot be and something went wrong before, the latter is what is said."""
+    wrong_before = sys.exception()
+    try:
+        for name, text in files.items():
+            write_atomic(out / name, text)
+    except OSError:
+        if wrong_before is None:
+            raise

@@ -1,0 +1,87 @@
+"""Many sessions of a scenario at once: the operator's procedures on a fleet of instruments held as arrays."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from a7sim.instrument.autograph_batch import AutographBatch, build_batch
+from a7sim.operator import Job
+from a7sim.operator.models import ModelRecordBatch, measure_models_batch
+from a7sim.operator.operator_batch import OperatorBatch
+from a7sim.operator.random_draws import OperatorRandom
+from a7sim.operator.workstation import Workstation
+from a7sim.result_documents import Document
+from a7sim.scenario import Scenario
+from a7sim.scene import RelativeTruth, Scene, SharedScene
+from a7sim.session import results
+from a7sim.session.batch_driver import BatchDriver
+from a7sim.session.running import make_job, strip_document
+from a7sim.session.strips import ground_control
+from a7sim.session.truth import TruthComparison
+
+
+@dataclass(frozen=True)
+class SessionBatch:
+    """Sessions of a scenario, one a seed, ready to begin."""
+
+    scenario: Scenario
+    seeds: tuple[int, ...]
+    scenes: tuple[Scene, ...]
+    fleet: AutographBatch
+    bench: Workstation
+    job: Job
+
+    def measure_models(self) -> Iterator[ModelRecordBatch]:
+        """Yield the models as they are done; what a session gives up for stands in `bench.crew.reasons`."""
+        return measure_models_batch(self.bench)
+
+    def run(self, strips: bool = True, whole: bool = True) -> list[Document]:
+        """Work to the end and return a document a seed, as `run` gives it, without what is told of line and book.
+
+        Without strips they say nothing of the strip on the ground either, which costs as much as the rest; where they
+        are not whole, of the models only what is in `of_model_in_brief`.
+        """
+        found: list[list[Document]] = [[] for _ in self.seeds]
+        for records in self.measure_models():
+            plan = next(model for model in self.scenario.models if model.name == records.model.name)
+            beside = self._beside(records, self.scenes[0].relative_truth(plan))
+            for member, session in enumerate(records.sessions.tolist()):
+                record = records.of(session)
+                found[session].append(
+                    results.model_document(record, beside, member, plan.published)
+                    if whole
+                    else results.brief_model_document(record, beside, member)
+                )
+        return [self._document(session, models, strips) for session, models in enumerate(found)]
+
+    def _beside(self, records: ModelRecordBatch, truth: RelativeTruth | None) -> TruthComparison:
+        """Return the truth about a model of those who did it; their instruments stand as they left them."""
+        who, model, fleet = records.sessions, records.model, self.fleet
+        centres = {
+            hand: {f"{axis}0": each for axis, each in fleet.readings_at(who, fleet.pose(who, projector)[0]).items()}
+            for hand, projector in ((1, model.left_projector), (2, model.right_projector))
+        }
+        elements = {name: counts[who] for name, counts in records.orientation.elements.items()}
+        return TruthComparison.of(truth, centres, records.orientation.method, elements, model, fleet.variant)
+
+    def _document(self, session: int, models: list[Document], strips: bool) -> Document:
+        crew, scenario = self.bench.crew, self.scenario
+        why = crew.reasons.get(session)
+        document: Document = results.results_header(scenario, self.seeds[session]) | {
+            "status": "complete" if why is None else "does not fit",
+            "message": why or "",
+            "models": models,
+            "operator": results.hours_document(float(crew.seconds[session]), crew.timesheet, session),
+        }
+        if strips and why is None:
+            document["strip"], _ = strip_document(scenario, ground_control(scenario, self.scenes[session]), models)
+        return document
+
+
+def open_batch(scenario: Scenario, seeds: Sequence[int]) -> SessionBatch:
+    """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
+    flight = SharedScene.of(scenario)
+    scenes = tuple(flight.scene(seed) for seed in seeds)
+    fleet = build_batch(scenario.instrument, [scene.mountable for scene in scenes], seeds)
+    crew = OperatorBatch(scenario.observer, [OperatorRandom(scenario.observer, seed) for seed in seeds])
+    job = make_job(scenario, scenes[0])
+    return SessionBatch(scenario, tuple(seeds), scenes, fleet, Workstation(crew, BatchDriver(fleet), job), job)

@@ -1,0 +1,134 @@
+"""The twenty-five strips of the thesis: every case of one model with every case of the next (thesis 4.3)."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+from pathlib import Path
+
+import msgspec
+
+from a7sim.errors import A7SimError
+from a7sim.operator import ModelJob
+from a7sim.reduction import Ground, Model, Undetermined
+from a7sim.result_documents import Document, as_json
+from a7sim.scenario import Scenario, amend_provenance
+from a7sim.scenario.schema import StripPlan
+from a7sim.scene import build_scene
+from a7sim.session import results
+from a7sim.session.journal import JournalOptions, make_header, write_header_only
+from a7sim.session.running import ProgressCallbacks, make_job, run
+from a7sim.session.session_files import RESULTS, STRIPS, write_atomic
+from a7sim.session.strips import ground_control, models_from_documents, orient_strip, oriented_strip_document
+from a7sim.standard_points import CASES
+
+MAX_STRIPS = 700
+"""Strips of one command: five cases in up to four models."""
+
+FOLDER_OF_CASE = "case-{}"
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A strip of models each oriented on the points of a case of its own, numbered as in the thesis."""
+
+    number: int
+    cases: tuple[str, ...]
+    models: tuple[Model, ...]
+
+
+def run_combinations(
+    scenario: Scenario,
+    seed: int,
+    out: Path | None = None,
+    watcher: ProgressCallbacks | None = None,
+    force: bool = False,
+    keeping: JournalOptions | None = None,
+) -> Document:
+    """Work through a scenario once in every case and return the document of all strips that the models make.
+
+    The sessions are those that `run` gives for each case; with `out`, their folders are there. The first session that
+    does not fit ends the work. Raises Mistake for a scenario without ground control or of too many models.
+    """
+    watcher = watcher or ProgressCallbacks()
+    check_strips_possible(scenario)
+    keeping = keeping or JournalOptions()
+    keeping.prepare(out, force, map(FOLDER_OF_CASE.format, CASES))
+    if out is not None and not keeping.resumes:
+        write_header_only(out, make_header("run", scenario, seed, strips="all"))
+    document = results.results_header(scenario, seed) | {"case": "all", "status": "complete", "message": ""}
+    sessions: dict[str, Document] = {}
+    for case in CASES:
+        folder = out / FOLDER_OF_CASE.format(case) if out is not None else None
+        sessions[case] = run(
+            with_case(scenario, case),
+            seed,
+            folder,
+            watcher,
+            force or keeping.resumes,
+            keeping=keeping.for_part(folder),
+        )
+        if sessions[case]["status"] != "complete":
+            document |= {"status": sessions[case]["status"], "message": f"case {case}: {sessions[case]['message']}"}
+            break
+    document["sessions"] = {case: each["operator"] for case, each in sessions.items()}
+    document["strips"] = _strips(scenario, seed, sessions) if document["status"] == "complete" else []
+    if out is not None:
+        write_atomic(out / STRIPS, results.strips_csv(document["strips"]))
+        write_atomic(out / RESULTS, as_json(document))
+    return document
+
+
+def with_case(scenario: Scenario, case: str) -> Scenario:
+    """Return a scenario whose models are all oriented on the points of a case."""
+    of_case = msgspec.structs.replace(scenario, plotting=msgspec.structs.replace(scenario.plan, case=case))
+    return amend_provenance(of_case, "--strips all", f"--case {case}", {"plan.case": f'"{case}"'})
+
+
+def check_strips_possible(scenario: Scenario) -> None:
+    """Raise Mistake for a scenario of too many models or without ground control."""
+    strips = len(CASES) ** len(scenario.models)
+    if strips > MAX_STRIPS:
+        raise A7SimError(
+            f"--strips all: expected at most {MAX_STRIPS} strips, got {len(scenario.models)} models: {strips}"
+        )
+    if not any(point.role != "check" for point in scenario.ground):
+        raise A7SimError("--strips all: expected ground control in the scenario, got none")
+
+
+def _strips(scenario: Scenario, seed: int, sessions: Mapping[str, Document]) -> list[Document]:
+    scene = build_scene(scenario, seed)
+    ground, jobs = ground_control(scenario, scene), make_job(scenario, scene).models
+    by_case = {case: models_from_documents(session["models"]) for case, session in sessions.items()}
+    return [_of_combination(each, jobs, ground, scenario.strip) for each in combinations(by_case)]
+
+
+def combinations(by_case: Mapping[str, Sequence[Model]]) -> Iterator[Combination]:
+    """Yield every combination of the models' cases: A with A first, E with E last."""
+    models = len(next(iter(by_case.values())))
+    for number, cases in enumerate(product(by_case, repeat=models), start=1):
+        yield Combination(number, cases, tuple(by_case[case][i] for i, case in enumerate(cases)))
+
+
+def _of_combination(combination: Combination, jobs: Sequence[ModelJob], ground: Ground, plan: StripPlan) -> Document:
+    described = {
+        "number": combination.number,
+        "cases": list(combination.cases),
+        "in_words": describe(combination, jobs),
+    }
+    try:
+        return described | oriented_strip_document(orient_strip(combination.models, ground, plan.join, plan.polynomial))
+    except Undetermined as undetermined:
+        raise A7SimError(f"strip {combination.number}: {undetermined}") from undetermined
+
+
+def describe(combination: Combination, jobs: Sequence[ModelJob]) -> str:
+    """Return what the diagram of a strip shows (thesis fig. 4.3), in words."""
+    parts = [
+        f"model {job.name} ({job.left} and {job.right}) case {case}, oriented on {' '.join(job.points_of_case(case))}"
+        for job, case in zip(jobs, combination.cases, strict=True)
+    ]
+    joins = [
+        f"models {before.name} and {after.name} joined on {' '.join(sorted(set(before.points) & set(after.points)))}"
+        for before, after in pairwise(combination.models)
+    ]
+    return f"Strip {combination.number}: " + "; ".join([*parts, *joins])

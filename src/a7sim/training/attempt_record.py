@@ -1,0 +1,72 @@
+"""The account of an attempt: what was done and read in it, the truth beside it. All grades follow from it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from a7sim.operator import ModelJob
+from a7sim.scenario import Scenario
+from a7sim.scene import Scene
+from a7sim.session.running import make_job
+from a7sim.training.action_log import ActionLog, LoggedAutograph, Reading, StudentAction
+from a7sim.training.exercise import OPENING, Exercise
+
+ANSWER = "answer "
+"""How a note begins that answers something at the instrument: NOTE "answer play=0.05"."""
+
+
+@dataclass(frozen=True)
+class AttemptRecord:
+    """An attempt as it stands."""
+
+    exercise: Exercise
+    scenario: Scenario
+    scene: Scene
+    autograph: LoggedAutograph
+    """As the attempt leaves it."""
+    witness: ActionLog
+    written: Mapping[str, str] = field(default_factory=dict)
+    """Answers that were written down beside the journal."""
+    hidden: Mapping[str, Any] = field(default_factory=dict)
+    """What the maker of the papers knows and did not hand out."""
+
+    @property
+    def actions(self) -> Sequence[StudentAction]:
+        """The student's deeds."""
+        return [each for each in self.witness.deeds if each.client != OPENING]
+
+    @property
+    def readings(self) -> Sequence[Reading]:
+        """The student's registrations that were not struck out."""
+        return [each for each in self.witness.readings if each.client != OPENING and not each.struck]
+
+    @property
+    def seconds(self) -> float:
+        """Simulated s since the student sat down."""
+        return max(0.0, self.witness.now - self.witness.began)
+
+    @cached_property
+    def model(self) -> ModelJob:
+        """The model that the exercise is about, as the job sheet has it."""
+        models = make_job(self.scenario, self.scene).models
+        return next(each for each in models if each.name == self.exercise.model)
+
+    @property
+    def answers(self) -> dict[str, str]:
+        """What was answered, in notes at the instrument or beside the journal; the later answer counts."""
+        noted: dict[str, str] = {}
+        for deed in self.actions:
+            if deed.what == "note" and deed.text.lower().startswith(ANSWER):
+                noted |= parse_answers(deed.text[len(ANSWER) :].split())
+        return noted | dict(self.written)
+
+    def name_of(self, point: str) -> str:
+        """Return the name of a point given by its position in the model, such as 1, or by its name."""
+        return self.model.standard_points.get(point, point)
+
+
+def parse_answers(words: Sequence[str]) -> dict[str, str]:
+    """Return the answers in words such as play=0.05; words that are none are passed over."""
+    pairs = (word.partition("=") for word in words)
+    return {key.strip().lower(): value.strip() for key, equals, value in pairs if equals and key.strip()}

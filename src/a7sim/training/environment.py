@@ -1,0 +1,167 @@
+"""The room of an attempt: the instrument of an exercise with a witness beside it, its clock, and its journal."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from a7sim.errors import A7SimError
+from a7sim.instrument.language import LinkEvent, Listener, SharedInstrument
+from a7sim.link.clock import Clock
+from a7sim.scenario import Scenario, hash_scenario
+from a7sim.scene import Scene, build_scene
+from a7sim.session.journal import Header, Journal, JournalOptions, make_header_without_scenario, software_version
+from a7sim.session.journal_format import JournalFile, read_journal
+from a7sim.session.replaying import Replay, ReplayDifference, replay_lines
+from a7sim.session.session_files import JOURNAL
+from a7sim.training.action_log import ActionLog, LoggedAutograph
+from a7sim.training.attempt_record import AttemptRecord
+from a7sim.training.exercise import ExerciseFolder
+from a7sim.training.variation import scenario_for
+
+_CHECKSUM = re.compile(r"(?<=bytes, )crc32 [0-9a-f]{8}")
+
+JOURNAL_COMMAND = "train"
+"""The command in the header of an attempt's journal."""
+
+
+class UnreliableJournalError(A7SimError):
+    """A journal that is damaged, or in which stands what the instrument does not do again."""
+
+
+@dataclass(frozen=True)
+class AttemptEnvironment:
+    """An exercise's instrument."""
+
+    shelved: ExerciseFolder
+    scenario: Scenario
+    seed: int
+    scene: Scene
+    desk: SharedInstrument
+    clock: Clock
+    autograph: LoggedAutograph
+
+    @property
+    def action_log(self) -> ActionLog:
+        """Who saw all that happened."""
+        return self.autograph.witness
+
+    def record(self, written: dict[str, str] | None = None, hidden: dict[str, Any] | None = None) -> AttemptRecord:
+        """Return the account of what has happened so far."""
+        exercise = self.shelved.exercise
+        return AttemptRecord(
+            exercise, self.scenario, self.scene, self.autograph, self.action_log, written or {}, hidden or {}
+        )
+
+    def snapshot(self) -> "AttemptEnvironment":
+        """Return a room of its own in which all has happened as in this one, of which no journal is kept.
+
+        To be asked while every client is gone.
+        """
+        autograph = LoggedAutograph.from_parts(self.scenario.instrument, self.scene.mountable, self.seed)
+        desk = SharedInstrument(autograph, autograph.witness.on_link_event)
+        desk.restore(self.desk.state())
+        autograph.witness.copy_from(self.action_log)
+        return replace(self, desk=desk, clock=Clock(self.clock.now), autograph=autograph)
+
+
+def header_for(shelved: ExerciseFolder, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
+    """Return what the journal of an attempt says first. It names the scenario by its hash alone: it holds the truth."""
+    first = make_header_without_scenario(JOURNAL_COMMAND, exercise=shelved.name, student=student, mode=mode).line
+    return Header(first | {"title": shelved.exercise.title, "scenario_hash": hash_scenario(scenario), "seed": seed})
+
+
+def _built(shelved: ExerciseFolder, seed: int, observer: dict[str, Any]) -> tuple[Scenario, Scene, LoggedAutograph]:
+    scenario = scenario_for(shelved, seed, observer)
+    scene = build_scene(scenario, seed)
+    return scenario, scene, LoggedAutograph.from_parts(scenario.instrument, scene.mountable, seed)
+
+
+def dry_run_environment(shelved: ExerciseFolder, seed: int) -> AttemptEnvironment:
+    """Return the room of an attempt of which no journal is kept; the opening is still to be done."""
+    scenario, scene, autograph = _built(shelved, seed, {})
+    return AttemptEnvironment(
+        shelved, scenario, seed, scene, SharedInstrument(autograph, autograph.witness.on_link_event), Clock(), autograph
+    )
+
+
+@contextmanager
+def open_environment(
+    shelved: ExerciseFolder, seed: int, folder: Path, student: str, mode: str, observer: dict[str, Any] | None = None
+) -> Iterator[AttemptEnvironment]:
+    """Enter the room of a new attempt, journalled in a folder; the opening is still to be done.
+
+    Raises Mistake where it cannot be written.
+    """
+    scenario, scene, autograph = _built(shelved, seed, observer or {})
+    journal = Journal(JournalOptions(states=False))
+    desk = SharedInstrument(autograph, tee_listener(journal.on_link_event, autograph.witness.on_link_event))
+    nominal = scenario_for(shelved, seed)
+    with journal.recording(folder, header_for(shelved, nominal, seed, student, mode), desk):
+        yield AttemptEnvironment(shelved, scenario, seed, scene, desk, Clock(), autograph)
+
+
+@contextmanager
+def resume_environment(shelved: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
+    """Enter the room of an attempt that was left, as its journal leaves it. Raises Unreliable, Mistake."""
+    there = read_journal(folder / JOURNAL)
+    if there.header.get("software") != software_version():
+        raise A7SimError(
+            f"{there.location(1)}: expected an attempt of {software_version()} to go on with, got one of "
+            f"{there.header.get('software')} (a7sim train reset begins anew)"
+        )
+    room, replay = _replayed(shelved, seed, there)
+    journal = Journal(JournalOptions(resumes=True, states=False)).resume_at(there, room.desk, replay.checkpoints)
+    room.desk.listener = tee_listener(journal.on_link_event, room.action_log.on_link_event)
+    with journal:
+        for event in replay.pending_events():
+            journal.on_link_event(event)
+        for client in [*room.desk.clients]:
+            room.desk.close(client, room.clock.now)
+        yield room
+
+
+def replay_environment(shelved: ExerciseFolder, seed: int, there: JournalFile) -> AttemptEnvironment:
+    """Return the room of an attempt as its journal leaves it. Raises Unreliable."""
+    return _replayed(shelved, seed, there)[0]
+
+
+def _replayed(shelved: ExerciseFolder, seed: int, there: JournalFile) -> tuple[AttemptEnvironment, Replay]:
+    scenario, scene, autograph = _built(shelved, seed, {})
+    expected = header_for(shelved, scenario, seed, "", "").line
+    for name in ("command", "scenario_hash", "seed"):
+        got = there.header.get(name)
+        if got != expected[name]:
+            raise UnreliableJournalError(
+                f"{there.location(1)}: expected an attempt with {name} {expected[name]}, got {got}"
+            )
+    replay = Replay(there, autograph=autograph)
+    autograph.blind = True
+    assert replay.desk.listener is not None
+    replay.desk.listener = tee_listener(replay.desk.listener, autograph.witness.on_link_event)
+    for number, _, difference in replay_lines(replay):
+        if difference is not None and not _same_but_for_pictures(difference):
+            expected_, got = difference.replayed or "nothing", difference.journalled or "nothing"
+            raise UnreliableJournalError(
+                f"{there.location(number)}: expected what the instrument does again, {expected_[:200]}, got {got[:200]}"
+            )
+    autograph.blind = False
+    return AttemptEnvironment(shelved, scenario, seed, scene, replay.desk, Clock(replay.time), autograph), replay
+
+
+def _same_but_for_pictures(difference: ReplayDifference) -> bool:
+    """Whether two replies differ in nothing but the checksums of pictures, which are not drawn again."""
+    journalled, again = (_CHECKSUM.sub("", each) for each in (difference.journalled, difference.replayed))
+    return journalled == again != difference.replayed
+
+
+def tee_listener(first: Listener, then: Listener) -> Listener:
+    """Return a listener that lets two hear."""
+
+    def heard(event: LinkEvent) -> None:
+        first(event)
+        then(event)
+
+    return heard

@@ -1,0 +1,156 @@
+"""The student's sheet and the class sheet, each one page of HTML that needs nothing beside it."""
+
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import TYPE_CHECKING
+
+from a7sim.report.drawing import INK, LEFT, RIGHT, drawing
+from a7sim.report.page import Chapter, PageFigure, Paragraph, Part, TableBlock, page
+from a7sim.text import pluralize
+from a7sim.training.exercise import FULL_MARKS, ExerciseFolder
+from a7sim.training.grading import EXCELLENT, Grade
+from a7sim.training.progress import Attempt, GradeRecord
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Best = Mapping[tuple[str, str], GradeRecord]
+
+
+def student_sheet(student: str, shelf: Sequence[ExerciseFolder], best: Best, graded: Sequence[GradeRecord]) -> str:
+    """Return the sheet of a student: where they stand, and for every exercise what to do better."""
+    mine = {exercise: each for (name, exercise), each in best.items() if name == student}
+    passed = sum(each.grade.passed for each in mine.values())
+    lead: list[Part] = [Paragraph(f"{passed} of {pluralize(len(shelf), 'exercise')} passed, {len(mine)} tried.")]
+    chapters = [Chapter("Where you stand", [_points(shelf, mine), _overview(shelf, mine, graded)])]
+    for shelved in shelf:
+        each = mine.get(shelved.name)
+        if each is not None:
+            chapters.append(Chapter(f"{shelved.exercise.number} {shelved.exercise.title}", list(_of_exercise(each))))
+    return page(f"{student}: exercises at the plotter", lead, chapters)
+
+
+def _overview(
+    shelf: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord], graded: Sequence[GradeRecord]
+) -> TableBlock:
+    rows = []
+    for shelved in shelf:
+        each = mine.get(shelved.name)
+        tried = sum(other.attempt.exercise == shelved.name for other in graded)
+        name = f"{shelved.exercise.number} {shelved.exercise.title}"
+        if each is None:
+            rows.append([name, "open", "", "", ""])
+        else:
+            grade = each.grade
+            rows.append([name, _verdict(grade), f"{grade.points:g}", str(grade.hints), str(tried)])
+    return TableBlock(
+        "Best grade of each exercise", ["exercise", "", "points", "hints", "graded"], rows, frozenset({0, 1})
+    )
+
+
+def _verdict(grade: Grade) -> str:
+    return "passed" if grade.passed else "not passed"
+
+
+def _of_exercise(each: GradeRecord) -> Sequence[Part]:
+    grade, attempt = each.grade, each.attempt
+    after = f", {pluralize(grade.hints, 'hint')} (-{grade.hint_points:g})" if grade.hints else ""
+    first = Paragraph(
+        f"{_verdict(grade).capitalize()} with {grade.points:g} of {FULL_MARKS:g} points{after}; "
+        f"attempt {attempt.number}, {attempt.mode}, {pluralize(grade.minutes, 'minute')} at the instrument's clock."
+    )
+    rows = [[mark.title, mark.band, f"{mark.points:g} of {mark.weight:g}", mark.reason] for mark in grade.marks]
+    table = TableBlock("What was graded", ["criterion", "", "points", "why"], rows, frozenset({0, 1, 3}))
+    advice = [mark for mark in grade.marks if mark.band != EXCELLENT]
+    better = [Paragraph(f"{mark.title} (-{mark.lost:g}): {mark.feedback}") for mark in advice]
+    return [first, table, *better]
+
+
+def _points(shelf: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord]) -> PageFigure:
+    numbers = [str(each.exercise.number) for each in shelf]
+    points = [mine[each.name].grade.points if each.name in mine else 0.0 for each in shelf]
+    colours = [LEFT if each.name in mine and mine[each.name].grade.passed else RIGHT for each in shelf]
+    said = "; ".join(f"exercise {n}: {p:g}" for n, p in zip(numbers, points, strict=True))
+    with drawing("points", "Points of each exercise", said, size=(8.0, 3.2), wide=True) as drawn:
+        axes = drawn.axes[0]
+        axes.bar(numbers, points, color=colours, edgecolor=INK, width=0.65)
+        _what_passes(axes, shelf)
+        axes.set(xlabel="exercise", ylabel="points", ylim=(0.0, FULL_MARKS))
+        axes.grid(axis="y")
+        axes.set_axisbelow(True)
+        drawn.legend = "Blue passed, red not passed; dotted, the points that pass unless a required criterion failed"
+    return drawn.picture
+
+
+def _what_passes(axes: "Axes", shelf: Sequence[ExerciseFolder]) -> None:
+    """Draw the points with which each exercise is passed."""
+    for place, shelved in enumerate(shelf):
+        limit = shelved.exercise.pass_points
+        axes.plot([place - 0.45, place + 0.45], [limit] * 2, ":", color=INK, linewidth=1.6)
+
+
+def class_sheet(shelf: Sequence[ExerciseFolder], best: Best, attempts: Sequence[Attempt]) -> str:
+    """Return the sheet of a class: who stands where, and which mistakes are everybody's."""
+    students = sorted({each.student for each in attempts})
+    lead: list[Part] = [Paragraph(f"{pluralize(len(students), 'student')}, {pluralize(len(attempts), 'attempt')}.")]
+    rows = [
+        [student, str(_passed(best, [student], shelf)), *(_cell(best.get((student, each.name))) for each in shelf)]
+        for student in students
+    ]
+    totals = [_passed(best, students, [each]) for each in shelf]
+    rows.append(["how many passed", str(sum(totals)), *map(str, totals)])
+    columns = ["student", "passed", *(str(each.exercise.number) for each in shelf)]
+    table = TableBlock("Best points by exercise; in brackets: not passed", columns, rows)
+    chapters = [
+        Chapter("The class", [_spread(shelf, best), table]),
+        Chapter("What went wrong", [_mistakes(shelf, best)]),
+    ]
+    return page("Exercises at the plotter: the class", lead, chapters)
+
+
+def _passed(best: Best, students: Sequence[str], shelf: Sequence[ExerciseFolder]) -> int:
+    """Return how many exercises of these were passed by these students, all together."""
+    grades = [best.get((student, shelved.name)) for student in students for shelved in shelf]
+    return sum(each is not None and each.grade.passed for each in grades)
+
+
+def _cell(each: GradeRecord | None) -> str:
+    if each is None:
+        return ""
+    return f"{each.grade.points:g}" if each.grade.passed else f"({each.grade.points:g})"
+
+
+def _spread(shelf: Sequence[ExerciseFolder], best: Best) -> PageFigure:
+    by_exercise = [[each.grade.points for (_, name), each in best.items() if name == s.name] for s in shelf]
+    numbers = [str(each.exercise.number) for each in shelf]
+    said = "; ".join(
+        f"exercise {n}: median {median(some):g} of {pluralize(len(some), 'student')}"
+        if some
+        else f"exercise {n}: nobody"
+        for n, some in zip(numbers, by_exercise, strict=True)
+    )
+    with drawing("spread", "Points of the class by exercise", said, size=(8.0, 3.6), wide=True) as drawn:
+        axes = drawn.axes[0]
+        for place, some in enumerate(by_exercise):
+            axes.plot([place] * len(some), some, "o", color=LEFT, alpha=0.5, markersize=6)
+            if some:
+                axes.plot([place - 0.3, place + 0.3], [median(some)] * 2, color=RIGHT)
+        _what_passes(axes, shelf)
+        axes.set_xticks(range(len(numbers)), numbers)
+        axes.set(xlabel="exercise", ylabel="points", ylim=(0.0, 1.04 * FULL_MARKS))
+        axes.grid(axis="y")
+        drawn.legend = "Each dot a student, line the median; dotted, the points that pass"
+    return drawn.picture
+
+
+def _mistakes(shelf: Sequence[ExerciseFolder], best: Best) -> TableBlock:
+    rows = []
+    for shelved in shelf:
+        marked = [each.grade.marks for (_, name), each in best.items() if name == shelved.name]
+        for criterion in shelved.exercise.criteria:
+            bands = [mark.band for marks in marked for mark in marks if mark.id == criterion.id]
+            failed = sum(band == "fail" for band in bands)
+            if failed:
+                rows.append([f"{shelved.exercise.number}: {criterion.title}", f"{failed} of {len(bands)}"])
+    rows.sort(key=lambda row: -int(row[1].split()[0]))
+    return TableBlock("Criteria that were failed, those of most students first", ["criterion", "failed"], rows)
