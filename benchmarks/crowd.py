@@ -33,9 +33,9 @@ def main():
     figures = []
     for sessions in counts:
         began = time.process_time()
-        crowd = open_batch(scenario, range(sessions))
+        batch = open_batch(scenario, range(sessions))
         opened = time.process_time()
-        records = list(crowd.measure_models())
+        records = list(batch.measure_models())
         worked = time.process_time()
         drawing = cpu_seconds_to_draw(calls) * sessions / RECORDED
         same = all(one.points == many.of(0).points for one, many in zip(alone, records, strict=True))

@@ -18,13 +18,13 @@ with atheris.instrument_imports(include=["a7sim.instrument.language"]):
 
 def listener(numbers):
     """Return a function that hears bytes as lines, on a new instrument now and then."""
-    desks = fuzz_language.instruments(1)
+    instruments = fuzz_language.instruments(1)
     fuzzed = []
 
     def hear(data):
         if not fuzzed or fuzzed[0].tally["lines"] >= fuzz_language.LINES_AN_INSTRUMENT:
-            desk = next(desks)
-            fuzzed[:] = [fuzz_language.Fuzzed(desk, numbers, desk.token is None)]
+            instrument = next(instruments)
+            fuzzed[:] = [fuzz_language.Fuzzed(instrument, numbers, instrument.token is None)]
         for line in data.split(b"\n"):
             fuzzed[0].hears(line)
 

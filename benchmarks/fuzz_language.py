@@ -79,8 +79,8 @@ def reported():
 class Fuzzed:
     """A conversation whose every line is checked."""
 
-    def __init__(self, desk, numbers, admitted=True):
-        self.engine = desk.open(cr_ends_line=False)
+    def __init__(self, instrument, numbers, admitted=True):
+        self.engine = instrument.open(cr_ends_line=False)
         self._clock = Clock()
         self._numbers = numbers
         self._admitted = admitted
@@ -203,21 +203,21 @@ def instruments(seed):
     number = 0
     while True:
         number += 1
-        desk = SharedInstrument(build_autograph(scenario.instrument, drawer, seed))
-        desk.open().feed(MOUNTING, 0.0)
+        instrument = SharedInstrument(build_autograph(scenario.instrument, drawer, seed))
+        instrument.open().feed(MOUNTING, 0.0)
         if number % 4 == 0:
-            desk.token = "not to be guessed"
-        yield desk
+            instrument.token = "not to be guessed"
+        yield instrument
 
 
 def fuzz(lines, seed):
     """Try so many lines and return the tally. Raises Broken, or whatever the engine raises."""
     author, tally = Author(seed), Counter()
     with reported() as numbers:
-        desks = instruments(seed)
+        instruments = instruments(seed)
         while tally["lines"] < lines:
-            desk = next(desks)
-            fuzzed = Fuzzed(desk, numbers, desk.token is None)
+            instrument = next(instruments)
+            fuzzed = Fuzzed(instrument, numbers, instrument.token is None)
             for _ in range(min(LINES_AN_INSTRUMENT, lines - tally["lines"])):
                 fuzzed.hears(author.line())
             tally += fuzzed.tally

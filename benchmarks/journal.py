@@ -34,9 +34,9 @@ TARGETS = {"none": Target("below", 15)}
 
 
 def seconds(scenario, folder, durability):
-    keeping = JournalOptions(durability) if durability else None
+    journal_options = JournalOptions(durability) if durability else None
     began = time.perf_counter()
-    run(scenario, SEED, folder if durability else None, keeping=keeping, force=True)
+    run(scenario, SEED, folder if durability else None, journal_options=journal_options, force=True)
     return time.perf_counter() - began
 
 
@@ -63,12 +63,12 @@ def cost(home, repeats):
 def long_session(folder, events):
     """Leave the journal of a session of so many events: turning, looking, reading, registering."""
     scenario = load_scenario("akwanga")
-    desk = SharedInstrument(build_autograph(scenario.instrument, build_scene(scenario, SEED).mountable, SEED))
+    instrument = SharedInstrument(build_autograph(scenario.instrument, build_scene(scenario, SEED).mountable, SEED))
     folder.mkdir()
     dice = random.Random(SEED)
-    with Journal(JournalOptions("none")).recording(folder, make_header("serve", scenario, SEED), desk) as journal:
-        desk.listener = journal.on_link_event
-        engine = desk.open()
+    with Journal(JournalOptions("none")).recording(folder, make_header("serve", scenario, SEED), instrument) as journal:
+        instrument.listener = journal.on_link_event
+        engine = instrument.open()
         engine.feed(b'PHOT1:LOAD "101";:PHOT2:LOAD "102";:BASE:BX 194.99\n', 0.0)
         for step in range(events // 4):
             now = 60.0 + step * SESSION_S / (events // 4)

@@ -104,7 +104,7 @@ def registered(folder):
     replay = Replay(read_journal(folder / "session.jsonl"))
     assert all(difference is None for _, _, difference in replay_lines(replay))
     found = {1: [], 2: []}
-    for each in replay.desk.autograph.recorder.registrations:
+    for each in replay.instrument.autograph.recorder.registrations:
         found[int(each.point[0])].append((each.point, each.readings))
     return found
 

@@ -81,14 +81,14 @@ def procedure_of(shelved):
 
 def attempt(name, profile, seed):
     """Return passed, points, minutes and the failed criteria of an attempt."""
-    shelved = find_exercise(name)
-    played = replace(procedure_of(shelved), observer={"skill": profile})
+    exercise_folder = find_exercise(name)
+    played = replace(procedure_of(exercise_folder), observer={"skill": profile})
     with tempfile.TemporaryDirectory() as place:
         try:
-            run_attempt(shelved, played, Path(place), seed)
-            grade = grade_folder(shelved, seed, Path(place))
-        except A7SimError as mistake:
-            raise SystemExit(f"{name}, {profile}, seed {seed}: {mistake}") from mistake
+            run_attempt(exercise_folder, played, Path(place), seed)
+            grade = grade_folder(exercise_folder, seed, Path(place))
+        except A7SimError as error:
+            raise SystemExit(f"{name}, {profile}, seed {seed}: {error}") from error
     return grade.passed, grade.points, grade.minutes, [each.id for each in grade.failed]
 
 

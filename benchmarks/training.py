@@ -35,18 +35,24 @@ def main():
         folders, lines = [], 0
         for i in range(STUDENTS):
             name, played = DONE[i % len(DONE)]
-            shelved, student = find_exercise(name), f"student {i}"
+            exercise_folder, student = find_exercise(name), f"student {i}"
             folder = Path(place) / str(i)
             run_attempt(
-                shelved, played or shelved.exercise.reference, folder, attempt_seed(student, shelved.name), student
+                exercise_folder,
+                played or exercise_folder.exercise.reference,
+                folder,
+                attempt_seed(student, exercise_folder.name),
+                student,
             )
             folders.append(folder)
             lines += len(read_journal(folder / "session.jsonl"))
         seconds = timed(lambda: grade_submissions(folders, workers=CORES))
-        shelved, seed, folder = find_exercise("4"), attempt_seed("student 0", "04-parallax"), folders[0]
+        exercise_folder, seed, folder = find_exercise("4"), attempt_seed("student 0", "04-parallax"), folders[0]
         journal = folder / "session.jsonl"
-        replaying = min(timed(lambda: replay_environment(shelved, seed, read_journal(journal))) for _ in range(3))
-        grading = min(timed(lambda: grade_folder(shelved, seed, folder)) for _ in range(3))
+        replaying = min(
+            timed(lambda: replay_environment(exercise_folder, seed, read_journal(journal))) for _ in range(3)
+        )
+        grading = min(timed(lambda: grade_folder(exercise_folder, seed, folder)) for _ in range(3))
     print(f"{STUDENTS} journals, {lines} lines, {CORES} processes: {seconds:.1f} s")
     print(f"grading takes {grading / replaying:.2f} times as long as replaying")
     return [

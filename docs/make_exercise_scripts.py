@@ -26,10 +26,14 @@ class Driver:
     """Somebody with perfect eyes who writes a script of what they do."""
 
     def __init__(self, room, seed, intro):
-        port = InProcessSerial(desk=room.desk, clock=room.clock, client="student", timeout=1.0)
+        port = InProcessSerial(instrument=room.instrument, clock=room.clock, client="student", timeout=1.0)
         self.client, self.room = Client(port), room
-        self.model = room.account().model
-        self.lines = [f"scenario {room.shelved.exercise.scenario} seed {seed}", "", *(f"# {each}" for each in intro)]
+        self.model = room.record().model
+        self.lines = [
+            f"scenario {room.exercise_folder.exercise.scenario} seed {seed}",
+            "",
+            *(f"# {each}" for each in intro),
+        ]
         self.readings = 0
         self.skew = 0.0
 
@@ -147,17 +151,17 @@ ROUGH = {"1": (0, 0), "2": (195, 0), "3": (0, 182), "4": (195, 182), "5": (0, -1
 
 def scripts_of(name, seed, play, variants):
     """Write the reference and the faulty scripts of an exercise: file name, what is done otherwise, and the heading."""
-    shelved = find_exercise(name)
+    exercise_folder = find_exercise(name)
     for file, otherwise, intro in variants:
         with (
             tempfile.TemporaryDirectory() as folder,
-            open_environment(shelved, seed, Path(folder), "author", "practice") as room,
+            open_environment(exercise_folder, seed, Path(folder), "author", "practice") as environment,
         ):
-            run_opening(room)
-            driver = Driver(room, seed, intro)
+            run_opening(environment)
+            driver = Driver(environment, seed, intro)
             play(driver, otherwise)
-            driver.finish(shelved.folder / file)
-            print(shelved.folder / file)
+            driver.finish(exercise_folder.folder / file)
+            print(exercise_folder.folder / file)
 
 
 def parallax(driver, otherwise):
@@ -265,7 +269,7 @@ def fittings(driver, otherwise):
 
 
 def interior(driver, otherwise):
-    camera = driver.room.scenario.camera
+    camera = driver.environment.scenario.camera
     places = {each.name: (each.x, each.y) for each in camera.fiducials}
     pictures = {1: "101", 2: "102"} if otherwise != "exchanged" else {1: "102", 2: "101"}
     for projector, picture in pictures.items():
@@ -325,7 +329,7 @@ def one_projector(driver, otherwise):
 
 
 def slip(driver, otherwise):
-    made = make_handout("book with a slip", driver.room.scenario, driver.room.seed, {})
+    made = make_handout("book with a slip", driver.environment.scenario, driver.environment.seed, {})
     kind, entry, right = made.hidden["kind"], made.hidden["entry"], made.hidden["right"][0]
     wrong = made.papers["book.csv"].splitlines()[entry].split(",")
     driver.lines += ["# What follows from the copy that the seed above makes.", ""]

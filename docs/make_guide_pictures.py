@@ -32,7 +32,7 @@ class Student:
 
     def __init__(self, person, room):
         self.person, self.room, self.point = person, room, FIRST
-        self.looker = Client(InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0))
+        self.looker = Client(InProcessSerial(instrument=room.instrument, clock=room.clock, timeout=5.0))
         plan, camera = room.scenario.plan, room.scenario.camera
         self.scale = 1e-3 * plan.projection_height / camera.c
 
@@ -131,19 +131,19 @@ async def work(console, room):
 
 def main():
     with tempfile.TemporaryDirectory() as place, Progress(Path(place)) as progress:
-        shelved = find_exercise("4")
-        attempt = progress.begin("ada", shelved)
-        with start_attempt(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
-            port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
-            seat = ConsoleConfig(
+        exercise_folder = find_exercise("4")
+        attempt = progress.begin("ada", exercise_folder)
+        with start_attempt(exercise_folder, attempt.seed, attempt.folder, "ada", attempt.mode) as environment:
+            port = InProcessSerial(instrument=environment.instrument, clock=environment.clock, timeout=5.0)
+            config = ConsoleConfig(
                 lambda: Client(port),
-                lambda: room.clock.now,
+                lambda: environment.clock.now,
                 where="exercise 4",
-                sheet=JobSheet("exercise 4", room.scenario.camera),
+                sheet=JobSheet("exercise 4", environment.scenario.camera),
                 drawing=DrawingMode.HALVES,
-                tasks=Checklist(room, attempt).lines,
+                tasks=Checklist(environment, attempt).lines,
             )
-            asyncio.run(work(Console(seat), room))
+            asyncio.run(work(Console(config), environment))
 
 
 if __name__ == "__main__":

@@ -23,7 +23,9 @@ class Newcomer(Student):
     """Somebody who lays two photographs, centres them and clears six points."""
 
     def __init__(self, person, door, photographed):
-        super().__init__(person, SimpleNamespace(desk=door.desk, clock=door.clock, scenario=load_scenario("akwanga")))
+        super().__init__(
+            person, SimpleNamespace(instrument=door.instrument, clock=door.clock, scenario=load_scenario("akwanga"))
+        )
         self.photographed = photographed
 
     async def at_the_bench(self, *choices):

@@ -23,9 +23,9 @@ MODEL_1 = (
 class Door:
     """A client of an instrument."""
 
-    def __init__(self, desk: SharedInstrument | None = None, cr_ends_line: bool = True) -> None:
-        self.desk = desk or SharedInstrument(Autograph(VARIANTS["A7"]))
-        self.engine = self.desk.open(cr_ends_line=cr_ends_line)
+    def __init__(self, instrument: SharedInstrument | None = None, cr_ends_line: bool = True) -> None:
+        self.instrument = instrument or SharedInstrument(Autograph(VARIANTS["A7"]))
+        self.engine = self.instrument.open(cr_ends_line=cr_ends_line)
         self.clock = Clock()
 
     def feed(self, received: bytes) -> bytes:

@@ -67,12 +67,12 @@ class Served:
 
     def __init__(
         self,
-        desk: SharedInstrument | None = None,
+        instrument: SharedInstrument | None = None,
         terms: ServerLimits | None = None,
         doors: Endpoints | None = None,
         realtime: bool = False,
     ) -> None:
-        self.desk = desk or SharedInstrument(Autograph(VARIANTS["A7"]), poll_takes=0.0 if realtime else 0.1)
+        self.instrument = instrument or SharedInstrument(Autograph(VARIANTS["A7"]), poll_takes=0.0 if realtime else 0.1)
         self.clock = WallClock() if realtime else Clock()
         self._terms = terms or ServerLimits()
         self._doors = doors or Endpoints(tcp=[ANYWHERE])
@@ -82,7 +82,7 @@ class Served:
 
     def __enter__(self) -> "Served":
         self._thread.start()
-        self.server = Server(self.desk, self.clock, self._terms)
+        self.server = Server(self.instrument, self.clock, self._terms)
         self.opened = asyncio.run_coroutine_threadsafe(self.server.open(self._doors), self._loop).result(PATIENCE)
         self.port = next((each["port"] for each in self.opened if "port" in each), None)
         return self

@@ -27,7 +27,7 @@ PATIENCE_S = 20.0
 def at(door: Door, **others: Any) -> Console:
     """Return a console at a door's instrument, pictures in half-blocks."""
     akwanga = load_scenario("akwanga")
-    port = InProcessSerial(desk=door.desk, clock=door.clock, timeout=5.0)
+    port = InProcessSerial(instrument=door.instrument, clock=door.clock, timeout=5.0)
     drawing = others.pop("drawing", DrawingMode.HALVES)
     sheet = JobSheet(akwanga.title, akwanga.camera)
     return Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, sheet=sheet, drawing=drawing, **others))
@@ -55,7 +55,7 @@ class Person:
 
     async def settle(self) -> None:
         """Wait until all that was ordered is said and shown."""
-        await self.until(lambda: self.console.dials is not None and self._quiet() and self.console.station.is_idle)
+        await self.until(lambda: self.console.dials is not None and self._quiet() and self.console.thread.is_idle)
         for _ in range(5):
             await asyncio.sleep(0.0)
         await self.until(self._quiet)
@@ -115,7 +115,7 @@ class Person:
 
     async def step_of(self, step: float) -> None:
         """Take a step of the ladder."""
-        away = STEP_SIZES.index(step) - self.console.hands.step_index
+        away = STEP_SIZES.index(step) - self.console.selection.step_index
         await self.press(*["]" if away > 0 else "["] * abs(away))
 
     def message(self) -> str:

@@ -21,7 +21,7 @@ class Recorder:
     def __init__(self, door):
         self.port = door.getsockname()[1]
         self.heard = []
-        self.trouble = None
+        self.error = None
         self.stop = threading.Event()
         self._is_there = threading.Condition()
         between_them = RecordingProxy("a7sim://akwanga", self._listen, WallClock(), self.stop)
@@ -31,8 +31,8 @@ class Recorder:
     def _serve(self, between_them, door):
         try:
             between_them.serve(door)
-        except A7SimError as mistake:
-            self.trouble = str(mistake)
+        except A7SimError as error:
+            self.error = str(error)
 
     def _listen(self, event):
         with self._is_there:
@@ -72,7 +72,7 @@ def test_what_says_nothing_is_passed_on_and_not_written_down_and_what_is_too_lon
         ("!", "(a line of more than 4096 bytes)"),
         (">", "SYST:ERR:NEXT?"),
     ]
-    assert recorder.trouble is None
+    assert recorder.error is None
 
 
 def test_a_client_that_is_cut_off_is_written_down_as_gone_and_the_next_is_let_in():
@@ -84,7 +84,7 @@ def test_a_client_that_is_cut_off_is_written_down_as_gone_and_the_next_is_let_in
         with recorder.client() as client:
             client.sendall(b"*OPC?\n")
             recorder.until("<", "1")
-    assert recorder.trouble is None
+    assert recorder.error is None
 
 
 class Broken:
@@ -112,7 +112,7 @@ def test_a_line_to_the_instrument_that_breaks_ends_it_in_a_sentence(monkeypatch)
     with recording() as recorder, recorder.client() as client:
         client.sendall(b"*OPC?\n")
         recorder.thread.join(PATIENCE)
-        assert recorder.trouble == "a7sim://akwanga: the line to the instrument broke"
+        assert recorder.error == "a7sim://akwanga: the line to the instrument broke"
 
 
 def test_it_stops_with_a_client_still_there():

@@ -33,8 +33,8 @@ def scenario_of(models, **overrides):
 
 
 def worked(scenario, seeds=(1,)):
-    crowd = open_batch(scenario, seeds)
-    return crowd, list(bridge_strip_batch(crowd.bench))
+    batch = open_batch(scenario, seeds)
+    return batch, list(bridge_strip_batch(batch.workstation))
 
 
 def misclosures(crowd, models, session=0):
@@ -83,7 +83,7 @@ def test_three_models_close_within_what_is_asked_of_ten(three):
 
 def test_the_scale_is_carried_by_the_heights_of_common_points(monkeypatch):
     """The comparison can fail: without the carrying of scale the flying height's changes break the strip."""
-    monkeypatch.setattr(bridging, "carry_scale_on", lambda bench, who, model, before: np.ones(bench.crew.size))
+    monkeypatch.setattr(bridging, "carry_scale_on", lambda bench, active, model, before: np.ones(bench.operators.size))
     crowd, models = worked(scenario_of(2))
     assert len(models) == 2
     assert np.abs(misclosures(crowd, models)).max() > 10.0 * CLOSES_MM
@@ -107,7 +107,7 @@ def test_models_that_do_not_go_on_are_refused():
     again = msgspec.structs.replace(scenario.models[1], base="inside")
     crowd, models = worked(msgspec.structs.replace(scenario, models=[scenario.models[0], again]))
     assert len(models) == 1
-    assert "does not go on from model 1" in crowd.bench.crew.reasons[0]
+    assert "does not go on from model 1" in crowd.workstation.operators.reasons[0]
 
 
 @pytest.mark.slow
@@ -135,8 +135,8 @@ def test_a_bridge_that_does_not_close_says_why_in_both(monkeypatch):
         assert "ways" not in document
 
 
-def _gives_up(bench, who, model, before):
-    bench.crew.give_up(who, "no scale")
+def _gives_up(bench, active, model, before):
+    bench.operators.give_up(active, "no scale")
     raise AllGaveUpError
 
 
@@ -161,9 +161,9 @@ def test_ten_models_close_on_the_truth():
 def test_what_cannot_be_looked_at_again_stays_as_it_was_oriented(monkeypatch):
     """Where no image can be fused at the last look nothing is corrected and nothing set to zero."""
 
-    def all_apart(bench, who, points):
-        nothing = np.zeros((len(points), bench.crew.size))
-        apart = np.full(bench.crew.size, points[0], dtype=object)
+    def all_apart(bench, active, points):
+        nothing = np.zeros((len(points), bench.operators.size))
+        apart = np.full(bench.operators.size, points[0], dtype=object)
         return Parallaxes(nothing, np.zeros((3, *nothing.shape)), apart)
 
     monkeypatch.setattr(Workstation, "parallaxes_seen", all_apart)
@@ -177,7 +177,7 @@ def test_a_model_without_a_common_point_on_its_left_is_refused(monkeypatch):
     monkeypatch.setattr(bridging, "model_coordinates", lambda bench, model: {})
     crowd, models = worked(scenario)
     assert len(models) == 1
-    assert "none of its points 1, 3 and 5 was measured before" in crowd.bench.crew.reasons[0]
+    assert "none of its points 1, 3 and 5 was measured before" in crowd.workstation.operators.reasons[0]
 
 
 @pytest.mark.slow
@@ -185,9 +185,11 @@ def test_of_two_readings_that_contradict_each_other_either_may_be_the_wrong_one(
     """One reading of by' and one of by": a slip in by" is made again too, and nobody gives up for it."""
     settings = {"plan.parallax_readings": 1, "plan.centre_method": "scales", "observer.blunder_rate": 0.02}
     scenario = load_scenario("akwanga", settings=settings)
-    crowd = open_batch(msgspec.structs.replace(scenario, models=scenario.models[:1]), range(12))
-    assert len(list(crowd.measure_models())) == 1
-    assert not any("do not agree" in why for why in crowd.bench.crew.reasons.values()), crowd.bench.crew.reasons
+    batch = open_batch(msgspec.structs.replace(scenario, models=scenario.models[:1]), range(12))
+    assert len(list(batch.measure_models())) == 1
+    assert not any("do not agree" in why for why in batch.workstation.operators.reasons.values()), (
+        batch.workstation.operators.reasons
+    )
 
 
 @pytest.mark.parametrize(("photo", "picture", "bridged"), [(1, "202", 0), (2, "203", 1)])

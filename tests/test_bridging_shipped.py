@@ -47,7 +47,7 @@ def test_a_bridge_leaves_its_files(shipped):
 def test_over_the_line_and_in_a_crowd_it_is_the_same_strip(shipped):
     """One procedure, two benches: with errors too, every reading of a session is the same."""
     scenario, document, out = shipped
-    models = list(islice(bridge_strip_batch(open_batch(scenario, (2,)).bench), 2))
+    models = list(islice(bridge_strip_batch(open_batch(scenario, (2,)).workstation), 2))
     rows = [row.split(",")[:2] for row in (out / "models.csv").read_text().splitlines()[2:]]
     points = [[model.model.name, point] for model in models for point in model.coordinates_of(0)]
     assert rows[: len(points)] == points

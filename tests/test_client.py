@@ -23,13 +23,13 @@ SHORT = 0.1
 
 
 @pytest.fixture(scope="module")
-def desk():
+def instrument():
     return new_desk()
 
 
 @pytest.fixture
-def client(desk):
-    with served("tcp", desk) as url, Client.open(url, timeout=0.5) as opened:
+def client(instrument):
+    with served("tcp", instrument) as url, Client.open(url, timeout=0.5) as opened:
         opened.send("*RST")
         yield opened
 
@@ -38,8 +38,8 @@ def client(desk):
 
 
 @pytest.mark.parametrize("kind", WIRES)
-def test_any_url_opens_as_a_pyserial_port(desk, kind):
-    with served(kind, desk) as url, open_port(url, timeout=1.0) as port:
+def test_any_url_opens_as_a_pyserial_port(instrument, kind):
+    with served(kind, instrument) as url, open_port(url, timeout=1.0) as port:
         assert isinstance(port, serial.SerialBase)
         port.write(b"*OPC?;*TST?\n*OPC?\n")
         assert (port.readline(), port.read(1), port.read_until(b"\n")) == (b"1;0\n", b"1", b"\n")
@@ -144,11 +144,11 @@ def test_a_closed_port_hangs_up_and_is_not_open(pair):
 # --- the client ----------------------------------------------------------------------------------------
 
 
-def test_a_client_holds_the_lock_while_it_works_and_gives_it_back(client, desk):
+def test_a_client_holds_the_lock_while_it_works_and_gives_it_back(client, instrument):
     with Client.open("a7sim://akwanga") as alone, alone.lock() as same:
         assert same is alone
     with client.lock():
-        other = desk.open()
+        other = instrument.open()
         other.feed(b"BASE:BX 10\n", 0.0)
         assert other.feed(b"SYST:ERR?\n", 0.0).startswith(b"-203")
         client.send("BASE:BX 20")
@@ -157,19 +157,19 @@ def test_a_client_holds_the_lock_while_it_works_and_gives_it_back(client, desk):
     assert client.ask("BASE:BX?") == "30.00"
 
 
-def test_a_client_is_told_that_another_holds_the_lock(client, desk):
-    other = desk.open()
+def test_a_client_is_told_that_another_holds_the_lock(client, instrument):
+    other = instrument.open()
     other.feed(b"SYST:LOCK:REQ?\n", 0.0)
     with pytest.raises(InstrumentError, match="another client holds the lock"), client.lock():
         pytest.fail("the lock was given twice")
-    desk.close(other.client)
+    instrument.close(other.client)
 
 
-def test_a_lock_is_given_back_when_the_work_under_it_fails(client, desk):
+def test_a_lock_is_given_back_when_the_work_under_it_fails(client, instrument):
     with pytest.raises(ZeroDivisionError), client.lock():
         raise ZeroDivisionError
     assert client.ask("*OPC?") == "1"
-    assert desk.lock_holder is None
+    assert instrument.lock_holder is None
 
 
 def test_a_client_waits_for_movement(client):
@@ -315,8 +315,8 @@ def test_whatever_is_completed_is_a_header_of_the_instrument(client):
     assert not [error for error in client.errors() if error.startswith("-113")]
 
 
-def test_who_has_not_logged_in_is_told_of_the_token(desk):
-    guarded = SharedInstrument(desk.autograph)
+def test_who_has_not_logged_in_is_told_of_the_token(instrument):
+    guarded = SharedInstrument(instrument.autograph)
     guarded.token = "secret"
     with served("tcp", guarded) as url:
         with Client.open(url, timeout=SHORT) as stranger, pytest.raises(A7SimError, match="asks for a token"):

@@ -41,16 +41,16 @@ class Worker:
         job = replace(self.session.job, models=self.session.job.models[:1])
         person = self.session.person
         person.book.set_heading("", "preparation")
-        self.bench = Workstation(OperatorBatch.single(person), ScpiDriver(person), job)
-        self.record = next(measure_models_batch(self.bench)).of(0)
-        self.view = StereoView(self.bench, person)
+        self.workstation = Workstation(OperatorBatch.single(person), ScpiDriver(person), job)
+        self.record = next(measure_models_batch(self.workstation)).of(0)
+        self.view = StereoView(self.workstation, person)
         control = ground_control(scenario, self.session.scene)
-        self.model = level_model(self.bench, self.view, self.record.points, control, SCALE)
+        self.model = level_model(self.workstation, self.view, self.record.points, control, SCALE)
         self.area = Area(np.array([5030.0, 4990.0]), np.array([5110.0, 5070.0]))
         self.spots = self.at_work(0.0).spot_heights(20.0)
 
     def at_work(self, tremor_um):
-        return Compilation(self.bench, self.session.person, self.view, self.model, self.area, Tracing(tremor_um))
+        return Compilation(self.workstation, self.session.person, self.view, self.model, self.area, Tracing(tremor_um))
 
     def too_high(self, readings, height=None):
         """Heights as drawn minus the true ground, m."""
@@ -81,10 +81,10 @@ def test_the_model_is_level_and_to_scale(worker):
 
 def test_the_eyes_see_height_and_slope_of_the_ground(worker):
     worker.at_work(0.0)._drive(np.array([5070.0, 5030.0]), float(np.nanmean(worker.spots.readings[2])))
-    who = np.zeros(1, dtype=int)
+    active = np.zeros(1, dtype=int)
 
     def true_height(dx, dy):
-        at = worker.bench.seat.counters(who)[:, 0] + (dx, dy, 0.0)
+        at = worker.workstation.controls.counters(active)[:, 0] + (dx, dy, 0.0)
         return -float(worker.too_high(at[:, None])[0]) / worker.model.metres_per_mm
 
     look = worker.view.look(FINE_MM)

@@ -39,7 +39,7 @@ def test_a_person_orients_by_eye_and_what_is_recorded_is_what_the_same_lines_giv
     heard: list[LinkEvent] = []
     door = with_photographs(heard.append)
     console = at(door)
-    eye = Client(InProcessSerial(desk=door.desk, clock=door.clock, timeout=5.0))
+    eye = Client(InProcessSerial(instrument=door.instrument, clock=door.clock, timeout=5.0))
 
     def parallaxes(point: str) -> tuple[float, float]:
         px, py = eye.numbers(f'EYEP:STER? "{point}"')
@@ -94,7 +94,7 @@ def _same_over_a_link(heard: list[LinkEvent]) -> None:
     pictures = sum(event.direction == ">" and "PICT" in event.text for event in heard)
     assert pictures > 20
     replayed = 0
-    with Served(with_photographs().desk) as served:
+    with Served(with_photographs().instrument) as served:
         line = served.line()
         replies = iter([event.text for event in said if event.direction == "<" and not event.text.startswith("#")])
         for event in said:
@@ -129,7 +129,7 @@ def test_keys_pressed_before_anything_answers_are_done_when_it_does() -> None:
 
     def connected() -> Client:
         assert answers.wait(20.0)
-        return Client(InProcessSerial(desk=door.desk, clock=door.clock, timeout=5.0))
+        return Client(InProcessSerial(instrument=door.instrument, clock=door.clock, timeout=5.0))
 
     console = Console(ConsoleConfig(connected, lambda: 0.0, drawing=DrawingMode.HALVES))
 
@@ -157,7 +157,7 @@ def test_free_hand_is_a_state_of_its_own_that_goes_past_the_collars() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
-            console.station.send("FITT:XCOL OUT")
+            console.thread.send("FITT:XCOL OUT")
             await person.press("right")
             assert console.dials.counters["X"] == "-1.00"
             await person.press("h", "right", "right")
@@ -186,12 +186,12 @@ def test_the_drum_under_the_mouse_turns_and_is_taken_up() -> None:
                 await rolled(drum, 0)
                 assert float(console.dials.elements[drum]) == before
                 await rolled(drum, 1)
-                assert float(console.dials.elements[drum]) == pytest.approx(before + console.hands.step)
-                assert (console.hands.name, console.hands.side) == (hands, side)
+                assert float(console.dials.elements[drum]) == pytest.approx(before + console.selection.step)
+                assert (console.selection.name, console.selection.side) == (hands, side)
             before = float(console.dials.counters["X"])
             await rolled("X", -1)
-            assert float(console.dials.counters["X"]) == pytest.approx(before - console.hands.step)
-            assert console.hands.name == "bx"
+            assert float(console.dials.counters["X"]) == pytest.approx(before - console.selection.step)
+            assert console.selection.name == "bx"
 
     played(sit_down())
 
@@ -265,7 +265,7 @@ def test_what_the_instrument_refuses_is_one_sentence_and_nothing_moves() -> None
 
 def test_a_question_that_is_refused_does_not_break_the_conversation() -> None:
     door = with_photographs()
-    port = InProcessSerial(desk=door.desk, clock=door.clock, timeout=0.1)
+    port = InProcessSerial(instrument=door.instrument, clock=door.clock, timeout=0.1)
     console = Console(ConsoleConfig(lambda: Client(port), lambda: 0.0))
 
     async def sit_down() -> None:
@@ -303,14 +303,14 @@ def test_the_book_strikes_out_and_never_erases() -> None:
 
 def test_a8_has_the_same_hands_and_says_what_it_lacks() -> None:
     akwanga = load_scenario("akwanga-a8")
-    desk = SharedInstrument(build_autograph(akwanga.instrument, {}, 7))
-    console = at(Door(desk))
+    instrument = SharedInstrument(build_autograph(akwanga.instrument, {}, 7))
+    console = at(Door(instrument))
 
     async def sit_down() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
-            assert console.hands.element == "kappa1", "an A8 has no by"
+            assert console.selection.element == "kappa1", "an A8 has no by"
             await person.press("y")
             assert person.message() == "an A8 has no by"
             await person.press("p", "+")
@@ -393,9 +393,9 @@ def test_plain_says_in_words_what_the_eyes_see() -> None:
 
 
 def test_a_dead_link_is_a_banner_and_a_new_one_is_taken_up() -> None:
-    first = Served(with_photographs().desk)
+    first = Served(with_photographs().instrument)
     first.__enter__()
-    second = Served(with_photographs().desk, doors=Endpoints(tcp=[Address("127.0.0.1", first.port)]))
+    second = Served(with_photographs().instrument, doors=Endpoints(tcp=[Address("127.0.0.1", first.port)]))
     url = f"tcp://127.0.0.1:{first.port}"
     console = Console(ConsoleConfig(lambda: Client.open(url, timeout=1.0), lambda: 0.0, alone=False))
 
@@ -483,12 +483,12 @@ def test_every_deed_is_in_the_palette_under_its_group_and_keys() -> None:
             person = Person(pilot)
             await person.settle()
             listed = {each.title: each for each in console.get_system_commands(console.screen)}
-            for deed in actions_for(watching=False):
-                assert listed[deed.description].help.startswith(f"{deed.group}, ")
+            for action in actions_for(watching=False):
+                assert listed[action.description].help.startswith(f"{action.group}, ")
             listed["a smaller step"].callback()
-            finer = console.hands.step
+            finer = console.selection.step
             listed["a larger step"].callback()
-            assert console.hands.step > finer
+            assert console.selection.step > finer
 
     played(sit_down())
 

@@ -130,9 +130,9 @@ def test_the_ladder_has_ends() -> None:
 
 
 def test_hands_say_lines_of_the_language() -> None:
-    hands = ControlSelection("omega", 2).stepping(-1)
-    assert hands.turned(-1) == "PROJ2:OMEG:TURN -0.1"
-    assert hands.moved("X", 1, 12.0) == "WHE:X 0.1"
+    selection = ControlSelection("omega", 2).stepping(-1)
+    assert selection.turned(-1) == "PROJ2:OMEG:TURN -0.1"
+    assert selection.moved("X", 1, 12.0) == "WHE:X 0.1"
     assert ControlSelection(free=True).moved("Y", -1, 12.0) == "DRIV:Y 11.0000"
     assert ControlSelection().valid_for(VARIANTS["A8"]).element == "kappa1"
 
@@ -161,7 +161,7 @@ def test_the_sample_keymap_is_the_default_one(tmp_path: Path) -> None:
     file.write_text(sample(), encoding="utf-8")
     assert load_keymap(file) == default_keymap()
     for watching in (False, True):
-        keys = [key for deed in actions_for(watching) for key in deed.keys]
+        keys = [key for action in actions_for(watching) for key in action.keys]
         assert len(keys) == len(set(keys))
 
 

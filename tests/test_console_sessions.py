@@ -265,7 +265,7 @@ def test_after_kill_9_nothing_that_was_recorded_is_lost(data: Path) -> None:
             ("P1", ("2.00", "1.00", "-300.00")),
         ]
         assert person.console.dials.counters == {"X": "2.00", "Y": "1.00", "Z": "-300.00"}
-        assert here._chair._desk.lock_holder == "client2", "the lock that was held is taken again"
+        assert here._interactive._instrument.lock_holder == "client2", "the lock that was held is taken again"
 
     here = place(go_on=True)
     assert sat_at(here, afterwards) == journal.parent

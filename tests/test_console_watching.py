@@ -52,11 +52,11 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setattr(journal_module, "EVERY", 10)
         journal = Journal()
-        desk = SharedInstrument(
+        instrument = SharedInstrument(
             build_autograph(scenario.instrument, build_scene(scenario, 7).mountable, 7), journal.on_link_event
         )
-        with journal.recording(folder, make_header("serve", scenario, 7), desk):
-            port = InProcessSerial(desk=desk, timeout=1.0)
+        with journal.recording(folder, make_header("serve", scenario, 7), instrument):
+            port = InProcessSerial(instrument=instrument, timeout=1.0)
             for line in WORK:
                 port.clock.advance(10.0)
                 port.write(line.encode() + b"\n")
@@ -256,7 +256,7 @@ def test_a_script_is_watched_too_and_in_words(session: Path) -> None:
 
 
 def test_who_watches_a_served_instrument_sees_what_another_does_and_turns_nothing() -> None:
-    with Served(with_model().desk) as served:
+    with Served(with_model().instrument) as served:
         url = f"tcp://127.0.0.1:{served.port}"
         console = Console(
             replace(remote_console(url, JobSheet("Akwanga"), None, watching=True), drawing=DrawingMode.HALVES)

@@ -27,17 +27,17 @@ def same_to_the_digit(scenario, seeds=SEEDS, all_finish=False, looked_at=None):
     """
     crowd, same = same_as_alone(scenario, seeds, looked_at or seeds)
     if all_finish:
-        assert crowd.bench.crew.reasons == {}
+        assert crowd.workstation.operators.reasons == {}
     return same
 
 
 def same_as_alone(scenario, seeds, looked_at):
     """A crowd that has worked, and whether those of it that are looked at read and set what each does alone."""
-    crowd = open_batch(scenario, seeds)
-    records = list(crowd.measure_models())
-    if not crowd.bench.crew.reasons:
+    batch = open_batch(scenario, seeds)
+    records = list(batch.measure_models())
+    if not batch.workstation.operators.reasons:
         assert [each.model.name for each in records] == [each.name for each in scenario.models]
-    return crowd, all(_same(crowd, records, seeds.index(seed), seed) for seed in looked_at)
+    return batch, all(_same(batch, records, seeds.index(seed), seed) for seed in looked_at)
 
 
 def _same(crowd, records, session, seed):
@@ -46,11 +46,11 @@ def _same(crowd, records, session, seed):
     try:
         for record in measure_models(alone.person, alone.job):
             done.append(record)
-    except OperatorGaveUp as trouble:
-        why = str(trouble)
+    except OperatorGaveUp as error:
+        why = str(error)
     among_others = [each.of(session) for each in records if session in each.who]
     return (
-        crowd.bench.crew.reasons.get(session) == why
+        crowd.workstation.operators.reasons.get(session) == why
         and [read_and_set(each) for each in done] == [read_and_set(each) for each in among_others]
         and all(
             computed(one) == pytest.approx(computed(other), abs=1e-6)
@@ -134,8 +134,8 @@ def test_a_bench_that_is_off_by_a_count_is_found_out(monkeypatch):
     """The comparison can fail: a counter of the crowd that shows a hundredth too much gives other numbers."""
     truly = BatchDriver.elements
 
-    def a_count_too_much(self, who, names):
-        return {name: counts + 0.01 * (name == "by1") for name, counts in truly(self, who, names).items()}
+    def a_count_too_much(self, active, names):
+        return {name: counts + 0.01 * (name == "by1") for name, counts in truly(self, active, names).items()}
 
     monkeypatch.setattr(BatchDriver, "elements", a_count_too_much)
     scenario = read_once(SCENARIOS["as it stands"])
@@ -165,7 +165,7 @@ def test_documents_are_those_of_a_run_without_its_line(by_itself):
 def test_who_gives_up_says_why_and_is_left_behind(setting, value):
     crowd, same = same_as_alone(read_once(load_scenario("akwanga", {setting: value})), SEEDS, SEEDS)
     assert same
-    assert set(crowd.bench.crew.reasons) == {0, 1}
+    assert set(crowd.workstation.operators.reasons) == {0, 1}
 
 
 def test_sessions_do_not_disturb_each_other(by_itself):

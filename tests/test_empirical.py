@@ -63,11 +63,11 @@ def ready(scenario, seed, model=0, change=lambda job: job):
 
 
 def made_ready(crew, hands, job):
-    bench = Workstation(crew, hands, job)
+    workstation = Workstation(crew, hands, job)
     with suppress(_IsReady):
-        next(measure_models_batch(bench, _stop_at_relative_orientation))
+        next(measure_models_batch(workstation, _stop_at_relative_orientation))
     crew.begin(crew.active, job.models[0].name, "relative orientation")
-    return bench
+    return workstation
 
 
 def orient(scenario, seed, model=0, change=lambda job: job):
@@ -143,11 +143,13 @@ def _cleared(seeds, method, **overrides):
     scenario = load_scenario("akwanga", TWO_GON_OFF | {"plan.method": f'"{method}"'} | overrides)
     found = {}
     for model in (0, 1):
-        crowd = open_batch(scenario, [seed for seed in seeds if seed % 2 == model])
-        job = dataclasses.replace(crowd.job, models=(crowd.job.models[model],))
-        orientations = orient_model(made_ready(crowd.bench.crew, crowd.bench.hands, job), job.models[0])
-        assert crowd.bench.crew.reasons == {}
-        found |= {seed: orientations.of(session) for session, seed in enumerate(crowd.seeds)}
+        batch = open_batch(scenario, [seed for seed in seeds if seed % 2 == model])
+        job = dataclasses.replace(batch.job, models=(batch.job.models[model],))
+        orientations = orient_model(
+            made_ready(batch.workstation.operators, batch.workstation.driver, job), job.models[0]
+        )
+        assert batch.workstation.operators.reasons == {}
+        found |= {seed: orientations.of(session) for session, seed in enumerate(batch.seeds)}
     in_order = [found[seed] for seed in seeds]
     return np.array([(len(f.rounds), f.rms, len(f.residuals), abs(f.rounds[0].parallaxes["6"])) for f in in_order])
 
@@ -322,7 +324,7 @@ def test_a_point_that_is_pricked_on_one_print_only_is_done_without(monkeypatch):
     monkeypatch.setattr(
         ScpiDriver,
         "prints",
-        lambda self, who, n: {k: v for k, v in prints(self, who, n).items() if n == 1 or k != "1025"},
+        lambda self, active, n: {k: v for k, v in prints(self, active, n).items() if n == 1 or k != "1025"},
     )
     found, _ = orient(akwanga(**READ_ONCE), 8)
     assert set(found.rounds[0].parallaxes) == set("12345")
@@ -333,7 +335,7 @@ def test_a_point_whose_images_do_not_come_together_is_done_without(monkeypatch):
     session, bench = ready(akwanga(**READ_ONCE), 8)
     fuse = bench.mark.fuse
     monkeypatch.setattr(
-        bench.mark, "fuse", lambda who, point, judged: who[:0] if point == "1025" else fuse(who, point, judged)
+        bench.mark, "fuse", lambda active, point, judged: active[:0] if point == "1025" else fuse(active, point, judged)
     )
     found = orient_model(bench, bench.job.models[0]).of(0)
     assert set(found.rounds[-1].parallaxes) == set("12345")

@@ -13,9 +13,9 @@ def fuzzing():
 
 @pytest.fixture
 def fuzzed(fuzzing):
-    desk = next(fuzzing.instruments(1))
+    instrument = next(fuzzing.instruments(1))
     with fuzzing.reported() as numbers:
-        yield fuzzing.Fuzzed(desk, numbers)
+        yield fuzzing.Fuzzed(instrument, numbers)
 
 
 def test_no_promise_is_broken_by_lines_at_random(fuzzing):
@@ -77,8 +77,8 @@ def test_a_broken_promise_is_found(fuzzing, fuzzed, spoilt):
 
 
 def test_whoever_has_not_logged_in_must_not_be_answered(fuzzing):
-    desk = next(fuzzing.instruments(1))
+    instrument = next(fuzzing.instruments(1))
     with fuzzing.reported() as numbers:
-        fuzzed = fuzzing.Fuzzed(SharedInstrument(desk.autograph), numbers, admitted=False)
+        fuzzed = fuzzing.Fuzzed(SharedInstrument(instrument.autograph), numbers, admitted=False)
         with pytest.raises(fuzzing.Broken, match="before the login"):
             fuzzed.hears(b"*OPC?")

@@ -91,8 +91,8 @@ def sheets_of(scenario, seed=1, **order):
 def sheets_of_crowd(scenario, seeds, **order):
     """The left and the right projector, each of many sessions, which test as each would at its line (see below)."""
     order = GridTestPlan(scenario.camera, scenario.grid_plate, **order)
-    bench = open_batch(scenario, seeds).bench
-    sheets = list(measure_grid_batch(Workstation(bench.crew, bench.hands, order.job), order))
+    workstation = open_batch(scenario, seeds).workstation
+    sheets = list(measure_grid_batch(Workstation(workstation.operators, workstation.driver, order.job), order))
     assert all(len(sheet.sessions) == len(seeds) for sheet in sheets)
     return sheets
 
@@ -319,8 +319,10 @@ def test_slips_are_struck_out_and_do_not_spoil_the_test():
 def test_a_crowd_tests_its_instruments_as_each_would_at_its_line():
     scenario = with_faults()
     order = GridTestPlan(scenario.camera, scenario.grid_plate)
-    crowd = open_batch(scenario, [1, 2])
-    sheets = list(measure_grid_batch(Workstation(crowd.bench.crew, crowd.bench.hands, order.job), order))
+    batch = open_batch(scenario, [1, 2])
+    sheets = list(
+        measure_grid_batch(Workstation(batch.workstation.operators, batch.workstation.driver, order.job), order)
+    )
     for i, seed in enumerate((1, 2)):
         session = open_session(scenario, seed)
         for sheet, alone in zip(sheets, measure_grid(session.person, order), strict=True):
@@ -376,10 +378,10 @@ def centres_by(method, seed):
 @cache
 def sessions_by(method):
     plan = {"plan.centre_method": f'"{method}"', "plan.parallax_readings": "2"}
-    crowd = open_batch(load_scenario("akwanga", plan | METHODS[method]), SEEDS)
-    documents = crowd.run()
-    assert crowd.bench.crew.reasons == {}
-    return documents, crowd.bench.crew.seconds / 3600.0
+    batch = open_batch(load_scenario("akwanga", plan | METHODS[method]), SEEDS)
+    documents = batch.run()
+    assert batch.workstation.operators.reasons == {}
+    return documents, batch.workstation.operators.seconds / 3600.0
 
 
 @pytest.mark.slow

@@ -58,7 +58,7 @@ def copied(whole, tmp_path):
 
 def resumed(folder):
     begun = find_resumable(folder, "run")
-    return run(begun.scenario, begun.seed, folder, keeping=JournalOptions(resumes=True))
+    return run(begun.scenario, begun.seed, folder, journal_options=JournalOptions(resumes=True))
 
 
 def forged(journalled, header=None, change=lambda number, data: data):
@@ -308,7 +308,9 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
     assert not (cut / "results.json").exists()
     session = find_resumable(cut, "run")
     assert session.setting("strips") == "all"
-    strip_combinations.run_combinations(session.scenario, session.seed, cut, keeping=JournalOptions(resumes=True))
+    strip_combinations.run_combinations(
+        session.scenario, session.seed, cut, journal_options=JournalOptions(resumes=True)
+    )
     assert {name: files_of(cut / name) for name in ("case-A", "case-B")} == {
         name: files_of(whole / name) for name in ("case-A", "case-B")
     }
@@ -513,7 +515,7 @@ def test_a_replay_from_a_checkpoint_ends_where_one_from_the_beginning_ends(whole
         first = replay.seek(line)
         assert all(difference is None for _, _, difference in replay_lines(replay, first))
         assert replay.final_difference() is None
-        states.append(replay.desk.state())
+        states.append(replay.instrument.state())
         assert (first > len(journalled) // 2) == (line > 2)
     assert states[0]["clients"] == states[1]["clients"]
     registered = [state["autograph"].pop("registered") for state in states]

@@ -570,7 +570,7 @@ def test_an_error_says_its_number_its_message_and_what_was_expected():
 
 def two_clients():
     first = Door()
-    return first, Door(first.desk)
+    return first, Door(first.instrument)
 
 
 def test_clients_share_the_instrument():
@@ -598,7 +598,7 @@ def test_whoever_holds_the_lock_turns_alone_and_the_others_may_look():
 )
 def test_the_lock_protects_all_that_moves(header):
     holder = with_model()
-    other = Door(holder.desk)
+    other = Door(holder.instrument)
     holder.say("SYST:LOCK:REQ?")
     before = other.say(POSITIONS)
     other.say(f"{in_short(header)} {EXAMPLES[header]}")
@@ -619,10 +619,10 @@ def test_a_lock_is_released_by_its_holder_only():
 def test_a_client_that_leaves_frees_its_lock_and_no_others():
     first, second = two_clients()
     first.say("SYST:LOCK:REQ?")
-    second.desk.close(second.engine.client)
-    third = Door(first.desk)
+    second.instrument.close(second.engine.client)
+    third = Door(first.instrument)
     assert third.say("SYST:LOCK:REQ?") == "0"
-    first.desk.close(first.engine.client)
+    first.instrument.close(first.engine.client)
     assert third.say("SYST:LOCK:REQ?;:BASE:BX 20;BX?") == "1;20.00"
 
 
@@ -892,7 +892,7 @@ def test_centring_shifts_the_fiducials_on_their_carrier():
 def test_the_sketch_is_good_to_half_a_millimetre():
     door = with_model()
     sketch = listed(door.say("PHOT1:SKET?"))
-    true = door.desk.autograph.carrier(1).photograph.points
+    true = door.instrument.autograph.carrier(1).photograph.points
     errors = [each - place for name in sketch for each, place in zip(sketch[name], true.get(name), strict=True)]
     assert set(sketch) == set(true.names)
     assert 0.1 < (sum(error**2 for error in errors) / len(errors)) ** 0.5 < 0.5
@@ -990,11 +990,11 @@ def test_struck_entries_stay_marked():
 
 def test_all_that_crosses_the_link_is_heard_in_order_with_its_time():
     heard: list[LinkEvent] = []
-    desk = SharedInstrument(Autograph(VARIANTS["A7"]), heard.append)
-    engine = desk.open()
+    instrument = SharedInstrument(Autograph(VARIANTS["A7"]), heard.append)
+    engine = instrument.open()
     engine.feed(b"NOTE 'coffee'\n*OPC?;FOO?;*TST?\n", 12.5)
     engine.feed(b"\n" + b" " * 5000 + b"\n", 13.0)
-    desk.close(engine.client, 14.0)
+    instrument.close(engine.client, 14.0)
     assert [(event.time, event.direction) for event in heard] == [
         *[(0.0, "+"), (12.5, ">"), (12.5, ">"), (12.5, "<"), (13.0, "!"), (14.0, "-")]
     ]

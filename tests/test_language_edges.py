@@ -103,7 +103,7 @@ def test_a_plain_query_is_answered_the_same_whether_anybody_listens():
     """The quick way of a line that is one plain query, taken while nobody listens, is that of all lines."""
     for new in (with_photographs, with_model, guarded):
         quick, heard = new(), new()
-        heard.desk.listener = [].append
+        heard.instrument.listener = [].append
         for header in COMMANDS.headers():
             query = re.sub(r"\[[^]]*\]", "", header.replace("<n>", "2"))
             if query.endswith("?"):
@@ -113,7 +113,7 @@ def test_a_plain_query_is_answered_the_same_whether_anybody_listens():
 
 def test_a_listener_hears_a_line_whole_but_for_what_was_given_as_a_token():
     door = guarded()
-    door.desk.listener = (heard := []).append
+    door.instrument.listener = (heard := []).append
     door.say("""SYST:LOG "ours""; yours";*OPC?;:SYST:LOGIN 'heerbrugg';*OPC?""")
     door.say("SYST:LOG heerbrugg")
     assert [event.text for event in heard if event.direction == ">"] == [
@@ -125,8 +125,8 @@ def test_a_listener_hears_a_line_whole_but_for_what_was_given_as_a_token():
 
 def guarded() -> Door:
     door = with_photographs()
-    door.desk.token = "heerbrugg"
-    return Door(door.desk)
+    door.instrument.token = "heerbrugg"
+    return Door(door.instrument)
 
 
 def queue(door):

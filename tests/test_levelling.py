@@ -28,9 +28,9 @@ def scenario_of(**overrides):
 
 
 def levelled(scenario, seed=1):
-    crowd = open_batch(scenario, [seed])
-    (record,) = crowd.measure_models()
-    return crowd, record.of(0)
+    batch = open_batch(scenario, [seed])
+    (record,) = batch.measure_models()
+    return batch, record.of(0)
 
 
 @pytest.fixture(scope="module")
@@ -80,11 +80,11 @@ def test_the_relative_orientation_is_untouched_but_for_rounding(without_any_erro
 def test_afterwards_everything_stands_as_it_did(without_any_error):
     """Elements, gear and counters: the instrument reads a point as it read it before."""
     crowd, record = without_any_error
-    bench, who = crowd.bench, crowd.bench.crew.active
-    shown = bench.seat.elements(who, list(record.on_ground.before))
+    bench, active = crowd.bench, crowd.workstation.operators.active
+    shown = bench.controls.elements(active, list(record.on_ground.before))
     assert {name: each[0] for name, each in shown.items()} == record.on_ground.before
-    assert bench.seat.units_per_mm == record.z_units_per_mm == 8.0
-    again = bench.measure(who, ["K1"])[:, 0, 0]
+    assert bench.controls.units_per_mm == record.z_units_per_mm == 8.0
+    again = bench.measure(active, ["K1"])[:, 0, 0]
     assert again == pytest.approx(record.points["K1"], abs=0.015)
 
 
@@ -115,7 +115,7 @@ def test_too_little_control_is_left_alone():
     ]
     crowd, record = levelled(msgspec.structs.replace(scenario, ground=ground))
     assert record.on_ground is None
-    assert crowd.bench.crew.reasons == {}
+    assert crowd.workstation.operators.reasons == {}
 
 
 SETTINGS = {

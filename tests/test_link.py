@@ -273,12 +273,15 @@ def test_a_bad_scenario_file_is_one_line_that_names_it(tmp_path, text):
     assert "\n" not in str(raised.value)
 
 
-# --- several ports at one desk -------------------------------------------------------------------------
+# --- several ports at one instrument -------------------------------------------------------------------------
 
 
 def test_ports_at_one_desk_share_instrument_and_lock_and_a_closed_port_frees_it():
-    desk = SharedInstrument(Autograph(VARIANTS["A7"]))
-    first, second = InProcessSerial(desk=desk, timeout=SHORT), InProcessSerial(desk=desk, timeout=SHORT)
+    instrument = SharedInstrument(Autograph(VARIANTS["A7"]))
+    first, second = (
+        InProcessSerial(instrument=instrument, timeout=SHORT),
+        InProcessSerial(instrument=instrument, timeout=SHORT),
+    )
     assert answers(first, "BASE:BX 20;:SYST:LOCK:REQ?") == b"1\n"
     assert answers(second, "BASE:BX?;:SYST:LOCK:REQ?") == b"20.00;0\n"
     first.close()
@@ -288,7 +291,9 @@ def test_ports_at_one_desk_share_instrument_and_lock_and_a_closed_port_frees_it(
 def test_lines_cross_at_the_time_of_the_clock():
     heard = []
     clock = Clock()
-    port = InProcessSerial(desk=SharedInstrument(Autograph(VARIANTS["A7"]), heard.append), clock=clock, timeout=SHORT)
+    port = InProcessSerial(
+        instrument=SharedInstrument(Autograph(VARIANTS["A7"]), heard.append), clock=clock, timeout=SHORT
+    )
     clock.advance(12.5)
     answers(port, "*OPC?")
     assert [(event.time, event.direction, event.text) for event in heard] == [
@@ -299,7 +304,7 @@ def test_lines_cross_at_the_time_of_the_clock():
 
 
 def test_a_port_without_a_desk_cannot_be_opened():
-    with pytest.raises(serial.SerialException, match="expected a desk"):
+    with pytest.raises(serial.SerialException, match="expected an instrument"):
         InProcessSerial("anywhere")
 
 

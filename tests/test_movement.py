@@ -20,13 +20,13 @@ RATES = Rates()
 
 
 @pytest.fixture
-def desk():
+def instrument():
     return SharedInstrument(Autograph(VARIANTS["A7"]), poll_takes=0.0)
 
 
 @pytest.fixture
-def engine(desk):
-    return desk.open()
+def engine(instrument):
+    return instrument.open()
 
 
 @pytest.mark.parametrize(
@@ -50,9 +50,9 @@ def engine(desk):
         ("DRIV:X 1000", 0.0),
     ],
 )
-def test_a_movement_lasts_by_how_far_it_goes(desk, engine, line, seconds):
+def test_a_movement_lasts_by_how_far_it_goes(instrument, engine, line, seconds):
     engine.feed(line.encode() + b"\n", 100.0)
-    assert max(desk.busy_until - 100.0, 0.0) == pytest.approx(seconds)
+    assert max(instrument.busy_until - 100.0, 0.0) == pytest.approx(seconds)
 
 
 @pytest.mark.parametrize(
@@ -68,22 +68,22 @@ def test_pictures_take_their_time(line, seconds):
     door = with_photographs()
     door.engine.feed(b'PHOT2:LOAD "102"\n', 0.0)
     door.engine.feed(line.encode() + b"\n", 100.0)
-    assert door.desk.busy_until - 100.0 == pytest.approx(seconds)
+    assert door.instrument.busy_until - 100.0 == pytest.approx(seconds)
 
 
-def test_parts_move_at_the_same_time_and_each_does_one_thing_after_the_other(desk, engine):
+def test_parts_move_at_the_same_time_and_each_does_one_thing_after_the_other(instrument, engine):
     engine.feed(b"DRIV:X 50;Y 20\n", 0.0)
-    assert desk.busy_until == 5.0
+    assert instrument.busy_until == 5.0
     engine.feed(b"DRIV:Y -40\n", 1.0)
-    assert desk.busy_until == 2.0 + 6.0
+    assert instrument.busy_until == 2.0 + 6.0
     engine.feed(b"DRIV:X 0\n", 20.0)
-    assert (desk.busy_since, desk.busy_until) == (20.0, 25.0)
+    assert (instrument.busy_since, instrument.busy_until) == (20.0, 25.0)
 
 
-def test_reset_lasts_as_long_as_the_element_that_has_furthest_to_go(desk, engine):
+def test_reset_lasts_as_long_as_the_element_that_has_furthest_to_go(instrument, engine):
     engine.feed(b"BASE:BX 100;:PROJ1:KAPP 12;OMEG 95\n", 0.0)
     engine.feed(b"*RST\n", 1000.0)
-    assert desk.busy_until == pytest.approx(1000.0 + 100.0 / RATES.length)
+    assert instrument.busy_until == pytest.approx(1000.0 + 100.0 / RATES.length)
 
 
 def test_what_is_read_while_something_moves_is_what_stands_at_the_end(engine):
@@ -105,31 +105,31 @@ def test_opc_answers_at_once_where_nothing_moves(engine):
     assert engine.feed(b"*OPC?\n", 5.0) == b"1\n"
 
 
-def test_wai_lets_the_next_unit_begin_when_the_movement_is_done(desk, engine):
+def test_wai_lets_the_next_unit_begin_when_the_movement_is_done(instrument, engine):
     engine.feed(b"DRIV:X 50;*WAI;X 0;*WAI;X 10\n", 0.0)
-    assert (engine.waits_until, desk.busy_until) == (5.0, 5.0)
+    assert (engine.waits_until, instrument.busy_until) == (5.0, 5.0)
     engine.feed(b"", 5.0)
     assert engine.waits_until == 10.0
     engine.feed(b"", 10.0)
-    assert (engine.waits_until, desk.busy_until) == (None, 11.0)
+    assert (engine.waits_until, instrument.busy_until) == (None, 11.0)
 
 
-def test_a_wait_that_ends_late_goes_on_from_then(desk, engine):
+def test_a_wait_that_ends_late_goes_on_from_then(instrument, engine):
     engine.feed(b"DRIV:X 50;*WAI;X 0\n", 0.0)
     engine.feed(b"", 7.5)
-    assert desk.busy_until == 12.5
+    assert instrument.busy_until == 12.5
 
 
-def test_who_waits_does_not_wait_for_what_others_begin_meanwhile(desk, engine):
-    other = desk.open()
+def test_who_waits_does_not_wait_for_what_others_begin_meanwhile(instrument, engine):
+    other = instrument.open()
     engine.feed(b"DRIV:X 50;*OPC?\n", 0.0)
     other.feed(b"DRIV:X -200\n", 1.0)
-    assert desk.busy_until == 30.0
+    assert instrument.busy_until == 30.0
     assert engine.feed(b"", 5.0) == b"1\n"
 
 
-def test_others_go_on_while_one_waits(desk, engine):
-    other = desk.open()
+def test_others_go_on_while_one_waits(instrument, engine):
+    other = instrument.open()
     engine.feed(b"DRIV:X 50;*WAI\n", 0.0)
     assert other.feed(b"COUN:X?\n", 0.1) == b"50.00\n"
 
@@ -153,17 +153,17 @@ def test_bit_1_of_the_operation_register_follows_the_movement(engine):
     assert engine.feed(b"STAT:OPER:COND?;EVEN?\n", 5.0) == b"0;0\n"
 
 
-def test_a_movement_that_came_and_went_unseen_is_an_event(desk, engine):
-    desk.open().feed(b"DRIV:X 50\n", 0.0)
+def test_a_movement_that_came_and_went_unseen_is_an_event(instrument, engine):
+    instrument.open().feed(b"DRIV:X 50\n", 0.0)
     assert engine.feed(b"STAT:OPER:COND?;EVEN?;ENAB 2;*STB?\n", 50.0) == b"0;2;0\n"
-    desk.open().feed(b"DRIV:X 0\n", 60.0)
+    instrument.open().feed(b"DRIV:X 0\n", 60.0)
     assert engine.feed(b"*STB?;*CLS;*STB?;:STAT:OPER?\n", 70.0) == b"128;0;0\n"
 
 
 @pytest.mark.parametrize("query", ["*ESR?", "*STB?", "STAT:OPER:COND?", "STAT:OPER?"])
 def test_who_waits_by_looking_at_the_status_lets_time_pass(query):
     clock = Clock()
-    with InProcessSerial(desk=SharedInstrument(Autograph(VARIANTS["A7"])), clock=clock, timeout=0.1) as port:
+    with InProcessSerial(instrument=SharedInstrument(Autograph(VARIANTS["A7"])), clock=clock, timeout=0.1) as port:
         port.write(b"*CLS;DRIV:X 5;*OPC\n")
         assert clock.now == 0.0
         port.write(query.encode() + b"\n")
@@ -176,7 +176,7 @@ def test_who_waits_by_looking_at_the_status_lets_time_pass(query):
 
 def test_looking_takes_no_time_where_nothing_moves_or_the_clock_goes_by_itself(engine):
     clock = Clock()
-    with InProcessSerial(desk=SharedInstrument(Autograph(VARIANTS["A7"])), clock=clock) as port:
+    with InProcessSerial(instrument=SharedInstrument(Autograph(VARIANTS["A7"])), clock=clock) as port:
         port.write(b"*ESR?;*STB?\n")
     assert clock.now == 0.0
     engine.feed(b"DRIV:X 50;*ESR?\n", 0.0)
@@ -198,7 +198,7 @@ def test_in_process_nothing_ever_blocks_and_the_clock_runs_on():
 def test_a_flood_in_process_is_obeyed_to_its_end(engine):
     lines = b"DRIV:X 10;*WAI;X 0;*OPC?\n" * 6000
     assert len(lines) > 2 * MAX_BUFFERED_BYTES
-    with InProcessSerial(desk=engine.desk, timeout=1) as port:
+    with InProcessSerial(instrument=engine.instrument, timeout=1) as port:
         port.write(lines)
         assert port.in_waiting == 2 * 6000
         port.write(b"SYST:ERR:COUN?\n")
@@ -237,10 +237,10 @@ def test_within_a_long_line_others_have_their_turn(engine, line):
 
 def test_what_a_line_cannot_reply_is_not_worked_out(engine):
     """Thirty pictures in a line cost no more than the four that are begun; every one left out is an error."""
-    door = Door(engine.desk)
-    picture = engine.desk.autograph.picture
+    door = Door(engine.instrument)
+    picture = engine.instrument.autograph.picture
     asked = []
-    engine.desk.autograph.picture = lambda *what: asked.append(what) or picture(*what)
+    engine.instrument.autograph.picture = lambda *what: asked.append(what) or picture(*what)
     reply = door.feed(b"EYEP:PICT? 1024,1024,1;" + b"PICT? 1024,1024,1;" * 29 + b"*ESR?\n")
     assert len(reply) == 3 * (9 + 1024 * 1024) + 3
     assert len(asked) == 4

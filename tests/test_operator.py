@@ -275,10 +275,10 @@ WRONG = {
 def test_wrong_handling_fails_as_a_person_would_with_a_remark_that_says_what(what):
     exchanges, word = WRONG[what]
     session = tampered_session(read_once(load_scenario("akwanga")), exchanges)
-    with pytest.raises(OperatorGaveUp) as trouble:
+    with pytest.raises(OperatorGaveUp) as error:
         list(measure_models(session.person, session.job))
-    assert word in str(trouble.value)
-    assert session.person.book.remarks[-1] == f"does not fit: {trouble.value}"
+    assert word in str(error.value)
+    assert session.person.book.remarks[-1] == f"does not fit: {error.value}"
 
 
 def test_a_picture_upside_down_in_its_carrier_is_found_at_the_fiducials():

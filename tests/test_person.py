@@ -80,9 +80,9 @@ def test_from_novice_to_first_order_everything_gets_better():
     ],
 )
 def test_mistakes_about_the_observer_are_named(overrides, said):
-    with pytest.raises(ScenarioError) as trouble:
+    with pytest.raises(ScenarioError) as error:
         load_scenario("akwanga", overrides)
-    assert said in str(trouble.value)
+    assert said in str(error.value)
 
 
 def test_the_schema_takes_the_word_and_the_table():
@@ -100,9 +100,9 @@ def test_the_command_line_knows_the_skills():
 def crowd_of(skill):
     """Twelve persons of a skill on film without errors, none of whom slips."""
     scenario = read_once(one_model(observer_of_skill(skill, **WITHOUT_SLIPS), film=FilmDeformation()))
-    crowd = open_batch(scenario, range(12))
-    (records,) = crowd.measure_models()
-    return crowd, records
+    batch = open_batch(scenario, range(12))
+    (records,) = batch.measure_models()
+    return batch, records
 
 
 @pytest.mark.slow
@@ -111,25 +111,27 @@ def test_the_profiles_differ_in_residuals_in_centres_and_in_time():
     for measure in (
         lambda crowd, records: np.median(records.orientation.rms),
         lambda crowd, records: np.median([records.centres[hand].rms for hand in (1, 2)]),
-        lambda crowd, records: np.median(crowd.bench.crew.seconds),
+        lambda crowd, records: np.median(crowd.workstation.operators.seconds),
     ):
         first, trained, novice = (measure(*each) for each in found.values())
         assert first < trained < novice
-    assert [crowd.bench.crew.reasons for crowd, _ in found.values()] == [{}, {}, {}]
+    assert [crowd.workstation.operators.reasons for crowd, _ in found.values()] == [{}, {}, {}]
 
 
 @pytest.mark.slow
 def test_a_novice_in_a_crowd_is_the_novice_at_the_line():
     scenario, seeds = one_model(observer_of_skill("novice")), (4, 5)
-    crowd = open_batch(scenario, seeds)
-    (records,) = crowd.measure_models()
-    assert all(crowd.bench.crew.slip_log[i] for i in range(len(seeds)))
+    batch = open_batch(scenario, seeds)
+    (records,) = batch.measure_models()
+    assert all(batch.workstation.operators.slip_log[i] for i in range(len(seeds)))
     for i, seed in enumerate(seeds):
         session = open_session(scenario, seed)
         record = next(iter(measure_models(session.person, session.job)))
         assert record.orientation.elements == records.of(i).orientation.elements
-        assert [_told(slip) for slip in session.person.slips] == [_told(slip) for slip in crowd.bench.crew.slip_log[i]]
-        assert session.person.timesheet.acts_of(0) == crowd.bench.crew.timesheet.acts_of(i)
+        assert [_told(slip) for slip in session.person.slips] == [
+            _told(slip) for slip in batch.workstation.operators.slip_log[i]
+        ]
+        assert session.person.timesheet.acts_of(0) == batch.workstation.operators.timesheet.acts_of(i)
 
 
 def _told(slip):
@@ -148,22 +150,26 @@ def test_warm_up_falls_evenly_to_nothing_and_fatigue_grows_once_no_longer_fresh(
 
 def test_a_tired_persons_settings_scatter_more_and_a_break_restores_them():
     """The same draws, larger by the factor of the hour; after a break as at the start."""
-    tired = open_batch(one_model(Observer(fresh_hours=0.0, fatigue_per_hour=1.0, takes_breaks=True)), (1,)).bench.crew
-    fresh = open_batch(one_model(Observer()), (1,)).bench.crew
-    who = tired.active
-    for crew in (tired, fresh):
-        crew.spend(who, 3.0 * HOUR)
-    assert tired.draw_setting_errors(who, 1.0, (50,)) == pytest.approx(4.0 * fresh.draw_setting_errors(who, 1.0, (50,)))
-    tired.begin_round(who, 2)
-    assert tired.draw_setting_errors(who, 1.0, (50,)) == pytest.approx(fresh.draw_setting_errors(who, 1.0, (50,)))
+    tired = open_batch(
+        one_model(Observer(fresh_hours=0.0, fatigue_per_hour=1.0, takes_breaks=True)), (1,)
+    ).workstation.operators
+    fresh = open_batch(one_model(Observer()), (1,)).workstation.operators
+    active = tired.active
+    for operators in (tired, fresh):
+        operators.spend(active, 3.0 * HOUR)
+    assert tired.draw_setting_errors(active, 1.0, (50,)) == pytest.approx(
+        4.0 * fresh.draw_setting_errors(active, 1.0, (50,))
+    )
+    tired.begin_round(active, 2)
+    assert tired.draw_setting_errors(active, 1.0, (50,)) == pytest.approx(fresh.draw_setting_errors(active, 1.0, (50,)))
     assert tired.timesheet.activities_of(0)["breaks"] == 900.0
 
 
 def test_breaks_are_taken_by_those_who_are_due_only():
-    crew = open_batch(one_model(Observer(takes_breaks=True)), (1, 2)).bench.crew
-    crew.spend(crew.active[:1], 2.5 * HOUR)
-    crew.begin(crew.active, "1", "relative orientation")
-    assert crew.seconds.tolist() == [2.75 * HOUR, 0.0]
+    operators = open_batch(one_model(Observer(takes_breaks=True)), (1, 2)).workstation.operators
+    operators.spend(operators.active[:1], 2.5 * HOUR)
+    operators.begin(operators.active, "1", "relative orientation")
+    assert operators.seconds.tolist() == [2.75 * HOUR, 0.0]
 
 
 # --- time -------------------------------------------------------------------------------------------
@@ -182,9 +188,9 @@ def test_the_time_adds_up(skill):
 
 
 def test_pace_makes_everything_slower_but_breaks():
-    slow, usual = (open_batch(one_model(Observer(pace=pace)), (1,)).bench.crew for pace in (1.5, 1.0))
-    for crew in (slow, usual):
-        crew.spend(crew.active, 10.0, "looking")
+    slow, usual = (open_batch(one_model(Observer(pace=pace)), (1,)).workstation.operators for pace in (1.5, 1.0))
+    for operators in (slow, usual):
+        operators.spend(operators.active, 10.0, "looking")
     assert (slow.seconds[0], usual.seconds[0]) == (15.0, 10.0)
 
 
@@ -203,8 +209,8 @@ def planted(kind, **place):
     session = open_session(scenario if kind == "forgotten lever" else read_once(scenario), 1)
     try:
         record = next(iter(measure_models(session.person, session.job)))
-    except OperatorGaveUp as trouble:
-        return session.person, None, str(trouble)
+    except OperatorGaveUp as error:
+        return session.person, None, str(error)
     return session.person, record, ""
 
 
@@ -342,13 +348,13 @@ def test_slips_are_told_in_the_results_and_in_no_entry_of_book_or_journal(tmp_pa
 def test_drawn_slips_come_as_often_as_their_rates_say():
     """Of four persons who write a thousand readings of by each, with a rate of 5 % of either kind."""
     slipping = Observer(**WITHOUT_SLIPS | {"wrong_sign_rate": 0.05, "transposed_rate": 0.05})
-    crew = open_batch(one_model(slipping), range(4)).bench.crew
-    who, nothing = crew.active, np.zeros(4)
+    operators = open_batch(one_model(slipping), range(4)).workstation.operators
+    active, nothing = operators.active, np.zeros(4)
     for _ in range(1000):
-        crew.transcribe(who, "1", "by1", np.full(4, 3.12), nothing)
+        operators.transcribe(active, "1", "by1", np.full(4, 3.12), nothing)
     for kind in ("wrong sign", "transposed digits"):
-        assert sum(slip.kind == kind for log in crew.slip_log for slip in log) == pytest.approx(200, abs=45)
-    written = {slip.written for log in crew.slip_log for slip in log}
+        assert sum(slip.kind == kind for log in operators.slip_log for slip in log) == pytest.approx(200, abs=45)
+    written = {slip.written for log in operators.slip_log for slip in log}
     assert written == {"-3.12", "3.21"}
 
 

@@ -86,7 +86,7 @@ def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridg
     shutil.rmtree(cut / INDEPENDENT)
     cut_off(bridged / INDEPENDENT, cut / INDEPENDENT, 0.3)
     begun = find_resumable(cut, "bridge")
-    run_bridge(begun.scenario, begun.seed, cut, keeping=JournalOptions(resumes=True))
+    run_bridge(begun.scenario, begun.seed, cut, journal_options=JournalOptions(resumes=True))
     assert without_what_was_torn(files_of(cut)) == files_of(bridged)
 
 
@@ -101,7 +101,7 @@ def test_results_of_a_bridge_say_so_where_it_was_interrupted_among_the_independe
     begun = find_resumable(cut, "bridge")
     monkeypatch.setattr("a7sim.session.bridge.run", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        run_bridge(begun.scenario, begun.seed, cut, keeping=JournalOptions(resumes=True))
+        run_bridge(begun.scenario, begun.seed, cut, journal_options=JournalOptions(resumes=True))
     results = msgspec.json.decode((cut / "results.json").read_bytes())
     assert results["status"] == "interrupted"
     assert results["bridged"]["strip"]

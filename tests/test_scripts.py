@@ -24,17 +24,19 @@ def replay(*arguments):
 def played(tmp_path, text):
     (tmp_path / "s.a7s").write_text(FIRST + text)
     heard = []
-    player = ScriptRunner(read_script(tmp_path / "s.a7s"), heard.append)
-    return player.run(), [event.text for event in heard if event.direction == ">"], player
+    runner = ScriptRunner(read_script(tmp_path / "s.a7s"), heard.append)
+    return runner.run(), [event.text for event in heard if event.direction == ">"], runner
 
 
 @pytest.mark.parametrize("name", ["interior", "clearing", "centres"])
 def test_the_scripts_of_the_thesis_find_all_that_they_expect(name):
     script = read_script(find_script(name))
     assert sum(isinstance(each, Expect) for each in script.statements) >= 11
-    player = ScriptRunner(script)
-    assert player.run() is None
-    assert len(player.desk.autograph.recorder.registrations) == {"interior": 0, "clearing": 12, "centres": 24}[name]
+    runner = ScriptRunner(script)
+    assert runner.run() is None
+    assert (
+        len(runner.instrument.autograph.recorder.registrations) == {"interior": 0, "clearing": 12, "centres": 24}[name]
+    )
 
 
 def test_there_is_a_test_of_every_script():
@@ -52,7 +54,7 @@ def test_lines_waits_and_comments_are_what_they_say(tmp_path):
     failed, said, player = played(tmp_path, text)
     assert failed is None
     assert said == ["DRIV:X 10", "NOTE \"a # in quotes, and 'more'\"", "COUN:X?", "COUN?", "PHOT:CAT?"]
-    assert player.desk.opened == 1
+    assert player.instrument.opened == 1
 
 
 @pytest.mark.parametrize(

@@ -78,10 +78,10 @@ def test_a_block_is_shown_as_its_size_and_kept_in_a_file(url, tmp_path):
 
 def test_a_token_comes_from_a_file_or_the_environment_and_goes_out_first(tmp_path, monkeypatch):
     (tmp_path / "token").write_text("of the file\n")
-    desk = new_desk()
+    instrument = new_desk()
     heard = []
-    desk.listener = lambda event: heard.append(event.text) if event.direction == ">" else None
-    with served("tcp", desk) as url:
+    instrument.listener = lambda event: heard.append(event.text) if event.direction == ">" else None
+    with served("tcp", instrument) as url:
         monkeypatch.setenv("A7SIM_TOKEN", "of the environment")
         a7sim("send", url, "*OPC?")
         a7sim("send", url, "*OPC?", "--token-file", tmp_path / "token")
@@ -172,7 +172,7 @@ def one_model():
 def test_an_operator_at_a_served_instrument_leaves_the_same_results(one_model, kind, tmp_path):
     scenario, results = one_model
     with served(kind, new_desk(scenario)) as url, open_checked_port(url, timeout=5.0) as port:
-        run(scenario, 7, tmp_path / "out", cable=lambda twin: TwinCheckedPort(port, twin, url))
+        run(scenario, 7, tmp_path / "out", port_adapter=lambda twin: TwinCheckedPort(port, twin, url))
     assert (tmp_path / "out" / "results.json").read_text(encoding="utf-8") == results
 
 
@@ -208,7 +208,7 @@ def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
             self.given += b"\n"
             return self.given
 
-    run(scenario, 7, cable=lambda twin: Eavesdropper(Served(new_desk(scenario).open()), twin, "url"))
+    run(scenario, 7, port_adapter=lambda twin: Eavesdropper(Served(new_desk(scenario).open()), twin, "url"))
     assert len(read) > 1000
     assert all(line is given for line, given in read if line)
 
@@ -230,7 +230,7 @@ def test_an_instrument_of_another_scenario_or_seed_is_refused_in_one_sentence(on
         pytest.raises(A7SimError, match=f"{url}: the instrument served {sentence}"),
         open_checked_port(url, timeout=1.0) as port,
     ):
-        run(one_model[0], 7, cable=lambda twin: TwinCheckedPort(port, twin, url))
+        run(one_model[0], 7, port_adapter=lambda twin: TwinCheckedPort(port, twin, url))
 
 
 def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
@@ -242,17 +242,17 @@ def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
             return b""
 
     with pytest.raises(A7SimError, match=r"url: expected an answer to \*IDN\? in time, got none"):
-        run(one_model[0], 7, cable=lambda twin: TwinCheckedPort(Silent(), twin, "url"))
+        run(one_model[0], 7, port_adapter=lambda twin: TwinCheckedPort(Silent(), twin, "url"))
 
 
 def test_operate_holds_the_lock_and_gives_it_back():
-    desk = new_desk()
-    with served("tcp", desk) as url:
+    instrument = new_desk()
+    with served("tcp", instrument) as url:
         with open_checked_port(url, timeout=1.0):
-            assert desk.lock_holder is not None
+            assert instrument.lock_holder is not None
             with pytest.raises(A7SimError, match="another client holds its lock"), open_checked_port(url, timeout=1.0):
                 pytest.fail("two operators in one chair")
-        assert desk.lock_holder is None
+        assert instrument.lock_holder is None
 
 
 def test_operate_needs_work_at_the_plotter(url):

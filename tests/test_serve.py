@@ -1,4 +1,4 @@
-"""The served instrument over TCP (issue 5): many clients at one desk, each with its limits, none in another's way."""
+"""The served instrument over TCP (issue 5): many clients at one instrument, each with its limits, none in another's way."""
 
 import selectors
 import socket
@@ -135,7 +135,7 @@ def test_a_client_that_goes_while_it_waits_leaves_nothing_behind():
     with Served(realtime=True) as served:
         waiting = served.line()
         waiting.send(b"SYST:LOCK:REQ?;:DRIV:X 200;*OPC?\n" + b"COUN:X?\n" * 10000)
-        assert served.until(lambda: served.desk.lock_holder is not None)
+        assert served.until(lambda: served.instrument.lock_holder is not None)
         waiting.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
         waiting.close()
         assert served.line().ask("COUN:X?") == "200.00"
@@ -155,8 +155,8 @@ def test_before_the_login_only_the_identity_is_told(guarded, line):
     client = guarded.line()
     client.send(line.encode() + b";*CLS;DRIV:X 5;:RST\n")
     assert client.ask("*IDN?") == IDENTITY
-    assert guarded.desk.autograph.counter("X") == 0.0
-    assert guarded.desk.lock_holder is None
+    assert guarded.instrument.autograph.counter("X") == 0.0
+    assert guarded.instrument.lock_holder is None
 
 
 def test_after_the_login_the_errors_from_before_it_are_there(guarded):

@@ -57,7 +57,7 @@ def test_a_terminal_is_a_serial_port_in_raw_mode(terminal, link):
 def test_every_byte_of_a_block_comes_through_a_terminal(link):
     door = with_model()
     expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
-    with Served(door.desk, doors=Endpoints(pty=[link])) as served, at(served) as port:
+    with Served(door.instrument, doors=Endpoints(pty=[link])) as served, at(served) as port:
         assert Client(port).block("EYEP1:PICT? 60,50,4") == expected
 
 
@@ -132,7 +132,7 @@ def test_a_terminal_long_silent_frees_its_lock_and_stays(link):
     with Served(terms=ServerLimits(idle_timeout=0.2), doors=Endpoints(pty=[link])) as served:
         with at(served) as port:
             assert Client(port).ask("SYST:LOCK:REQ?") == "1"
-        assert served.until(lambda: served.desk.lock_holder is None)
+        assert served.until(lambda: served.instrument.lock_holder is None)
         with at(served) as port:
             assert Client(port).ask("*TST?") == "0"
             assert port.in_waiting == 0
@@ -145,7 +145,7 @@ def test_a_port_over_rfc_2217_carries_every_byte_and_ends_lines_with_cr_as_well(
     door = with_model()
     expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
     assert expected.count(b"\xff") > 0
-    with Served(door.desk, doors=Endpoints(rfc2217=[ANYWHERE])) as served, at(served) as port:
+    with Served(door.instrument, doors=Endpoints(rfc2217=[ANYWHERE])) as served, at(served) as port:
         client = Client(port)
         assert client.block("EYEP1:PICT? 60,50,4") == expected
         port.write(b"*TST?\r")

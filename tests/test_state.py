@@ -53,25 +53,25 @@ def worn(name, token=None):
 def test_an_instrument_restored_goes_on_as_the_one_its_state_was_taken_from(name, seed):
     """A worn one, whose dice fall at every setting, with two clients in the midst of their work."""
     dice = random.Random(seed)
-    desk, clock = worn(name, "sesame"), Clock()
-    engines = [desk.open(), desk.open()]
+    instrument, clock = worn(name, "sesame"), Clock()
+    engines = [instrument.open(), instrument.open()]
     engines[0].feed(b'SYST:LOG "sesame";:REC "P0"\n', 0.0)
     engines[1].feed(b'SYST:LOG "sesame"\n' if seed % 2 else b"COUN?\n", 0.0)
     for _ in range(60):
         feed_until_idle(dice.choice(engines), line(dice, name), clock)
-    changes = len(desk.autograph.recorder.changes)
-    state = json.loads(json.dumps(desk.state()))
+    changes = len(instrument.autograph.recorder.changes)
+    state = json.loads(json.dumps(instrument.state()))
     again = worn(name, "sesame")
     again.restore(state)
     assert json.loads(json.dumps(again.state())) == state
     later = Clock(clock.now)
     for _ in range(60):
         client, said = dice.choice(engines).client, line(dice, name)
-        expected = feed_until_idle(desk.clients[client], said, clock)
+        expected = feed_until_idle(instrument.clients[client], said, clock)
         assert feed_until_idle(again.clients[client], said, later) == expected
     assert clock.now == later.now
-    assert desk.state(changes) == again.state(changes)
-    assert len(desk.state(changes)["autograph"]["registered"]) < len(desk.autograph.recorder.changes)
+    assert instrument.state(changes) == again.state(changes)
+    assert len(instrument.state(changes)["autograph"]["registered"]) < len(instrument.autograph.recorder.changes)
     assert again.open().client == "client3"
 
 

@@ -26,13 +26,13 @@ AT_THE_PLOTTER = {
 @pytest.fixture(scope="module")
 def worked(tmp_path_factory):
     """A study of one session, and its tally by the true batch bench; the link's results are worked once."""
-    laid = build_study(AT_THE_PLOTTER, tmp_path_factory.mktemp("study"))
+    loaded = build_study(AT_THE_PLOTTER, tmp_path_factory.mktemp("study"))
     tally = Tally.empty(1, 1)
-    run_study(laid, tally, InProcess())
-    linked = laid.tasks[0].link_document(0, replicate_seed(laid.study.seed, 0))
+    run_study(loaded, tally, InProcess())
+    linked = loaded.tasks[0].link_document(0, replicate_seed(loaded.study.seed, 0))
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(Task, "linked", lambda task, cell, seed: linked)
-        yield laid, tally
+        yield loaded, tally
 
 
 def test_the_true_batch_bench_passes(worked):
@@ -43,8 +43,8 @@ def _reads(name, off):
     """Hands that read `off` more of an element, a counter axis or whatever the method gives."""
 
     def perturbed(truly):
-        def method(self, who, *arguments):
-            found = truly(self, who, *arguments)
+        def method(self, active, *arguments):
+            found = truly(self, active, *arguments)
             if isinstance(found, dict):
                 return {each: value + off * (each == name) for each, value in found.items()}
             return found + off * (name in arguments)
@@ -56,8 +56,8 @@ def _reads(name, off):
 
 def _moves(off, *names):
     def perturbed(truly):
-        def method(self, who, element, values):
-            truly(self, who, element, values + off * (element in names))
+        def method(self, active, element, values):
+            truly(self, active, element, values + off * (element in names))
 
         return method
 
@@ -65,7 +65,7 @@ def _moves(off, *names):
 
 
 def _gives(off):
-    return lambda truly: lambda self, who, *arguments: truly(self, who, *arguments) + off
+    return lambda truly: lambda self, active, *arguments: truly(self, active, *arguments) + off
 
 
 PERTURBED = {

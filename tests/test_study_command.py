@@ -69,8 +69,8 @@ def test_a_study_that_was_killed_goes_on_to_the_same_bytes_and_leaves_no_worker_
     os.kill(killed.pid, signal.SIGKILL)
     killed.wait()
     _wait_until(lambda: _gone(killed.pid))
-    laid = load_study(path)
-    assert 0 < load(checkpoint_path(out), laid.identity).done.sum() < 24
+    loaded = load_study(path)
+    assert 0 < load(checkpoint_path(out), loaded.identity).done.sum() < 24
     assert said_here(capsys, "study", path, "--executor", "process", "--out", out, "--quiet").returncode == 0
     assert _files_in(out) == _files_in(whole)
 

@@ -20,13 +20,13 @@ NOISE = 0.01 * np.random.default_rng(1).standard_normal((40, 8))
 
 def found(folder, values, **changes):
     """The document of a study whose responses all have replicates ``(cells, n)``, and its tables as text."""
-    laid = build_study(BY_COMPARATOR | {"responses": [RESPONSE]} | changes, folder)
+    loaded = build_study(BY_COMPARATOR | {"responses": [RESPONSE]} | changes, folder)
     values = np.asarray(values, dtype=float)
-    responses = len(laid.responses)
-    tally = Tally.empty(len(laid.cells), responses)
+    responses = len(loaded.responses)
+    tally = Tally.empty(len(loaded.cells), responses)
     for i, each in enumerate(values):
         tally.add(i, np.tile(each, (responses, 1)))
-    document = findings_document(laid, tally)
+    document = findings_document(loaded, tally)
     console = Console(width=200)
     with console.capture() as printed:
         console.print(study_tables(document))
@@ -95,8 +95,8 @@ def test_a_hypercube_says_which_way_a_factor_works_or_that_none_does(tmp_path, s
         "samples": 40,
         "factor": [{"name": "film", "path": "film.irregular_um", "range": [0.0, 5.0]}],
     }
-    laid = build_study(BY_COMPARATOR | {"responses": [RESPONSE]} | hypercube, tmp_path)
-    films = np.array([[cell.settings["film.irregular_um"]] for cell in laid.cells])
+    loaded = build_study(BY_COMPARATOR | {"responses": [RESPONSE]} | hypercube, tmp_path)
+    films = np.array([[cell.settings["film.irregular_um"]] for cell in loaded.cells])
     document, printed = found(tmp_path, 9.0 + slope * films + NOISE, **hypercube)
     assert words in document["answer"][0]
     (effects,) = document["main_effects"]

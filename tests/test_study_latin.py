@@ -98,12 +98,12 @@ def test_a_hypercube_is_told_in_words_tables_and_a_page(tmp_path):
         "responses": ["strip_plan_at_checks_m"],
         "replicates": 5,
     }
-    laid = build_study(raw, tmp_path)
+    loaded = build_study(raw, tmp_path)
     tally = Tally.empty(40, 1)
     rng = np.random.default_rng(1)
-    for i, cell in enumerate(make_cells(laid.study)):
+    for i, cell in enumerate(make_cells(loaded.study)):
         tally.add(i, cell.settings["film.irregular_um"] + 0.1 * rng.standard_normal((1, 5)))
-    document = findings_document(laid, tally)
+    document = findings_document(loaded, tally)
     (hypercube,) = document["main_effects"]
     assert [each["factor"] for each in hypercube["factors"]] == ["film", "kind"]
     assert "alone it follows film (100 % of the variance between cells" in document["answer"][0]

@@ -147,11 +147,11 @@ def studied(folder):
         "responses": ["centre_Z_error", "hours"],
         "replicates": 3,
     }
-    laid = build_study(raw, folder)
+    loaded = build_study(raw, folder)
     tally = Tally.empty(2, 2)
     for cell in range(2):
         tally.add(cell, np.array([[0.9, 1.0, 1.1], [9.0, 8.0, 7.0]]))
-    return findings_document(laid, tally)
+    return findings_document(loaded, tally)
 
 
 def test_a_study_has_theory_in_its_document_and_on_its_page(tmp_path):

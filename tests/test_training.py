@@ -92,19 +92,21 @@ def test_the_journal_of_an_attempt_holds_no_truth(left_standing):
 
 
 def test_an_attempt_that_was_cut_off_goes_on_where_it_was(parallax, tmp_path):
-    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
-        engine = room.desk.open("client2", time=1.0)
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as environment:
+        engine = environment.instrument.open("client2", time=1.0)
         engine.feed(b'PROJ1:BY 0.30\nREC "1011",BY1\n', 2.0)
         engine.feed(b"REC:COUN?\n", 3.0)
     journal = tmp_path / "session.jsonl"
     lines = journal.read_bytes().splitlines(keepends=True)
     cut = next(n for n, line in enumerate(lines) if b"REC:COUN?" in line) + 1
     journal.write_bytes(b"".join(lines[:cut]) + b'{"t":3.0,"cl')
-    with resume_attempt(parallax, 4, tmp_path) as room:
-        assert room.autograph.element("by1") == 0.3
-        assert [each.point for each in room.record().readings] == ["1011"]
-        room.desk.open(time=room.clock.now).feed(b'REC "1012",BY1\n', 9.0)
-    assert grade_folder(parallax, 4, tmp_path).minutes == pytest.approx((9.0 - room.action_log.began) / 60.0, abs=0.1)
+    with resume_attempt(parallax, 4, tmp_path) as environment:
+        assert environment.autograph.element("by1") == 0.3
+        assert [each.point for each in environment.record().readings] == ["1011"]
+        environment.instrument.open(time=environment.clock.now).feed(b'REC "1012",BY1\n', 9.0)
+    assert grade_folder(parallax, 4, tmp_path).minutes == pytest.approx(
+        (9.0 - environment.action_log.began) / 60.0, abs=0.1
+    )
 
 
 def test_neighbours_have_different_photographs_and_the_same_student_the_same(parallax):
@@ -124,14 +126,14 @@ def test_answers_written_down_count_before_those_noted(tmp_path):
 
 
 def test_pictures_are_not_drawn_again_for_a_grade_and_all_else_is_compared(parallax, tmp_path):
-    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
-        engine = room.desk.open("client2")
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as environment:
+        engine = environment.instrument.open("client2")
         first = engine.feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 1.0)
         engine.feed(b'REC "1011",BY1\n', 2.0)
     assert len(set(first)) > 20, "expected a picture that is not black"
     assert grade_folder(parallax, 4, tmp_path).marks
-    with resume_attempt(parallax, 4, tmp_path) as room:
-        assert room.desk.open(time=3.0).feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 3.0) == first
+    with resume_attempt(parallax, 4, tmp_path) as environment:
+        assert environment.instrument.open(time=3.0).feed(b"EYEP1:PICT? 20,10,8;:COUN:X?\n", 3.0) == first
 
 
 BAD = {
@@ -165,8 +167,8 @@ def test_a_mistake_in_an_exercise_is_named_with_its_place(parallax, tmp_path, wa
 
 def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
     """By lines that a person might say; what the instrument refuses and what is struck out did not happen."""
-    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
-        engine = room.desk.open("client2", time=5.0)
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as environment:
+        engine = environment.instrument.open("client2", time=5.0)
         lines = (
             b'PROJ1:BY 0.30;:REC "1011",BY1\n',
             b'PROJector1:BY:TURN -0.04;:RECord "1011",BY1\n',
@@ -175,10 +177,10 @@ def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
         )
         for line in lines:
             engine.feed(line, 6.0)
-        account = room.record({"play": "0.08"})
+        record = environment.record({"play": "0.08"})
 
         def found(name, **options):
-            return make_metric(MetricSpec(measure=name, options=options)).evaluate(account)
+            return make_metric(MetricSpec(measure=name, options=options)).evaluate(record)
 
         assert found("spread", handles=["by1"]) == MetricResult(0.04, "by' at point 1 read from 0.26 to 0.30")
         assert found("missing-readings", points=["2"]) == MetricResult(1.0, "1 of 1 registration missing: 2")
@@ -186,19 +188,23 @@ def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
         assert found("handles-moved", handles=["by1", "by2"]) == MetricResult(1.0, "by' moved")
         assert found("run-by-motor", handles=["X"]).value == 0.0
         assert found("not-opposed").value is None
-        assert account.answers == {"play": "0.08", "slip": "none"}
+        assert record.answers == {"play": "0.08", "slip": "none"}
 
 
 def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parallax, tmp_path):
     """At the console whatever is in hand is registered, so that an element is named says nothing."""
-    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
-        engine = room.desk.open("client2", time=5.0)
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as environment:
+        engine = environment.instrument.open("client2", time=5.0)
 
         def missing_after(*lines):
             for line in lines:
                 engine.feed(line + b"\n", 6.0)
             options = {"points": ["1"], "each": 4}
-            return make_metric(MetricSpec(measure="missing-pointings", options=options)).evaluate(room.record()).value
+            return (
+                make_metric(MetricSpec(measure="missing-pointings", options=options))
+                .evaluate(environment.record())
+                .value
+            )
 
         assert missing_after(b"DRIV:X 50", b"PROJ1:BY 0.3", b"DRIV:X 1", b'REC "1011",BY1') == 3.0
         assert missing_after(b"PROJ1:BY 0.4;:WHE:Y 0.4", b'REC "1011",BY1') == 3.0
@@ -208,14 +214,14 @@ def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parall
 
 def test_an_answer_that_is_missing_or_no_number_is_told_and_measures_nothing(parallax, tmp_path):
     """What is answered is measured against what was kept back; blanks and capitals of words do not matter."""
-    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as room:
-        room.desk.open("client2", time=5.0).feed(b'DRIV:X 20;:REC "1011"\n', 6.0)
-        blank = room.record({})
+    with start_attempt(parallax, 4, tmp_path, "ada", "practice") as environment:
+        environment.instrument.open("client2", time=5.0).feed(b'DRIV:X 20;:REC "1011"\n', 6.0)
+        blank = environment.record({})
         hidden = {"base": 92.5, "height": 300.0, "sign": ["minus", "-"]}
 
     def found(name, answers, **options):
-        account = replace(blank, written=answers, hidden=hidden)
-        return make_metric(MetricSpec(measure=name, options=options)).evaluate(account)
+        record = replace(blank, written=answers, hidden=hidden)
+        return make_metric(MetricSpec(measure=name, options=options)).evaluate(record)
 
     both = {"keys": ["base", "height"]}
     assert found("answers-off", {"base": "92", "height": "301"}, **both) == MetricResult(

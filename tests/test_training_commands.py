@@ -162,12 +162,14 @@ def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
 
 def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path, monkeypatch):
     monkeypatch.setattr("a7sim.training.submissions.ALONE", 2)
-    shelved = find_exercise("14")
+    exercise_folder = find_exercise("14")
     folders = []
     for i in range(4):
-        seed = attempt_seed(f"student {i}", shelved.name)
+        seed = attempt_seed(f"student {i}", exercise_folder.name)
         folders.append(tmp_path / str(i))
-        assert run_attempt(shelved, PlayedRun(script="faulty-kind.a7s"), folders[-1], seed, f"student {i}") == ""
+        assert (
+            run_attempt(exercise_folder, PlayedRun(script="faulty-kind.a7s"), folders[-1], seed, f"student {i}") == ""
+        )
     together = grade_submissions(folders, workers=2)
     assert together == [grade_submission(folder) for folder in folders]
     assert [each.student for each in together] == [f"student {i}" for i in range(4)]
@@ -261,12 +263,12 @@ def test_served_anybodys_client_works_the_exercise(tmp_path):
 
 
 def test_two_consoles_write_progress_at_once_and_lose_nothing(tmp_path):
-    shelved = find_exercise("4")
+    exercise_folder = find_exercise("4")
 
     def begin(student):
         with Progress(tmp_path) as progress:
             for _ in range(10):
-                progress.begin(student, shelved)
+                progress.begin(student, exercise_folder)
 
     threads = [threading.Thread(target=begin, args=(name,)) for name in ("ada", "ada", "bob")]
     for each in threads:

@@ -16,9 +16,9 @@ from tests.sitting_down import Person
 
 
 def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: Path) -> None:
-    shelved = find_exercise("4")
+    exercise_folder = find_exercise("4")
     with Progress(tmp_path) as progress:
-        attempt = progress.begin("ada", shelved)
+        attempt = progress.begin("ada", exercise_folder)
 
     async def sit_down(console: Console) -> None:
         async with console.run_test(size=(110, 34)) as pilot:
@@ -34,13 +34,13 @@ def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: 
             await person.type_in("A")
             assert person.message() == "recorded 3: A"
 
-    with start_attempt(shelved, attempt.seed, attempt.folder, "ada", attempt.mode) as room:
-        port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
-        tasks = Checklist(room, attempt).lines
+    with start_attempt(exercise_folder, attempt.seed, attempt.folder, "ada", attempt.mode) as environment:
+        port = InProcessSerial(instrument=environment.instrument, clock=environment.clock, timeout=5.0)
+        tasks = Checklist(environment, attempt).lines
         asyncio.run(
             sit_down(Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, drawing=DrawingMode.HALVES, tasks=tasks)))
         )
-        readings = room.record().readings
+        readings = environment.record().readings
         assert [(each.point, each.named) for each in readings] == [("1011", ("by1",))] * 2 + [("A", ("by1",))]
 
 
@@ -50,7 +50,7 @@ def shown(console: Console) -> str:
 
 def test_points_are_driven_to_with_a_gear_engaged_before_and_counters_preset_by_a_line(tmp_path: Path) -> None:
     """As exercise 9 asks for it: its opening engages the gear, its text says COUN:X:PRES."""
-    shelved = find_exercise("9")
+    exercise_folder = find_exercise("9")
 
     async def sit_down(console: Console) -> None:
         async with console.run_test(size=(110, 34)) as pilot:
@@ -65,7 +65,7 @@ def test_points_are_driven_to_with_a_gear_engaged_before_and_counters_preset_by_
                     await person.press(":")
                     await person.type_in(line)
 
-    with start_attempt(shelved, 9, tmp_path, "ada", "practice") as room:
-        port = InProcessSerial(desk=room.desk, clock=room.clock, timeout=5.0)
+    with start_attempt(exercise_folder, 9, tmp_path, "ada", "practice") as environment:
+        port = InProcessSerial(instrument=environment.instrument, clock=environment.clock, timeout=5.0)
         asyncio.run(sit_down(Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, drawing=DrawingMode.HALVES))))
-        assert abs(room.autograph.counter("X") - 5000.0 - 194.99) < 15.0
+        assert abs(environment.autograph.counter("X") - 5000.0 - 194.99) < 15.0

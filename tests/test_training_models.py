@@ -28,9 +28,9 @@ PERFECT = {
 
 @pytest.fixture(scope="module")
 def grid_tested(tmp_path_factory):
-    shelved, folder = find_exercise("13"), tmp_path_factory.mktemp("grid")
-    assert run_attempt(shelved, shelved.exercise.reference, folder, 3) == ""
-    return load_record(shelved, 3, folder)
+    exercise_folder, folder = find_exercise("13"), tmp_path_factory.mktemp("grid")
+    assert run_attempt(exercise_folder, exercise_folder.exercise.reference, folder, 3) == ""
+    return load_record(exercise_folder, 3, folder)
 
 
 @pytest.mark.parametrize("projector", [1, 2])
@@ -60,36 +60,36 @@ def test_the_grid_test_by_hand_finds_what_stands_in_a_worn_projector(grid_tested
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
 def test_the_misread_point_can_be_found_and_the_strip_comes_to_the_true_ground(seed, tmp_path):
-    shelved = find_exercise("12")
-    scenario = scenario_for(shelved, seed)
-    made = make_handout("model sheets", scenario, seed, shelved.exercise.handout_options)
-    assert run_attempt(shelved, shelved.exercise.reference, tmp_path, seed) == ""
-    account = load_record(shelved, seed, tmp_path)
-    assert account.answers["bad"] == made.hidden["bad"]
+    exercise_folder = find_exercise("12")
+    scenario = scenario_for(exercise_folder, seed)
+    made = make_handout("model sheets", scenario, seed, exercise_folder.exercise.handout_options)
+    assert run_attempt(exercise_folder, exercise_folder.exercise.reference, tmp_path, seed) == ""
+    record = load_record(exercise_folder, seed, tmp_path)
+    assert record.answers["bad"] == made.hidden["bad"]
     for name in ("8003", "8005"):
-        found = [float(account.answers[f"{axis}{name}"]) for axis in "xyz"]
-        assert found == pytest.approx(account.scene.ground_points[name], abs=1.0)
+        found = [float(record.answers[f"{axis}{name}"]) for axis in "xyz"]
+        assert found == pytest.approx(record.scene.ground_points[name], abs=1.0)
 
 
 def test_who_leaves_the_misread_point_in_is_told_where_it_shows(tmp_path):
-    shelved = find_exercise("12")
+    exercise_folder = find_exercise("12")
     played = PlayedRun(procedure="strip by cards", options={"wanted": ["8003", "8005"], "leave_out": False})
-    assert run_attempt(shelved, played, tmp_path, 12) == ""
-    failed = {each.id: each for each in grade_record(load_record(shelved, 12, tmp_path)).failed}
+    assert run_attempt(exercise_folder, played, tmp_path, 12) == ""
+    failed = {each.id: each for each in grade_record(load_record(exercise_folder, 12, tmp_path)).failed}
     assert set(failed) == {"plan"}
     assert "y8003 was answered" in failed["plan"].sentence
 
 
 @pytest.fixture(scope="module")
 def levelled(tmp_path_factory):
-    shelved, folder = find_exercise("10"), tmp_path_factory.mktemp("levelled")
-    assert run_attempt(shelved, PlayedRun(procedure="absolute orientation", observer=PERFECT), folder, 8) == ""
-    return load_record(shelved, 8, folder)
+    exercise_folder, folder = find_exercise("10"), tmp_path_factory.mktemp("levelled")
+    assert run_attempt(exercise_folder, PlayedRun(procedure="absolute orientation", observer=PERFECT), folder, 8) == ""
+    return load_record(exercise_folder, 8, folder)
 
 
 def test_levelling_turns_both_projectors_as_the_text_says(levelled):
     """Both phi alike, both omega alike, and the right centre sinks by bx times the tilt of phi (T 3.5)."""
-    opened = max(each.place for each in levelled.witness.deeds if each.client == "opening") + 1
+    opened = max(each.place for each in levelled.action_log.actions if each.client == "opening") + 1
     level = last_readings(levelled, ["K1"])["K1"][-1]
     turned = {
         name: level.shown[name] - element_at(levelled, name, opened)

@@ -95,9 +95,9 @@ def test_tolerances_of_centres_rest_on_what_pointings_scatter_by(akwanga):
 
 
 def sheet_of(name, folder, seed, **played):
-    shelved = find_exercise(name)
-    run_attempt(shelved, PlayedRun(**played), folder, seed)
-    return {each.id: each for each in grade_folder(shelved, seed, folder).marks}
+    exercise_folder = find_exercise(name)
+    run_attempt(exercise_folder, PlayedRun(**played), folder, seed)
+    return {each.id: each for each in grade_folder(exercise_folder, seed, folder).marks}
 
 
 def test_the_sheet_says_how_far_omega_should_have_gone(tmp_path):

@@ -9,8 +9,8 @@ from a7sim.training.grading import evaluate_metrics, load_record
 
 
 def seen(account):
-    witness = account.witness
-    return witness.deeds, witness.readings, witness.sides, account.seconds, account.answers, account.autograph.state()
+    witness = account.action_log
+    return witness.actions, witness.readings, witness.sides, account.seconds, account.answers, account.autograph.state()
 
 
 @pytest.mark.parametrize("number", ["4", "9", "12"])
@@ -19,14 +19,14 @@ def test_a_rehearsal_comes_to_what_the_journal_of_the_same_attempt_gives(number,
 
     The second rehearsal begins from an opening that was done for the first.
     """
-    shelved = find_exercise(number)
-    played = shelved.exercise.faulty[0]
-    rehearsals = DryRuns(shelved)
-    rehearsals.run_attempt(shelved.exercise.reference)
-    rehearsed, trouble = rehearsals.run_attempt(played)
-    seed = seed_for(shelved, played)
-    assert run_attempt(shelved, played, tmp_path, seed) == trouble
-    journalled = load_record(shelved, seed, tmp_path)
+    exercise_folder = find_exercise(number)
+    played = exercise_folder.exercise.faulty[0]
+    rehearsals = DryRuns(exercise_folder)
+    rehearsals.run_attempt(exercise_folder.exercise.reference)
+    rehearsed, error = rehearsals.run_attempt(played)
+    seed = seed_for(exercise_folder, played)
+    assert run_attempt(exercise_folder, played, tmp_path, seed) == error
+    journalled = load_record(exercise_folder, seed, tmp_path)
     assert len(journalled.actions) > 0
     assert seen(rehearsed) == seen(journalled)
     assert evaluate_metrics(rehearsed) == evaluate_metrics(journalled)
@@ -34,7 +34,7 @@ def test_a_rehearsal_comes_to_what_the_journal_of_the_same_attempt_gives(number,
 
 def test_what_is_rehearsed_leaves_the_opening_as_it_was():
     rehearsals = DryRuns(find_exercise("9"))
-    seed = seed_for(rehearsals.shelved, rehearsals.shelved.exercise.reference)
+    seed = seed_for(rehearsals.exercise_folder, rehearsals.exercise_folder.exercise.reference)
     before = rehearsals.run_and_leave(seed, None)
-    rehearsals.run_attempt(rehearsals.shelved.exercise.reference)
+    rehearsals.run_attempt(rehearsals.exercise_folder.exercise.reference)
     assert seen(rehearsals.run_and_leave(seed, None)) == seen(before)

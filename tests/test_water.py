@@ -251,17 +251,17 @@ def test_on_water_no_spot_is_set_and_no_contour_followed():
     session = open_session(scenario, 1)
     person = session.person
     person.book.set_heading("", "preparation")
-    bench = Workstation(
+    workstation = Workstation(
         OperatorBatch.single(person), ScpiDriver(person), replace(session.job, models=session.job.models[:1])
     )
-    record = next(measure_models_batch(bench)).of(0)
-    view = StereoView(bench, person)
-    model = level_model(bench, view, record.points, ground_control(scenario, session.scene), 3750.0)
+    record = next(measure_models_batch(workstation)).of(0)
+    view = StereoView(workstation, person)
+    model = level_model(workstation, view, record.points, ground_control(scenario, session.scene), 3750.0)
     ground = session.scene.ground
     shore = np.array([*ground.shores[0][:, 2], 460.0])
     x, y, _ = model.readings_of(shore)
     area = Area(np.array([x - 9.0, y - 6.0]), np.array([x + 9.0, y + 6.0]))
-    work = Compilation(bench, person, view, model, area, Tracing(0.0))
+    work = Compilation(workstation, person, view, model, area, Tracing(0.0))
     spots = work.spot_heights(SPACING)
 
     def on_ground(plan):

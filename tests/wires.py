@@ -18,17 +18,17 @@ def new_desk(scenario="akwanga", seed=7):
 
 
 @contextmanager
-def everywhere(desk):
-    """Serve a desk; yield its URLs by kind."""
+def everywhere(instrument):
+    """Serve a instrument; yield its URLs by kind."""
     with tempfile.TemporaryDirectory() as folder:
         doors = Endpoints([ANYWHERE], [ANYWHERE], [Path(folder) / "pty"])
-        with Served(desk, doors=doors) as opened:
+        with Served(instrument, doors=doors) as opened:
             urls = {door["kind"]: door["url"] for door in opened.opened}
             yield urls | {"socket": urls["tcp"].replace("tcp://", "socket://")}
 
 
 @contextmanager
-def served(kind, desk):
-    """Serve a desk; yield its URL of one kind."""
-    with everywhere(desk) as urls:
+def served(kind, instrument):
+    """Serve a instrument; yield its URL of one kind."""
+    with everywhere(instrument) as urls:
         yield urls[kind]

@@ -40,10 +40,10 @@ def seen_at_six(n_and_seed):
     n, seed = n_and_seed
     plan = {"plan.procedure": '"empirical"', "plan.start_off_gon": "2", "plan.over_correction": n}
     session = open_session(load_scenario("akwanga", plan | {"plan.tolerated_parallax_um": "1000"}), seed)
-    bench = Workstation(OperatorBatch.single(session.person), ScpiDriver(session.person), session.job)
+    workstation = Workstation(OperatorBatch.single(session.person), ScpiDriver(session.person), session.job)
     with suppress(_IsReady):
-        next(measure_models_batch(bench, _stop))
-    found = orient_model(bench, session.job.models[0]).of(0)
+        next(measure_models_batch(workstation, _stop))
+    found = orient_model(workstation, session.job.models[0]).of(0)
     _, y, z = found.places["6"]
     return [abs(each.parallaxes["6"]) for each in found.rounds], float(over_correction(z, abs(y)))
 

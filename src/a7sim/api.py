@@ -49,8 +49,8 @@ def connect(
         raise A7SimError(
             "connect: expected no token beside a scenario, since an instrument in this process asks for none"
         )
-    desk = SharedInstrument(Autograph.from_scenario(*_chosen(to, seed)))
-    return Client(InProcessSerial(desk=desk, timeout=timeout))
+    instrument = SharedInstrument(Autograph.from_scenario(*_chosen(to, seed)))
+    return Client(InProcessSerial(instrument=instrument, timeout=timeout))
 
 
 class Operator:

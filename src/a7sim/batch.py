@@ -12,37 +12,37 @@ Indices = npt.NDArray[np.intp]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
-def exclude(who: Indices, others: Indices) -> Indices:
+def exclude(active: Indices, others: Indices) -> Indices:
     """Return those of some that are not among others, in their order."""
-    if not who.size or not others.size:
-        return who
-    stays = np.ones(max(int(who.max()), int(others.max())) + 1, dtype=bool)
+    if not active.size or not others.size:
+        return active
+    stays = np.ones(max(int(active.max()), int(others.max())) + 1, dtype=bool)
     stays[others] = False
-    return np.asarray(who[stays[who]])
+    return np.asarray(active[stays[active]])
 
 
-def take(values: npt.NDArray[Scalar], who: Indices) -> npt.NDArray[Scalar]:
+def take(values: npt.NDArray[Scalar], active: Indices) -> npt.NDArray[Scalar]:
     """Return the values ``(..., m)`` of some among those ``(..., all)``, to be read at once and not written to.
 
     They are laid out as these, where indexing transposes; everybody's are not copied.
     """
-    return values if who.size == values.shape[-1] else values.take(who, axis=-1)
+    return values if active.size == values.shape[-1] else values.take(active, axis=-1)
 
 
-def put(values: npt.NDArray[np.float64], who: Indices, into: npt.NDArray[np.float64]) -> None:
+def put(values: npt.NDArray[np.float64], active: Indices, into: npt.NDArray[np.float64]) -> None:
     """Put values ``(m,)`` or ``(k, m)`` of some among those ``(all,)`` or ``(k, all)`` of all."""
-    if who.size == into.shape[-1]:
+    if active.size == into.shape[-1]:
         into[...] = values
     elif into.ndim == 1:
-        into[who] = values
+        into[active] = values
     else:
         for row, new in zip(into, values, strict=True):
-            row[who] = new
+            row[active] = new
 
 
-def add_at(amount: float, who: Indices, to: npt.NDArray[np.float64]) -> None:
+def add_at(amount: float, active: Indices, to: npt.NDArray[np.float64]) -> None:
     """Add an amount to the values of some among those ``(all,)`` of all."""
-    if who.size == to.size:
+    if active.size == to.size:
         to += amount
     else:
-        to[who] += amount
+        to[active] += amount

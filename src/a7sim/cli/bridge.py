@@ -33,5 +33,5 @@ def command(scenario: str | None, asked: ScenarioOptions, kept: OutputOptions, t
 
     order = resolve_request(scenario, asked, kept)
     with progress_bar(_POINTS_A_MODEL * len(order.scenario.models), told) as watcher:
-        document = run_bridge(order.scenario, order.seed, kept.folder, watcher, kept.force, kept.keeping)
+        document = run_bridge(order.scenario, order.seed, kept.folder, watcher, kept.force, kept.journal_options)
     show_results(document, told, bridge_tables)

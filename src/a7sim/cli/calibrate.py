@@ -62,5 +62,7 @@ def command(
         raise A7SimError(f"--points: expected as many crosses as lie evenly on the plate ({known}), got {points}")
     test = GridTestPlan(camera, plate, points, levels, pointings, polarity)
     with progress_bar(PROJECTORS * points * levels * pointings, told) as watcher:
-        document = run_grid_test(order.scenario, order.seed, test, kept.folder, watcher, kept.force, kept.keeping)
+        document = run_grid_test(
+            order.scenario, order.seed, test, kept.folder, watcher, kept.force, kept.journal_options
+        )
     show_results(document, told, report_tables)

@@ -59,5 +59,7 @@ def command(
     if order.begun_with is not None:
         wanted = CompilationRequest.from_settings(order.begun_with)
     with progress_bar(_POINTS, told) as watcher:
-        document = compile_model(order.scenario, order.seed, wanted, kept.folder, watcher, kept.force, kept.keeping)
+        document = compile_model(
+            order.scenario, order.seed, wanted, kept.folder, watcher, kept.force, kept.journal_options
+        )
     show_results(document, told, map_tables)

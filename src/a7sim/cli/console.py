@@ -102,16 +102,16 @@ def command(
     here: LocalConsole | None = None
     if watch is not None and not is_url(watch):
         _refuse_beside("--watch", watch, scenario=scenario)
-        seat = playback_console(watch)
+        config = playback_console(watch)
     elif url := watch or connect:
         loaded = load_scenario(scenario) if scenario else None
         sheet = JobSheet(loaded.title, loaded.camera) if loaded else JobSheet()
-        seat = remote_console(url, sheet, token_file, watching=watch is not None)
+        config = remote_console(url, sheet, token_file, watching=watch is not None)
     else:
         name = scenario or USUAL
         overrides = {"instrument.variant": f'"{variant.upper()}"'} if variant else {}
         here = LocalConsole(name, load_scenario(name, overrides), seed, out, go_on)
-        seat = here.config
+        config = here.config
     if serve_in_browser(context):
         return
     if not (is_browser_child() or (sys.stdin.isatty() and sys.stderr.isatty())):
@@ -120,7 +120,7 @@ def command(
         )
     Console(
         replace(
-            seat,
+            config,
             keymap=keys,
             drawing=DrawingMode.WORDS if plain else DrawingMode(drawing) if drawing else None,
             acuity_um=acuity,

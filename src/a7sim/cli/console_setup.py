@@ -33,7 +33,7 @@ class LocalConsole:
         self._go_on = go_on
         self._clock, self._wall = Clock(), WallClock()
         self._left: SavedSession | None = None
-        self._chair: InteractiveSession | None = None
+        self._interactive: InteractiveSession | None = None
         self._greeting = ""
         if go_on is not None or (out is not None and out.exists()):
             self._answered_beforehand(out)
@@ -42,7 +42,7 @@ class LocalConsole:
         last = self._last()
         if self._go_on:
             if last is None or last.begun is None:
-                found = last.trouble if last else "found none"
+                found = last.error if last else "found none"
                 raise A7SimError(
                     f"--go-on: expected a session of {self._name} at seed {self._seed} in {self._folder}: {found}"
                 )
@@ -80,7 +80,7 @@ class LocalConsole:
         if last is None:
             return None
         if last.begun is None:
-            self._greeting = f"begun anew, since the last session cannot be gone on with: {last.trouble}"
+            self._greeting = f"begun anew, since the last session cannot be gone on with: {last.error}"
             return None
         if not last.has_changes:
             self._decide(last, True)
@@ -98,15 +98,19 @@ class LocalConsole:
 
     def _opened(self) -> Client:
         """Sit down in the chair, which is built when the instrument is first spoken to."""
-        if self._chair is None:
+        if self._interactive is None:
             from a7sim.session.interactive import InteractiveSession  # beside the first paint of the screen
 
             begun = self._left.begun if self._left else None
-            self._chair = InteractiveSession(self._scenario, self._seed, self._folder, self._clock, begun)
-        return self._chair.open()
+            self._interactive = InteractiveSession(self._scenario, self._seed, self._folder, self._clock, begun)
+        return self._interactive.open()
 
     def _past(self) -> Iterable[LoggedLine]:
-        return (LoggedLine(each.text, each.dir == "<") for each in self._chair.history()) if self._chair else ()
+        return (
+            (LoggedLine(each.text, each.dir == "<") for each in self._interactive.history())
+            if self._interactive
+            else ()
+        )
 
     def _time(self) -> float:
         self._clock.advance_to(self._wall.now)
@@ -114,10 +118,10 @@ class LocalConsole:
 
     def close(self) -> Path | None:
         """End the journal; return the folder where it is, None where nothing was begun."""
-        if self._chair is None:
+        if self._interactive is None:
             return None
-        self._chair.close()
-        return self._chair.folder
+        self._interactive.close()
+        return self._interactive.folder
 
 
 def remote_console(url: str, sheet: JobSheet, token_file: Path | None, watching: bool = False) -> ConsoleConfig:
@@ -144,15 +148,15 @@ def playback_console(session: str) -> ConsoleConfig:
     """Return a seat from which a session that is over is watched. Raises Mistake where there is none."""
     from a7sim.session.recording import open_recording  # only for who watches one
 
-    film = open_recording(session)
-    title = str(film.journalled.header.get("title", ""))
+    recording = open_recording(session)
+    title = str(recording.journalled.header.get("title", ""))
     return ConsoleConfig(
-        film.open_client,
-        lambda: film.frame.time,
+        recording.open_client,
+        lambda: recording.frame.time,
         where=session,
         sheet=JobSheet(title),
         watching=True,
-        film=film,
+        recording=recording,
         greeting=lambda: "hands off: space plays, . steps, g jumps; ? is help",
     )
 

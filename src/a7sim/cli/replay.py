@@ -192,12 +192,12 @@ def play_script(
     script = read_script(find_script(session))
     journal = Journal()
     told = TranscriptListener(lambda text: None if silent else click.echo(text), pace.until, journal.on_link_event)
-    player = ScriptRunner(script, told.on_link_event)
+    runner = ScriptRunner(script, told.on_link_event)
     if out is not None:
         prepare_folder(out, force)
     header = make_header("replay", script.scenario, script.seed, script=script.file.name)
-    with journal.recording(out, header, player.desk) if out else nullcontext():
-        failed = player.run()
+    with journal.recording(out, header, runner.instrument) if out else nullcontext():
+        failed = runner.run()
     if as_document:
         document = document_header("replay") | {
             "session": str(script.file),

@@ -57,5 +57,7 @@ def command(
     work = run_combinations if every_case else run_all_methods
     sessions = len(CASES) if every_case else 1
     with progress_bar(POINTS_A_MODEL * sessions * len(order.scenario.models), told) as watcher:
-        document = work(order.scenario, order.seed, kept.folder, watcher, kept.force, keeping=kept.keeping)
+        document = work(
+            order.scenario, order.seed, kept.folder, watcher, kept.force, journal_options=kept.journal_options
+        )
     show_results(document, told, strips_table if every_case else session_tables)

@@ -67,7 +67,7 @@ class OutputOptions:
         return self.resume or self.out
 
     @property
-    def keeping(self) -> "JournalOptions":
+    def journal_options(self) -> "JournalOptions":
         """How the journal is kept."""
         from a7sim.session.journal import JournalOptions
 

@@ -104,10 +104,10 @@ def command(
         baud, parse_faults(fault) if fault is not None else None, fault_seed, idle, max_clients=clients
     )
     if kept.resume is not None:
-        served = _served_again(resolve_resume(kept.resume, *_OF_THE_DOOR), token, kept.keeping)
+        served = _served_again(resolve_resume(kept.resume, *_OF_THE_DOOR), token, kept.journal_options)
     else:
         loaded, seed = resolve_scenario(scenario, asked)
-        kept.keeping.prepare(kept.out, kept.force)
+        kept.journal_options.prepare(kept.out, kept.force)
         served = _served_anew(loaded, seed, token, realtime, kept)
     with served.journal:
         run(serve(served, doors, terms, StartupMessages(served.head, as_document, quiet)))
@@ -118,7 +118,7 @@ class ServedInstrument:
     """What is served: a desk, the time at it, and the journal of what is said there."""
 
     head: Document
-    desk: SharedInstrument
+    instrument: SharedInstrument
     clock: Clock | WallClock
     journal: Journal
 
@@ -127,24 +127,28 @@ def _served_anew(
     scenario: Scenario, seed: int, token: str | None, realtime: bool, kept: OutputOptions
 ) -> ServedInstrument:
     autograph = Autograph.from_scenario(scenario, seed)
-    journal = Journal(kept.keeping)
-    desk = SharedInstrument(
+    journal = Journal(kept.journal_options)
+    instrument = SharedInstrument(
         autograph, journal.on_link_event if kept.out else None, token, 0.0 if realtime else POLL_SECONDS
     )
     header = make_header("serve", scenario, seed, realtime=realtime, login=token is not None)
-    return ServedInstrument(_head(scenario, seed), desk, _clock(realtime), journal.recording(kept.out, header, desk))
+    return ServedInstrument(
+        _head(scenario, seed), instrument, _clock(realtime), journal.recording(kept.out, header, instrument)
+    )
 
 
-def _served_again(begun: ResumableSession, token: str | None, keeping: JournalOptions) -> ServedInstrument:
+def _served_again(begun: ResumableSession, token: str | None, journal_options: JournalOptions) -> ServedInstrument:
     if begun.setting("login") != (token is not None):
         asked, given = ("a", "none") if token is None else ("no", "one")
         raise A7SimError(
             f"{begun.journalled.location(1)}: expected {asked} token, as the session was begun with, got {given}"
         )
-    journal = Journal(keeping)
-    desk, now, _ = restore_instrument(begun, journal)
-    desk.token = token
-    return ServedInstrument(_head(begun.scenario, begun.seed), desk, _clock(begun.setting("realtime"), now), journal)
+    journal = Journal(journal_options)
+    instrument, now, _ = restore_instrument(begun, journal)
+    instrument.token = token
+    return ServedInstrument(
+        _head(begun.scenario, begun.seed), instrument, _clock(begun.setting("realtime"), now), journal
+    )
 
 
 def _clock(realtime: bool, now: float = 0.0) -> Clock | WallClock:
@@ -168,7 +172,7 @@ async def serve(served: ServedInstrument, doors: Endpoints, terms: ServerLimits,
     loop.set_exception_handler(fail)
     for name in _STOPPING:
         loop.add_signal_handler(getattr(signal, name), stopped.set)
-    server = Server(served.desk, served.clock, terms)
+    server = Server(served.instrument, served.clock, terms)
     opened = await server.open(doors)
     try:
         told.ready(opened)

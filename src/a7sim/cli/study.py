@@ -74,22 +74,22 @@ def command(
 
     Example: a7sim study levels --replicates 50 --out runs/levels --audit 4
     """
-    laid = load_study(study, replicates)
+    loaded = load_study(study, replicates)
     with open_executor(executor, workers, scheduler) as (others, at_once):
-        tally = open_tally(laid, out, force)
-        with _watched(laid, tally, as_document or quiet) as (progress, task):
+        tally = open_tally(loaded, out, force)
+        with _watched(loaded, tally, as_document or quiet) as (progress, task):
             checkpoint = checkpoint_path(out) if out is not None else None
-            run_study(laid, tally, others, at_once, checkpoint, lambda done: progress.advance(task, done))
-    document = findings_document(laid, tally)
+            run_study(loaded, tally, others, at_once, checkpoint, lambda done: progress.advance(task, done))
+    document = findings_document(loaded, tally)
     if out is not None:
-        write_results(out, laid, tally, document)
+        write_results(out, loaded, tally, document)
         _leave_page(out, document)
     if as_document:
         click.echo(as_json(document), nl=False)
     elif not quiet:
         Console().print(study_tables(document))
     if audit is not None:
-        _audit(laid, tally, audit, as_document or quiet)
+        _audit(loaded, tally, audit, as_document or quiet)
 
 
 def _leave_page(out: Path, document: Document) -> None:
@@ -100,9 +100,9 @@ def _leave_page(out: Path, document: Document) -> None:
         click.echo(f"a7sim: {missing}", err=True)
 
 
-def _audit(laid: LoadedStudy, tally: Tally, picks: int, silent: bool) -> None:
-    differences = audit_study(laid, tally, picks)
-    worked = pluralize(min(picks, sum(tally.sample(i).shape[1] for i in range(len(laid.cells)))), "session")
+def _audit(loaded: LoadedStudy, tally: Tally, picks: int, silent: bool) -> None:
+    differences = audit_study(loaded, tally, picks)
+    worked = pluralize(min(picks, sum(tally.sample(i).shape[1] for i in range(len(loaded.cells)))), "session")
     if differences:
         click.echo(f"a7sim: {len(differences)} of {worked} differ over the link; {differences[0]}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
@@ -119,11 +119,11 @@ class _Rate(ProgressColumn):
 
 
 @contextmanager
-def _watched(laid: LoadedStudy, tally: Tally, silent: bool) -> Iterator[tuple[Progress, TaskID]]:
+def _watched(loaded: LoadedStudy, tally: Tally, silent: bool) -> Iterator[tuple[Progress, TaskID]]:
     """Show on a terminal how many sessions are done, at what rate, and how long it will take."""
-    title = TextColumn(laid.study.title, markup=False)
+    title = TextColumn(loaded.study.title, markup=False)
     columns = (title, BarColumn(), MofNCompleteColumn(), _Rate(), TimeRemainingColumn())
     hidden = silent or not sys.stderr.isatty()
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=hidden) as progress:
-        total = laid.replicates * len(laid.cells)
+        total = loaded.replicates * len(loaded.cells)
         yield progress, progress.add_task("", total=total, completed=int(tally.done.sum()))

@@ -49,8 +49,8 @@ def write_result(outcome: ProcessingResult, folder: Path) -> Document:
     for name, text in outcome.files.items():
         try:
             texts[name] = text()
-        except A7SimError as mistake:
-            refused[name] = str(mistake)
+        except A7SimError as error:
+            refused[name] = str(error)
     document = outcome.document | ({"not_written": refused} if refused else {})
     write_files(folder, texts | {"results.json": as_json(document)})
     return document

@@ -29,9 +29,9 @@ class ActionBase:
         assert console.met is not None and console.dials is not None
         return console.met.variant, console.dials
 
-    def _hold(self, hands: ControlSelection) -> None:
+    def _hold(self, selection: ControlSelection) -> None:
         console = self._console
-        console.hands = hands
+        console.selection = selection
         console.refresh_panels()
 
     def _ask_number(self, question: str, note: str, then: Callable[[float], None]) -> None:

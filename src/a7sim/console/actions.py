@@ -42,7 +42,7 @@ class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackAc
     def do_go_to(self) -> None:
         """Choose a point of the sketch and drive near it."""
         console = self._console
-        projector = console.hands.side if console.sketches[console.hands.side] else 3 - console.hands.side
+        projector = console.selection.side if console.sketches[console.selection.side] else 3 - console.selection.side
         points = console.sketches[projector]
         if not points:
             console.say("there is no sketch: lay a picture first (l)", refused=True)
@@ -102,7 +102,9 @@ class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackAc
         """Show all keys."""
         console = self._console
         console.push_screen(
-            HelpPage(console.seat.keymap, not console.utf8, console.seat.watching, console.seat.film is not None)
+            HelpPage(
+                console.config.keymap, not console.utf8, console.config.watching, console.config.recording is not None
+            )
         )
 
     def do_quit(self) -> None:

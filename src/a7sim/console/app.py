@@ -45,13 +45,13 @@ class Console(MessageHandlers, Actions, App[None]):
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (100, "-usual"), (140, "-wide")]  # noqa: RUF012 # as the library declares it
     VERTICAL_BREAKPOINTS = [(0, "-low"), (28, "-tall"), (44, "-high")]  # noqa: RUF012
 
-    def __init__(self, seat: ConsoleConfig) -> None:
+    def __init__(self, config: ConsoleConfig) -> None:
         super().__init__()
-        self.seat = seat
+        self.config = config
         self.utf8 = speaks_utf8()
-        drawing = seat.drawing or best_drawing(self.utf8, self.no_color, self.console.color_system)
+        drawing = config.drawing or best_drawing(self.utf8, self.no_color, self.console.color_system)
         self.binocular = Binocular(ViewSettings(drawing), "•" if self.utf8 else "o")
-        self.hands = ControlSelection()
+        self.selection = ControlSelection()
         self.entries: tuple[RecordedEntry, ...] = ()
         self.presets = CounterOrigins()
         self.sketches: dict[int, dict[str, Place]] = {1: {}, 2: {}}
@@ -61,16 +61,16 @@ class Console(MessageHandlers, Actions, App[None]):
         self.dials: Readouts | None = None
         self.sight: ViewResult | None = None
         self.silent: ConnectionLost | None = None
-        self.station = InstrumentThread(seat.connect, self._tell, seat.alone)
-        self.playback = Playback(seat.film, self.ask, self.show_frame) if seat.film else None
-        self._by_key = actions_by_key(seat.keymap, seat.watching)
+        self.thread = InstrumentThread(config.connect, self._tell, config.alone)
+        self.playback = Playback(config.recording, self.ask, self.show_frame) if config.recording else None
+        self._by_key = actions_by_key(config.keymap, config.watching)
         self._early: deque[events.Key] | None = deque()
         self.main = MainScreen(
-            self.binocular, self.key_pressed, self.utf8, seat.exercise_goal or WELCOME * seat.welcome, seat.tasks
+            self.binocular, self.key_pressed, self.utf8, config.exercise_goal or WELCOME * config.welcome, config.tasks
         )
         for theme in THEMES:
             self.register_theme(theme)
-        self.theme = seat.theme
+        self.theme = config.theme
 
     # --- the screen -----------------------------------------------------------------------------------
 
@@ -88,14 +88,14 @@ class Console(MessageHandlers, Actions, App[None]):
 
     def on_main_screen_laid(self) -> None:
         """Sit down, at the session that was left if that is wanted."""
-        self.say(f"sitting down at {self.seat.where or 'the instrument'} ...")
+        self.say(f"sitting down at {self.config.where or 'the instrument'} ...")
         self.call_after_refresh(self._sit_down)
         self.set_interval(1.0, self._masthead)
 
     def _sit_down(self) -> None:
-        resumable = self.seat.resumable()
+        resumable = self.config.resumable()
         if resumable is None:
-            self.station.start()
+            self.thread.start()
         else:
             self.push_screen(Choose("the last session", GO_ON, resumable.about), partial(self._decided, resumable))
 
@@ -104,11 +104,11 @@ class Console(MessageHandlers, Actions, App[None]):
             self.exit()
         else:
             resumable.decide(answer == "go_on")
-            self.station.start()
+            self.thread.start()
 
     def on_unmount(self) -> None:
         """End the conversation."""
-        self.station.stop()
+        self.thread.stop()
 
     def say(self, words: str, refused: bool = False) -> None:
         """Show a message."""
@@ -116,8 +116,8 @@ class Console(MessageHandlers, Actions, App[None]):
 
     def _masthead(self) -> None:
         if self.met is not None and self.main.is_there:
-            job = self.seat.sheet.title or self.seat.where
-            self.main.show_header(header_text(self.met.identity, self.dials, job, self.seat.time(), self.size.width))
+            job = self.config.sheet.title or self.config.where
+            self.main.show_header(header_text(self.met.identity, self.dials, job, self.config.time(), self.size.width))
 
     def next_panel(self) -> None:
         """Show the next panel at the right of a narrow screen."""
@@ -169,9 +169,9 @@ class Console(MessageHandlers, Actions, App[None]):
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
         """Return what the palette lists: every deed by its name, and the library's own."""
-        for deed in actions_for(self.seat.watching, self.seat.film is not None):
-            keys = " ".join(key_display(key, not self.utf8) for key in self.seat.keymap[deed.name])
-            yield SystemCommand(deed.description, f"{deed.group}, {keys}", partial(self.run_by_name, deed.name))
+        for action in actions_for(self.config.watching, self.config.recording is not None):
+            keys = " ".join(key_display(key, not self.utf8) for key in self.config.keymap[action.name])
+            yield SystemCommand(action.description, f"{action.group}, {keys}", partial(self.run_by_name, action.name))
         yield from super().get_system_commands(screen)
 
     # --- panels ---------------------------------------------------------------------------------------
@@ -181,19 +181,19 @@ class Console(MessageHandlers, Actions, App[None]):
         met, dials = self.met, self.dials
         if met is None or dials is None or not self.main.is_there:
             return
-        self.main.show(met.variant, dials, None if self.seat.watching else self.hands, self.entries)
+        self.main.show(met.variant, dials, None if self.config.watching else self.selection, self.entries)
         for projector, picture in enumerate(dials.pictures, start=1):
             mark = partial(print_position, met.variant, dials, self.presets, projector)
             self.main.show_sketch(projector, picture, self.sketches[projector], mark, self.point)
         pricked = any(self.sketches.values())
         unstruck = any(not entry.struck for entry in self.entries)
-        keys, magnification = key_labels(self.seat.keymap, not self.utf8), self.view.magnification
-        if self.seat.watching:
+        keys, magnification = key_labels(self.config.keymap, not self.utf8), self.view.magnification
+        if self.config.watching:
             self.main.show_hints(
                 hints_to_watch(keys, magnification, None if self.playback is None else self.playback.playing)
             )
         else:
-            self.main.show_hints(hints(keys, self.hands, magnification, self.point, pricked, unstruck))
+            self.main.show_hints(hints(keys, self.selection, magnification, self.point, pricked, unstruck))
         self._masthead()
 
     # --- what widgets tell ---------------------------------------------------------------------------

@@ -27,7 +27,7 @@ class BookActions(ActionBase):
         console = self._console
         if point is not None:
             console.point = point
-            elements = [registration_word(console.hands.element)]
+            elements = [registration_word(console.selection.element)]
             console.ask(lambda client: record(client, point, elements), self._recorded)
 
     def _recorded(self, entry: RecordedEntry | None) -> None:
@@ -47,7 +47,7 @@ class BookActions(ActionBase):
         if last is None:
             console.say("there is nothing in the book to strike out")
             return
-        console.station.send(f"REC:STR {last.number},{quote_text(STRIKE_REASON)}")
+        console.thread.send(f"REC:STR {last.number},{quote_text(STRIKE_REASON)}")
         console.entries = tuple(entry.struck_out() if entry is last else entry for entry in console.entries)
         console.say(f"struck out {last.number}: {last.point}")
         console.refresh_panels()
@@ -58,7 +58,7 @@ class BookActions(ActionBase):
 
         def noted(text: str | None) -> None:
             if text is not None:
-                console.station.send(f"NOTE {quote_text(text)}")
+                console.thread.send(f"NOTE {quote_text(text)}")
                 console.say(f"noted: {text}")
 
         console.push_screen(Ask("note"), noted)

@@ -55,7 +55,7 @@ class ConsoleConfig:
     """What was said in the session that is gone on with."""
     watching: bool = False
     """Whether somebody else turns and this console only shows it."""
-    film: "Recording | None" = None
+    recording: "Recording | None" = None
     """The session that is watched, where it is over."""
 
 

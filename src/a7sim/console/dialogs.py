@@ -117,12 +117,12 @@ counters, elements and book. Your hands are off; your eyes are your own.
 def help_text(keymap: Keymap, plain: bool, watching: bool = False, film: bool = True) -> str:
     """Return the page of help."""
     lines = [_HOW_TO_WATCH if watching else _HOW_TO]
-    deeds = actions_for(watching, film)
-    for group in dict.fromkeys(deed.group for deed in deeds):
+    actions = actions_for(watching, film)
+    for group in dict.fromkeys(action.group for action in actions):
         lines.append(group.upper())
-        for deed in deeds:
-            if deed.group == group:
-                keys = " ".join(key_display(key, plain) for key in keymap[deed.name])
-                lines.append(f"  {keys:<10} {deed.description}")
+        for action in actions:
+            if action.group == group:
+                keys = " ".join(key_display(key, plain) for key in keymap[action.name])
+                lines.append(f"  {keys:<10} {action.description}")
         lines.append("")
     return "\n".join(lines)

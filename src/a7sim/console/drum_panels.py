@@ -97,15 +97,15 @@ class ElementsPanel(Panel):
         self.plain = False
         self._variant: Variant | None = None
         self._readings: Mapping[str, str] = {}
-        self._hands: ControlSelection | None = None
+        self._selection: ControlSelection | None = None
 
-    def show(self, variant: Variant, readings: Mapping[str, str], hands: ControlSelection | None) -> None:
+    def show(self, variant: Variant, readings: Mapping[str, str], selection: ControlSelection | None) -> None:
         """Show readings, and what is in hand, None where hands are off."""
-        if (variant, readings, hands) != (self._variant, self._readings, self._hands):
+        if (variant, readings, selection) != (self._variant, self._readings, self._selection):
             anew = self._variant is not variant
-            self._variant, self._readings, self._hands = variant, readings, hands
-            free = " free hand" if hands and hands.free else ""
-            self.border_subtitle = f"step {hands.step:g}{free}" if hands else "hands off"
+            self._variant, self._readings, self._selection = variant, readings, selection
+            free = " free hand" if selection and selection.free else ""
+            self.border_subtitle = f"step {selection.step:g}{free}" if selection else "hands off"
             self.refresh(layout=anew)
 
     @property
@@ -136,7 +136,7 @@ class ElementsPanel(Panel):
         shown = "Phi" if name == "common_phi" else name
         row = Text(f"{shown:<{name_width}}", self.like("word"))
         for element in [name] if name in SIDELESS_ELEMENTS else [f"{name}1", f"{name}2"]:
-            lit = self._hands is not None and element == self._hands.element
+            lit = self._selection is not None and element == self._selection.element
             reading = self._readings.get(element, "")
             row.append(f">{reading:>6} " if lit else f"{reading:>7} ", self.like("hand" if lit else "drum"))
             row.append(f"{self._bar(element, bar_width)} ", self.like("faint"))

@@ -42,7 +42,7 @@ def key_labels(keymap: Keymap, plain: bool) -> Mapping[str, str]:
 
 def hints(
     keys: Mapping[str, str],
-    hands: ControlSelection,
+    selection: ControlSelection,
     magnification: float,
     point: str | None,
     pricked: bool,
@@ -55,13 +55,13 @@ def hints(
         (True, keys["bench"], "bench"),
         (True, arrows if len(arrows) == 4 else f"{keys['x_up']} {keys['y_up']} ...", "X Y"),
         (True, f"{keys['z_up']} {keys['z_down']}", "Z"),
-        (True, f"{keys['turn_up']} {keys['turn_down']}", element_label(hands.element)),
-        (True, f"{keys['finer']} {keys['coarser']}", f"step {hands.step:g}"),
+        (True, f"{keys['turn_up']} {keys['turn_down']}", element_label(selection.element)),
+        (True, f"{keys['finer']} {keys['coarser']}", f"step {selection.step:g}"),
         (pricked, keys["go_to"], "go to"),
         (pricked, keys["record"], f"record {point}" if point else "record"),
         (pricked, keys["magnify"], f"x{magnification:g}"),
         (unstruck, keys["strike"], "strike out"),
-        (hands.free, keys["free_hand"], "back to the wheels"),
+        (selection.free, keys["free_hand"], "back to the wheels"),
     )
     return tuple((key, word) for applies, key, word in offered if applies)
 

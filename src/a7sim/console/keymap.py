@@ -86,24 +86,24 @@ def actions_for(watching: bool, film: bool = True) -> tuple[Action, ...]:
     """Return what keys do at the instrument, or while one watches, be it a film or what is done now."""
     played = {PLAYBACK_ACTIONS} if film else set()
     return tuple(
-        deed
-        for deed in ACTIONS
-        if deed.group in VIEW_ACTIONS or (deed.group in played if watching else deed.group != PLAYBACK_ACTIONS)
+        action
+        for action in ACTIONS
+        if action.group in VIEW_ACTIONS or (action.group in played if watching else action.group != PLAYBACK_ACTIONS)
     )
 
 
 def default_keymap() -> Keymap:
     """Return the keys that the console comes with."""
-    return {deed.name: deed.keys for deed in ACTIONS}
+    return {action.name: action.keys for action in ACTIONS}
 
 
 def sample() -> str:
     """Return a file of all keys as they are by default."""
     lines = ["# Keys of a7sim console: one or more for every deed; a deed that is left out keeps its own.", "[keys]"]
-    width = max(len(deed.name) for deed in ACTIONS)
-    for deed in ACTIONS:
-        keys = ", ".join(f"'{key}'" if '"' in key else f'"{key}"' for key in deed.keys)
-        lines.append(f"{deed.name:<{width}} = [{keys}]  # {deed.description}")
+    width = max(len(action.name) for action in ACTIONS)
+    for action in ACTIONS:
+        keys = ", ".join(f"'{key}'" if '"' in key else f'"{key}"' for key in action.keys)
+        lines.append(f"{action.name:<{width}} = [{keys}]  # {action.description}")
     return "\n".join(lines) + "\n"
 
 
@@ -142,18 +142,18 @@ def _is_key(key: str) -> bool:
 
 def _refuse_shared(path: Path, keymap: Keymap) -> None:
     for watching in (False, True):
-        deeds: dict[str, str] = {}
-        for deed in actions_for(watching):
-            for key in keymap[deed.name]:
-                other = deeds.setdefault(key, deed.name)
-                if other != deed.name:
-                    raise A7SimError(f"{path}: expected every key once, got {key!r} for both {other} and {deed.name}")
+        actions: dict[str, str] = {}
+        for action in actions_for(watching):
+            for key in keymap[action.name]:
+                other = actions.setdefault(key, action.name)
+                if other != action.name:
+                    raise A7SimError(f"{path}: expected every key once, got {key!r} for both {other} and {action.name}")
 
 
 def actions_by_key(keymap: Keymap, watching: bool = False) -> dict[str, str]:
     """Return the name of the deed that every key does; who watches has those of the hands too where they are free."""
     at_the_instrument, watched = (
-        {key: deed.name for deed in actions_for(each) for key in keymap[deed.name]} for each in (False, True)
+        {key: action.name for action in actions_for(each) for key in keymap[action.name]} for each in (False, True)
     )
     return at_the_instrument | watched if watching else at_the_instrument
 

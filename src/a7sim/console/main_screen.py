@@ -148,12 +148,12 @@ class MainScreen(Screen[None]):
             self.query_one(f"#{name}").set_class(index == (at + 1) % len(PANELS), "-chosen")
 
     def show(
-        self, variant: Variant, dials: Readouts, hands: ControlSelection | None, entries: tuple[RecordedEntry, ...]
+        self, variant: Variant, dials: Readouts, selection: ControlSelection | None, entries: tuple[RecordedEntry, ...]
     ) -> None:
         """Show the dials, the hands unless they are off, and the book."""
         for counter in self._counters:
             counter.turn_to(dials.counters[counter.axis])
-        self.query_one(ElementsPanel).show(variant, dials.elements, hands)
+        self.query_one(ElementsPanel).show(variant, dials.elements, selection)
         self.query_one(FittingsPanel).show(variant, dials)
         self.query_one(BookPanel).show(entries)
 

@@ -45,7 +45,7 @@ class MessageHandlers(ActionBase):
             answer = work(client)
             console.post_message(AnswerReady(partial(then, answer)))
 
-        console.station.submit(order)
+        console.thread.submit(order)
 
     def call_after_orders(self, then: Callable[[], None]) -> None:
         """Go on when all that was ordered so far is said, and what came of it is known."""
@@ -81,12 +81,12 @@ class MessageHandlers(ActionBase):
         console = self._console
         first = console.met is None
         console.met = met
-        console.hands = console.hands.valid_for(met.variant)
+        console.selection = console.selection.valid_for(met.variant)
         if console.silent is not None:
             console.silent = None
             console.say("the instrument answers again")
         else:
-            console.say(console.seat.greeting() or "l lays pictures; ? is help")
+            console.say(console.config.greeting() or "l lays pictures; ? is help")
         if first:
             self._begin(met)
         console.main.warn(None)
@@ -95,8 +95,8 @@ class MessageHandlers(ActionBase):
     def _begin(self, met: Connected) -> None:
         """Take up what was there before anybody sat down here."""
         console = self._console
-        past = console.seat.history
-        watching = console.seat.watching
+        past = console.config.history
+        watching = console.config.watching
         self.ask(
             lambda client: recover_presets(met.variant, past(), "" if watching else unquote(client.ask("GEAR:HEIG?"))),
             self._recall,
@@ -124,7 +124,7 @@ class MessageHandlers(ActionBase):
         for projector, picture in enumerate(dials.pictures, start=1):
             if before is None or before.pictures[projector - 1] != picture:
                 self.ask(partial(fetch_sketch, projector, picture), partial(self._sketch, projector))
-        if console.seat.watching or (before is None and console.seat.alone):
+        if console.config.watching or (before is None and console.config.alone):
             self._keep_book(dials)
         console.refresh_panels()
         if before is None:

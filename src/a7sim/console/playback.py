@@ -32,14 +32,14 @@ class RequestRunner(Protocol):
 class Playback:
     """A film, and how it is played. `shown` is called with every frame that it comes to."""
 
-    def __init__(self, film: "Recording", asks: RequestRunner, shown: "Callable[[Frame], None]") -> None:
-        self.film = film
-        self.frame = film.frame
+    def __init__(self, recording: "Recording", asks: RequestRunner, shown: "Callable[[Frame], None]") -> None:
+        self.recording = recording
+        self.frame = recording.frame
         self.playing = False
         self.speed = SPEEDS[0]
         self._asks = asks
         self._shown = shown
-        self._aim = film.frame.step
+        self._aim = recording.frame.step
         self._running = 0
         self._since: tuple[float, float] | None = None
 
@@ -47,7 +47,7 @@ class Playback:
         """Play, from the beginning where the film is at its end; or pause."""
         self.playing = not self.playing
         self._since = None
-        if self.playing and self.frame.step >= self.film.steps:
+        if self.playing and self.frame.step >= self.recording.steps:
             self.go_to(0)
 
     def pace(self, way: int) -> None:
@@ -59,8 +59,8 @@ class Playback:
     def go_to(self, step: int) -> None:
         """Run to a step, as far as there is one."""
         self._since = None
-        aim = self._aim = min(max(step, 0), self.film.steps)
-        self._run(lambda _: self.film.seek(aim))
+        aim = self._aim = min(max(step, 0), self.recording.steps)
+        self._run(lambda _: self.recording.seek(aim))
 
     def go_by(self, steps: int) -> None:
         """Pause, and run on or back by so many steps."""
@@ -70,32 +70,32 @@ class Playback:
     def go_to_record(self, way: int) -> bool:
         """Pause, and run to the next registration, on or back; return whether there is one."""
         self.playing = False
-        step = self.film.next_record(self._aim, way)
+        step = self.recording.next_record(self._aim, way)
         if step is not None:
             self.go_to(step)
         return step is not None
 
     def jump(self, words: str) -> None:
         """Run to the step that a number, a time or the text of a note names. Raises Mistake where there is none."""
-        self.go_to(self.film.find_step(words))
+        self.go_to(self.recording.find_step(words))
 
     def tick(self) -> None:
         """Run on by what is due."""
         if not self.playing or self._running:
             return
-        if self.frame.step >= self.film.steps:
+        if self.frame.step >= self.recording.steps:
             self.playing = False
             self._shown(self.frame)
         elif math.isinf(self.speed):
             self._run(self._run_on)
         else:
-            step = self.film.step_at(self._due())
+            step = self.recording.step_at(self._due())
             if step > self.frame.step:
-                self._run(lambda _: self.film.seek(step))
+                self._run(lambda _: self.recording.seek(step))
 
     def _run_on(self, _: Client) -> "Frame":
         until = monotonic() + RUN_S
-        return self.film.advance_until(lambda: monotonic() >= until)
+        return self.recording.advance_until(lambda: monotonic() >= until)
 
     def _due(self) -> float:
         """Return how late it is in the film by the wall's clock, counted from when it was last set going."""
@@ -125,13 +125,15 @@ class Playback:
         frame = self.frame
         pace = "max" if math.isinf(self.speed) else f"{self.speed:g}x"
         state = f"playing {pace}" if self.playing else f"paused ({pace})"
-        return f"{state}  step {frame.step} of {self.film.steps}  {format_elapsed(frame.time)}  {frame.line}".rstrip()
+        return (
+            f"{state}  step {frame.step} of {self.recording.steps}  {format_elapsed(frame.time)}  {frame.line}".rstrip()
+        )
 
 
 def jump_with_message(playback: Playback, words: str) -> str | None:
     """Jump, and return what is to be said where there is no such place."""
     try:
         playback.jump(words)
-    except A7SimError as mistake:
-        return str(mistake)
+    except A7SimError as error:
+        return str(error)
     return None

@@ -22,13 +22,13 @@ class PlaybackActions(ActionBase):
     def reject_if_watching(self, deed: str = "") -> bool:
         """Return whether a deed is not for who watches, and say so."""
         console = self._console
-        if not console.seat.watching or deed in _LOOKED or (console.playback is not None and deed in _PLAYED):
+        if not console.config.watching or deed in _LOOKED or (console.playback is not None and deed in _PLAYED):
             return False
         if console.playback is None:
             why = "there is nothing to play" if deed in _PLAYED else "hands are off"
-            console.say(f"{why}: you watch what somebody else does at {console.seat.where} now", refused=True)
+            console.say(f"{why}: you watch what somebody else does at {console.config.where} now", refused=True)
         else:
-            keys = key_labels(console.seat.keymap, not console.utf8)
+            keys = key_labels(console.config.keymap, not console.utf8)
             console.say(f"hands are off: what you watch has been done; {keys['play']} plays and pauses", refused=True)
         return True
 
@@ -42,7 +42,7 @@ class PlaybackActions(ActionBase):
             console.look()
         if frame.error:
             console.say(frame.error, refused=True)
-        elif frame.step == playback.film.steps:
+        elif frame.step == playback.recording.steps:
             console.say("the end of the session")
         self._progress()
         console.refresh_panels()

@@ -32,17 +32,17 @@ class SetupActions(ActionBase):
             if picture:
                 choices.append((f"{side} projector: centre {picture}", partial(self._centre, projector)))
                 choices.append(
-                    (f"{side} projector: take {picture} off", partial(console.station.send, f"PHOT{projector}:UNL"))
+                    (f"{side} projector: take {picture} off", partial(console.thread.send, f"PHOT{projector}:UNL"))
                 )
             if projector in console.principal_distances:
                 c = console.principal_distances[projector]
                 words = f"{element_label(f'c{projector}')} to {c:.2f}, by certificate and film"
-                choices.append((words, partial(console.station.send, f"PROJ{projector}:PDIS {c:.2f}")))
+                choices.append((words, partial(console.thread.send, f"PROJ{projector}:PDIS {c:.2f}")))
         choices += [self._lever(name, at) for name, at in dials.fittings.items()]
         if len(variant.base_modes) > 1:
             other = next(mode for mode in variant.base_modes if mode != dials.base)
             choices.append(
-                (f"base {dials.base}: put it {other}", partial(console.station.send, f"BASE:MODE {short_form(other)}"))
+                (f"base {dials.base}: put it {other}", partial(console.thread.send, f"BASE:MODE {short_form(other)}"))
             )
         choices.append((f"height gear {dials.height_gear}: another", self._height_gear))
         choices.append((f"plan gear {dials.plan_gear}: another", self._plan_gear))
@@ -69,7 +69,7 @@ class SetupActions(ActionBase):
         def chosen(name: str | None) -> None:
             if name is not None:
                 console.principal_distances.pop(projector, None)
-                console.station.send(f"PHOT{projector}:LOAD {quote_text(catalogue[int(name.removeprefix('n'))])}")
+                console.thread.send(f"PHOT{projector}:LOAD {quote_text(catalogue[int(name.removeprefix('n'))])}")
 
         listed = [(f"n{number}", name) for number, name in enumerate(catalogue)]
         console.push_screen(Choose(f"lay in the {PROJECTORS[projector]} projector", listed), chosen)
@@ -82,12 +82,12 @@ class SetupActions(ActionBase):
                 console.principal_distances[projector] = lie.principal_distance
             console.say(f"{PROJECTORS[projector]} picture: {lie.words}")
 
-        console.ask(lambda client: centre_picture(client, projector, console.seat.sheet), centred)
+        console.ask(lambda client: centre_picture(client, projector, console.config.sheet), centred)
 
     def _lever(self, name: str, at: str) -> tuple[str, Callable[[], Any]]:
         other = next(position for position in POSITIONS_OF[name] if position != at)
         line = f"FITT:{FITTING_NODES[name]} {short_form(other)}"
-        return f"{FITTING_ROWS[name]} {at}: put it {other}", partial(self._console.station.send, line)
+        return f"{FITTING_ROWS[name]} {at}: put it {other}", partial(self._console.thread.send, line)
 
     def _height_gear(self) -> None:
         variant, _ = self._at()
@@ -108,14 +108,14 @@ class SetupActions(ActionBase):
             )
             return
         console.presets.regeared(variant, dials, units)
-        console.station.send(f"GEAR:HEIG {quote_text(gear) if known else gear}")
+        console.thread.send(f"GEAR:HEIG {quote_text(gear) if known else gear}")
 
     def _plan_gear(self) -> None:
         console = self._console
 
         def chosen(gear: str | None) -> None:
             if gear is not None:
-                console.station.send(f"GEAR:PLAN {quote_text(gear)}")
+                console.thread.send(f"GEAR:PLAN {quote_text(gear)}")
 
         console.push_screen(Ask("plan gear", note="such as 1-2-1"), chosen)
 
@@ -124,8 +124,8 @@ class SetupActions(ActionBase):
         variant, dials = self._at()
         for axis, reading in readings:
             console.presets.preset(variant, dials, axis, float(reading))
-            console.station.send(f"COUN:{axis}:PRES {reading}")
+            console.thread.send(f"COUN:{axis}:PRES {reading}")
 
     def _reset(self) -> None:
         self._console.presets.origins.clear()
-        self._console.station.send("*RST")
+        self._console.thread.send("*RST")

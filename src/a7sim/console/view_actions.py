@@ -27,7 +27,7 @@ class ViewActions(ActionBase):
         if console.met is None or not console.main.is_there:
             return
         console.binocular.lay()
-        console.call_after_refresh(lambda: console.station.look(console.binocular.look(console.point)))
+        console.call_after_refresh(lambda: console.thread.look(console.binocular.look(console.point)))
 
     def draw(self) -> None:
         """Draw what the eyes see."""
@@ -41,7 +41,7 @@ class ViewActions(ActionBase):
 
     def _say_what_is_seen(self, sight: ViewResult) -> None:
         console = self._console
-        point, acuity = console.point, console.seat.acuity_um
+        point, acuity = console.point, console.config.acuity_um
         if not point:
             console.binocular.say(dict.fromkeys((1, 2), "go to a point first"))
             return

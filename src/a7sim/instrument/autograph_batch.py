@@ -63,9 +63,9 @@ class ProjectorBundles:
         self.principal_point = rows[16:18]
         self.c = rows[18]
 
-    def take(self, who: Indices) -> "ProjectorBundles":
+    def take(self, active: Indices) -> "ProjectorBundles":
         """Return those of some, to be read at once and not written to."""
-        return self if who.size == self.c.size else ProjectorBundles(take(self._rows, who))
+        return self if active.size == self.c.size else ProjectorBundles(take(self._rows, active))
 
 
 class AutographBatch:
@@ -149,179 +149,181 @@ class AutographBatch:
 
     # --- refusals -------------------------------------------------------------------------------------
 
-    def pop_errors(self, who: Indices) -> dict[int, list[str]]:
+    def pop_errors(self, active: Indices) -> dict[int, list[str]]:
         """Return what was refused since the last asking, by instrument."""
-        return {int(each): self._refusals.pop(int(each)) for each in who if int(each) in self._refusals}
+        return {int(each): self._refusals.pop(int(each)) for each in active if int(each) in self._refusals}
 
-    def _refuse(self, who: Indices, why: str, number: int = -222) -> None:
-        for each in who:
+    def _refuse(self, active: Indices, why: str, number: int = -222) -> None:
+        for each in active:
             self._refusals.setdefault(int(each), []).append(f'{number},"{why}"')
 
     # --- elements -------------------------------------------------------------------------------------
 
-    def elements(self, who: Indices, names: Sequence[str]) -> dict[str, Array]:
+    def elements(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
         """Return what the counters of elements show ``(m,)``."""
-        return {name: self._drums[name].shown(who) for name in names}
+        return {name: self._drums[name].shown(active) for name in names}
 
-    def set_element(self, who: Indices, name: str, values: Array) -> None:
+    def set_element(self, active: Indices, name: str, values: Array) -> None:
         """Set an element through its counters to values ``(m,)``, to the least count."""
-        self._run_element(who, name, np.round(values / LEAST_COUNT) * LEAST_COUNT, self._rngs)
+        self._run_element(active, name, np.round(values / LEAST_COUNT) * LEAST_COUNT, self._rngs)
 
-    def turn_element(self, who: Indices, name: str, amounts: Array) -> None:
+    def turn_element(self, active: Indices, name: str, amounts: Array) -> None:
         """Turn the drums of an element by so much ``(m,)``, to wherever between two counts that is."""
         self._run_element(
-            who, name, self._drums[name].value_after_turn(who, amounts) if name in self._drums else amounts
+            active, name, self._drums[name].value_after_turn(active, amounts) if name in self._drums else amounts
         )
 
-    def _run_element(self, who: Indices, name: str, targets: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
+    def _run_element(
+        self, active: Indices, name: str, targets: Array, rngs: Sequence[np.random.Generator] = ()
+    ) -> None:
         if name not in self._drums:
-            self._refuse(who, f"an {self.variant.name} has no {name}", -221)
+            self._refuse(active, f"an {self.variant.name} has no {name}", -221)
             return
         drums = self._drums[name]
         allowed = drums.within_range(targets)
         moved = [n for n in (1, 2) if name in ("bx", "common_phi") or name.endswith(str(n))]
         told: dict[int, Array] = {}
         if name in MOVE_CENTRES:
-            told = {n: self._centres_told(who, n, {name: targets}) for n in moved}
-            allowed &= self._rods_can(who, told)
+            told = {n: self._centres_told(active, n, {name: targets}) for n in moved}
+            allowed &= self._rods_can(active, told)
         if not allowed.all():
-            self._refuse(who[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
-            who, targets = who[allowed], targets[allowed]
+            self._refuse(active[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
+            active, targets = active[allowed], targets[allowed]
             told = {n: each.compress(allowed, axis=-1) for n, each in told.items()}
-        drums.turn_to(who, targets, rngs)
+        drums.turn_to(active, targets, rngs)
         for n in moved:
             if name in SHIFTS:
-                self._shift(who, n, told[n])
+                self._shift(active, n, told[n])
             else:
-                self._stand(who, n)
+                self._stand(active, n)
 
-    def set_base_mode(self, who: Indices, mode: str) -> None:
+    def set_base_mode(self, active: Indices, mode: str) -> None:
         """Set base inside or outside."""
         inside = mode == "inside"
-        base_inside = np.full(who.size, inside)
-        able = self._rods_can(who, {n: self._centres_told(who, n, base_inside=base_inside) for n in (1, 2)})
-        self._refuse(who[~able], f"Data out of range;base {mode}: beyond the range of the rods")
-        self._base_inside[who[able]] = inside
+        base_inside = np.full(active.size, inside)
+        able = self._rods_can(active, {n: self._centres_told(active, n, base_inside=base_inside) for n in (1, 2)})
+        self._refuse(active[~able], f"Data out of range;base {mode}: beyond the range of the rods")
+        self._base_inside[active[able]] = inside
         self._levers = None
         for n in (1, 2):
-            self._stand(who, n)
+            self._stand(active, n)
 
-    def fitting(self, who: Indices, name: str) -> npt.NDArray[np.str_]:
+    def fitting(self, active: Indices, name: str) -> npt.NDArray[np.str_]:
         """Return the positions ``(m,)`` in which a fitting stands."""
-        return np.array(POSITIONS_OF[name])[self._fittings[name][who]]
+        return np.array(POSITIONS_OF[name])[self._fittings[name][active]]
 
-    def set_fitting(self, who: Indices, name: str, position: str) -> None:
+    def set_fitting(self, active: Indices, name: str, position: str) -> None:
         """Put a fitting into one of its two positions."""
-        self._fittings[name][who] = POSITIONS_OF[name].index(position)
+        self._fittings[name][active] = POSITIONS_OF[name].index(position)
         self._levers = None
 
-    def reset(self, who: Indices) -> None:
+    def reset(self, active: Indices) -> None:
         """Run every element that has a counter zero to it, base inside, fittings for a positive, presets off."""
         for name, drums in self._drums.items():
             if name not in ("c1", "c2"):
-                drums.turn_to(who, np.full(who.size, self.variant.elements[name].zero), self._rngs)
-        self._base_inside[who] = True
-        self._put_right_fittings(who)
-        self._reset_offsets(who)
+                drums.turn_to(active, np.full(active.size, self.variant.elements[name].zero), self._rngs)
+        self._base_inside[active] = True
+        self._put_right_fittings(active)
+        self._reset_offsets(active)
         for n in (1, 2):
-            self._stand(who, n)
+            self._stand(active, n)
 
-    def _reset_offsets(self, who: Indices) -> None:
+    def _reset_offsets(self, active: Indices) -> None:
         for axis, scale in self.variant.scales.items():
-            self._offsets[AXES.index(axis), who] = scale.at_origin
+            self._offsets[AXES.index(axis), active] = scale.at_origin
 
-    def _put_right_fittings(self, who: Indices) -> None:
+    def _put_right_fittings(self, active: Indices) -> None:
         for name, position in REQUIRED_FITTINGS["positive", "inside"].as_words().items():
-            self.set_fitting(who, name, position)
+            self.set_fitting(active, name, position)
 
     # --- carriages, counters, gears -------------------------------------------------------------------
 
-    def counter(self, who: Indices, axis: str) -> Array:
+    def counter(self, active: Indices, axis: str) -> Array:
         """Return what the X, Y or Z counters show ``(m,)``."""
         row = AXES.index(axis)
-        return round_like_counter(self._unrounded(who, row, self._carriages.at[row][who]), self._decimals[row])
+        return round_like_counter(self._unrounded(active, row, self._carriages.at[row][active]), self._decimals[row])
 
-    def counters(self, who: Indices) -> Array:
+    def counters(self, active: Indices) -> Array:
         """Return what the X, Y and Z counters show ``(3, m)``."""
-        readings = take(self._offsets, who) + self._units[:, None] * take(self._carriages.at, who)
+        readings = take(self._offsets, active) + self._units[:, None] * take(self._carriages.at, active)
         if len(set(self._decimals)) == 1:
             return round_like_counter(readings, self._decimals[0])
         return np.array(
             [round_like_counter(each, decimals) for each, decimals in zip(readings, self._decimals, strict=True)]
         )
 
-    def _unrounded(self, who: Indices, row: int, position: Array) -> Array:
-        return np.asarray(self._offsets[row][who] + self._units[row] * position)
+    def _unrounded(self, active: Indices, row: int, position: Array) -> Array:
+        return np.asarray(self._offsets[row][active] + self._units[row] * position)
 
-    def preset(self, who: Indices, axis: str, reading: float) -> None:
+    def preset(self, active: Indices, axis: str, reading: float) -> None:
         """Make the counters show a reading where their carriages stand."""
         row = AXES.index(axis)
         shown = round(reading, self._decimals[row])
-        self._offsets[row, who] = shown - self._units[row] * self._carriages.at[row][who]
+        self._offsets[row, active] = shown - self._units[row] * self._carriages.at[row][active]
 
-    def set_height_gear(self, who: Indices, gear: str | float) -> None:
+    def set_height_gear(self, active: Indices, gear: str | float) -> None:
         """Engage a height gear; all instruments have the same."""
         units, decimals = float(gear) if not isinstance(gear, str) else 0.0, COUNTER_DECIMALS
         if isinstance(gear, str):
             engaged = self.variant.height_gears[gear]
             units, decimals = engaged.units_per_mm, engaged.decimals
         row = AXES.index("Z")
-        position = self._carriages.at[row][who]
-        reading = self._unrounded(who, row, position)
+        position = self._carriages.at[row][active]
+        reading = self._unrounded(active, row, position)
         self._units[row], self._decimals[row] = units, decimals
-        self._offsets[row, who] = round_like_counter(reading, decimals) - units * position
+        self._offsets[row, active] = round_like_counter(reading, decimals) - units * position
 
-    def drive(self, who: Indices, axis: str, readings: Array) -> BoolArray:
+    def drive(self, active: Indices, axis: str, readings: Array) -> BoolArray:
         """Run carriages until their counters show readings ``(m,)``; return which went."""
         row = AXES.index(axis)
         wanted = round_like_counter(readings, self._decimals[row])
-        went = self._move(who, row, (wanted - self._offsets[row][who]) / self._units[row])
-        slipping = went & (self._slip_shares[who] > 0.0)
+        went = self._move(active, row, (wanted - self._offsets[row][active]) / self._units[row])
+        slipping = went & (self._slip_shares[active] > 0.0)
         if slipping.any():
-            again = (wanted[slipping] - self._offsets[row][who[slipping]]) / self._units[row]
-            off = np.abs(again - self._carriages.at[row][who[slipping]]) > self._half_a_count(row)
-            self._move(who[slipping][off], row, again[off], silently=True)
+            again = (wanted[slipping] - self._offsets[row][active[slipping]]) / self._units[row]
+            off = np.abs(again - self._carriages.at[row][active[slipping]]) > self._half_a_count(row)
+            self._move(active[slipping][off], row, again[off], silently=True)
         return went
 
     def _half_a_count(self, row: int) -> float:
         return float(0.5000001 * 10.0 ** -self._decimals[row] / self._units[row])
 
-    def turn_handwheels(self, who: Indices, amounts: Array) -> None:
+    def turn_handwheels(self, active: Indices, amounts: Array) -> None:
         """Turn the handwheels X, Y and, where there is a third, Z by so many counter units ``(k, m)``, in that order.
 
         Their collars decide which way the carriages go.
         """
         k = len(amounts)
-        before = take(self._carriages.at, who)
-        steps = take(self._levers_stand.senses[:k], who) * amounts / self._units[:k, None]
+        before = take(self._carriages.at, active)
+        steps = take(self._levers_stand.senses[:k], active) * amounts / self._units[:k, None]
         after = before[:k] + steps
-        if self._no_slips and who.size:
+        if self._no_slips and active.size:
             low, high = after.min(axis=1), after.max(axis=1)
-            if self._carriages.range_contains(low, high) and self._rods_surely_can(who, before, low, high):
-                self._carriages.move_to(who, 0, after)
+            if self._carriages.range_contains(low, high) and self._rods_surely_can(active, before, low, high):
+                self._carriages.move_to(active, 0, after)
                 return
         for row, each in enumerate(after):
-            self._move(who, row, each)
+            self._move(active, row, each)
 
-    def _move(self, who: Indices, row: int, positions: Array, silently: bool = False) -> BoolArray:
+    def _move(self, active: Indices, row: int, positions: Array, silently: bool = False) -> BoolArray:
         positions = self._carriages.snap_to_end(row, positions, self._half_a_count(row))
-        before = self._carriages.at[row, who]
-        mark = take(self._carriages.at, who).copy()
+        before = self._carriages.at[row, active]
+        mark = take(self._carriages.at, active).copy()
         mark[row] = positions
-        allowed = self._carriages.within_range(row, positions) & self._rods_can(who, mark=mark)
+        allowed = self._carriages.within_range(row, positions) & self._rods_can(active, mark=mark)
         if not silently:
-            self._refuse(who[~allowed], f"Data out of range;{AXES[row]}: beyond its range or that of the rods")
-        who, positions = who[allowed], positions[allowed]
-        self._slip(who, row, before[allowed], positions)
-        self._carriages.move_to(who, row, positions[None])
+            self._refuse(active[~allowed], f"Data out of range;{AXES[row]}: beyond its range or that of the rods")
+        active, positions = active[allowed], positions[allowed]
+        self._slip(active, row, before[allowed], positions)
+        self._carriages.move_to(active, row, positions[None])
         return np.asarray(allowed)
 
-    def _slip(self, who: Indices, row: int, before: Array, after: Array) -> None:
+    def _slip(self, active: Indices, row: int, before: Array, after: Array) -> None:
         """Let counters miss carries on the way from one position ``(m,)`` to another (see `Counter.passed`)."""
         if self._no_slips:
             return
-        for i in np.flatnonzero(self._slip_shares[who] > 0.0):
-            each = who[i]
+        for i in np.flatnonzero(self._slip_shares[active] > 0.0):
+            each = active[i]
             first, last = (
                 math.floor((self._offsets[row, each] + self._units[row] * position[i]) / UNITS_A_DRUM)
                 for position in (before, after)
@@ -331,23 +333,23 @@ class AutographBatch:
                 self._offsets[row, each] -= math.copysign(missed * UNITS_A_DRUM, last - first)
 
     def _rods_can(
-        self, who: Indices, centres: Mapping[int, Array] | None = None, mark: Array | None = None
+        self, active: Indices, centres: Mapping[int, Array] | None = None, mark: Array | None = None
     ) -> BoolArray:
         """Return where no rod comes beyond its limit, nor further beyond it, with other centres or marks ``(3, m)``."""
-        now = take(self._carriages.at, who)
+        now = take(self._carriages.at, active)
         mark = now if mark is None else mark
-        able = np.ones(who.size, dtype=bool)
+        able = np.ones(active.size, dtype=bool)
         for n in (1, 2) if centres is None else centres:
-            beside, below = _reach(take(self._told[n], who) if centres is None else centres[n], mark)
+            beside, below = _reach(take(self._told[n], active) if centres is None else centres[n], mark)
             if (beside < self._surely_within * below).all():
                 continue
             then = np.arctan2(beside, below) / GON
             beyond = then > self.variant.rod_limit_gon
             if beyond.any():
-                able &= ~beyond | (then <= np.arctan2(*_reach(take(self._told[n], who), now)) / GON)
+                able &= ~beyond | (then <= np.arctan2(*_reach(take(self._told[n], active), now)) / GON)
         return able
 
-    def _rods_surely_can(self, who: Indices, before: Array, low: Array, high: Array) -> bool:
+    def _rods_surely_can(self, active: Indices, before: Array, low: Array, high: Array) -> bool:
         """Return whether all carriages can go from marks ``(3, m)`` to between others ``(k,)``, one axis after another.
 
         Looks at the box that holds all marks, seen from that which holds all centres.
@@ -356,7 +358,7 @@ class AutographBatch:
         lowest, highest = before.min(axis=1), before.max(axis=1)
         lowest[:k], highest[:k] = np.minimum(lowest[:k], low), np.maximum(highest[:k], high)
         for n in (1, 2):
-            told = take(self._told[n], who)
+            told = take(self._told[n], active)
             least, most = told.min(axis=1), told.max(axis=1)
             x, y, _ = np.maximum(highest - least, most - lowest)
             if not math.hypot(x, y) < self._surely_within * (least[2] - highest[2]):
@@ -370,7 +372,7 @@ class AutographBatch:
 
     def _centres_told(
         self,
-        who: Indices,
+        active: Indices,
         n: int,
         elements: Mapping[str, Array] = MappingProxyType({}),
         base_inside: BoolArray | None = None,
@@ -380,9 +382,9 @@ class AutographBatch:
         def drum(name: str) -> Array:
             if name in elements:
                 return elements[name]
-            return take(self._drums[name].at, who) if name in self._drums else np.zeros(who.size)
+            return take(self._drums[name].at, active) if name in self._drums else np.zeros(active.size)
 
-        inside = take(self._base_inside, who) if base_inside is None else base_inside
+        inside = take(self._base_inside, active) if base_inside is None else base_inside
         x, y, z = self._shares(n, inside) * drum("bx"), -drum(f"by{n}"), drum(f"bz{n}")
         if "common_phi" in self._drums:
             tilt = (drum("common_phi") - self.variant.elements["common_phi"].zero) * GON
@@ -396,18 +398,18 @@ class AutographBatch:
 
     # --- pictures -------------------------------------------------------------------------------------
 
-    def load(self, who: Indices, projector: int, name: str) -> None:
+    def load(self, active: Indices, projector: int, name: str) -> None:
         """Put a photograph on the carriers of a projector, by hand."""
         photographs = [each[name] for each in self._photographs]
         laid = np.zeros((3, self.instruments))
         shift, turn = self._laying_sigmas
-        for each in who:
+        for each in active:
             upside_down = 200.0 if photographs[each].placement == "upside down" else 0.0
             laid[:, each] = self._rngs[each].standard_normal(3) * (shift, shift, turn) + (0.0, 0.0, upside_down)
         self._carriers[projector] = Carriers(photographs, laid)
         self._levers = None
 
-    def unload(self, who: Indices, projector: int) -> None:
+    def unload(self, active: Indices, projector: int) -> None:
         """Take the photographs off the carriers of a projector."""
         del self._carriers[projector]
         self._levers = None
@@ -423,54 +425,54 @@ class AutographBatch:
 
     # --- the space rods and the view ------------------------------------------------------------------
 
-    def _stand(self, who: Indices, n: int) -> None:
+    def _stand(self, active: Indices, n: int) -> None:
         """Put the projectors where their elements, the base and their faults bring them."""
-        omega, phi, kappa = (self._really(who, f"{name}{n}") * GON for name in ("omega", "phi", "kappa"))
+        omega, phi, kappa = (self._really(active, f"{name}{n}") * GON for name in ("omega", "phi", "kappa"))
         turned = rotation(omega, phi, kappa)
-        self._missed[n][:, who] = mxv(turned, take(self._axes[n], who))
+        self._missed[n][:, active] = mxv(turned, take(self._axes[n], active))
         if "common_phi" in self._drums:
-            common = rotation(0.0, self._really(who, "common_phi") * GON, 0.0)
-            self._common[:, :, who] = common
+            common = rotation(0.0, self._really(active, "common_phi") * GON, 0.0)
+            self._common[:, :, active] = common
             turned = mxm(common, turned)
         bundles = self._bundles[n]
-        bundles.turned[:, :, who] = turned
-        bundles.swung[:, :, who] = plane_rotation(kappa)
-        put(self._drums[f"c{n}"].position(who), who, bundles.c)
-        self._shift(who, n, self._centres_told(who, n))
+        bundles.turned[:, :, active] = turned
+        bundles.swung[:, :, active] = plane_rotation(kappa)
+        put(self._drums[f"c{n}"].position(active), active, bundles.c)
+        self._shift(active, n, self._centres_told(active, n))
 
-    def _shift(self, who: Indices, n: int, told: Array) -> None:
+    def _shift(self, active: Indices, n: int, told: Array) -> None:
         """Put the projectors, turned as they stand, where base, by and bz bring them and these are told ``(3, m)``."""
-        base = (self._really(who, name) for name in ("bx", f"by{n}", f"bz{n}"))
-        place = projection_centre(self._shares(n, take(self._base_inside, who)), *base)
-        centre = place + take(self._missed[n], who) - take(self._axes[n], who)
+        base = (self._really(active, name) for name in ("bx", f"by{n}", f"bz{n}"))
+        place = projection_centre(self._shares(n, take(self._base_inside, active)), *base)
+        centre = place + take(self._missed[n], active) - take(self._axes[n], active)
         if "common_phi" in self._drums:
-            centre = mxv(take(self._common, who), centre)
-        put(centre, who, self._bundles[n].centre)
-        put(told, who, self._told[n])
+            centre = mxv(take(self._common, active), centre)
+        put(centre, active, self._bundles[n].centre)
+        put(told, active, self._told[n])
 
-    def _really(self, who: Indices, name: str) -> Array:
+    def _really(self, active: Indices, name: str) -> Array:
         if name not in self._drums:
-            return np.zeros(who.size)
-        position = self._drums[name].position(who)
+            return np.zeros(active.size)
+        position = self._drums[name].position(active)
         return position - self.variant.elements[name].zero if name in COUNTED_FROM_ZERO else position
 
-    def pose(self, who: Indices, projector: int) -> tuple[Array, Array]:
+    def pose(self, active: Indices, projector: int) -> tuple[Array, Array]:
         """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
-        bundles = self._bundles[projector].take(who)
+        bundles = self._bundles[projector].take(active)
         return bundles.centre, bundles.turned
 
-    def readings_at(self, who: Indices, place: Array) -> dict[str, Array]:
+    def readings_at(self, active: Indices, place: Array) -> dict[str, Array]:
         """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
-        guides = np.moveaxis(self._guides[:, :, who], -1, 0)
+        guides = np.moveaxis(self._guides[:, :, active], -1, 0)
         carriage = np.asarray(np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T, dtype=float)
-        free = self._carriages.position_without_periodic_error(who, carriage)
-        return {axis: self._unrounded(who, row, free[row]) for row, axis in enumerate(AXES)}
+        free = self._carriages.position_without_periodic_error(active, carriage)
+        return {axis: self._unrounded(active, row, free[row]) for row, axis in enumerate(AXES)}
 
-    def mark(self, who: Indices) -> Array:
+    def mark(self, active: Indices) -> Array:
         """Return where the floating marks really stand ``(3, m)``."""
-        return mxv(take(self._guides, who), self._carriages.position(who))
+        return mxv(take(self._guides, active), self._carriages.position(active))
 
-    def _mark_on_carrier(self, who: Indices, projector: int, bundles: ProjectorBundles, mark: Array) -> Array:
+    def _mark_on_carrier(self, active: Indices, projector: int, bundles: ProjectorBundles, mark: Array) -> Array:
         """Return the places ``(2, m)`` in mm on carriers where the space rods bring floating marks ``(3, m)``."""
         local, rods = self._local[projector], self._rods[projector]
         return place_on_carrier(
@@ -479,36 +481,38 @@ class AutographBatch:
             bundles.turned,
             bundles.c,
             bundles.principal_point,
-            None if local is None else take(local, who),
-            None if rods is None else take(rods, who),
+            None if local is None else take(local, active),
+            None if rods is None else take(rods, active),
         )
 
-    def eyepiece(self, who: Indices, eye: int, name: str) -> Array:
+    def eyepiece(self, active: Indices, eye: int, name: str) -> Array:
         """Return dx, dy ``(2, m)`` in um at photo scale of an image point from the mark, nan outside the field."""
-        return self._in_eyepiece(who, eye, name, self.mark(who))
+        return self._in_eyepiece(active, eye, name, self.mark(active))
 
-    def both_eyepieces(self, who: Indices, name: str) -> Array:
+    def both_eyepieces(self, active: Indices, name: str) -> Array:
         """Return dx, dy in the left eyepiece and dx, dy in the right one ``(4, m)``, as `eyepiece` does."""
-        mark = self.mark(who)
-        return np.concatenate([self._in_eyepiece(who, eye, name, mark) for eye in (1, 2)])
+        mark = self.mark(active)
+        return np.concatenate([self._in_eyepiece(active, eye, name, mark) for eye in (1, 2)])
 
-    def _in_eyepiece(self, who: Indices, eye: int, name: str, mark: Array) -> Array:
-        straight = take(self._levers_stand.uncrossed, who)
+    def _in_eyepiece(self, active: Indices, eye: int, name: str, mark: Array) -> Array:
+        straight = take(self._levers_stand.uncrossed, active)
         ways = ((eye, straight), (3 - eye, ~straight))
         for projector, looking in ways:
             if projector in self._carriers and looking.all():
-                return self._seen_in(who, projector, name, mark)
-        seen = np.full((2, who.size), np.nan)
+                return self._seen_in(active, projector, name, mark)
+        seen = np.full((2, active.size), np.nan)
         for projector, looking in ways:
             if projector in self._carriers and looking.any():
-                seen[:, looking] = self._seen_in(who[looking], projector, name, mark[:, looking])
+                seen[:, looking] = self._seen_in(active[looking], projector, name, mark[:, looking])
         return seen
 
-    def _seen_in(self, who: Indices, projector: int, name: str, mark: Array) -> Array:
-        bundles = self._bundles[projector].take(who)
-        displacement = self._carriers[projector].point(who, name) - self._mark_on_carrier(who, projector, bundles, mark)
+    def _seen_in(self, active: Indices, projector: int, name: str, mark: Array) -> Array:
+        bundles = self._bundles[projector].take(active)
+        displacement = self._carriers[projector].point(active, name) - self._mark_on_carrier(
+            active, projector, bundles, mark
+        )
         turned = mxv(bundles.swung, displacement)
-        shown = take(self._levers_stand.signs[projector], who) * turned
+        shown = take(self._levers_stand.signs[projector], active) * turned
         return np.where(length_of(displacement) <= self.variant.field_radius_mm, shown, np.nan)
 
     # --- levers, prisms, collars ----------------------------------------------------------------------

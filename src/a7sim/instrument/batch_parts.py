@@ -48,10 +48,10 @@ class PeriodicErrors:
     lead: float
     phase: Array
 
-    def at(self, who: Indices, position: Array) -> Array:
+    def at(self, active: Indices, position: Array) -> Array:
         """Return by how much the nuts have gone further ``(3, m)`` than the turns say, mm."""
         turns = 2.0 * math.pi * position / self.lead
-        return np.asarray(take(self.amplitude, who) * np.sin(turns + take(self.phase, who)))
+        return np.asarray(take(self.amplitude, active) * np.sin(turns + take(self.phase, active)))
 
 
 class Carriages:
@@ -64,17 +64,17 @@ class Carriages:
         self._half_play = play / 2.0
         self._runouts = runouts
 
-    def position(self, who: Indices) -> Array:
+    def position(self, active: Indices) -> Array:
         """Return where they really stand ``(3, m)``."""
-        position = take(self._shaft, who)
-        return position if self._runouts is None else position + self._runouts.at(who, position)
+        position = take(self._shaft, active)
+        return position if self._runouts is None else position + self._runouts.at(active, position)
 
-    def position_without_periodic_error(self, who: Indices, place: Array) -> Array:
+    def position_without_periodic_error(self, active: Indices, place: Array) -> Array:
         """Return where they would stand ``(3, m)`` without the errors that the turns of their screws repeat."""
         position = place
         if self._runouts is not None:
             for _ in range(APPROXIMATIONS):
-                position = place - self._runouts.at(who, position)
+                position = place - self._runouts.at(active, position)
         return position
 
     def snap_to_end(self, axis: int, places: Array, within: float) -> Array:
@@ -91,12 +91,16 @@ class Carriages:
         k = len(low)
         return bool(((low >= self._low[:k]) & (high <= self._high[:k])).all())
 
-    def move_to(self, who: Indices, first: int, places: Array) -> None:
+    def move_to(self, active: Indices, first: int, places: Array) -> None:
         """Run carriages, from a first one on, to places ``(k, m)`` that they allow."""
         rows = slice(first, first + len(places))
-        half = take(self._half_play, who)
-        put(places, who, self.at[rows])
-        put(np.minimum(np.maximum(take(self._shaft[rows], who), places - half), places + half), who, self._shaft[rows])
+        half = take(self._half_play, active)
+        put(places, active, self.at[rows])
+        put(
+            np.minimum(np.maximum(take(self._shaft[rows], active), places - half), places + half),
+            active,
+            self._shaft[rows],
+        )
 
 
 class Drums:
@@ -118,32 +122,32 @@ class Drums:
         self._error = np.zeros(fault.shape)
         self._half_play, self._sigma, self._fault = play / 2.0, sigma, fault
 
-    def position(self, who: Indices) -> Array:
+    def position(self, active: Indices) -> Array:
         """Return where the shafts really stand ``(m,)``."""
-        return np.asarray(take(self._shaft, who) + take(self._error, who) + take(self._fault, who))
+        return np.asarray(take(self._shaft, active) + take(self._error, active) + take(self._fault, active))
 
-    def shown(self, who: Indices) -> Array:
+    def shown(self, active: Indices) -> Array:
         """Return what the counters show ``(m,)``."""
-        shown = round_like_counter(take(self.at, who), COUNTER_DECIMALS)
+        shown = round_like_counter(take(self.at, active), COUNTER_DECIMALS)
         return round_like_counter(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
 
     def within_range(self, values: Array) -> BoolArray:
         """Return which values the drum can be turned to."""
         return np.asarray((values >= self.low - 1e-9) & (values <= self.high + 1e-9))
 
-    def value_after_turn(self, who: Indices, amounts: Array) -> Array:
+    def value_after_turn(self, active: Indices, amounts: Array) -> Array:
         """Return to what values ``(m,)`` the drums come when they are turned by so much."""
-        values = take(self.at, who) + amounts
+        values = take(self.at, active) + amounts
         return np.asarray(values % self.high if self.endless else values)
 
-    def turn_to(self, who: Indices, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
+    def turn_to(self, active: Indices, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
         """Turn the drums to values ``(m,)`` that they allow; with dice, by their counters (see `Spindle.turn_to`)."""
         if self.endless:
-            values = values + self.high * np.round((take(self.at, who) - values) / self.high)
-        put(values, who, self.at)
-        half = take(self._half_play, who)
-        put(np.minimum(np.maximum(take(self._shaft, who), values - half), values + half), who, self._shaft)
-        for session in who[take(self._sigma, who) > 0.0] if rngs else ():
+            values = values + self.high * np.round((take(self.at, active) - values) / self.high)
+        put(values, active, self.at)
+        half = take(self._half_play, active)
+        put(np.minimum(np.maximum(take(self._shaft, active), values - half), values + half), active, self._shaft)
+        for session in active[take(self._sigma, active) > 0.0] if rngs else ():
             self._error[session] = self._sigma[session] * rngs[session].standard_normal()
 
 
@@ -162,38 +166,38 @@ class Carriers:
         self._placed: dict[str, Array] = {}
         self.centre(np.arange(laid.shape[1]), self.centring)
 
-    def centre(self, who: Indices, values: Array) -> None:
+    def centre(self, active: Indices, values: Array) -> None:
         """Shift and turn the pictures ``(3, m)``, mm and gon, from where they were laid."""
-        self.centring[:, who] = values
-        dx, dy, turn = self.laid[:, who] + values
-        self._turn[:, :, who] = plane_rotation(turn * GON)
-        self._shift[:, who] = dx, dy
+        self.centring[:, active] = values
+        dx, dy, turn = self.laid[:, active] + values
+        self._turn[:, :, active] = plane_rotation(turn * GON)
+        self._shift[:, active] = dx, dy
         self._placed.clear()
 
-    def point(self, who: Indices, name: str) -> Array:
+    def point(self, active: Indices, name: str) -> Array:
         """Return where an image point lies on the carriers ``(2, m)``, nan where a picture has none such."""
         placed = self._placed.get(name)
         if placed is None:
             placed = self._placed[name] = mxv(self._turn, self._film(name)) + self._shift
-        return take(placed, who)
+        return take(placed, active)
 
     def _film(self, name: str) -> Array:
         """Return where an image point lies on the films ``(2, instruments)``."""
         nowhere = np.full((2, len(self.photographs)), np.nan)
         return self._films.get(name, nowhere)
 
-    def fiducial_displacements(self, who: Indices) -> tuple[tuple[str, ...], Array]:
+    def fiducial_displacements(self, active: Indices) -> tuple[tuple[str, ...], Array]:
         """Return names and displacements ``(2, n, m)`` of the fiducials from their collimating marks."""
         fiducials = self.photographs[0].fiducials
         names, calibrated = fiducial_places(self.photographs[0].camera)
         marks = calibrated[:, [names.index(name) for name in fiducials.names]]
-        film = np.stack([self.photographs[session].fiducials.xy for session in who], axis=-1)
-        placed = np.einsum("ijm,jnm->inm", self._turn[:, :, who], film) + self._shift[:, None, who]
+        film = np.stack([self.photographs[session].fiducials.xy for session in active], axis=-1)
+        placed = np.einsum("ijm,jnm->inm", self._turn[:, :, active], film) + self._shift[:, None, active]
         return fiducials.names, np.asarray(placed - marks[:, :, None])
 
-    def sketch(self, who: Indices) -> dict[str, Array]:
+    def sketch(self, active: Indices) -> dict[str, Array]:
         """Return the places ``(2, m)`` of points on the paper prints, nan where a print has it not."""
-        return _places_of([self.photographs[session].sketch for session in who])
+        return _places_of([self.photographs[session].sketch for session in active])
 
 
 def _places_of(prints: Sequence[NamedPoints]) -> dict[str, Array]:

@@ -57,7 +57,7 @@ class ClientSession:
 
     def __init__(
         self,
-        desk: SharedInstrument,
+        instrument: SharedInstrument,
         clock: Clock | WallClock,
         terms: ServerLimits,
         wire: Transport,
@@ -65,11 +65,11 @@ class ClientSession:
         serial: bool,
     ) -> None:
         loop = self._loop = asyncio.get_running_loop()
-        self._desk = desk
+        self._instrument = instrument
         self._clock = clock
         self._terms = terms
         self._wire = wire
-        self._engine = desk.open(cr_ends_line=serial, time=clock.now)
+        self._engine = instrument.open(cr_ends_line=serial, time=clock.now)
         self._backlog = memoryview(b"")
         self._reading = self._open = True
         self._clogged = self._ended = False
@@ -123,7 +123,7 @@ class ClientSession:
     def connection_lost(self) -> None:
         """Forget the client: it is gone, and a lock that it holds is free again."""
         self._open = False
-        self._desk.close(self._engine.client, self._clock.now)
+        self._instrument.close(self._engine.client, self._clock.now)
         for timer in (self._next, self._impatient, self._sleeper):
             if timer is not None:
                 timer.cancel()

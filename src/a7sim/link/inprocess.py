@@ -25,25 +25,25 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         self,
         port: str | None = None,
         *args: Any,
-        desk: SharedInstrument | None = None,
+        instrument: SharedInstrument | None = None,
         clock: Clock | None = None,
         client: str | None = None,
         **kwargs: Any,
     ) -> None:
         self.clock = clock or Clock()
-        self._desk = desk
+        self._instrument = instrument
         self._client = client
         self._engine: Engine | None = None
         self._unread, self._read_up_to = b"", 0
         self._alone = threading.RLock()
         self._arrived = threading.Condition(self._alone)
         self._cancelled = False
-        super().__init__("in process" if port is None and desk is not None else port, *args, **kwargs)
+        super().__init__("in process" if port is None and instrument is not None else port, *args, **kwargs)
 
     def _connect(self) -> SharedInstrument:
-        if self._desk is None:
-            raise SerialException("expected a desk to connect the port to, got none")
-        return self._desk
+        if self._instrument is None:
+            raise SerialException("expected an instrument to connect the port to, got none")
+        return self._instrument
 
     def open(self) -> None:
         """Open a conversation with the instrument. Raises SerialException if it cannot, or is open."""
@@ -59,7 +59,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
     def close(self) -> None:
         """End the conversation; a lock that it holds is free again."""
         if self.is_open and self._engine is not None:
-            self._engine.desk.close(self._engine.client, self.clock.now)
+            self._engine.instrument.close(self._engine.client, self.clock.now)
         self._engine = None
         self.is_open = False
         self.cancel_read()

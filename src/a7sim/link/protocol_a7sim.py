@@ -28,9 +28,9 @@ class Serial(InProcessSerial):
 
     def _connect(self) -> SharedInstrument:
         url = str(self.port)
-        if self._desk is None or self._connected_to != url:
-            self._desk, self._connected_to = _described_by(url), url
-        return self._desk
+        if self._instrument is None or self._connected_to != url:
+            self._instrument, self._connected_to = _described_by(url), url
+        return self._instrument
 
 
 def _described_by(url: str) -> SharedInstrument:
@@ -39,8 +39,8 @@ def _described_by(url: str) -> SharedInstrument:
         scenario = load_scenario(scenario_name)
         chosen = scenario.seed if seed is None else seed
         autograph = Autograph.from_scenario(scenario, chosen)
-    except (A7SimError, OSError) as mistake:
-        raise SerialException("; ".join(str(mistake).splitlines())) from mistake
+    except (A7SimError, OSError) as error:
+        raise SerialException("; ".join(str(error).splitlines())) from error
     return SharedInstrument(autograph)
 
 

@@ -30,7 +30,7 @@ class RecordingProxy:
         self._stop = stop
         self._one_at_a_time = threading.Lock()
         self._clients = 0
-        self._trouble: A7SimError | None = None
+        self._error: A7SimError | None = None
 
     def serve(self, door: socket.socket) -> None:
         """Let clients through until it is told to stop. Raises Mistake where the instrument or the listener fails."""
@@ -42,8 +42,8 @@ class RecordingProxy:
                 continue
             with client:
                 self._let_through(client)
-            if self._trouble is not None:
-                raise self._trouble
+            if self._error is not None:
+                raise self._error
 
     def _let_through(self, client: socket.socket) -> None:
         self._clients += 1
@@ -68,11 +68,11 @@ class RecordingProxy:
     def _until_gone(self, gone: threading.Event, carry: Callable[..., None], *between: Any) -> None:
         try:
             carry(*between)
-        except A7SimError as mistake:
-            self._trouble = mistake
+        except A7SimError as error:
+            self._error = error
         except OSError:
             if not gone.is_set() and carry == self._replies:
-                self._trouble = A7SimError(f"{self._url}: the line to the instrument broke")
+                self._error = A7SimError(f"{self._url}: the line to the instrument broke")
         finally:
             gone.set()
 

@@ -35,8 +35,8 @@ class Endpoints:
 class Server:
     """An instrument that is served, from `open` to `close`."""
 
-    def __init__(self, desk: SharedInstrument, clock: Clock | WallClock, terms: ServerLimits) -> None:
-        self.desk = desk
+    def __init__(self, instrument: SharedInstrument, clock: Clock | WallClock, terms: ServerLimits) -> None:
+        self.instrument = instrument
         self._clock = clock
         self._terms = terms
         self._buffer = memoryview(bytearray(MAX_READ))
@@ -100,7 +100,7 @@ class Server:
             text = format_entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {pluralize(most, 'client')} at a time")
             return f"{text}\n".encode("ascii")
         self._wires.add(wire)
-        return ClientSession(self.desk, self._clock, self._terms, wire, self.desk.client_count + 1, serial)
+        return ClientSession(self.instrument, self._clock, self._terms, wire, self.instrument.client_count + 1, serial)
 
     def release(self, wire: Transport) -> None:
         """Take note that a wire is no more."""

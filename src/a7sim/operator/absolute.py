@@ -44,7 +44,7 @@ class GroundOrientation:
 
 
 def absolute_orientation_at(
-    bench: Workstation, model: ModelJob, control: Mapping[str, tuple[float, float, float]]
+    workstation: Workstation, model: ModelJob, control: Mapping[str, tuple[float, float, float]]
 ) -> dict[int, GroundOrientation]:
     """Level and scale a model, read it with heights in metres, and set the instruments back to how they stood.
 
@@ -52,28 +52,30 @@ def absolute_orientation_at(
     do not show two points of control in plan and three in height remark so and do nothing.
     """
     found: dict[int, GroundOrientation] = {}
-    crew = bench.crew
-    for who, names in bench.group_by_points(crew.active, [*control]):
+    operators = workstation.operators
+    for active, names in workstation.group_by_points(operators.active, [*control]):
         known = Control(tuple(names), np.array([control[name] for name in names]).reshape(-1, 3).T)
         if not known.is_enough:
-            crew.remark(who, f"{model.name}: too little control to level and scale it ({', '.join(names) or 'none'})")
+            operators.remark(
+                active, f"{model.name}: too little control to level and scale it ({', '.join(names) or 'none'})"
+            )
             continue
-        levelling = Levelling(bench, model, known)
-        before = levelling.settings(who)
-        start = np.zeros(crew.size)
-        bench.seat.drive(who, {"Z": np.round(bench.seat.counters(who)[2])})
-        start[who] = bench.seat.counters(who)[2]
-        fit = levelling.compared(who, levelling.measured(who, 1))
-        gears = np.array([_gear(bench, float(metres)) for metres in fit.metres])
+        levelling = Levelling(workstation, model, known)
+        before = levelling.settings(active)
+        start = np.zeros(operators.size)
+        workstation.controls.drive(active, {"Z": np.round(workstation.controls.counters(active)[2])})
+        start[active] = workstation.controls.counters(active)[2]
+        fit = levelling.compared(active, levelling.measured(active, 1))
+        gears = np.array([_gear(workstation, float(metres)) for metres in fit.metres])
         for gear in dict.fromkeys(gears.tolist()):
-            same = crew.is_active(who) & (gears == gear)
-            found |= _InMetres(levelling, gear).done(who[same], fit.of(same), before, start)
+            same = operators.is_active(active) & (gears == gear)
+            found |= _InMetres(levelling, gear).done(active[same], fit.of(same), before, start)
     return found
 
 
-def _gear(bench: Workstation, metres: float) -> str:
+def _gear(workstation: Workstation, metres: float) -> str:
     """Return the planned height gear, or that which counts metres at the scale nearest to the model as it stands."""
-    planned, gears = bench.job.plan.height_gear, bench.seat.manual.height_gears
+    planned, gears = workstation.job.plan.height_gear, workstation.controls.manual.height_gears
     if isinstance(planned, str):
         return planned
     return min(gears, key=lambda name: abs(math.log(gears[name].units_per_mm / metres)))
@@ -83,50 +85,52 @@ class _InMetres:
     """Sessions whose models are levelled to the same scale, that of the gear by which their counters read metres."""
 
     def __init__(self, levelling: Levelling, gear: str) -> None:
-        self.levelling, self.bench, self.control = levelling, levelling.bench, levelling.control
-        self.crew, self.seat = levelling.bench.crew, levelling.bench.seat
+        self.levelling, self.workstation, self.control = levelling, levelling.workstation, levelling.control
+        self.operators, self.controls = levelling.workstation.operators, levelling.workstation.controls
         self.gear = gear
-        self.number = 1e3 * self.seat.manual.height_gears[gear].units_per_mm
+        self.number = 1e3 * self.controls.manual.height_gears[gear].units_per_mm
 
-    def done(self, who: Indices, fit: Fit, before: Settings, start: Array) -> dict[int, GroundOrientation]:
+    def done(self, active: Indices, fit: Fit, before: Settings, start: Array) -> dict[int, GroundOrientation]:
         """Level, read and set back to settings and readings of Z ``(sessions,)``."""
-        self.seat.drive(who, {"Z": start[who]})
-        self.seat.set_height_gear(who, self.gear)
-        rounds = self.levelling.level(self.crew.remaining(who), fit.of(self.crew.is_active(who)), self.number)
-        who = self.crew.remaining(who)
-        shift = np.zeros(self.crew.size)
-        shift[who] = self._index_set(who)
-        readings = self._read(who)
-        who = self.crew.remaining(who)
-        found = self._concluded(who, rounds, before, self.levelling.settings(who), readings)
-        self._set_back(who, before, start, shift)
+        self.controls.drive(active, {"Z": start[active]})
+        self.controls.set_height_gear(active, self.gear)
+        rounds = self.levelling.level(
+            self.operators.remaining(active), fit.of(self.operators.is_active(active)), self.number
+        )
+        active = self.operators.remaining(active)
+        shift = np.zeros(self.operators.size)
+        shift[active] = self._index_set(active)
+        readings = self._read(active)
+        active = self.operators.remaining(active)
+        found = self._concluded(active, rounds, before, self.levelling.settings(active), readings)
+        self._set_back(active, before, start, shift)
         return found
 
-    def _index_set(self, who: Indices) -> Array:
+    def _index_set(self, active: Indices) -> Array:
         """Make the Z counter read heights, on the mean of the control; return how much more it reads ``(m,)``."""
         names = [self.control.names[i] for i in self.control.with_height]
-        self.bench.begin_round(who, MAX_ROUNDS + 1)
-        readings = self.bench.measure_points(who, names)[2][:, who]
+        self.workstation.begin_round(active, MAX_ROUNDS + 1)
+        readings = self.workstation.measure_points(active, names)[2][:, active]
         more = np.mean(self.control.ground[2, self.control.with_height][:, None] - readings, axis=0)
-        return self.seat.shift_counter(who, "Z", more)
+        return self.controls.shift_counter(active, "Z", more)
 
-    def _read(self, who: Indices) -> dict[str, Array]:
+    def _read(self, active: Indices) -> dict[str, Array]:
         """Measure control and all other points that are shown; X, Y in mm and Z in m ``(3, sessions)``."""
-        self.bench.begin_round(who, MAX_ROUNDS + 2)
-        wanted = dict.fromkeys([*self.control.names, *self.seat.model.other_points])
-        names = [name for name in wanted if self.bench.has_point(who, name).all()]
-        return dict(zip(names, np.moveaxis(self.bench.measure_points(who, names), 1, 0), strict=True))
+        self.workstation.begin_round(active, MAX_ROUNDS + 2)
+        wanted = dict.fromkeys([*self.control.names, *self.controls.model.other_points])
+        names = [name for name in wanted if self.workstation.has_point(active, name).all()]
+        return dict(zip(names, np.moveaxis(self.workstation.measure_points(active, names), 1, 0), strict=True))
 
     def _concluded(
         self,
-        who: Indices,
+        active: Indices,
         rounds: Mapping[int, Sequence[LevellingRound]],
         before: Settings,
         elements: Settings,
         readings: Settings,
     ) -> dict[int, GroundOrientation]:
         names, (first, last) = self.control.names, self.control.ends
-        mm = 1.0 / self.seat.manual.scales["X"].units_per_mm
+        mm = 1.0 / self.controls.manual.scales["X"].units_per_mm
         read = 1e-3 * self.number * mm * length_of((readings[names[last]] - readings[names[first]])[:2])
         distance = read - length_of(self.control.between(first, last)[:2])
         return {
@@ -141,16 +145,16 @@ class _InMetres:
                     for i in self.control.with_height
                 },
                 float(distance[s]),
-                TOLERATED_SHARE * 1e-3 * self.number * self.bench.job.plan.projection_height,
+                TOLERATED_SHARE * 1e-3 * self.number * self.workstation.job.plan.projection_height,
                 {name: (float(p[0, s]), float(p[1, s]), float(p[2, s])) for name, p in readings.items()},
             )
-            for s in who
+            for s in active
         }
 
-    def _set_back(self, who: Indices, before: Settings, start: Array, shift: Array) -> None:
+    def _set_back(self, active: Indices, before: Settings, start: Array, shift: Array) -> None:
         """Set elements, index and gear as they were before."""
-        if who.size:
-            self.seat.shift_counter(who, "Z", -shift[who])
-            self.seat.drive(who, {"Z": start[who]})
-            self.seat.set_height_gear(who, self.bench.job.plan.height_gear)
-            self.seat.turn_if_changed(who, {name: values[who] for name, values in before.items()})
+        if active.size:
+            self.controls.shift_counter(active, "Z", -shift[active])
+            self.controls.drive(active, {"Z": start[active]})
+            self.controls.set_height_gear(active, self.workstation.job.plan.height_gear)
+            self.controls.turn_if_changed(active, {name: values[active] for name, values in before.items()})

@@ -79,181 +79,198 @@ def bridge_strip(
     yield from bridge_strip_batch(Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick), begins)
 
 
-def bridge_strip_batch(bench: Workstation, begins: Callable[[str], None] = lambda _: None) -> Iterator[BridgedModels]:
+def bridge_strip_batch(
+    workstation: Workstation, begins: Callable[[str], None] = lambda _: None
+) -> Iterator[BridgedModels]:
     """Yield the models of a strip as a crew bridges it, each session at its own instrument.
 
     Every model must have the photograph of the one before it as its left-hand one and the other base; give up if not.
     """
     try:
-        yield from _bridged(bench, begins)
+        yield from _bridged(workstation, begins)
     except AllGaveUpError:
         return
 
 
-def _bridged(bench: Workstation, begins: Callable[[str], None]) -> Iterator[BridgedModels]:
-    crew, seat, job = bench.crew, bench.seat, bench.job
+def _bridged(workstation: Workstation, begins: Callable[[str], None]) -> Iterator[BridgedModels]:
+    operators, controls, job = workstation.operators, workstation.controls, workstation.job
     interior: dict[str, InteriorOrientationBatch] = {}
-    seat.prepare(crew.active)
+    controls.prepare(operators.active)
     before: dict[str, Array] = {}
     last: ModelJob | None = None
     for model in job.models:
-        begin_form(bench, model, "interior orientation", begins)
+        begin_form(workstation, model, "interior orientation", begins)
         if last is not None:
-            _see_that_it_follows(bench, last, model)
-            extend_strip(bench, model)
-        set_base_and_fittings(bench, model.base, model.polarity)
-        mount_photographs(bench, model, interior)
-        prints = load_prints(bench, model)
-        require_active(bench)
-        bench.begin(crew.active, model, prints)
+            _see_that_it_follows(workstation, last, model)
+            extend_strip(workstation, model)
+        set_base_and_fittings(workstation, model.base, model.polarity)
+        mount_photographs(workstation, model, interior)
+        prints = load_prints(workstation, model)
+        require_active(workstation)
+        workstation.begin(operators.active, model, prints)
         if last is None:
-            preset_counters(bench, model)
+            preset_counters(workstation, model)
         else:
-            copy_common_photo_orientation(bench, model)
-        begin_form(bench, model, "relative orientation", begins)
-        orientation = _oriented(bench, model)
-        scale = np.ones(crew.size)
+            copy_common_photo_orientation(workstation, model)
+        begin_form(workstation, model, "relative orientation", begins)
+        orientation = _oriented(workstation, model)
+        scale = np.ones(operators.size)
         if last is not None:
-            begin_form(bench, model, "scale", begins)
-            scale = transfer_scale(bench, crew.active, model, before)
-        orientation = _refined(bench, model, orientation)
+            begin_form(workstation, model, "scale", begins)
+            scale = transfer_scale(workstation, operators.active, model, before)
+        orientation = _refined(workstation, model, orientation)
         if last is not None:
-            scale *= transfer_scale(bench, crew.active, model, before)
-        begin_form(bench, model, "model coordinates", begins)
-        points = model_coordinates(bench, model)
-        require_active(bench)
+            scale *= transfer_scale(workstation, operators.active, model, before)
+        begin_form(workstation, model, "model coordinates", begins)
+        points = model_coordinates(workstation, model)
+        require_active(workstation)
         common = {name: points[name] - before[name] for name in points if name in before}
-        yield BridgedModels(model, crew.active, orientation, points, common, scale, seat.units_per_mm)
+        yield BridgedModels(model, operators.active, orientation, points, common, scale, controls.units_per_mm)
         before, last = points, model
 
 
-def _see_that_it_follows(bench: Workstation, last: ModelJob, model: ModelJob) -> None:
+def _see_that_it_follows(workstation: Workstation, last: ModelJob, model: ModelJob) -> None:
     if model.left != last.right or model.left_projector != last.right_projector:
-        bench.crew.give_up(
-            bench.crew.active,
+        workstation.operators.give_up(
+            workstation.operators.active,
             f"model {model.name} does not go on from model {last.name}: expected {last.right} on the left and base "
             f"{'outside' if last.base == 'inside' else 'inside'}, got {model.left} and base {model.base}",
         )
-        require_active(bench)
+        require_active(workstation)
 
 
 # --- from one model to the next ---------------------------------------------------------------------------------------
 
 
-def extend_strip(bench: Workstation, model: ModelJob) -> None:
+def extend_strip(workstation: Workstation, model: ModelJob) -> None:
     """Preset X for the oriented photograph's new place on the left, and Y and Z where its by and bz run out.
 
     With the base changed over, its centre comes from X = bx to X = 0: what stands in X = 0 has to read bx more.
     """
-    seat, who, n = bench.seat, bench.crew.active, model.left_projector
-    seat.shift_counter(who, "X", seat.elements(who, ["bx"])["bx"])
-    for name, axis, units in ((f"by{n}", "Y", -1.0), (f"bz{n}", "Z", seat.units_per_mm)):
-        element = seat.manual.elements[name]
-        counts = seat.elements(who, [name])[name]
+    controls, active, n = workstation.controls, workstation.operators.active, model.left_projector
+    controls.shift_counter(active, "X", controls.elements(active, ["bx"])["bx"])
+    for name, axis, units in ((f"by{n}", "Y", -1.0), (f"bz{n}", "Z", controls.units_per_mm)):
+        element = controls.manual.elements[name]
+        counts = controls.elements(active, [name])[name]
         far = np.abs(counts - element.zero) > SHARE_OF_RANGE * (element.high - element.low) / 2.0
         if far.any():
-            seat.shift_counter(who[far], axis, units * (counts - element.zero)[far])
-            seat.set_elements(who[far], {name: np.full(int(far.sum()), element.zero)})
+            controls.shift_counter(active[far], axis, units * (counts - element.zero)[far])
+            controls.set_elements(active[far], {name: np.full(int(far.sum()), element.zero)})
 
 
-def copy_common_photo_orientation(bench: Workstation, model: ModelJob) -> None:
+def copy_common_photo_orientation(workstation: Workstation, model: ModelJob) -> None:
     """Start the new photograph from the tilts and the by and bz of the oriented one, and bx from the plan."""
-    seat, who = bench.seat, bench.crew.active
+    controls, active = workstation.controls, workstation.operators.active
     left, right = model.left_projector, model.right_projector
     names = ("phi", "omega", "by", "bz")
-    shown = seat.elements(who, [f"{name}{left}" for name in names])
+    shown = controls.elements(active, [f"{name}{left}" for name in names])
     within = {}
     for name in names:
-        element = seat.manual.elements[f"{name}{right}"]
+        element = controls.manual.elements[f"{name}{right}"]
         within[f"{name}{right}"] = np.clip(shown[f"{name}{left}"], element.low, element.high)
-    seat.set_elements(who, {"bx": np.full(who.size, bench.job.plan.bx)} | within)
+    controls.set_elements(active, {"bx": np.full(active.size, workstation.job.plan.bx)} | within)
 
 
-def _oriented(bench: Workstation, model: ModelJob) -> OrientationRecordBatch:
-    plan, who, tolerated = bench.job.plan, bench.crew.active, bench.job.tolerated_parallax_mm
-    return relative_orientation(bench, who, model, "dependent", plan.case, plan.parallax_readings, plan.bx, tolerated)
+def _oriented(workstation: Workstation, model: ModelJob) -> OrientationRecordBatch:
+    plan, active, tolerated = workstation.job.plan, workstation.operators.active, workstation.job.tolerated_parallax_mm
+    return relative_orientation(
+        workstation, active, model, "dependent", plan.case, plan.parallax_readings, plan.bx, tolerated
+    )
 
 
 # --- scale ------------------------------------------------------------------------------------------------------------
 
 
-def transfer_scale(bench: Workstation, who: Indices, model: ModelJob, before: Mapping[str, Array]) -> Array:
+def transfer_scale(workstation: Workstation, active: Indices, model: ModelJob, before: Mapping[str, Array]) -> Array:
     """Change the base until common points read the heights that they had; return the factor ``(sessions,)``.
 
     by and bz of the new photograph follow, so that the base keeps its direction and the parallaxes stay cleared.
     """
-    crew, seat = bench.crew, bench.seat
+    operators, controls = workstation.operators, workstation.controls
     left, right = model.left_projector, model.right_projector
-    factor, least = np.ones(crew.size), np.full(crew.size, np.inf)
+    factor, least = np.ones(operators.size), np.full(operators.size, np.inf)
     names = [name for name in map(model.standard_points.get, "135") if name is not None and name in before]
     if not names:
-        crew.give_up(who, f"{model.name}: none of its points 1, 3 and 5 was measured before, to carry the scale on")
-        require_active(bench)
+        operators.give_up(
+            active, f"{model.name}: none of its points 1, 3 and 5 was measured before, to carry the scale on"
+        )
+        require_active(workstation)
     for number in range(1, MAX_SCALINGS + 1):
-        bench.begin_round(who, number)
-        readings = bench.measure_points(who, names)[:, :, who]
-        wanted = np.stack([before[name][:, who] for name in names], axis=1)
-        bench.compute(who)
-        settings = seat.exact_values(who, ["bx", *(f"{name}{n}" for name in ("by", "bz") for n in (left, right))])
+        workstation.begin_round(active, number)
+        readings = workstation.measure_points(active, names)[:, :, active]
+        wanted = np.stack([before[name][:, active] for name in names], axis=1)
+        workstation.compute(active)
+        settings = controls.exact_values(
+            active, ["bx", *(f"{name}{n}" for name in ("by", "bz") for n in (left, right))]
+        )
         depths = [
-            settings[f"bz{left}"] + np.stack([seat.model_position(who, each[:, i])[2] for i in range(len(names))])
+            settings[f"bz{left}"]
+            + np.stack([controls.model_position(active, each[:, i])[2] for i in range(len(names))])
             for each in (readings, wanted)
         ]
         larger = np.nanmean(depths[1] / depths[0], axis=0)
         change = np.abs(larger - 1.0) * np.abs(settings["bx"])
-        turning = (change > bench.eyes.finest_mm) & (change < STILL_FALLING * least[who])
-        least[who] = change
-        crew.give_up(who[~np.isfinite(larger)], f"{model.name}: no common point carries the scale on")
-        turning &= crew.is_active(who)
+        turning = (change > workstation.pointing.finest_mm) & (change < STILL_FALLING * least[active])
+        least[active] = change
+        operators.give_up(active[~np.isfinite(larger)], f"{model.name}: no common point carries the scale on")
+        turning &= operators.is_active(active)
         if not turning.any():
             break
         new = {"bx": larger * settings["bx"]}
         for name in ("by", "bz"):
             fixed = settings[f"{name}{left}"]
             new[f"{name}{right}"] = fixed + larger * (settings[f"{name}{right}"] - fixed)
-        who = who[turning]
-        seat.turn_elements(who, {name: values[turning] for name, values in new.items()})
-        factor[who] *= larger[turning]
+        active = active[turning]
+        controls.turn_elements(active, {name: values[turning] for name, values in new.items()})
+        factor[active] *= larger[turning]
     return factor
 
 
 # --- refinement -------------------------------------------------------------------------------------------------------
 
 
-def _refined(bench: Workstation, model: ModelJob, found: OrientationRecordBatch) -> OrientationRecordBatch:
+def _refined(workstation: Workstation, model: ModelJob, found: OrientationRecordBatch) -> OrientationRecordBatch:
     """Look at what is left at all standard points and correct the new photograph while it falls.
 
     The eye sees finer than by counts, and a drum turns finer than it shows; the settings with the smallest residual
     parallaxes stand.
     """
-    crew, seat = bench.crew, bench.seat
+    operators, controls = workstation.operators, workstation.controls
     unknowns = unknown_elements("dependent", model)
     points = [model.standard_points[label] for label in model.all_positions()]
-    everybody = who = crew.active
-    best = expand_to_batch(seat.exact_values(who, unknowns), who, crew.size)
-    least = np.full(crew.size, np.inf)
+    sessions = active = operators.active
+    best = expand_to_batch(controls.exact_values(active, unknowns), active, operators.size)
+    least = np.full(operators.size, np.inf)
     for number in range(1, MAX_REFINEMENTS + 1):
-        bench.begin_round(who, number)
-        seen = bench.look_at_parallaxes(who, points)
-        who = crew.remaining(who)
-        who = exclude(who, seen.disagrees(who))
+        workstation.begin_round(active, number)
+        seen = workstation.look_at_parallaxes(active, points)
+        active = operators.remaining(active)
+        active = exclude(active, seen.disagrees(active))
         rms = np.sqrt((seen.parallax_mm**2).mean(axis=0))
-        now = expand_to_batch(seat.exact_values(who, unknowns), who, crew.size)
-        better = who[rms[who] < least[who]]
-        falling = who[rms[who] < STILL_FALLING * least[who]]
+        now = expand_to_batch(controls.exact_values(active, unknowns), active, operators.size)
+        better = active[rms[active] < least[active]]
+        falling = active[rms[active] < STILL_FALLING * least[active]]
         least[better] = rms[better]
         for name, kept in best.items():
             kept[better] = now[name][better]
-        who = falling
-        if not who.size or number == MAX_REFINEMENTS:
+        active = falling
+        if not active.size or number == MAX_REFINEMENTS:
             break
-        corrections, _ = compute_corrections(bench, who, model, seen.places, seen.parallax_mm, unknowns, seat.bx(who))
-        who = crew.remaining(who)
-        seat.turn_elements(who, {name: (now[name] + corrections[name])[who] for name in unknowns})
-    everybody = crew.remaining(everybody)
-    seat.turn_if_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
-    bench.begin_round(everybody, MAX_REFINEMENTS + 1)
-    job = bench.job
+        corrections, _ = compute_corrections(
+            workstation, active, model, seen.places, seen.parallax_mm, unknowns, controls.bx(active)
+        )
+        active = operators.remaining(active)
+        controls.turn_elements(active, {name: (now[name] + corrections[name])[active] for name in unknowns})
+    sessions = operators.remaining(sessions)
+    controls.turn_if_changed(sessions, {name: kept[sessions] for name, kept in best.items()})
+    workstation.begin_round(sessions, MAX_REFINEMENTS + 1)
+    job = workstation.job
     return assess_residuals(
-        bench, everybody, model, found, model.all_positions(), job.plan.parallax_readings, job.tolerated_parallax_mm
+        workstation,
+        sessions,
+        model,
+        found,
+        model.all_positions(),
+        job.plan.parallax_readings,
+        job.tolerated_parallax_mm,
     )

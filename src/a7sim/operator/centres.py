@@ -47,26 +47,26 @@ Levels = npt.NDArray[np.float64]
 _PARTS = attrgetter(*(field.name for field in fields(PerspectiveCentre)))
 
 
-def observe_centre(bench: Workstation, who: Indices, model: ModelJob, hand: int) -> PerspectiveCentre:
+def observe_centre(workstation: Workstation, active: Indices, model: ModelJob, side: int) -> PerspectiveCentre:
     """Return the centres ``(sessions,)`` of one photograph in counter units, by the method of the plan.
 
     hand is 1 for the left-hand photograph, 2 for the right-hand one. Those for whom the rms is beyond the tolerated
     give up.
     """
-    plan, crew = bench.job.plan, bench.crew
-    shown = bench.seat.displayed_levels(who, plan.centre_levels)
-    who = crew.remaining(who)
+    plan, operators = workstation.job.plan, workstation.operators
+    shown = workstation.controls.displayed_levels(active, plan.centre_levels)
+    active = operators.remaining(active)
     levels = shown[:, 0]
     if plan.centre_method == "scales":
-        return _by_scales(bench, who, hand, plan.centre_levels)
+        return _by_scales(workstation, active, side, plan.centre_levels)
     if plan.centre_method == "grid plate":
-        centres = _by_grid_plate(bench, who, model, hand, levels)
+        centres = _by_grid_plate(workstation, active, model, side, levels)
     else:
-        centres = _by_levels(bench, who, model, hand, levels)
-    who = crew.remaining(who)
-    rms = centres.rms[who]
-    for session, bad in zip(who[rms > plan.tolerated_centre_rms], rms[rms > plan.tolerated_centre_rms], strict=True):
-        crew.give_up(
+        centres = _by_levels(workstation, active, model, side, levels)
+    active = operators.remaining(active)
+    rms = centres.rms[active]
+    for session, bad in zip(active[rms > plan.tolerated_centre_rms], rms[rms > plan.tolerated_centre_rms], strict=True):
+        operators.give_up(
             np.array([session]),
             f"{model.name}: the pointings of a perspective centre do not meet: rms {bad:.2f}, "
             f"tolerated {plan.tolerated_centre_rms:.2f}",
@@ -80,10 +80,10 @@ def centre_of(centres: PerspectiveCentre, session: int) -> PerspectiveCentre:
     return PerspectiveCentre(*parts)
 
 
-def _among_all(centres: PerspectiveCentre, who: Indices, sessions: int) -> PerspectiveCentre:
+def _among_all(centres: PerspectiveCentre, active: Indices, sessions: int) -> PerspectiveCentre:
     def spread(values: Array) -> Array:
         every = np.full((*values.shape[:-1], sessions), np.nan)
-        every[..., who] = values
+        every[..., active] = values
         return every
 
     return PerspectiveCentre(*_each(centres, spread))
@@ -100,14 +100,14 @@ def _each(found: PerspectiveCentre | PlatePlacement, change: Callable[[Array], A
     return [None if each is None else change(each) for each in values]
 
 
-def _by_scales(bench: Workstation, who: Indices, hand: int, levels: Sequence[float]) -> PerspectiveCentre:
+def _by_scales(workstation: Workstation, active: Indices, side: int, levels: Sequence[float]) -> PerspectiveCentre:
     """Return where base, by, bz and the scales put the centres ``(sessions,)``, as P 3.1 and 3.2 take them.
 
     Their standard deviations are those of the rounding to the last digit.
     """
-    sessions = bench.crew.size
+    sessions = workstation.operators.size
     X0, Y0, Z0 = np.full((3, sessions), np.nan)
-    X0[who], Y0[who], Z0[who] = bench.seat.centre(who, hand)
+    X0[active], Y0[active], Z0[active] = workstation.controls.centre(active, side)
     rounding = np.full(sessions, LEAST_COUNT / np.sqrt(12.0))
     depth = levels[1] - levels[0]
     return PerspectiveCentre(
@@ -127,64 +127,66 @@ def _by_scales(bench: Workstation, who: Indices, hand: int, levels: Sequence[flo
 # --- levels of Z --------------------------------------------------------------------------------------
 
 
-def _by_levels(bench: Workstation, who: Indices, model: ModelJob, hand: int, levels: Levels) -> PerspectiveCentre:
+def _by_levels(
+    workstation: Workstation, active: Indices, model: ModelJob, side: int, levels: Levels
+) -> PerspectiveCentre:
     """Point monocularly at points 1 to 6 at every level and compute the centres ``(sessions,)``.
 
     Those that the print does not show are done without; with fewer than three of them all standard points serve, and
     whose prints do not show three of these give up.
     """
-    crew = bench.crew
+    operators = workstation.operators
     points = [model.standard_points[label] for label in model.all_positions()]
     corners_and_nadirs = {model.standard_points[label] for label in model.points_of_case("A")}
     groups = []
-    for them, there in bench.group_by_points(who, points, (hand,)):
+    for them, there in workstation.group_by_points(active, points, (side,)):
         usual = [name for name in there if name in corners_and_nadirs]
         chosen = usual if len(usual) >= MIN_POINTS else there
         if len(chosen) >= MIN_POINTS:
-            found = _of_points(bench, them, model, hand, chosen, levels)
-            groups.append((crew.remaining(them), chosen, found))
+            found = _of_points(workstation, them, model, side, chosen, levels)
+            groups.append((operators.remaining(them), chosen, found))
         else:
-            crew.give_up(
+            operators.give_up(
                 them,
-                f"{model.name}: {len(chosen)} of the standard points are pricked on the print of the {side_name(hand)} "
+                f"{model.name}: {len(chosen)} of the standard points are pricked on the print of the {side_name(side)} "
                 f"photograph: there must be {MIN_POINTS} for its perspective centre",
             )
-    return _gathered(groups, crew.size)
+    return _gathered(groups, operators.size)
 
 
 def _gathered(groups: Sequence[tuple[Indices, Sequence[str], PerspectiveCentre]], sessions: int) -> PerspectiveCentre:
     """Return the centres of groups, each from points of its own, among all sessions, nan where there is nothing."""
     points = list(dict.fromkeys(name for _, names, _ in groups for name in names))
     every: dict[str, Array] = {}
-    for who, names, centres in groups:
+    for active, names, centres in groups:
         slots = [points.index(name) for name in names]
         for name, values in ((field.name, getattr(centres, field.name)) for field in fields(centres)):
             if name == "residuals":
                 residuals = every.setdefault(name, np.full((3, len(points), sessions), np.nan))
-                residuals[:, np.array(slots)[:, None], who] = values
+                residuals[:, np.array(slots)[:, None], active] = values
             elif values is not None:
-                every.setdefault(name, np.full(sessions, np.nan))[who] = values
+                every.setdefault(name, np.full(sessions, np.nan))[active] = values
     return PerspectiveCentre(**every) if every else _nowhere(sessions)
 
 
 def _of_points(
-    bench: Workstation, who: Indices, model: ModelJob, hand: int, points: Sequence[str], levels: Levels
+    workstation: Workstation, active: Indices, model: ModelJob, side: int, points: Sequence[str], levels: Levels
 ) -> PerspectiveCentre:
     """Return the centres ``(m,)`` of those who go on, from points at every level.
 
     A point that does not fit the others is struck out and pointed at again; when the rms stays suspicious though no
     point stands out, a second set is observed and the mean of both is taken.
     """
-    crew = bench.crew
-    pointings = _one_set(bench, who, hand, points, levels)
-    who = crew.remaining(who)
-    doubtful = who[_rms(pointings[..., who], levels) > SUSPICIOUS_RMS]
+    operators = workstation.operators
+    pointings = _one_set(workstation, active, side, points, levels)
+    active = operators.remaining(active)
+    doubtful = active[_rms(pointings[..., active], levels) > SUSPICIOUS_RMS]
     if doubtful.size:
-        crew.remark(doubtful, f"{model.name}: the points of the centre fit badly, a second set is observed")
-        again = _one_set(bench, doubtful, hand, points, levels)
+        operators.remark(doubtful, f"{model.name}: the points of the centre fit badly, a second set is observed")
+        again = _one_set(workstation, doubtful, side, points, levels)
         pointings[..., doubtful] = (pointings[..., doubtful] + again[..., doubtful]) / 2.0
-        who = crew.remaining(who)
-    return _centre(pointings[..., who], levels)
+        active = operators.remaining(active)
+    return _centre(pointings[..., active], levels)
 
 
 def _centre(pointings: Array, levels: Levels) -> PerspectiveCentre:
@@ -198,14 +200,15 @@ def _rms(pointings: Array, levels: Levels) -> Array:
     return _centre(pointings, levels).rms
 
 
-def _one_set(bench: Workstation, who: Indices, hand: int, points: Sequence[str], levels: Levels) -> Array:
+def _one_set(workstation: Workstation, active: Indices, side: int, points: Sequence[str], levels: Levels) -> Array:
     """Return pointings ``(2, k, n, sessions)`` at k levels."""
-    crew = bench.crew
+    operators = workstation.operators
     pointings = np.stack(
-        [bench.point_monocularly(crew.remaining(who), hand, points, level) for level in levels.tolist()], axis=1
+        [workstation.point_monocularly(operators.remaining(active), side, points, level) for level in levels.tolist()],
+        axis=1,
     )
-    looking = crew.remaining(who)
-    bench.compute(looking)
+    looking = operators.remaining(active)
+    workstation.compute(looking)
     for _ in range(MAX_REPETITIONS):
         misread = _misread_points(pointings[..., looking], levels)
         looking, misread = looking[misread >= 0], misread[misread >= 0]
@@ -215,10 +218,10 @@ def _one_set(bench: Workstation, who: Indices, hand: int, points: Sequence[str],
         for place in np.unique(misread):
             again = looking[misread == place]
             for i, level in enumerate(levels.tolist()):
-                pointed = bench.repeat_pointing(again, hand, points[place], level, why)
+                pointed = workstation.repeat_pointing(again, side, points[place], level, why)
                 pointings[:, i, place, again] = pointed[:, again]
-        looking = crew.remaining(looking)
-        bench.compute(looking)
+        looking = operators.remaining(looking)
+        workstation.compute(looking)
     return pointings
 
 
@@ -233,50 +236,60 @@ def _misread_points(pointings: Array, levels: Levels) -> npt.NDArray[np.intp]:
 # --- a grid plate -------------------------------------------------------------------------------------
 
 
-def _by_grid_plate(bench: Workstation, who: Indices, model: ModelJob, hand: int, levels: Levels) -> PerspectiveCentre:
+def _by_grid_plate(
+    workstation: Workstation, active: Indices, model: ModelJob, hand: int, levels: Levels
+) -> PerspectiveCentre:
     """Put the grid plate in the picture's place, point at its crosses at every level, and put the picture back.
 
     The elements stay as they are. Both are centred anew, each as well as a fiducial is registered.
     """
-    crew, job = bench.crew, bench.job
+    operators, job = workstation.operators, workstation.job
     plate = job.grid_plate
     certificate = plate.certificate(job.certificate)
-    projector = bench.seat.projector(hand)
+    projector = workstation.controls.projector(hand)
     picture = model.left if hand == 1 else model.right
-    centre_picture(bench, who, projector, plate.name, certificate)
-    lie = locate_plate(bench, crew.remaining(who), projector, certificate, times=1)
-    bench.eyes.set_prints({hand: sketch_positions(bench, crew.remaining(who), projector)})
-    crosses = _crosses_in_model(bench, crew.remaining(who), hand, levels)
+    centre_picture(workstation, active, projector, plate.name, certificate)
+    lie = locate_plate(workstation, operators.remaining(active), projector, certificate, times=1)
+    workstation.pointing.set_prints({hand: sketch_positions(workstation, operators.remaining(active), projector)})
+    crosses = _crosses_in_model(workstation, operators.remaining(active), hand, levels)
     if len(crosses) < MIN_CROSSES:
-        crew.give_up(who, f"{model.name}: too few crosses of plate {plate.name} lie within the model for a centre")
-        return _nowhere(crew.size)
+        operators.give_up(
+            active, f"{model.name}: too few crosses of plate {plate.name} lie within the model for a centre"
+        )
+        return _nowhere(operators.size)
     pointings = np.stack(
-        [point_at_crosses(bench, crew.remaining(who), hand, crosses, level) for level in levels.tolist()], axis=1
+        [point_at_crosses(workstation, operators.remaining(active), hand, crosses, level) for level in levels.tolist()],
+        axis=1,
     )
-    who = crew.remaining(who)
-    bench.compute(who)
-    c = bench.seat.elements(who, [f"c{projector}"])[f"c{projector}"]
-    its_lie = PlatePlacement(*_each(lie, lambda values: values[who]))
-    found = _resected(bench, crosses, pointings[..., who], levels, c, its_lie)
-    centres = _among_all(found, who, crew.size)
-    centre_picture(bench, who, projector, picture, job.certificate)
-    who = crew.remaining(who)
-    bench.eyes.set_prints({side: sketch_positions(bench, who, bench.seat.projector(side)) for side in (1, 2)})
+    active = operators.remaining(active)
+    workstation.compute(active)
+    c = workstation.controls.elements(active, [f"c{projector}"])[f"c{projector}"]
+    its_lie = PlatePlacement(*_each(lie, lambda values: values[active]))
+    found = _resected(workstation, crosses, pointings[..., active], levels, c, its_lie)
+    centres = _among_all(found, active, operators.size)
+    centre_picture(workstation, active, projector, picture, job.certificate)
+    active = operators.remaining(active)
+    workstation.pointing.set_prints(
+        {side: sketch_positions(workstation, active, workstation.controls.projector(side)) for side in (1, 2)}
+    )
     return centres
 
 
-def _crosses_in_model(bench: Workstation, who: Indices, hand: int, levels: Levels) -> Crosses:
+def _crosses_in_model(workstation: Workstation, active: Indices, side: int, levels: Levels) -> Crosses:
     """Return crosses that lie within the model in every session, or none where they are too few."""
-    seat, plate = bench.seat, bench.job.grid_plate
-    bx = np.abs(seat.bx(who))
+    controls, plate = workstation.controls, workstation.job.grid_plate
+    bx = np.abs(controls.bx(active))
     beyond = BESIDE_THE_MODEL * bx
 
     def in_model(crosses: Crosses) -> Crosses:
         swung = np.array(
-            [seat.rotate_by_swing(who, hand, np.repeat([place], who.size, axis=0).T) for place in crosses.values()]
+            [
+                controls.rotate_by_swing(active, side, np.repeat([place], active.size, axis=0).T)
+                for place in crosses.values()
+            ]
         )
-        depth = seat.frame_positions(who, np.zeros((2, levels.size, who.size)), levels[:, None])[2]
-        x = swung[:, 0] * depth.max(axis=0) / seat.c + (0.0 if hand == 1 else bx)
+        depth = controls.frame_positions(active, np.zeros((2, levels.size, active.size)), levels[:, None])[2]
+        x = swung[:, 0] * depth.max(axis=0) / controls.c + (0.0 if side == 1 else bx)
         inside = ((x >= -beyond) & (x <= bx + beyond)).all(axis=1)
         return {name: place for (name, place), keep in zip(crosses.items(), inside, strict=True) if keep}
 
@@ -286,11 +299,11 @@ def _crosses_in_model(bench: Workstation, who: Indices, hand: int, levels: Level
 
 
 def _resected(
-    bench: Workstation, crosses: Crosses, pointings: Array, levels: Levels, c: Array, lie: PlatePlacement
+    workstation: Workstation, crosses: Crosses, pointings: Array, levels: Levels, c: Array, lie: PlatePlacement
 ) -> PerspectiveCentre:
     """Return the centres ``(m,)`` from pointings ``(2, k, n, m)`` at crosses, in counter units."""
     k, n = pointings.shape[1:3]
-    units = bench.seat.units_per_mm
+    units = workstation.controls.units_per_mm
     placed = np.tile(lie.placed(cross_positions(crosses)), (1, k, 1))
     heights = np.repeat(levels / units, n)[:, None]
     found = grid_plate_centre(placed, pointings.reshape(2, k * n, -1), heights, c)

@@ -95,34 +95,40 @@ class Compilation:
     """One person compiling a level model."""
 
     def __init__(
-        self, bench: Workstation, person: Person, view: StereoView, model: LevelModel, area: Area, tracing: Tracing
+        self,
+        workstation: Workstation,
+        person: Person,
+        view: StereoView,
+        model: LevelModel,
+        area: Area,
+        tracing: Tracing,
     ) -> None:
-        self._bench = bench
+        self._workstation = workstation
         self._person = person
         self._view = view
         self.model = model
         self.area = area
         self._tracing = tracing
-        self._who = bench.crew.active
-        self._light = 1.0 if bench.seat.model.polarity == "positive" else -1.0
+        self._active = workstation.operators.active
+        self._light = 1.0 if workstation.controls.model.polarity == "positive" else -1.0
 
     # --- the mark -------------------------------------------------------------------------------------
 
     def _drive(self, place: Array, z: float) -> None:
         targets = dict(zip("XYZ", [np.array([value]) for value in (*place, z)], strict=True))
-        self._bench.seat.drive(self._who, targets)
-        self._bench.seat.give_up_on_errors(self._who, "driving over the model")
+        self._workstation.controls.drive(self._active, targets)
+        self._workstation.controls.give_up_on_errors(self._active, "driving over the model")
 
     def _turn(self, plan: Array, rise: float = 0.0) -> None:
         wheels = np.array([*plan, rise * self.model.units_per_mm])
-        self._bench.hands.turn(self._who, wheels[:, None])
+        self._workstation.driver.turn(self._active, wheels[:, None])
 
     def _place(self) -> Array:
-        return np.asarray(self._bench.seat.counters(self._who)[:2, 0])
+        return np.asarray(self._workstation.controls.counters(self._active)[:2, 0])
 
     def _registered(self, name: str) -> Array:
         """Register the mark under a name and return the readings ``(3,)`` on the record."""
-        self._bench.crew.spend(self._who, self._tracing.seconds_per_vertex, "turning")
+        self._workstation.operators.spend(self._active, self._tracing.seconds_per_vertex, "turning")
         fields = self._person.client.fields(f'REC "{name}";:REC:LAST?')
         return np.array(fields[2:5], dtype=float)
 
@@ -141,9 +147,9 @@ class Compilation:
 
     def _tremor(self, look: StereoPatch) -> tuple[Array, float]:
         """Draw tremor along and across ``(2,)``, and how much too high the ground seems to be, in mm."""
-        along, across, height = self._bench.crew.draw_setting_errors(self._who, 1.0, (3,))[:, 0]
+        along, across, height = self._workstation.operators.draw_setting_errors(self._active, 1.0, (3,))[:, 0]
         tremor = 1e-3 * self._tracing.tremor_um * look.enlargement * np.array([along, across])
-        return tremor, float(1e-3 * self._bench.crew.observer.height_um * height / look.parallax_by_height)
+        return tremor, float(1e-3 * self._workstation.operators.observer.height_um * height / look.parallax_by_height)
 
     # --- spot heights ---------------------------------------------------------------------------------
 
@@ -161,12 +167,14 @@ class Compilation:
                     readings[:, i, j] = found
                     z = found[2]
         if np.isnan(readings).all():
-            self._bench.crew.give_up(self._who, f"{self._bench.seat.model.name}: the ground is nowhere seen in relief")
+            self._workstation.operators.give_up(
+                self._active, f"{self._workstation.controls.model.name}: the ground is nowhere seen in relief"
+            )
         return SpotHeights(readings, np.asarray(self.model.on_ground(readings)[2]))
 
     def _spot(self) -> Array | None:
-        observer = self._bench.crew.observer
-        self._bench.crew.spend(self._who, observer.seconds_to_look, "looking")
+        observer = self._workstation.operators.observer
+        self._workstation.operators.spend(self._active, observer.seconds_to_look, "looking")
         seen = self._seen(looks=_WIDELY)
         for _ in range(_MAX_LOOKS):
             if seen is None:
@@ -284,23 +292,26 @@ class Compilation:
 
     # --- lines ----------------------------------------------------------------------------------------
 
-    def line(self, errand: LineTarget, spots: SpotHeights) -> TracedLine:
+    def line(self, target: LineTarget, spots: SpotHeights) -> TracedLine:
         """Follow a road or track by its middle. Gives up where none is seen at its start."""
-        start, towards, end = (self._readings_in_plan(each) for each in (errand.start, errand.towards, errand.end))
+        start, towards, end = (self._readings_in_plan(each) for each in (target.start, target.towards, target.end))
         heading = (towards - start) / length_of(towards - start)
         self._drive(start, spots.nearest(start))
         found = self._road_at(heading, np.pi / 3.0, _WIDTHS_MM)
         if found is None:
-            self._bench.crew.give_up(
-                self._who, f"{self._bench.seat.model.name}: no {errand.kind} is seen where the map shows {errand.name}"
+            self._workstation.operators.give_up(
+                self._active,
+                f"{self._workstation.controls.model.name}: no {target.kind} is seen where the map shows {target.name}",
             )
             raise AssertionError
-        vertices, ending = self._line_followed(errand.name, found, end)
+        vertices, ending = self._line_followed(target.name, found, end)
         readings = np.array(vertices).reshape(-1, 3).T
-        return TracedLine(errand.name, errand.kind, None, readings, ("end", ending))
+        return TracedLine(target.name, target.kind, None, readings, ("end", ending))
 
     def _readings_in_plan(self, plan: tuple[float, float]) -> Array:
-        level = self.model.on_ground(np.array([*self._place(), self._bench.seat.counters(self._who)[2, 0]]))
+        level = self.model.on_ground(
+            np.array([*self._place(), self._workstation.controls.counters(self._active)[2, 0]])
+        )
         return np.asarray(self.model.readings_of(np.array([*plan, level[2]]))[:2])
 
     def _line_followed(self, name: str, road: "_Road", end: Array) -> tuple[list[Array], Ending]:

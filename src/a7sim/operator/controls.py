@@ -28,112 +28,112 @@ class Controls:
     over.
     """
 
-    def __init__(self, crew: OperatorBatch, hands: InstrumentDriver, job: Job) -> None:
-        self.crew = crew
-        self.hands = hands
+    def __init__(self, operators: OperatorBatch, driver: InstrumentDriver, job: Job) -> None:
+        self.operators = operators
+        self.driver = driver
         self.job = job
         self.model: ModelJob
         self.manual: Variant = VARIANTS["A7"]
         self.units_per_mm = 1.0
         """Of the Z counter."""
-        self.z = np.zeros(crew.size)
+        self.z = np.zeros(operators.size)
         """How far the mark stood below the base line when the counters were last read."""
         self.c = job.certificate.c
         self._plane = _by_dimensions(np.ones(2))
         """Units of the X and Y counters a mm."""
-        self._settings = {name: np.zeros(crew.size) for name in STEADY}
+        self._settings = {name: np.zeros(operators.size) for name in STEADY}
         self._left_at: dict[str, Array] = {}
         """Where drums were left by these hands ``(sessions,)``, between two counts too; nan where that is not known."""
-        self._offset = np.zeros((3, crew.size))
+        self._offset = np.zeros((3, operators.size))
 
-    def prepare(self, who: Indices) -> None:
+    def prepare(self, active: Indices) -> None:
         """Bring the instruments to their zeros, engage the gears, set base and projection height."""
-        plan, hands = self.job.plan, self.hands
+        plan, driver = self.job.plan, self.driver
         gear = self._learn_manual()
-        hands.set_height_gear(who, 1.0, plan.plan_gear)
-        hands.reset(who)
-        self.spend_setting(who, 6)
+        driver.set_height_gear(active, 1.0, plan.plan_gear)
+        driver.reset(active)
+        self.spend_setting(active, 6)
         self._left_at.clear()
-        self.run_element(who, "bx", np.full(who.size, plan.bx))
-        hands.drive(who, {"Z": np.full(who.size, -plan.projection_height)})
-        self._count_from_origin(who, "XY")
-        hands.drive(who, dict(zip("XY", self._offset[:2, who], strict=True)))
-        height = hands.counter(who, "Z")
-        hands.set_height_gear(who, gear, plan.plan_gear)
-        self.give_up_on_errors(who, "preparing the instrument")
-        self._offset[2, who] = hands.counter(who, "Z") - self.units_per_mm * height
+        self.run_element(active, "bx", np.full(active.size, plan.bx))
+        driver.drive(active, {"Z": np.full(active.size, -plan.projection_height)})
+        self._count_from_origin(active, "XY")
+        driver.drive(active, dict(zip("XY", self._offset[:2, active], strict=True)))
+        height = driver.counter(active, "Z")
+        driver.set_height_gear(active, gear, plan.plan_gear)
+        self.give_up_on_errors(active, "preparing the instrument")
+        self._offset[2, active] = driver.counter(active, "Z") - self.units_per_mm * height
 
-    def take_over(self, who: Indices) -> None:
+    def take_over(self, active: Indices) -> None:
         """Sit down at instruments that somebody else has prepared by the job sheet, their counters not yet preset."""
         self._learn_manual()
         self._left_at.clear()
-        self._count_from_origin(who, "XYZ")
+        self._count_from_origin(active, "XYZ")
 
     def _learn_manual(self) -> str | float:
         """Read up on the plotter; return the height gear that the job sheet asks for."""
         gear = self.job.plan.height_gear
-        self.manual = VARIANTS[self.hands.variant()]
+        self.manual = VARIANTS[self.driver.variant()]
         self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
         self._plane = _by_dimensions(np.array([self.manual.scales[axis].units_per_mm for axis in "XY"]))
         return gear
 
-    def _count_from_origin(self, who: Indices, axes: str) -> None:
+    def _count_from_origin(self, active: Indices, axes: str) -> None:
         for axis in axes:
-            self._offset["XYZ".index(axis), who] = self.manual.scales[axis].at_origin
+            self._offset["XYZ".index(axis), active] = self.manual.scales[axis].at_origin
 
-    def begin(self, who: Indices, model: ModelJob) -> None:
+    def begin(self, active: Indices, model: ModelJob) -> None:
         """Take up a model whose pictures are mounted."""
         self.model = model
-        self.read_settings(who)
+        self.read_settings(active)
 
-    def preset(self, who: Indices, readings: tuple[float, float, float]) -> None:
+    def preset(self, active: Indices, readings: tuple[float, float, float]) -> None:
         """Make the counters that can be preset show these readings where the mark stands."""
         wanted = {a: reading for a, reading in zip("XYZ", readings, strict=True) if self.manual.scales[a].preset}
-        before = self.hands.counters(who)
-        self.spend_setting(who)
-        self.hands.preset(who, wanted)
-        self.give_up_on_errors(who, "presetting the counters")
+        before = self.driver.counters(active)
+        self.spend_setting(active)
+        self.driver.preset(active, wanted)
+        self.give_up_on_errors(active, "presetting the counters")
         for axis, reading in wanted.items():
-            self._offset["XYZ".index(axis), who] += reading - before["XYZ".index(axis)]
+            self._offset["XYZ".index(axis), active] += reading - before["XYZ".index(axis)]
 
-    def shift_counter(self, who: Indices, axis: str, by: Array) -> Array:
+    def shift_counter(self, active: Indices, axis: str, by: Array) -> Array:
         """Make a counter read so much more ``(m,)``, its carriage on a full count; return by how much it does."""
-        self.drive(who, {axis: self.hands.counter(who, axis)})
-        before = self.hands.counter(who, axis)
-        self.spend_setting(who)
-        self.hands.preset_one(who, axis, np.round(before + by, 2))
-        self.give_up_on_errors(who, f"presetting the {axis} counter")
-        more = np.round(self.hands.counter(who, axis) - before, 2)
-        self._offset["XYZ".index(axis), who] += more
+        self.drive(active, {axis: self.driver.counter(active, axis)})
+        before = self.driver.counter(active, axis)
+        self.spend_setting(active)
+        self.driver.preset_one(active, axis, np.round(before + by, 2))
+        self.give_up_on_errors(active, f"presetting the {axis} counter")
+        more = np.round(self.driver.counter(active, axis) - before, 2)
+        self._offset["XYZ".index(axis), active] += more
         return np.asarray(more)
 
-    def set_height_gear(self, who: Indices, gear: str | float) -> None:
+    def set_height_gear(self, active: Indices, gear: str | float) -> None:
         """Engage a height gear; the Z counter goes on from what it shows, the carriage standing on a full count."""
-        self.drive(who, {"Z": self.hands.counter(who, "Z")})
-        height = (self.hands.counter(who, "Z") - self._offset[2, who]) / self.units_per_mm
-        self.spend_setting(who)
-        self.hands.set_height_gear(who, gear, self.job.plan.plan_gear)
-        self.give_up_on_errors(who, f"engaging the height gear {gear}")
+        self.drive(active, {"Z": self.driver.counter(active, "Z")})
+        height = (self.driver.counter(active, "Z") - self._offset[2, active]) / self.units_per_mm
+        self.spend_setting(active)
+        self.driver.set_height_gear(active, gear, self.job.plan.plan_gear)
+        self.give_up_on_errors(active, f"engaging the height gear {gear}")
         self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
-        self._offset[2, who] = self.hands.counter(who, "Z") - self.units_per_mm * height
+        self._offset[2, active] = self.driver.counter(active, "Z") - self.units_per_mm * height
 
-    def spend_setting(self, who: Indices, times: int = 1) -> None:
+    def spend_setting(self, active: Indices, times: int = 1) -> None:
         """Let the time of setting something go by."""
-        self.crew.spend(who, times * self.crew.observer.seconds_to_set, "setting")
+        self.operators.spend(active, times * self.operators.observer.seconds_to_set, "setting")
 
     # --- elements -------------------------------------------------------------------------------------
 
-    def elements(self, who: Indices, names: Sequence[str]) -> dict[str, Array]:
+    def elements(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
         """Read the counters of elements ``(m,)``; one that the instrument has not stands at nothing."""
         there = [name for name in names if name in self.manual.elements]
-        seen = self.hands.elements(who, there) if there else {}
-        return {name: seen.get(name, np.zeros(who.size)) for name in names}
+        seen = self.driver.elements(active, there) if there else {}
+        return {name: seen.get(name, np.zeros(active.size)) for name in names}
 
-    def elements_from_zero(self, who: Indices, names: Sequence[str]) -> dict[str, Array]:
+    def elements_from_zero(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
         """Read the counters of elements ``(m,)`` from their zeros; one that the instrument has not stands there."""
         return {
             name: counts - (self.manual.elements[name].zero if name in self.manual.elements else 0.0)
-            for name, counts in self.elements(who, names).items()
+            for name, counts in self.elements(active, names).items()
         }
 
     @property
@@ -141,160 +141,160 @@ class Controls:
         """Whether y-parallaxes can be measured: with by' and by", which not every plotter has."""
         return not self.manual.missing_elements("by1", "by2")
 
-    def set_elements(self, who: Indices, settings: Mapping[str, Array]) -> None:
+    def set_elements(self, active: Indices, settings: Mapping[str, Array]) -> None:
         """Set elements through their counters to values ``(m,)``, and enter them in the book."""
         for name, value in settings.items():
             counts = counter_value(name, value)
-            self.spend_setting(who)
-            self.run_element(who, name, counts)
-            self.give_up_on_errors(who, f"setting {name}")
-            self.crew.enter(who, "", f"set {name}", counts)
-        self.read_settings(self.crew.remaining(who))
+            self.spend_setting(active)
+            self.run_element(active, name, counts)
+            self.give_up_on_errors(active, f"setting {name}")
+            self.operators.enter(active, "", f"set {name}", counts)
+        self.read_settings(self.operators.remaining(active))
 
-    def set_if_changed(self, who: Indices, settings: Mapping[str, Array]) -> None:
+    def set_if_changed(self, active: Indices, settings: Mapping[str, Array]) -> None:
         """Set those elements whose counters do not yet show the values ``(m,)`` that they have to."""
         for name, wanted in settings.items():
-            if not who.size:
+            if not active.size:
                 return
-            off = _difference(name, counter_value(name, wanted), self.elements(who, [name])[name])
-            changed = self.crew.is_active(who) & (np.abs(off) > LEAST_COUNT / 2.0)
+            off = _difference(name, counter_value(name, wanted), self.elements(active, [name])[name])
+            changed = self.operators.is_active(active) & (np.abs(off) > LEAST_COUNT / 2.0)
             if changed.any():
-                self.set_elements(who[changed], {name: wanted[changed]})
+                self.set_elements(active[changed], {name: wanted[changed]})
 
-    def run_element(self, who: Indices, name: str, counts: Array) -> None:
+    def run_element(self, active: Indices, name: str, counts: Array) -> None:
         """Run an element to counts ``(m,)``, and bear in mind that it stands there."""
-        self.hands.set_element(who, name, counts)
-        self._leave(who, name, counts)
+        self.driver.set_element(active, name, counts)
+        self._leave(active, name, counts)
 
-    def exact_values(self, who: Indices, names: Sequence[str]) -> dict[str, Array]:
+    def exact_values(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
         """Read where elements stand ``(m,)``, between two counts too where these hands have left them there."""
         found = {}
-        for name, shown in self.elements(who, names).items():
-            left = self._left_at.get(name, np.full(self.crew.size, np.nan))[who]
+        for name, shown in self.elements(active, names).items():
+            left = self._left_at.get(name, np.full(self.operators.size, np.nan))[active]
             near = np.abs(_difference(name, left, shown)) <= ROUNDED_AWAY * LEAST_COUNT
             found[name] = np.where(near, left, shown)
         return found
 
-    def turn_elements(self, who: Indices, settings: Mapping[str, Array]) -> None:
+    def turn_elements(self, active: Indices, settings: Mapping[str, Array]) -> None:
         """Turn elements until they stand at values ``(m,)``, between two counts too, and enter what they show."""
         for name, wanted in settings.items():
-            amounts = _difference(name, wanted, self.grab_drum(who, name))
-            self.spend_setting(who)
-            self.hands.turn_element(who, name, amounts)
-            self._turned(who, name, amounts)
-            self.give_up_on_errors(who, f"turning {name}")
-            self.crew.enter(who, "", f"set {name}", self.elements(who, [name])[name])
-        self.read_settings(self.crew.remaining(who))
+            amounts = _difference(name, wanted, self.grab_drum(active, name))
+            self.spend_setting(active)
+            self.driver.turn_element(active, name, amounts)
+            self._turned(active, name, amounts)
+            self.give_up_on_errors(active, f"turning {name}")
+            self.operators.enter(active, "", f"set {name}", self.elements(active, [name])[name])
+        self.read_settings(self.operators.remaining(active))
 
-    def turn_if_changed(self, who: Indices, settings: Mapping[str, Array]) -> None:
+    def turn_if_changed(self, active: Indices, settings: Mapping[str, Array]) -> None:
         """Turn those elements that do not yet stand at the values ``(m,)`` at which they have to."""
         for name, wanted in settings.items():
-            if not who.size:
+            if not active.size:
                 return
-            off = np.abs(_difference(name, wanted, self.exact_values(who, [name])[name]))
-            changed = self.crew.is_active(who) & (off >= 10.0**-TURNED_DECIMALS)
+            off = np.abs(_difference(name, wanted, self.exact_values(active, [name])[name]))
+            changed = self.operators.is_active(active) & (off >= 10.0**-TURNED_DECIMALS)
             if changed.any():
-                self.turn_elements(who[changed], {name: wanted[changed]})
+                self.turn_elements(active[changed], {name: wanted[changed]})
 
-    def grab_drum(self, who: Indices, name: str) -> Array:
+    def grab_drum(self, active: Indices, name: str) -> Array:
         """Take a drum in hand to turn it; return where it stands ``(m,)``."""
-        stands = self.exact_values(who, [name])[name]
-        self._leave(who, name, stands)
+        stands = self.exact_values(active, [name])[name]
+        self._leave(active, name, stands)
         return stands
 
-    def held_position(self, who: Indices, name: str) -> Array:
+    def held_position(self, active: Indices, name: str) -> Array:
         """Return where a drum that these hands have turned stands ``(m,)``."""
-        return self._left_at[name][who]
+        return self._left_at[name][active]
 
-    def _leave(self, who: Indices, name: str, at: Array) -> None:
-        self._left_at.setdefault(name, np.full(self.crew.size, np.nan))[who] = at
+    def _leave(self, active: Indices, name: str, at: Array) -> None:
+        self._left_at.setdefault(name, np.full(self.operators.size, np.nan))[active] = at
 
-    def _turned(self, who: Indices, name: str, amounts: Array) -> None:
-        self._left_at[name][who] += amounts.round(TURNED_DECIMALS)
+    def _turned(self, active: Indices, name: str, amounts: Array) -> None:
+        self._left_at[name][active] += amounts.round(TURNED_DECIMALS)
 
-    def read_settings(self, who: Indices) -> None:
+    def read_settings(self, active: Indices) -> None:
         """Read off what the places of images depend on."""
-        for name, counts in self.elements(who, [name for name in STEADY if name in self.manual.elements]).items():
-            self._settings[name][who] = counts
+        for name, counts in self.elements(active, [name for name in STEADY if name in self.manual.elements]).items():
+            self._settings[name][active] = counts
 
-    def projector(self, hand: int) -> int:
+    def projector(self, side: int) -> int:
         """Return the projector of the left-hand (1) or the right-hand (2) photograph."""
-        return self.model.left_projector if hand == 1 else self.model.right_projector
+        return self.model.left_projector if side == 1 else self.model.right_projector
 
-    def bx(self, who: Indices) -> Array:
+    def bx(self, active: Indices) -> Array:
         """Return the base as it is set ``(m,)``, mm."""
-        return take(self._settings["bx"], who)
+        return take(self._settings["bx"], active)
 
     # --- places ---------------------------------------------------------------------------------------
 
-    def counters(self, who: Indices) -> Array:
+    def counters(self, active: Indices) -> Array:
         """Read X, Y and Z ``(3, m)``, and bear in mind how deep the mark stands."""
-        readings = self.hands.counters(who)
-        put((take(self._offset[2], who) - readings[2]) / self.units_per_mm, who, self.z)
+        readings = self.driver.counters(active)
+        put((take(self._offset[2], active) - readings[2]) / self.units_per_mm, active, self.z)
         return readings
 
-    def displayed_levels(self, who: Indices, levels: Sequence[float]) -> Array:
+    def displayed_levels(self, active: Indices, levels: Sequence[float]) -> Array:
         """Return Z readings ``(k, m)`` as the counters show them when they are driven there."""
         shown = []
         for level in levels:
-            self.drive(who, {"Z": np.full(who.size, level)})
-            self.give_up_on_errors(who, f"driving Z to {level:.2f}")
-            shown.append(self.counters(who)[2])
+            self.drive(active, {"Z": np.full(active.size, level)})
+            self.give_up_on_errors(active, f"driving Z to {level:.2f}")
+            shown.append(self.counters(active)[2])
         return np.array(shown)
 
-    def drive(self, who: Indices, readings: Mapping[str, Array]) -> BoolArray:
+    def drive(self, active: Indices, readings: Mapping[str, Array]) -> BoolArray:
         """Run carriages to readings ``(m,)``; return which instruments let them go there."""
-        self.crew.spend(who, self.crew.observer.seconds_to_drive, "driving")
-        return self.hands.drive(who, readings)
+        self.operators.spend(active, self.operators.observer.seconds_to_drive, "driving")
+        return self.driver.drive(active, readings)
 
-    def drive_z_to(self, who: Indices, height: Array) -> BoolArray:
+    def drive_z_to(self, active: Indices, height: Array) -> BoolArray:
         """Run the mark to heights ``(m,)`` above the base line, mm, hence negative."""
-        return self.drive(who, {"Z": self._offset[2, who] + height * self.units_per_mm})
+        return self.drive(active, {"Z": self._offset[2, active] + height * self.units_per_mm})
 
-    def turn(self, who: Indices, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
+    def turn(self, active: Indices, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
         """Turn the handwheels ``(2 or 3, m)`` in counter units and with them an element that is in hand."""
-        self.crew.spend(who, self.crew.observer.seconds_to_turn, "turning")
-        self.hands.turn(who, wheels, element, amounts)
+        self.operators.spend(active, self.operators.observer.seconds_to_turn, "turning")
+        self.driver.turn(active, wheels, element, amounts)
         if element is not None and amounts is not None:
-            self._turned(who, element, amounts)
+            self._turned(active, element, amounts)
 
-    def give_up_on_errors(self, who: Indices, doing: str) -> None:
+    def give_up_on_errors(self, active: Indices, doing: str) -> None:
         """Give up where an instrument has refused anything since the last look."""
-        refused = self.hands.pop_errors(who)
+        refused = self.driver.pop_errors(active)
         if refused:
             sessions = np.array(sorted(refused), dtype=np.intp)
-            self.crew.give_up(
+            self.operators.give_up(
                 sessions, lambda session: f"{doing}: the instrument refuses: {'; '.join(refused[session][:2])}"
             )
 
-    def model_position(self, who: Indices, readings: Array) -> Array:
+    def model_position(self, active: Indices, readings: Array) -> Array:
         """Return readings ``(3, m)`` as x, y, z in mm: from the left-hand centre, the base line, downward."""
-        offset = take(self._offset, who)
+        offset = take(self._offset, active)
         x, y = self.to_mm(readings[:2] - offset[:2])
         z = (offset[2] - readings[2]) / self.units_per_mm
-        return np.array([x - self._share(1) * self.bx(who), y, z])
+        return np.array([x - self._share(1) * self.bx(active), y, z])
 
-    def frame_positions(self, who: Indices, readings: Array, level: Array) -> Array:
+    def frame_positions(self, active: Indices, readings: Array, level: Array) -> Array:
         """Return X, Y readings ``(2, n, m)`` at Z readings ``(m,)`` as places x, y, z ``(3, n, m)`` in mm."""
-        x, y = self.to_mm(readings - self._offset[:2, None, who])
-        x = x - self._share(1) * self.bx(who)
-        z = np.broadcast_to((self._offset[2, who] - level) / self.units_per_mm, x.shape)
+        x, y = self.to_mm(readings - self._offset[:2, None, active])
+        x = x - self._share(1) * self.bx(active)
+        z = np.broadcast_to((self._offset[2, active] - level) / self.units_per_mm, x.shape)
         return np.array([x, y, z])
 
-    def under_centre(self, who: Indices, hand: int) -> Array:
+    def under_centre(self, active: Indices, side: int) -> Array:
         """Return the X and Y readings ``(2, m)`` straight below a photograph's centre, as far as by and bx tell."""
-        below = np.array([self._share(hand) * self.bx(who), -self._settings[f"by{self.projector(hand)}"][who]])
-        return self.to_counter_units(below) + self._offset[:2, who]
+        below = np.array([self._share(side) * self.bx(active), -self._settings[f"by{self.projector(side)}"][active]])
+        return self.to_counter_units(below) + self._offset[:2, active]
 
-    def centre(self, who: Indices, hand: int) -> Array:
+    def centre(self, active: Indices, side: int) -> Array:
         """Return the readings ``(3, m)`` of a photograph's centre, as far as elements and scales tell (P 3.1, 3.2)."""
-        heights = self.elements_from_zero(who, [f"bz{self.projector(hand)}"])[f"bz{self.projector(hand)}"]
-        below = self.under_centre(who, hand)
-        return np.array([*below, self._offset[2, who] + self.units_per_mm * heights])
+        heights = self.elements_from_zero(active, [f"bz{self.projector(side)}"])[f"bz{self.projector(side)}"]
+        below = self.under_centre(active, side)
+        return np.array([*below, self._offset[2, active] + self.units_per_mm * heights])
 
-    def _share(self, hand: int) -> float:
+    def _share(self, side: int) -> float:
         """Return where a centre stands along X from the frame's origin, as a share of bx."""
-        return self.manual.centres_on_base[hand - 1]
+        return self.manual.centres_on_base[side - 1]
 
     def to_counter_units(self, shift: Array) -> Array:
         """Return shifts ``(2, ...)`` in mm as so much of the X and Y counters."""
@@ -309,9 +309,9 @@ class Controls:
         """Units a mm ``(3,)`` of the X, Y and Z counters."""
         return np.array([*self._plane[1], self.units_per_mm])
 
-    def rotate_by_swing(self, who: Indices, hand: int, print_place: Array) -> Array:
+    def rotate_by_swing(self, active: Indices, side: int, print_place: Array) -> Array:
         """Return places of paper prints ``(2, m)`` as the swing of their photograph turns them."""
-        swing = wrap_gon(self._settings[f"kappa{self.projector(hand)}"][who]) * GON
+        swing = wrap_gon(self._settings[f"kappa{self.projector(side)}"][active]) * GON
         return mxv(plane_rotation(swing), print_place)
 
 
@@ -335,6 +335,6 @@ def _difference(name: str, value: Array, other: Array) -> Array:
     return wrap_gon(value - other) if name.startswith("kappa") else np.asarray(value - other)
 
 
-def side_name(hand: int) -> str:
+def side_name(side: int) -> str:
     """Return left or right for a hand."""
-    return "left" if hand == 1 else "right"
+    return "left" if side == 1 else "right"

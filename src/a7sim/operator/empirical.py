@@ -93,7 +93,7 @@ def clearing_coefficients(points: Array, left: ProjectorPose, right: ProjectorPo
     normal = np.cross(r1, r2, axis=0) / across
     sides = ((left, r1, np.cross(r2, base, axis=0) / across), (right, r2, np.cross(base, r1, axis=0) / across))
     rows: dict[str, Array] = {"by1": normal[1], "by2": -normal[1], "bz1": -normal[2], "bz2": normal[2]}
-    for hand, (stand, ray, lever) in enumerate(sides, start=1):
+    for side, (stand, ray, lever) in enumerate(sides, start=1):
         omega, phi, kappa = stand.angles
         axes = {
             "kappa": rotation(omega, phi, kappa)[:, 2],
@@ -102,7 +102,7 @@ def clearing_coefficients(points: Array, left: ProjectorPose, right: ProjectorPo
         }
         for name, axis in axes.items():
             turned = np.cross(np.broadcast_to(axis[:, None], ray.shape), ray, axis=0)
-            rows[f"{name}{hand}"] = (turned * lever).sum(axis=0)
+            rows[f"{name}{side}"] = (turned * lever).sum(axis=0)
     return np.array([rows[name] for name in PARALLAX_ELEMENTS])
 
 
@@ -144,28 +144,28 @@ def _apart(ends: tuple[str, str] | None) -> bool:
     return ends is not None and PLACES[ends[1]][0] - PLACES[ends[0]][0] >= 0.5
 
 
-def perturb_elements(bench: Workstation, who: Indices, model: ModelJob, method: str, most: float) -> None:
+def perturb_elements(workstation: Workstation, active: Indices, model: ModelJob, method: str, most: float) -> None:
     """Set the elements that a method turns off by anything up to so many gon, alike on both sides.
 
     A component of the base by as much as tilts the base by that angle.
     """
     unknowns = unknown_elements(method, model)
-    shares = np.vectorize(math.erf)(bench.crew.draw_setting_errors(who, 0.5**0.5, (len(unknowns),)))
-    now = bench.seat.elements(who, unknowns)
-    base = np.abs(bench.seat.bx(who)) * GON
-    bench.crew.remark(who, f"{model.name}: elements set off by up to {most:g} gon, for practice")
-    bench.seat.set_elements(
-        who,
+    shares = np.vectorize(math.erf)(workstation.operators.draw_setting_errors(active, 0.5**0.5, (len(unknowns),)))
+    now = workstation.controls.elements(active, unknowns)
+    base = np.abs(workstation.controls.bx(active)) * GON
+    workstation.operators.remark(active, f"{model.name}: elements set off by up to {most:g} gon, for practice")
+    workstation.controls.set_elements(
+        active,
         {
-            name: now[name] + most * share[who] * (base if name.startswith("b") else 1.0)
+            name: now[name] + most * share[active] * (base if name.startswith("b") else 1.0)
             for name, share in zip(unknowns, shares, strict=True)
         },
     )
 
 
 def empirical_orientation(
-    bench: Workstation,
-    who: Indices,
+    workstation: Workstation,
+    active: Indices,
     model: ModelJob,
     method: str,
     case: str,
@@ -181,24 +181,24 @@ def empirical_orientation(
     case do. Those whose residual parallaxes at all standard points in the end have a larger rms than tolerated, in
     mm, give up.
     """
-    crew = bench.crew
+    operators = workstation.operators
     labels = model.points_of_case(case)
-    waiting = _with_pricked(bench, who, model, labels)
+    waiting = _with_pricked(workstation, active, model, labels)
     done: list[tuple[Indices, OrientationRecordBatch]] = []
     while waiting:
         missing, group = waiting.popitem()
         usable = [label for label in labels if label not in missing]
         steps = clearing_steps(method, model, usable)
         if steps is None:
-            crew.give_up(group, _too_few(model, missing))
+            operators.give_up(group, _too_few(model, missing))
             continue
-        clearing = _Clearing(bench, model, steps, _checks(usable, steps), over_corrected)
+        clearing = _Clearing(workstation, model, steps, _checks(usable, steps), over_corrected)
         ended = clearing.run(group)
         for lost, label in clearing.lost:
             waiting[missing | {label}] = np.union1d(waiting.get(missing | {label}, lost), lost)
         found = OrientationRecordBatch(method, case, clearing.rounds, clearing.rough, {}, {}, {}, "empirical")
-        done.append((ended, _assessed(bench, ended, model, found, missing, readings, tolerated_rms)))
-    return merge_groups(done, method, case, crew.size, "empirical")
+        done.append((ended, _assessed(workstation, ended, model, found, missing, readings, tolerated_rms)))
+    return merge_groups(done, method, case, operators.size, "empirical")
 
 
 def _checks(usable: Sequence[str], steps: Sequence[ClearingStep]) -> list[str]:
@@ -207,30 +207,30 @@ def _checks(usable: Sequence[str], steps: Sequence[ClearingStep]) -> list[str]:
 
 
 def _assessed(
-    bench: Workstation,
-    who: Indices,
+    workstation: Workstation,
+    active: Indices,
     model: ModelJob,
     found: OrientationRecordBatch,
     missing: frozenset[str],
     readings: int,
     tolerated_rms: float,
 ) -> OrientationRecordBatch:
-    if not who.size:
+    if not active.size:
         return found
-    bench.begin_round(who, len(found.rounds) + 1)
+    workstation.begin_round(active, len(found.rounds) + 1)
     there = [label for label in model.all_positions() if label not in missing]
-    there = [label for label in there if bench.has_point(who, model.standard_points[label]).all()]
-    return assess_residuals(bench, who, model, found, there, readings, tolerated_rms)
+    there = [label for label in there if workstation.has_point(active, model.standard_points[label]).all()]
+    return assess_residuals(workstation, active, model, found, there, readings, tolerated_rms)
 
 
 def _with_pricked(
-    bench: Workstation, who: Indices, model: ModelJob, labels: Sequence[str]
+    workstation: Workstation, active: Indices, model: ModelJob, labels: Sequence[str]
 ) -> dict[frozenset[str], Indices]:
     """Return the sessions by what positions are not in their model, or not pricked on both their prints."""
     absent = frozenset(CASES["A"]) - frozenset(labels)
-    pricked = {label: bench.has_point(who, model.standard_points[label]) for label in labels}
+    pricked = {label: workstation.has_point(active, model.standard_points[label]) for label in labels}
     groups: dict[frozenset[str], list[int]] = {}
-    for i, session in enumerate(who):
+    for i, session in enumerate(active):
         missing = absent | {label for label, there in pricked.items() if not there[i]}
         groups.setdefault(missing, []).append(int(session))
     return {missing: np.array(sessions, dtype=np.intp) for missing, sessions in groups.items()}
@@ -248,44 +248,48 @@ class _Clearing:
 
     def __init__(
         self,
-        bench: Workstation,
+        workstation: Workstation,
         model: ModelJob,
         steps: Sequence[ClearingStep],
         checks: Sequence[str],
         over_corrected: str | float,
     ) -> None:
-        self.bench = bench
-        self.crew = bench.crew
+        self.workstation = workstation
+        self.operators = workstation.operators
         self.model = model
         self.steps = steps
         self.checks = checks
         self.rounds: list[RoundBatch] = []
-        self.rough = np.zeros(self.crew.size, dtype=np.intp)
+        self.rough = np.zeros(self.operators.size, dtype=np.intp)
         self.lost: list[tuple[Indices, str]] = []
         """Who could not bring the images together, and at which position."""
         self._over_corrected = over_corrected
-        self._found = {label: np.full(self.crew.size, np.nan) for label in self._labels()}
-        self._places = np.zeros((3, len(steps), self.crew.size))
-        acuity = 1e-3 * self.crew.observer.parallax_um * bench.job.plan.projection_height / bench.seat.c
-        self._visible = max(acuity, bench.eyes.finest_mm)
+        self._found = {label: np.full(self.operators.size, np.nan) for label in self._labels()}
+        self._places = np.zeros((3, len(steps), self.operators.size))
+        acuity = (
+            1e-3 * self.operators.observer.parallax_um * workstation.job.plan.projection_height / workstation.controls.c
+        )
+        self._visible = max(acuity, workstation.pointing.finest_mm)
 
-    def run(self, who: Indices) -> Indices:
+    def run(self, active: Indices) -> Indices:
         """Go round until the last point is found clear; return those who came to an end."""
-        ended = who[:0]
-        while who.size:
-            self.bench.begin_round(who, len(self.rounds) + 1)
-            settings = expand_to_batch(self.bench.seat.elements(who, self._elements()), who, self.crew.size)
-            who = self._clear_first_four(who)
-            if not who.size:
+        ended = active[:0]
+        while active.size:
+            self.workstation.begin_round(active, len(self.rounds) + 1)
+            settings = expand_to_batch(
+                self.workstation.controls.elements(active, self._elements()), active, self.operators.size
+            )
+            active = self._clear_first_four(active)
+            if not active.size:
                 break
-            self._look_at_checks(who)
-            who, turning, n = self._over_correct(who)
-            self._close_round(who, turning, settings, n)
+            self._look_at_checks(active)
+            active, turning, n = self._over_correct(active)
+            self._close_round(active, turning, settings, n)
             if len(self.rounds) == MAX_ROUNDS:
                 ended = np.union1d(ended, self._clear_first_four(turning))
                 turning = turning[:0]
-            ended = np.union1d(ended, exclude(who, np.flatnonzero(n)))
-            who = self._going(turning)
+            ended = np.union1d(ended, exclude(active, np.flatnonzero(n)))
+            active = self._going(turning)
         return self._going(ended)
 
     def _labels(self) -> list[str]:
@@ -295,17 +299,17 @@ class _Clearing:
     def _elements(self) -> list[str]:
         return [step.element for step in self.steps]
 
-    def _going(self, who: Indices) -> Indices:
-        who = self.crew.remaining(np.asarray(who, dtype=np.intp))
+    def _going(self, active: Indices) -> Indices:
+        active = self.operators.remaining(np.asarray(active, dtype=np.intp))
         for lost, _ in self.lost:
-            who = exclude(who, lost)
-        return who
+            active = exclude(active, lost)
+        return active
 
     # --- a round --------------------------------------------------------------------------------------
 
-    def _clear_first_four(self, who: Indices) -> Indices:
+    def _clear_first_four(self, active: Indices) -> Indices:
         """Clear them over and over until on arriving each is seen to be clear."""
-        clearing = who
+        clearing = active
         for _ in range(MAX_PASSES):
             again = clearing[:0]
             for place, step in enumerate(self.steps[:4]):
@@ -315,129 +319,131 @@ class _Clearing:
             clearing = self._going(again)
             if not clearing.size:
                 break
-        return self._going(who)
+        return self._going(active)
 
-    def _over_correct(self, who: Indices) -> tuple[Indices, Indices, Array]:
+    def _over_correct(self, active: Indices) -> tuple[Indices, Indices, Array]:
         """Turn omega n times as far as clears the last point; return who is there, who had to turn, and n."""
-        seat, step, threshold = self.bench.seat, self.steps[-1], VISIBLE_SIGMAS_AT_LAST * self._visible
-        turn, n = np.zeros((2, self.crew.size))
-        who = self._clear(who, len(self.steps) - 1, step, threshold, turn)
-        turning = who[turn[who] != 0.0]
+        controls, step, threshold = self.workstation.controls, self.steps[-1], VISIBLE_SIGMAS_AT_LAST * self._visible
+        turn, n = np.zeros((2, self.operators.size))
+        active = self._clear(active, len(self.steps) - 1, step, threshold, turn)
+        turning = active[turn[active] != 0.0]
         if turning.size:
             n[turning] = self._times(turning)
             turning = self._going(turning)
-            stands = seat.exact_values(turning, [step.element])[step.element]
-            seat.turn_elements(turning, {step.element: stands + ((n - 1.0) * turn)[turning]})
-        return self._going(who), self._going(turning), n
+            stands = controls.exact_values(turning, [step.element])[step.element]
+            controls.turn_elements(turning, {step.element: stands + ((n - 1.0) * turn)[turning]})
+        return self._going(active), self._going(turning), n
 
-    def _times(self, who: Indices) -> Array:
+    def _times(self, active: Indices) -> Array:
         """Return the over-correction ``(m,)``: as given, or from the places of the five points."""
         if not isinstance(self._over_corrected, str):
-            return np.full(who.size, float(self._over_corrected))
-        n = over_correction_by_coefficients(self._coefficients(who))
+            return np.full(active.size, float(self._over_corrected))
+        n = over_correction_by_coefficients(self._coefficients(active))
         hopeless = ~((n > 0.0) & (n < MAX_OVER_CORRECTION))
-        self.crew.give_up(
-            who[hopeless],
+        self.operators.give_up(
+            active[hopeless],
             f"{self.model.name}: the heights of the points leave omega open: what {self.steps[-1].element} does at "
             f"{self.steps[-1].position} the other elements take up again (critical surface)",
         )
         return np.where(hopeless, 0.0, n)
 
-    def _look_at_checks(self, who: Indices) -> None:
+    def _look_at_checks(self, active: Indices) -> None:
         for label in self.checks:
-            seen = self.bench.look_at_parallaxes(who, [self.model.standard_points[label]])
-            together = self.crew.remaining(who)
+            seen = self.workstation.look_at_parallaxes(active, [self.model.standard_points[label]])
+            together = self.operators.remaining(active)
             apart = seen.disagrees(together)
             self._found[label][together] = seen.parallax_mm[0, together]
             self._found[label][apart] = np.nan
 
-    def _close_round(self, who: Indices, turning: Indices, settings: Mapping[str, Array], n: Array) -> None:
+    def _close_round(self, active: Indices, turning: Indices, settings: Mapping[str, Array], n: Array) -> None:
         parallaxes = {label: p.copy() for label, p in self._found.items()}
         squares = np.square(list(parallaxes.values()))
         rms = np.sqrt(np.nansum(squares, axis=0) / np.maximum(1, (~np.isnan(squares)).sum(axis=0)))
-        nothing = np.zeros(self.crew.size)
-        self.rounds.append(RoundBatch(who, settings, parallaxes, nothing, rms, turning, {}, n))
+        nothing = np.zeros(self.operators.size)
+        self.rounds.append(RoundBatch(active, settings, parallaxes, nothing, rms, turning, {}, n))
 
     # --- a point --------------------------------------------------------------------------------------
 
     def _clear(
-        self, who: Indices, place: int, step: ClearingStep, unless_within: float = 0.0, turn: Array | None = None
+        self, active: Indices, place: int, step: ClearingStep, unless_within: float = 0.0, turn: Array | None = None
     ) -> Indices:
         """Clear a point, its images brought together first where they are too far apart; return who did.
 
         Put the turns that did it into place.
         """
-        point, cleared, parted = self.model.standard_points[step.position], who[:0], who[:0]
+        point, cleared, parted = self.model.standard_points[step.position], active[:0], active[:0]
         for tries_left in reversed(range(TRIES)):
-            if not who.size:
+            if not active.size:
                 break
-            done = self.bench.clear_parallax(who, point, step.element, partial(self._gain, step.element), unless_within)
+            done = self.workstation.clear_parallax(
+                active, point, step.element, partial(self._gain, step.element), unless_within
+            )
             self._found[step.position][done.sessions] = done.arrival_parallax_mm[done.sessions]
             self._places[:, place, done.sessions] = done.model_position_mm[:, done.sessions]
             if turn is not None:
                 turn[done.sessions] = done.element_change[done.sessions]
             cleared = np.union1d(cleared, done.sessions)
-            who = exclude(self.crew.remaining(who), done.sessions)
-            parted = exclude(who, done.disagreement)
+            active = exclude(self.operators.remaining(active), done.sessions)
+            parted = exclude(active, done.disagreement)
             if tries_left:
-                for session in np.intersect1d(who, done.disagreement):
+                for session in np.intersect1d(active, done.disagreement):
                     self._bring_together(np.array([session]), point, step)
-                who = self.crew.remaining(who)
-        self.crew.give_up(
-            self.crew.remaining(parted),
+                active = self.operators.remaining(active)
+        self.operators.give_up(
+            self.operators.remaining(parted),
             f"{self.model.name}: {point} cannot be cleared with {step.element}: that comes to its end, or images part",
         )
-        who = self.crew.remaining(who)
-        if who.size:
-            self.crew.remark(who, f"{self.model.name}: the images of {point} cannot be fused: done without it")
-            self.lost.append((who, step.position))
-        return self.crew.remaining(np.asarray(cleared, dtype=np.intp))
+        active = self.operators.remaining(active)
+        if active.size:
+            self.operators.remark(active, f"{self.model.name}: the images of {point} cannot be fused: done without it")
+            self.lost.append((active, step.position))
+        return self.operators.remaining(np.asarray(cleared, dtype=np.intp))
 
     def _bring_together(self, one: Indices, point: str, step: ClearingStep) -> None:
         """Turn an element by what the Y readings of each eye alone differ by."""
-        bench, seat, element = self.bench, self.bench.seat, step.element
+        workstation, controls, element = self.workstation, self.workstation.controls, step.element
         self.rough[one] += 1
-        self.crew.remark(
+        self.operators.remark(
             one, f"{self.model.name}: the images of {point} are too far apart: {element} by each eye alone"
         )
-        level = float(seat.counters(one)[2, 0])
-        readings = [bench.point_monocularly(one, hand, [point], level) for hand in (1, 2)]
-        if not self.crew.remaining(one).size:
+        level = float(controls.counters(one)[2, 0])
+        readings = [workstation.point_monocularly(one, side, [point], level) for side in (1, 2)]
+        if not self.operators.remaining(one).size:
             return
-        left, right = (seat.frame_positions(one, each[:, :, one], np.array([level]))[:, 0] for each in readings)
-        base = seat.bx(one)
+        left, right = (controls.frame_positions(one, each[:, :, one], np.array([level]))[:, 0] for each in readings)
+        base = controls.bx(one)
         place = left * base / (left[0] - right[0] + base)
         parallax = (left[1] - right[1]) * base / (left[0] - right[0] + base)
-        limits = seat.manual.elements[element]
-        wanted = seat.elements(one, [element])[element] - parallax / self._gain(element, one, place)
-        seat.set_elements(one, {element: wanted if limits.endless else np.clip(wanted, limits.low, limits.high)})
+        limits = controls.manual.elements[element]
+        wanted = controls.elements(one, [element])[element] - parallax / self._gain(element, one, place)
+        controls.set_elements(one, {element: wanted if limits.endless else np.clip(wanted, limits.low, limits.high)})
 
     # --- coefficients ---------------------------------------------------------------------------------
 
     def _by_hand(self, element: str) -> str:
         return f"{element[:-1]}{self.model.side_of(int(element[-1]))}"
 
-    def _gain(self, element: str, who: Indices, place: Array) -> Array:
+    def _gain(self, element: str, active: Indices, place: Array) -> Array:
         """Return what one unit of an element's counter adds to the parallax ``(m,)`` at places ``(3, m)``, mm.
 
         While it is turned, that is, and the mark is still to follow in height.
         """
-        left, right = self._stands(who)
+        left, right = self._stands(active)
         point = _in_frame(place)
         row = PARALLAX_ELEMENTS.index(self._by_hand(element))
         coefficients = parallax_coefficients(point, point, left.centre, right.centre, left.angles, right.angles)[row]
         return np.asarray(coefficients * (1.0 if element.startswith("b") else GON))
 
-    def _coefficients(self, who: Indices) -> Array:
+    def _coefficients(self, active: Indices) -> Array:
         """Return those of the five elements at the five points ``(5, 5, m)``, mm a radian or mm a mm."""
         rows = [PARALLAX_ELEMENTS.index(self._by_hand(name)) for name in self._elements()]
-        return clearing_coefficients(_in_frame(self._places[:, :, who]), *self._stands(who))[rows]
+        return clearing_coefficients(_in_frame(self._places[:, :, active]), *self._stands(active))[rows]
 
-    def _stands(self, who: Indices) -> tuple[ProjectorPose, ProjectorPose]:
+    def _stands(self, active: Indices) -> tuple[ProjectorPose, ProjectorPose]:
         model = self.model
         return (
-            projector_pose(self.bench, who, model.left_projector, np.zeros(who.size)),
-            projector_pose(self.bench, who, model.right_projector, self.bench.seat.bx(who)),
+            projector_pose(self.workstation, active, model.left_projector, np.zeros(active.size)),
+            projector_pose(self.workstation, active, model.right_projector, self.workstation.controls.bx(active)),
         )
 
 

@@ -27,21 +27,21 @@ def required_fittings(manual: Variant, polarity: str, base: str) -> dict[str, st
     return {name: position for name, position in words.items() if name in manual.fittings}
 
 
-def correct_fittings(seat: Controls, who: Indices) -> BoolArray:
+def correct_fittings(controls: Controls, active: Indices) -> BoolArray:
     """Look at every lever and put right those that were forgotten, with a remark.
 
     Return for whom there was one ``(m,)`` and all now stands as the table asks; a lever that does not stay is no help.
     """
-    crew, hands, model = seat.crew, seat.hands, seat.model
-    mended, astray = np.zeros((2, who.size), dtype=bool)
-    for name, position in required_fittings(seat.manual, model.polarity, model.base).items():
-        crew.spend(who, crew.observer.seconds_to_look, "looking")
-        wrong = hands.fitting(who, name) != position
+    operators, driver, model = controls.operators, controls.driver, controls.model
+    mended, astray = np.zeros((2, active.size), dtype=bool)
+    for name, position in required_fittings(controls.manual, model.polarity, model.base).items():
+        operators.spend(active, operators.observer.seconds_to_look, "looking")
+        wrong = driver.fitting(active, name) != position
         if wrong.any():
-            them = who[wrong]
-            seat.spend_setting(them)
-            hands.set_fitting(them, name, position)
-            astray[wrong] |= hands.fitting(them, name) != position
+            them = active[wrong]
+            controls.spend_setting(them)
+            driver.set_fitting(them, name, position)
+            astray[wrong] |= driver.fitting(them, name) != position
             mended |= wrong
-            crew.remark(them, f"{model.name}: the {FITTING_NAMES[name]} had been forgotten: put {position}")
+            operators.remark(them, f"{model.name}: the {FITTING_NAMES[name]} had been forgotten: put {position}")
     return mended & ~astray

@@ -107,72 +107,74 @@ def measure_grid(
 
 
 def measure_grid_batch(
-    bench: Workstation, order: GridTestPlan, begins: Callable[[str], None] = lambda _: None
+    workstation: Workstation, order: GridTestPlan, begins: Callable[[str], None] = lambda _: None
 ) -> Iterator[ProjectorReadings]:
     """Yield the left and the right projector as a crew tests them, each session at its own instrument."""
-    crew = bench.crew
-    crew.begin(crew.active, "", "preparation")
-    bench.seat.prepare(crew.active)
-    set_base_and_fittings(bench, "inside", order.polarity)
-    for hand in (1, 2):
-        form = f"grid test, {side_name(hand)} projector"
+    operators = workstation.operators
+    operators.begin(operators.active, "", "preparation")
+    workstation.controls.prepare(operators.active)
+    set_base_and_fittings(workstation, "inside", order.polarity)
+    for side in (1, 2):
+        form = f"grid test, {side_name(side)} projector"
         begins(form)
-        crew.begin(crew.active, order.plate.name, form)
-        bench.hands.note(crew.active, form)
-        yield _tested(bench, order, hand)
-        bench.hands.unload(crew.active, hand)
+        operators.begin(operators.active, order.plate.name, form)
+        workstation.driver.note(operators.active, form)
+        yield _tested(workstation, order, side)
+        workstation.driver.unload(operators.active, side)
 
 
-def _tested(bench: Workstation, order: GridTestPlan, hand: int) -> ProjectorReadings:
-    crew, seat, plate = bench.crew, bench.seat, order.plate
-    model = ModelJob(f"{plate.name} in projector {hand}", plate.name, plate.name, "inside", order.polarity, {})
-    certificate = bench.job.certificate
-    _set_to_zeros(bench, hand)
-    centre_picture(bench, crew.active, hand, plate.name, certificate)
-    lie = locate_plate(bench, crew.active, hand, certificate, TIMES_REGISTERED)
-    bench.begin(crew.active, model, {hand: sketch_positions(bench, crew.active, hand)})
-    heights = order.heights(seat.manual)
-    sets = np.stack([_pointings(bench, order, hand, height) for height in heights], axis=2)
-    who = crew.active
-    bench.compute(who)
-    counters = _counters(bench, who, hand)
-    means = sets.mean(axis=0)[..., who]
-    its_lie = PlatePlacement(*(getattr(lie, field.name)[who] for field in fields(lie)))
-    test = grid_test(cross_positions(order.chosen), means, heights, _elements(seat.manual, counters, hand), its_lie)
-    enlarged = -np.array(heights)[:, None, None] / seat.c
-    pointing = _repeatability(sets[..., who], enlarged)
+def _tested(workstation: Workstation, order: GridTestPlan, side: int) -> ProjectorReadings:
+    operators, controls, plate = workstation.operators, workstation.controls, order.plate
+    model = ModelJob(f"{plate.name} in projector {side}", plate.name, plate.name, "inside", order.polarity, {})
+    certificate = workstation.job.certificate
+    _set_to_zeros(workstation, side)
+    centre_picture(workstation, operators.active, side, plate.name, certificate)
+    lie = locate_plate(workstation, operators.active, side, certificate, TIMES_REGISTERED)
+    workstation.begin(operators.active, model, {side: sketch_positions(workstation, operators.active, side)})
+    heights = order.heights(controls.manual)
+    sets = np.stack([_pointings(workstation, order, side, height) for height in heights], axis=2)
+    active = operators.active
+    workstation.compute(active)
+    counters = _counters(workstation, active, side)
+    means = sets.mean(axis=0)[..., active]
+    its_lie = PlatePlacement(*(getattr(lie, field.name)[active] for field in fields(lie)))
+    test = grid_test(cross_positions(order.chosen), means, heights, _elements(controls.manual, counters, side), its_lie)
+    enlarged = -np.array(heights)[:, None, None] / controls.c
+    pointing = _repeatability(sets[..., active], enlarged)
     return ProjectorReadings(
-        hand, who, counters, tuple(heights), order.chosen, test, pointing, crew.seconds[who].copy()
+        side, active, counters, tuple(heights), order.chosen, test, pointing, operators.seconds[active].copy()
     )
 
 
-def _set_to_zeros(bench: Workstation, projector: int) -> None:
+def _set_to_zeros(workstation: Workstation, projector: int) -> None:
     """Set a projector's elements and bx to their counter zeros, and the camera's principal distance."""
-    seat, who = bench.seat, bench.crew.active
-    elements = seat.manual.elements
+    controls, active = workstation.controls, workstation.operators.active
+    elements = controls.manual.elements
     zeros = {
-        name: np.full(who.size, element.zero)
+        name: np.full(active.size, element.zero)
         for name, element in elements.items()
         if name == "bx" or (name[-1] == str(projector) and name != f"c{projector}")
     }
-    seat.set_elements(who, zeros | {f"c{projector}": np.full(who.size, bench.job.certificate.c)})
+    controls.set_elements(active, zeros | {f"c{projector}": np.full(active.size, workstation.job.certificate.c)})
 
 
-def _pointings(bench: Workstation, order: GridTestPlan, hand: int, height: float) -> Array:
+def _pointings(workstation: Workstation, order: GridTestPlan, side: int, height: float) -> Array:
     """Return places of the mark ``(p, 2, n, sessions)`` in mm of the frame, pointed at all crosses p times."""
-    crew, seat = bench.crew, bench.seat
-    places = np.zeros((order.pointings, 2, len(order.chosen), crew.size))
-    level = seat.units_per_mm * height
+    operators, controls = workstation.operators, workstation.controls
+    places = np.zeros((order.pointings, 2, len(order.chosen), operators.size))
+    level = controls.units_per_mm * height
     for i in range(order.pointings):
-        readings = point_at_crosses(bench, crew.active, hand, order.chosen, level)
-        who = crew.active
-        places[i][:, :, who] = seat.frame_positions(who, readings[:, :, who], np.full(who.size, level))[:2]
+        readings = point_at_crosses(workstation, operators.active, side, order.chosen, level)
+        active = operators.active
+        places[i][:, :, active] = controls.frame_positions(active, readings[:, :, active], np.full(active.size, level))[
+            :2
+        ]
     return places
 
 
-def _counters(bench: Workstation, who: Indices, projector: int) -> Mapping[str, Array]:
-    names = [name for name in bench.seat.manual.elements if name == "bx" or name[-1] == str(projector)]
-    return bench.seat.elements(who, names)
+def _counters(workstation: Workstation, active: Indices, projector: int) -> Mapping[str, Array]:
+    names = [name for name in workstation.controls.manual.elements if name == "bx" or name[-1] == str(projector)]
+    return workstation.controls.elements(active, names)
 
 
 def _elements(manual: Variant, counters: Mapping[str, Array], projector: int) -> Elements:

@@ -54,40 +54,44 @@ class InteriorOrientationBatch:
 
 
 def interior_orientation(
-    bench: Workstation, who: Indices, projector: int, photograph: str, certificate: Camera
+    workstation: Workstation, active: Indices, projector: int, photograph: str, certificate: Camera
 ) -> InteriorOrientationBatch:
     """Mount a photograph in a projector, centre it and set its principal distance.
 
     Uniform film shrinkage, seen as a change of scale at the fiducials, goes into the principal distance. Those who
     cannot centre the picture give up.
     """
-    found = centre_picture(bench, who, projector, photograph, certificate)
-    _set_principal_distance(bench, bench.crew.remaining(who), projector, photograph, certificate, found)
+    found = centre_picture(workstation, active, projector, photograph, certificate)
+    _set_principal_distance(
+        workstation, workstation.operators.remaining(active), projector, photograph, certificate, found
+    )
     return found
 
 
 def centre_picture(
-    bench: Workstation, who: Indices, projector: int, photograph: str, certificate: Camera
+    workstation: Workstation, active: Indices, projector: int, photograph: str, certificate: Camera
 ) -> InteriorOrientationBatch:
     """Mount a picture in a projector and centre it on the calibrated principal point; no element is touched.
 
     The principal distances found are zero. Those who cannot centre the picture give up.
     """
-    crew, hands = bench.crew, bench.hands
-    _mount(bench, who, projector, photograph)
+    operators, driver = workstation.operators, workstation.driver
+    _mount(workstation, active, projector, photograph)
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
     wanted = -np.array(certificate.principal_point)[:, None]
-    found = InteriorOrientationBatch(photograph, np.zeros(crew.size, dtype=np.intp), *np.zeros((3, crew.size)))
-    centring = crew.remaining(who)
+    found = InteriorOrientationBatch(
+        photograph, np.zeros(operators.size, dtype=np.intp), *np.zeros((3, operators.size))
+    )
+    centring = operators.remaining(active)
     for round_ in range(1, MAX_ROUNDS + 1):
-        names, displacements = view_fiducials(bench, centring, projector)
+        names, displacements = view_fiducials(workstation, centring, projector)
         places = np.array([marks[name] for name in names]).T
-        right = _rightly_laid(bench, centring, projector, photograph, displacements, places)
+        right = _rightly_laid(workstation, centring, projector, photograph, displacements, places)
         centring, displacements = centring[right], displacements[:, :, right]
         try:
             lie = picture_placement(displacements, places)
         except Undetermined as undetermined:
-            crew.give_up(centring, f"the fiducials of {photograph} do not tell how it lies: {undetermined}")
+            operators.give_up(centring, f"the fiducials of {photograph} do not tell how it lies: {undetermined}")
             return found
         off = np.array([lie.dx, lie.dy]) - wanted
         there = (np.abs(off).max(axis=0) <= CENTRED_MM) & (np.abs(lie.turn) * np.abs(places).max() <= CENTRED_MM)
@@ -98,44 +102,48 @@ def centre_picture(
         off, turn, centring = off[:, ~there], lie.turn[~there] / GON, centring[~there]
         if not centring.size:
             break
-        now = hands.centring(centring, projector)
-        bench.seat.spend_setting(centring)
-        hands.centre(centring, projector, np.round(now - [*off, turn], 3))
-        bench.seat.give_up_on_errors(centring, f"centring {photograph}")
-        centring = crew.remaining(centring)
-    crew.give_up(centring, f"picture {photograph} cannot be centred in projector {projector}")
+        now = driver.centring(centring, projector)
+        workstation.controls.spend_setting(centring)
+        driver.centre(centring, projector, np.round(now - [*off, turn], 3))
+        workstation.controls.give_up_on_errors(centring, f"centring {photograph}")
+        centring = operators.remaining(centring)
+    operators.give_up(centring, f"picture {photograph} cannot be centred in projector {projector}")
     return found
 
 
-def _mount(bench: Workstation, who: Indices, projector: int, photograph: str) -> None:
-    crew = bench.crew
-    crew.spend(who, crew.observer.seconds_to_mount, "mounting")
-    bench.seat.spend_setting(who)
-    bench.hands.load(who, projector, photograph)
-    bench.seat.give_up_on_errors(who, f"mounting {photograph}")
-    lies_there = bench.hands.loaded(who, projector)
+def _mount(workstation: Workstation, active: Indices, projector: int, photograph: str) -> None:
+    operators = workstation.operators
+    operators.spend(active, operators.observer.seconds_to_mount, "mounting")
+    workstation.controls.spend_setting(active)
+    workstation.driver.load(active, projector, photograph)
+    workstation.controls.give_up_on_errors(active, f"mounting {photograph}")
+    lies_there = workstation.driver.loaded(active, projector)
     if lies_there != photograph:
-        crew.give_up(who, f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it")
+        operators.give_up(
+            active, f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it"
+        )
 
 
-def view_fiducials(bench: Workstation, who: Indices, projector: int) -> tuple[list[str], Array]:
+def view_fiducials(workstation: Workstation, active: Indices, projector: int) -> tuple[list[str], Array]:
     """Return the names of a picture's fiducials and their displacements ``(2, n, m)`` as they are registered, mm."""
-    names, exact = bench.hands.fiducials(who, projector)
-    crew = bench.crew
-    crew.spend(who, len(names) * crew.observer.seconds_to_read, "reading")
-    return names, exact + 1e-3 * crew.draw_setting_errors(who, crew.observer.fiducial_um, exact.shape[:2])[:, :, who]
+    names, exact = workstation.driver.fiducials(active, projector)
+    operators = workstation.operators
+    operators.spend(active, len(names) * operators.observer.seconds_to_read, "reading")
+    return names, exact + 1e-3 * operators.draw_setting_errors(active, operators.observer.fiducial_um, exact.shape[:2])[
+        :, :, active
+    ]
 
 
 def _rightly_laid(
-    bench: Workstation, who: Indices, projector: int, photograph: str, displacements: Array, places: Array
+    workstation: Workstation, active: Indices, projector: int, photograph: str, displacements: Array, places: Array
 ) -> npt.NDArray[np.bool_]:
     """Return whose fiducials stand near the collimating marks of their names ``(m,)``; the others give up."""
     furthest = np.abs(displacements).max(axis=(0, 1))
     upside_down = np.abs(displacements + 2.0 * places[:, :, None]).max(axis=(0, 1)) < MISPLACED_MM
     misplaced = furthest > MISPLACED_MM
-    for session, distance, turned in zip(who[misplaced], furthest[misplaced], upside_down[misplaced], strict=True):
+    for session, distance, turned in zip(active[misplaced], furthest[misplaced], upside_down[misplaced], strict=True):
         how = "upside down" if turned else "beside its marks"
-        bench.crew.give_up(
+        workstation.operators.give_up(
             np.array([session]),
             f"picture {photograph} lies {how} in projector {projector}: its fiducials stand up to "
             f"{distance:.0f} mm from the collimating marks of their names",
@@ -150,16 +158,16 @@ def _unexplained(displacements: Array, places: Array, lie: PicturePlacement) -> 
 
 
 def _set_principal_distance(
-    bench: Workstation,
-    who: Indices,
+    workstation: Workstation,
+    active: Indices,
     projector: int,
     photograph: str,
     certificate: Camera,
     found: InteriorOrientationBatch,
 ) -> None:
-    c = np.round(certificate.c * (1.0 + found.film_scale[who]), 2)
-    found.principal_distance[who] = c
-    bench.seat.spend_setting(who)
-    bench.hands.set_element(who, f"c{projector}", c)
-    bench.seat.give_up_on_errors(who, f"setting c{projector}")
-    bench.crew.enter(who, "", f"{photograph} centred, c{projector}", c)
+    c = np.round(certificate.c * (1.0 + found.film_scale[active]), 2)
+    found.principal_distance[active] = c
+    workstation.controls.spend_setting(active)
+    workstation.driver.set_element(active, f"c{projector}", c)
+    workstation.controls.give_up_on_errors(active, f"setting c{projector}")
+    workstation.operators.enter(active, "", f"{photograph} centred, c{projector}", c)

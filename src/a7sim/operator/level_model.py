@@ -49,7 +49,7 @@ class LevelModel:
 
 
 def level_model(
-    bench: Workstation,
+    workstation: Workstation,
     view: StereoView,
     points: Mapping[str, Place],
     control: Ground,
@@ -61,22 +61,22 @@ def level_model(
     The control in the model, and the points of `also`, are measured anew in the end. Gives up where the control
     does not determine the orientation.
     """
-    crew, units = bench.crew, bench.seat.units_per_mm
+    operators, units = workstation.operators, workstation.controls.units_per_mm
     wanted = [name for name in points if name in control.points or name in also]
     rounds = 0
     shown = Control.of(control, [name for name in wanted if name in control.points])
     if shown.is_enough:
-        levelling = Levelling(bench, bench.seat.model, shown)
-        fit = levelling.compared(crew.active, levelling.measured(crew.active, 1))
-        rounds = len(levelling.level(crew.active, fit, scale_number)[0]) - 1
+        levelling = Levelling(workstation, workstation.controls.model, shown)
+        fit = levelling.compared(operators.active, levelling.measured(operators.active, 1))
+        rounds = len(levelling.level(operators.active, fit, scale_number)[0]) - 1
         view.read_projectors()
-        points = _measured(bench, wanted)
-    absolute = orient_model(bench, points, control, units)
+        points = _measured(workstation, wanted)
+    absolute = orient_model(workstation, points, control, units)
     return LevelModel(absolute, points, scale_number, _tilt(absolute), units, rounds)
 
 
-def _measured(bench: Workstation, names: Sequence[str]) -> dict[str, Place]:
-    readings = bench.measure_points(bench.crew.active, names)[:, :, 0].T
+def _measured(workstation: Workstation, names: Sequence[str]) -> dict[str, Place]:
+    readings = workstation.measure_points(workstation.operators.active, names)[:, :, 0].T
     return {
         name: (float(X), float(Y), float(Z))
         for name, (X, Y, Z) in zip(names, readings, strict=True)
@@ -84,14 +84,18 @@ def _measured(bench: Workstation, names: Sequence[str]) -> dict[str, Place]:
     }
 
 
-def orient_model(bench: Workstation, points: Mapping[str, Place], control: Ground, units: float) -> AbsoluteOrientation:
+def orient_model(
+    workstation: Workstation, points: Mapping[str, Place], control: Ground, units: float
+) -> AbsoluteOrientation:
     """Return the orientation to the ground of a model in which the control was measured, gives up where it has none."""
     names = tuple(name for name in points if name in control.points)
     coordinates = np.array([points[name] for name in names]).reshape(-1, 3).T / np.array([[1.0], [1.0], [units]])
     try:
-        return absolute_orientation(Model(bench.seat.model.name, names, coordinates), control)
+        return absolute_orientation(Model(workstation.controls.model.name, names, coordinates), control)
     except Undetermined as reason:
-        bench.crew.give_up(bench.crew.active, f"{bench.seat.model.name}: absolute orientation: {reason}")
+        workstation.operators.give_up(
+            workstation.operators.active, f"{workstation.controls.model.name}: absolute orientation: {reason}"
+        )
         raise
 
 

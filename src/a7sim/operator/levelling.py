@@ -110,40 +110,40 @@ class Fit:
 class Levelling:
     """Sessions with the same control at work on one model."""
 
-    def __init__(self, bench: Workstation, model: ModelJob, control: Control) -> None:
-        self.bench, self.crew, self.seat = bench, bench.crew, bench.seat
+    def __init__(self, workstation: Workstation, model: ModelJob, control: Control) -> None:
+        self.workstation, self.operators, self.controls = workstation, workstation.operators, workstation.controls
         self.model, self.control = model, control
-        self.names = [name for name in bench.seat.manual.elements if name not in ("c1", "c2")]
+        self.names = [name for name in workstation.controls.manual.elements if name not in ("c1", "c2")]
 
-    def settings(self, who: Indices) -> dict[str, Array]:
+    def settings(self, active: Indices) -> dict[str, Array]:
         """Return where all elements stand ``(sessions,)``."""
-        return expand_to_batch(self.seat.exact_values(who, self.names), who, self.crew.size)
+        return expand_to_batch(self.controls.exact_values(active, self.names), active, self.operators.size)
 
-    def measured(self, who: Indices, number: int) -> Array:
+    def measured(self, active: Indices, number: int) -> Array:
         """Return places ``(3, n, m)`` of the control in the frame as a round measures them, mm, Z up."""
-        self.bench.begin_round(who, number)
-        readings = self.bench.measure_points(who, self.control.names)[:, :, who]
-        x, y, z = np.stack([self.seat.model_position(who, each) for each in np.moveaxis(readings, 1, 0)], axis=1)
+        self.workstation.begin_round(active, number)
+        readings = self.workstation.measure_points(active, self.control.names)[:, :, active]
+        x, y, z = np.stack([self.controls.model_position(active, each) for each in np.moveaxis(readings, 1, 0)], axis=1)
         return np.array([x, y, -z])
 
-    def compared(self, who: Indices, at: Array) -> Fit:
+    def compared(self, active: Indices, at: Array) -> Fit:
         """Compare places ``(3, n, m)`` with the control: the scale by its two ends, the tilts by its heights."""
-        self.bench.compute(who)
+        self.workstation.compute(active)
         first, last = self.control.ends
         across = self.control.between(first, last)
         vector = at[:, last] - at[:, first]
         given = self.control.ground[2, self.control.with_height][:, None]
         has_height = bool(np.isfinite(across[2]))
         metres = length_of(across if has_height else across[:2]) / length_of(vector)
-        up = self._up(who, at[:, self.control.with_height], given / metres)
+        up = self._up(active, at[:, self.control.with_height], given / metres)
         if not has_height:
             metres = length_of(across[:2]) / length_of(vector - up * (up * vector).sum(axis=0))
         in_model = at[2, self.control.with_height]
         return Fit(up, metres, np.array([in_model, np.broadcast_to(given, in_model.shape)]))
 
-    def _up(self, who: Indices, at: Array, given: Array) -> Array:
+    def _up(self, active: Indices, at: Array, given: Array) -> Array:
         """Return the up directions ``(3, m)`` from places ``(3, n, m)`` and heights at their scale ``(n, m)``, mm."""
-        slopes = np.zeros((2, who.size))
+        slopes = np.zeros((2, active.size))
         design = np.moveaxis(np.array([at[0], at[1], np.ones_like(at[0])]), 0, 1)
         for _ in range(5):
             try:
@@ -151,45 +151,49 @@ class Levelling:
                     :2
                 ]
             except Undetermined as undetermined:
-                self.crew.give_up(who, f"{self.model.name}: the height control does not level it: {undetermined}")
+                self.operators.give_up(
+                    active, f"{self.model.name}: the height control does not level it: {undetermined}"
+                )
                 break
         return np.array([*slopes, np.sqrt(1.0 - (slopes**2).sum(axis=0))])
 
-    def level(self, who: Indices, fit: Fit, number: float) -> dict[int, list[LevellingRound]]:
+    def level(self, active: Indices, fit: Fit, number: float) -> dict[int, list[LevellingRound]]:
         """Turn and measure until it gets no better, the model to a scale number; the best settings stand.
 
         Return the rounds by session.
         """
-        crew = self.crew
-        rounds: dict[int, list[LevellingRound]] = {int(session): [] for session in who}
-        least = np.full(crew.size, np.inf)
-        best = self.settings(who)
-        height = 1e-3 * number * self.bench.job.plan.projection_height
+        operators = self.operators
+        rounds: dict[int, list[LevellingRound]] = {int(session): [] for session in active}
+        least = np.full(operators.size, np.inf)
+        best = self.settings(active)
+        height = 1e-3 * number * self.workstation.job.plan.projection_height
         for round_number in range(2, MAX_ROUNDS + 2):
-            _note(rounds, who, fit, number)
+            _note(rounds, active, fit, number)
             misfit = np.hypot(fit.rms(number), np.abs(fit.factor(number) - 1.0) * height)
-            now, better = self.settings(who), misfit < least[who]
-            falling = misfit < STILL_FALLING * least[who]
+            now, better = self.settings(active), misfit < least[active]
+            falling = misfit < STILL_FALLING * least[active]
             for name, kept in best.items():
-                kept[who[better]] = now[name][who[better]]
-            least[who[better]] = misfit[better]
-            who, fit = who[falling], fit.of(falling)
-            if not who.size or round_number > MAX_ROUNDS:
+                kept[active[better]] = now[name][active[better]]
+            least[active[better]] = misfit[better]
+            active, fit = active[falling], fit.of(falling)
+            if not active.size or round_number > MAX_ROUNDS:
                 break
-            settings = {name: values[who] for name, values in now.items()}
-            upright = levelled_elements(settings, self.model, self.seat.manual, fit.up, fit.factor(number))
-            self.seat.turn_if_changed(who, upright)
-            who = crew.remaining(who)
-            if not who.size:
+            settings = {name: values[active] for name, values in now.items()}
+            upright = levelled_elements(settings, self.model, self.controls.manual, fit.up, fit.factor(number))
+            self.controls.turn_if_changed(active, upright)
+            active = operators.remaining(active)
+            if not active.size:
                 break
-            fit = self.compared(who, self.measured(who, round_number))
-        everybody = crew.remaining(np.array(list(rounds), dtype=np.intp))
-        self.seat.turn_if_changed(everybody, {name: kept[everybody] for name, kept in best.items()})
+            fit = self.compared(active, self.measured(active, round_number))
+        sessions = operators.remaining(np.array(list(rounds), dtype=np.intp))
+        self.controls.turn_if_changed(sessions, {name: kept[sessions] for name, kept in best.items()})
         return rounds
 
 
-def _note(rounds: Mapping[int, list[LevellingRound]], who: Indices, fit: Fit, number: float) -> None:
-    for session, rms, factor, tilts in zip(who.tolist(), fit.rms(number), fit.factor(number), fit.tilts.T, strict=True):
+def _note(rounds: Mapping[int, list[LevellingRound]], active: Indices, fit: Fit, number: float) -> None:
+    for session, rms, factor, tilts in zip(
+        active.tolist(), fit.rms(number), fit.factor(number), fit.tilts.T, strict=True
+    ):
         rounds[session].append(LevellingRound(float(rms), float(factor), (float(tilts[0]), float(tilts[1]))))
 
 

@@ -73,7 +73,7 @@ class ModelRecordBatch:
             {name: each.of(session) for name, each in self.interior.items()},
             self.orientation.of(session),
             {point: (x, y, z) for point, (x, y, z) in places.items() if not math.isnan(x)},
-            {hand: centre_of(each, session) for hand, each in self.centres.items()},
+            {side: centre_of(each, session) for side, each in self.centres.items()},
             self.xy_units_per_mm,
             self.z_units_per_mm,
             float(self.finished_at[session]),
@@ -99,168 +99,174 @@ def measure_models(
 
 
 def measure_models_batch(
-    bench: Workstation, begins: Callable[[str], None] = lambda _: None
+    workstation: Workstation, begins: Callable[[str], None] = lambda _: None
 ) -> Iterator[ModelRecordBatch]:
     """Yield the models of a job as a crew does them, each session at its own instrument."""
     try:
-        yield from _worked(bench, begins)
+        yield from _worked(workstation, begins)
     except AllGaveUpError:
         return
 
 
-def _worked(bench: Workstation, begins: Callable[[str], None]) -> Iterator[ModelRecordBatch]:
-    job, crew = bench.job, bench.crew
+def _worked(workstation: Workstation, begins: Callable[[str], None]) -> Iterator[ModelRecordBatch]:
+    job, operators = workstation.job, workstation.operators
     interior: dict[str, InteriorOrientationBatch] = {}
-    bench.seat.prepare(crew.active)
+    workstation.controls.prepare(operators.active)
     for model in job.models:
-        begin_form(bench, model, "interior orientation", begins)
-        set_base_and_fittings(bench, model.base, model.polarity)
-        mount_photographs(bench, model, interior)
-        prints = load_prints(bench, model)
-        require_active(bench)
-        bench.begin(crew.active, model, prints)
-        note_missing_points(bench, model)
-        preset_counters(bench, model)
-        begin_form(bench, model, "relative orientation", begins)
-        orientation = orient_model(bench, model)
-        begin_form(bench, model, "model coordinates", begins)
-        points = model_coordinates(bench, model)
+        begin_form(workstation, model, "interior orientation", begins)
+        set_base_and_fittings(workstation, model.base, model.polarity)
+        mount_photographs(workstation, model, interior)
+        prints = load_prints(workstation, model)
+        require_active(workstation)
+        workstation.begin(operators.active, model, prints)
+        note_missing_points(workstation, model)
+        preset_counters(workstation, model)
+        begin_form(workstation, model, "relative orientation", begins)
+        orientation = orient_model(workstation, model)
+        begin_form(workstation, model, "model coordinates", begins)
+        points = model_coordinates(workstation, model)
         centres = {}
         for hand, side in ((1, "left"), (2, "right")):
-            begin_form(bench, model, f"{side} perspective centre", begins)
-            centres[hand] = observe_centre(bench, crew.active, model, hand)
+            begin_form(workstation, model, f"{side} perspective centre", begins)
+            centres[hand] = observe_centre(workstation, operators.active, model, hand)
         on_ground = None
         if job.control:
-            begin_form(bench, model, "absolute orientation", begins)
-            on_ground = absolute_orientation_at(bench, model, job.control)
-        require_active(bench)
+            begin_form(workstation, model, "absolute orientation", begins)
+            on_ground = absolute_orientation_at(workstation, model, job.control)
+        require_active(workstation)
         yield ModelRecordBatch(
             model,
-            crew.active,
+            operators.active,
             {name: interior[name] for name in (model.left, model.right)},
             orientation,
             points,
             centres,
-            float(bench.seat.counter_units_per_mm[0]),
-            bench.seat.units_per_mm,
-            crew.seconds.copy(),
+            float(workstation.controls.counter_units_per_mm[0]),
+            workstation.controls.units_per_mm,
+            operators.seconds.copy(),
             on_ground,
         )
 
 
-def require_active(bench: Workstation) -> None:
+def require_active(workstation: Workstation) -> None:
     """Raise NobodyGoesOn when all have given up."""
-    if not bench.crew.active.size:
+    if not workstation.operators.active.size:
         raise AllGaveUpError
 
 
-def note_missing_points(bench: Workstation, model: ModelJob) -> None:
+def note_missing_points(workstation: Workstation, model: ModelJob) -> None:
     """Write into the book which points of the case lie in water, or are not pricked on both prints."""
-    crew = bench.crew
-    listed = {label: model.standard_points.get(label, "") for label in CASES[bench.job.plan.case]}
-    for who, there in bench.group_by_points(crew.active, list(listed.values())):
+    operators = workstation.operators
+    listed = {label: model.standard_points.get(label, "") for label in CASES[workstation.job.plan.case]}
+    for active, there in workstation.group_by_points(operators.active, list(listed.values())):
         absent = [f"{label} ({name})" if name else label for label, name in listed.items() if name not in there]
         if absent:
-            crew.remark(who, f"{model.name}: not pricked on both prints, done without: {', '.join(absent)}")
+            operators.remark(active, f"{model.name}: not pricked on both prints, done without: {', '.join(absent)}")
 
 
-def preset_counters(bench: Workstation, model: ModelJob) -> None:
+def preset_counters(workstation: Workstation, model: ModelJob) -> None:
     """Preset the counters at point 1, as the thesis does, or where that is not there at the first point that is.
 
     Those who find no standard point at all on both their prints give up.
     """
-    crew = bench.crew
-    waiting = crew.active
+    operators = workstation.operators
+    waiting = operators.active
     for label in model.all_positions():
         point = model.standard_points[label]
-        there = bench.has_point(waiting, point)
+        there = workstation.has_point(waiting, point)
         presetting, waiting = waiting[there], waiting[~there]
         if presetting.size:
             if label != "1":
-                crew.remark(presetting, f"{model.name}: there is no point 1: counters preset at {point}, point {label}")
-            bench.preset(presetting, point)
-    crew.give_up(waiting, f"{model.name}: no standard point is pricked on both prints")
+                operators.remark(
+                    presetting, f"{model.name}: there is no point 1: counters preset at {point}, point {label}"
+                )
+            workstation.preset(presetting, point)
+    operators.give_up(waiting, f"{model.name}: no standard point is pricked on both prints")
 
 
-def model_coordinates(bench: Workstation, model: ModelJob) -> dict[str, Array]:
+def model_coordinates(workstation: Workstation, model: ModelJob) -> dict[str, Array]:
     """Measure all points that both prints show; sessions whose prints show the same do it together."""
-    crew = bench.crew
+    operators = workstation.operators
     wanted = list(dict.fromkeys([*model.standard_points.values(), *model.other_points]))
     points: dict[str, Array] = {}
-    for alike, names in bench.group_by_points(crew.active, wanted):
-        for name, measured in zip(names, np.moveaxis(bench.measure_points(alike, names), 1, 0), strict=True):
-            points.setdefault(name, np.full((3, crew.size), np.nan))[:, alike] = measured[:, alike]
+    for alike, names in workstation.group_by_points(operators.active, wanted):
+        for name, measured in zip(names, np.moveaxis(workstation.measure_points(alike, names), 1, 0), strict=True):
+            points.setdefault(name, np.full((3, operators.size), np.nan))[:, alike] = measured[:, alike]
     return {name: points[name] for name in wanted if name in points}
 
 
-def begin_form(bench: Workstation, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
+def begin_form(workstation: Workstation, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
     """Begin a form of a model in book and journal."""
-    require_active(bench)
+    require_active(workstation)
     begins(f"model {model.name}: {form}")
-    bench.crew.begin(bench.crew.active, model.name, form)
-    bench.hands.note(bench.crew.active, f"{model.name}: {form}")
+    workstation.operators.begin(workstation.operators.active, model.name, form)
+    workstation.driver.note(workstation.operators.active, f"{model.name}: {form}")
 
 
-def orient_model(bench: Workstation, model: ModelJob) -> OrientationRecordBatch:
+def orient_model(workstation: Workstation, model: ModelJob) -> OrientationRecordBatch:
     """Orient a model by the procedure on the job sheet."""
-    plan, who, tolerated = bench.job.plan, bench.crew.active, bench.job.tolerated_parallax_mm
+    plan, active, tolerated = workstation.job.plan, workstation.operators.active, workstation.job.tolerated_parallax_mm
     if plan.start_off_gon:
-        perturb_elements(bench, who, model, plan.method, plan.start_off_gon)
+        perturb_elements(workstation, active, model, plan.method, plan.start_off_gon)
     if plan.procedure == "empirical":
         return empirical_orientation(
-            bench, who, model, plan.method, plan.case, plan.over_correction, plan.parallax_readings, tolerated
+            workstation, active, model, plan.method, plan.case, plan.over_correction, plan.parallax_readings, tolerated
         )
-    return relative_orientation(bench, who, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated)
-
-
-def set_base_and_fittings(bench: Workstation, base: str, polarity: str) -> None:
-    """Set base in or out, and the fittings that belong to it and to the pictures."""
-    who, hands = bench.crew.active, bench.hands
-    right = required_fittings(bench.seat.manual, polarity, base)
-    bench.seat.spend_setting(who, 1 + len(right))
-    hands.set_base_mode(who, base)
-    for name, position in right.items():
-        for them, put in bench.crew.fitting_positions(who, name, position):
-            hands.set_fitting(them, name, put)
-    bench.seat.give_up_on_errors(who, f"setting base {base} and its fittings")
-
-
-def mount_photographs(bench: Workstation, model: ModelJob, interior: dict[str, InteriorOrientationBatch]) -> None:
-    """Mount what is not yet in its projector; a projector with a new picture starts from its counter zeros."""
-    seat, hands = bench.seat, bench.hands
-    for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
-        who = bench.crew.active
-        if hands.loaded(who, projector) == photograph:
-            continue
-        if hands.loaded(who, 3 - projector) == photograph:
-            seat.spend_setting(who)
-            hands.unload(who, 3 - projector)
-        seat.spend_setting(who)
-        for name, element in seat.manual.elements.items():
-            if name.endswith(str(projector)) and not name.startswith("c"):
-                seat.run_element(who, name, np.full(who.size, element.zero))
-        seat.give_up_on_errors(who, f"setting projector {projector} to its zeros")
-        interior[photograph] = interior_orientation(
-            bench, bench.crew.active, projector, photograph, bench.job.certificate
-        )
-
-
-def load_prints(bench: Workstation, model: ModelJob) -> dict[int, dict[str, Array]]:
-    """Take up the paper prints of both photographs and see that they overlap the right way round."""
-    crew = bench.crew
-    who = crew.active
-    prints = {}
-    for hand, projector in ((1, model.left_projector), (2, model.right_projector)):
-        prints[hand] = sketch_positions(bench, who, projector)
-    common = [name for name in prints[1] if name in prints[2]]
-    shifts = np.array([prints[1][name][0] - prints[2][name][0] for name in common]).reshape(-1, crew.size)[:, who]
-    nowhere = np.isnan(shifts).all(axis=0)
-    crew.give_up(
-        who[nowhere], f"{model.name}: no point is pricked on both the prints of {model.left} and {model.right}"
+    return relative_orientation(
+        workstation, active, model, plan.method, plan.case, plan.parallax_readings, plan.bx, tolerated
     )
-    who, shifts = who[~nowhere], shifts[:, ~nowhere]
-    crew.give_up(
-        who[np.nanmean(shifts, axis=0) <= 0.0] if who.size else who,
+
+
+def set_base_and_fittings(workstation: Workstation, base: str, polarity: str) -> None:
+    """Set base in or out, and the fittings that belong to it and to the pictures."""
+    active, driver = workstation.operators.active, workstation.driver
+    right = required_fittings(workstation.controls.manual, polarity, base)
+    workstation.controls.spend_setting(active, 1 + len(right))
+    driver.set_base_mode(active, base)
+    for name, position in right.items():
+        for them, put in workstation.operators.fitting_positions(active, name, position):
+            driver.set_fitting(them, name, put)
+    workstation.controls.give_up_on_errors(active, f"setting base {base} and its fittings")
+
+
+def mount_photographs(workstation: Workstation, model: ModelJob, interior: dict[str, InteriorOrientationBatch]) -> None:
+    """Mount what is not yet in its projector; a projector with a new picture starts from its counter zeros."""
+    controls, driver = workstation.controls, workstation.driver
+    for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
+        active = workstation.operators.active
+        if driver.loaded(active, projector) == photograph:
+            continue
+        if driver.loaded(active, 3 - projector) == photograph:
+            controls.spend_setting(active)
+            driver.unload(active, 3 - projector)
+        controls.spend_setting(active)
+        for name, element in controls.manual.elements.items():
+            if name.endswith(str(projector)) and not name.startswith("c"):
+                controls.run_element(active, name, np.full(active.size, element.zero))
+        controls.give_up_on_errors(active, f"setting projector {projector} to its zeros")
+        interior[photograph] = interior_orientation(
+            workstation, workstation.operators.active, projector, photograph, workstation.job.certificate
+        )
+
+
+def load_prints(workstation: Workstation, model: ModelJob) -> dict[int, dict[str, Array]]:
+    """Take up the paper prints of both photographs and see that they overlap the right way round."""
+    operators = workstation.operators
+    active = operators.active
+    prints = {}
+    for side, projector in ((1, model.left_projector), (2, model.right_projector)):
+        prints[side] = sketch_positions(workstation, active, projector)
+    common = [name for name in prints[1] if name in prints[2]]
+    shifts = np.array([prints[1][name][0] - prints[2][name][0] for name in common]).reshape(-1, operators.size)[
+        :, active
+    ]
+    nowhere = np.isnan(shifts).all(axis=0)
+    operators.give_up(
+        active[nowhere], f"{model.name}: no point is pricked on both the prints of {model.left} and {model.right}"
+    )
+    active, shifts = active[~nowhere], shifts[:, ~nowhere]
+    operators.give_up(
+        active[np.nanmean(shifts, axis=0) <= 0.0] if active.size else active,
         f"{model.name}: the prints of {model.left} and {model.right} do not overlap towards each other: the "
         "photographs have changed places, or one lies upside down",
     )

@@ -31,7 +31,7 @@ class Person:
     """The truth about every slip, which this person does not have."""
 
     def __post_init__(self) -> None:
-        self.dice = OperatorRandom(self.observer, self.seed)
+        self.random = OperatorRandom(self.observer, self.seed)
 
     def remark(self, text: str) -> None:
         """Write a remark into the book and into the journal of the instrument."""

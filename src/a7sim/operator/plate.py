@@ -31,35 +31,37 @@ def cross_positions(crosses: Crosses) -> Array:
     return np.array(list(crosses.values())).T
 
 
-def sketch_positions(bench: Workstation, who: Indices, projector: int) -> dict[str, Array]:
+def sketch_positions(workstation: Workstation, active: Indices, projector: int) -> dict[str, Array]:
     """Return where the sketch of what lies in a projector shows points ``(2, sessions)``, nan for those not asked."""
     prints = {}
-    for name, place in bench.hands.prints(who, projector).items():
-        prints[name] = np.full((2, bench.crew.size), np.nan)
-        prints[name][:, who] = place
+    for name, place in workstation.driver.prints(active, projector).items():
+        prints[name] = np.full((2, workstation.operators.size), np.nan)
+        prints[name][:, active] = place
     return prints
 
 
-def locate_plate(bench: Workstation, who: Indices, projector: int, certificate: Camera, times: int) -> PlatePlacement:
+def locate_plate(
+    workstation: Workstation, active: Indices, projector: int, certificate: Camera, times: int
+) -> PlatePlacement:
     """Register a mounted plate's fiducials so many times and return how it lies ``(sessions,)``."""
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
-    registered = [view_fiducials(bench, who, projector) for _ in range(times)]
+    registered = [view_fiducials(workstation, active, projector) for _ in range(times)]
     displacements = np.concatenate([seen for _, seen in registered], axis=1)
-    every = np.zeros((*displacements.shape[:2], bench.crew.size))
-    every[:, :, who] = displacements
+    every = np.zeros((*displacements.shape[:2], workstation.operators.size))
+    every[:, :, active] = displacements
     return plate_placement(every, np.array([marks[name] for names, _ in registered for name in names]).T)
 
 
-def point_at_crosses(bench: Workstation, who: Indices, hand: int, crosses: Crosses, level: float) -> Array:
+def point_at_crosses(workstation: Workstation, active: Indices, side: int, crosses: Crosses, level: float) -> Array:
     """Point with one eye at crosses at a Z reading; X, Y readings ``(2, n, sessions)``.
 
     A cross that its fellows contradict is struck out and pointed at again.
     """
-    crew = bench.crew
+    operators = workstation.operators
     names = list(crosses)
-    _go_below(bench, who, hand)
-    readings = bench.point_monocularly(who, hand, names, level)
-    looking = crew.remaining(who)
+    _go_below(workstation, active, side)
+    readings = workstation.point_monocularly(active, side, names, level)
+    looking = operators.remaining(active)
     for _ in range(MAX_REPETITIONS):
         misread = (
             _misread(readings[:, :, looking], cross_positions(crosses)) if looking.size else np.zeros(0, dtype=np.intp)
@@ -68,15 +70,15 @@ def point_at_crosses(bench: Workstation, who: Indices, hand: int, crosses: Cross
         for place in np.unique(misread):
             again = looking[misread == place]
             why = "does not agree with the other crosses of the plate"
-            readings[:, place, again] = bench.repeat_pointing(again, hand, names[place], level, why)[:, again]
-        looking = crew.remaining(looking)
+            readings[:, place, again] = workstation.repeat_pointing(again, side, names[place], level, why)[:, again]
+        looking = operators.remaining(looking)
     return readings
 
 
-def _go_below(bench: Workstation, who: Indices, hand: int) -> None:
+def _go_below(workstation: Workstation, active: Indices, side: int) -> None:
     """Run the mark straight below a centre, whence it can go to any level: from the side the rods may not let it."""
-    x, y = np.round(bench.seat.under_centre(who, hand), 2)
-    bench.seat.drive(who, {"X": x, "Y": y})
+    x, y = np.round(workstation.controls.under_centre(active, side), 2)
+    workstation.controls.drive(active, {"X": x, "Y": y})
 
 
 def _misread(readings: Array, crosses: Array) -> npt.NDArray[np.intp]:

@@ -91,39 +91,39 @@ def compile_map(
     Raises DoesNotFit when it cannot be set up, Mistake for a contour that does not run in the model.
     """
     person.book.set_heading("", "preparation")
-    bench = Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick)
-    record = next(measure_models_batch(bench, begins)).of(0)
-    view = StereoView(bench, person)
-    begin_form(bench, bench.seat.model, "absolute orientation", begins)
+    workstation = Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick)
+    record = next(measure_models_batch(workstation, begins)).of(0)
+    view = StereoView(workstation, person)
+    begin_form(workstation, workstation.controls.model, "absolute orientation", begins)
     gear = TABLE_GEARS[job.plan.plan_gear]
     corners = {label: record.model.standard_points.get(label, "") for label in "3456"}
-    first = orient_model(bench, record.points, control, record.z_units_per_mm)
+    first = orient_model(workstation, record.points, control, record.z_units_per_mm)
     number = gear * (order.map_scale or _round_scale(1e3 * float(first.similarity.scale) / gear))
-    model = level_model(bench, view, record.points, control, number, list(corners.values()))
+    model = level_model(workstation, view, record.points, control, number, list(corners.values()))
     seen = [label for label, name in corners.items() if name in model.points]
     if not all(any(label in seen for label in border) for border in ("34", "56", "35", "46")):
-        bench.crew.give_up(
-            bench.crew.active,
+        workstation.operators.give_up(
+            workstation.operators.active,
             f"{record.model.name}: of standard points 3 to 6, the corners of the model, only "
             f"{', '.join(seen) or 'none'} can be seen: they leave a side of it open",
         )
     area = Area.within(record.model.standard_points, model.points)
-    work = Compilation(bench, person, view, model, area, order.tracing)
-    begin_form(bench, bench.seat.model, "spot heights", begins)
+    work = Compilation(workstation, person, view, model, area, order.tracing)
+    begin_form(workstation, workstation.controls.model, "spot heights", begins)
     spots = work.spot_heights()
     heights = _heights(order, spots)
     lines: list[TracedLine] = []
     for height in heights:
-        begin_form(bench, bench.seat.model, f"contour {height:g}", begins)
+        begin_form(workstation, workstation.controls.model, f"contour {height:g}", begins)
         lines += work.contour(height, spots)
         tick()
-    for errand in order.lines:
-        begin_form(bench, bench.seat.model, f"line {errand.name}", begins)
-        lines.append(work.line(errand, spots))
+    for target in order.lines:
+        begin_form(workstation, workstation.controls.model, f"line {target.name}", begins)
+        lines.append(work.line(target, spots))
         tick()
-    above, sigma_height, sigma_plan = _expected(bench, view, model, spots, order.tracing)
+    above, sigma_height, sigma_plan = _expected(workstation, view, model, spots, order.tracing)
     return CompiledMap(
-        replace(record, finished_at=float(bench.crew.seconds[0])),
+        replace(record, finished_at=float(workstation.operators.seconds[0])),
         model, area, spots, tuple(lines), heights, gear, above, sigma_height, sigma_plan,
     )  # fmt: skip
 
@@ -153,15 +153,15 @@ def _heights(order: MapRequest, spots: SpotHeights) -> tuple[float, ...]:
 
 
 def _expected(
-    bench: Workstation, view: StereoView, model: LevelModel, spots: SpotHeights, tracing: Tracing
+    workstation: Workstation, view: StereoView, model: LevelModel, spots: SpotHeights, tracing: Tracing
 ) -> tuple[float, float, float]:
     """Return the height of the centres above the mean spot in m, and the standard errors in m that a person expects."""
-    who, observer = bench.crew.active, bench.crew.observer
+    active, observer = workstation.operators.active, workstation.operators.observer
     look = view.look()
     residuals = model.absolute.fit.at_control
     misfit = np.sqrt(np.nanmean(residuals**2, axis=1))
     setting = 1e-3 * observer.height_um / look.parallax_by_height * model.metres_per_mm
     tremor = 1e-3 * tracing.tremor_um * look.enlargement * model.metres_per_mm
     mean_spot = np.nanmean(spots.readings, axis=(1, 2))[:, None]
-    above = float(bench.seat.model_position(who, mean_spot)[2, 0]) * model.metres_per_mm
+    above = float(workstation.controls.model_position(active, mean_spot)[2, 0]) * model.metres_per_mm
     return above, math.hypot(float(misfit[2]), setting), math.hypot(float(np.hypot(*misfit[:2]) / np.sqrt(2.0)), tremor)

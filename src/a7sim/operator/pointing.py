@@ -31,55 +31,58 @@ DIVERGENCE_LOOKS = 3
 class Pointing:
     """The eyes of a crew, each looking at its own photograph."""
 
-    def __init__(self, seat: Controls) -> None:
-        self.seat = seat
-        self.crew = seat.crew
-        observer = seat.crew.observer
+    def __init__(self, controls: Controls) -> None:
+        self.controls = controls
+        self.operators = controls.operators
+        observer = controls.operators.observer
         eye = min(observer.monocular_um, observer.stereo_um, observer.height_um, observer.parallax_um)
-        self.finest_mm = max(FINEST_MM, FINEST_SHARE * 1e-3 * eye * seat.job.plan.projection_height / seat.c)
+        self.finest_mm = max(FINEST_MM, FINEST_SHARE * 1e-3 * eye * controls.job.plan.projection_height / controls.c)
         """What handwheels and drums are not turned by any more."""
         self._prints: Mapping[int, Mapping[str, Array]] = {}
-        self._strayed = np.zeros((3, 2, seat.crew.size))
-        self._seen_from = np.zeros((2, seat.crew.size))
+        self._strayed = np.zeros((3, 2, controls.operators.size))
+        self._seen_from = np.zeros((2, controls.operators.size))
 
     def set_prints(self, prints: Mapping[int, Mapping[str, Array]]) -> None:
         """Take up the paper prints by hand (1 left, 2 right): places ``(2, sessions)`` of points in mm."""
         self._prints = prints
         self._strayed[:] = 0.0
 
-    def bring_into_view(self, who: Indices, hand: int, point: str) -> None:
+    def bring_into_view(self, active: Indices, side: int, point: str) -> None:
         """Drive to where the print shows a point and look around until it is in the field of view."""
-        seat = self.seat
-        printed = self.crew.print_position(self._prints[hand], point)
-        nowhere = np.isnan(printed[0, who])
-        self.crew.give_up(
-            who[nowhere], f"point {point} is not pricked on the print of the {side_name(hand)} photograph"
+        controls = self.controls
+        printed = self.operators.print_position(self._prints[side], point)
+        nowhere = np.isnan(printed[0, active])
+        self.operators.give_up(
+            active[nowhere], f"point {point} is not pricked on the print of the {side_name(side)} photograph"
         )
-        who = who[~nowhere]
-        if not who.size:
+        active = active[~nowhere]
+        if not active.size:
             return
-        seat.counters(who)
-        from_below = seat.rotate_by_swing(who, hand, printed[:, who]) + self._strayed[hand][:, who]
-        origin = seat.under_centre(who, hand)
-        looking = np.arange(who.size)
+        controls.counters(active)
+        from_below = controls.rotate_by_swing(active, side, printed[:, active]) + self._strayed[side][:, active]
+        origin = controls.under_centre(active, side)
+        looking = np.arange(active.size)
         for around in _outward():
-            places = origin + seat.to_counter_units((from_below + around[:, None]) * seat.z[who] / seat.c)
+            places = origin + controls.to_counter_units(
+                (from_below + around[:, None]) * controls.z[active] / controls.c
+            )
             x, y = places[:, looking]
-            went = looking[seat.drive(who[looking], {"X": x, "Y": y})]
-            found = went[~np.isnan(self.view_point(who[went], hand, point)[0])] if went.size else went
-            self._seen_from[:, who[found]] = places[:, found]
+            went = looking[controls.drive(active[looking], {"X": x, "Y": y})]
+            found = went[~np.isnan(self.view_point(active[went], side, point)[0])] if went.size else went
+            self._seen_from[:, active[found]] = places[:, found]
             looking = exclude(looking, found)
             if not looking.size:
                 return
-        looking_on = who[looking]
-        again = correct_fittings(seat, looking_on)
+        looking_on = active[looking]
+        again = correct_fittings(controls, looking_on)
         if again.any():
-            self.bring_into_view(looking_on[again], hand, point)
+            self.bring_into_view(looking_on[again], side, point)
             looking = looking[~again]
-        seat.give_up_on_errors(who[looking], f"{seat.model.name}: looking for point {point}")
-        self.crew.give_up(
-            self.crew.remaining(who[looking]),
-            f"{seat.model.name}: point {point} is nowhere near where the print shows it in the {side_name(hand)} eye, "
+        controls.give_up_on_errors(active[looking], f"{controls.model.name}: looking for point {point}")
+        self.operators.give_up(
+            self.operators.remaining(active[looking]),
+            f"{controls.model.name}: point {point} is nowhere near where the print shows it in the "
+            f"{side_name(side)} eye, "
             f"not within {SEARCH_RINGS * SEARCH_STEP_MM:.0f} mm: wrong picture in the projector, or the base "
             "setting does not belong to this model",
         )
@@ -88,75 +91,81 @@ class Pointing:
         """Return what is not turned any more after so many looks, mm."""
         return self.finest_mm if looks < PATIENT_LOOKS else max(self.finest_mm, IMPATIENT_MM)
 
-    def measure_drift(self, who: Indices, hand: int, point: str, readings: Array) -> None:
+    def measure_drift(self, active: Indices, side: int, point: str, readings: Array) -> None:
         """Bear in mind how far from where the print showed it a point was found, by its readings ``(2 or 3, m)``."""
-        seat = self.seat
-        expected = seat.rotate_by_swing(who, hand, self.crew.print_position(self._prints[hand], point)[:, who])
-        away = seat.to_mm(readings[:2] - seat.under_centre(who, hand))
-        self._strayed[hand][:, who] = away * seat.c / seat.z[who] - expected
+        controls = self.controls
+        expected = controls.rotate_by_swing(
+            active, side, self.operators.print_position(self._prints[side], point)[:, active]
+        )
+        away = controls.to_mm(readings[:2] - controls.under_centre(active, side))
+        self._strayed[side][:, active] = away * controls.c / controls.z[active] - expected
 
-    def view_point(self, who: Indices, hand: int, point: str) -> Array:
+    def view_point(self, active: Indices, side: int, point: str) -> Array:
         """Look: where the image stands from the mark ``(2, m)`` in um, nan where it is not in the field of view."""
-        self.crew.spend(who, self.crew.observer.seconds_to_look, "looking")
-        return self.crew.view_points(who, point, lambda them, name: self.seat.hands.view_point(them, hand, name))
-
-    def bisect(self, who: Indices, hand: int, point: str, errors: Array) -> None:
-        """Turn X and Y until the image seems to lie at the mark; errors ``(2, sessions)`` in um."""
-        seat = self.seat
-        watch = DivergenceMonitor(2, self.crew.size)
-        for looks in range(MAX_LOOKS):
-            seen = self.view_point(who, hand, point)
-            if not watch.is_converging(who, seen):
-                lost = np.isnan(seen[0]) | watch.is_diverging(who, seen).any(axis=0)
-                if lost.any():
-                    self._look_again_with_levers_right(who, hand, point, seen, lost)
-                    self._ran_away(who[lost], hand, point)
-                    who, seen = who[~lost], seen[:, ~lost]
-            steps = (seen + take(errors, who)) * (1e-3 * take(seat.z, who) / seat.c)
-            moving = ~(np.abs(steps) < self.at_rest_mm(looks)).all(axis=0)
-            who = who[moving]
-            if not who.size:
-                return
-            seat.turn(who, seat.to_counter_units(steps[:, moving]))
-        seat.give_up_on_errors(who, f"{seat.model.name}: pointing at {point}")
-        self.crew.give_up(
-            self.crew.remaining(who),
-            f"{seat.model.name}: point {point}: the mark cannot be brought to rest on the image",
+        self.operators.spend(active, self.operators.observer.seconds_to_look, "looking")
+        return self.operators.view_points(
+            active, point, lambda them, name: self.controls.driver.view_point(them, side, name)
         )
 
-    def _look_again_with_levers_right(self, who: Indices, hand: int, point: str, seen: Array, lost: BoolArray) -> None:
+    def bisect(self, active: Indices, side: int, point: str, errors: Array) -> None:
+        """Turn X and Y until the image seems to lie at the mark; errors ``(2, sessions)`` in um."""
+        controls = self.controls
+        watch = DivergenceMonitor(2, self.operators.size)
+        for looks in range(MAX_LOOKS):
+            seen = self.view_point(active, side, point)
+            if not watch.is_converging(active, seen):
+                lost = np.isnan(seen[0]) | watch.is_diverging(active, seen).any(axis=0)
+                if lost.any():
+                    self._look_again_with_levers_right(active, side, point, seen, lost)
+                    self._ran_away(active[lost], side, point)
+                    active, seen = active[~lost], seen[:, ~lost]
+            steps = (seen + take(errors, active)) * (1e-3 * take(controls.z, active) / controls.c)
+            moving = ~(np.abs(steps) < self.at_rest_mm(looks)).all(axis=0)
+            active = active[moving]
+            if not active.size:
+                return
+            controls.turn(active, controls.to_counter_units(steps[:, moving]))
+        controls.give_up_on_errors(active, f"{controls.model.name}: pointing at {point}")
+        self.operators.give_up(
+            self.operators.remaining(active),
+            f"{controls.model.name}: point {point}: the mark cannot be brought to rest on the image",
+        )
+
+    def _look_again_with_levers_right(
+        self, active: Indices, side: int, point: str, seen: Array, lost: BoolArray
+    ) -> None:
         """Put right the levers of those from whom a point ran away, go back to where it was seen and look, in place."""
         away = np.flatnonzero(lost)
-        mended = away[correct_fittings(self.seat, who[away])]
+        mended = away[correct_fittings(self.controls, active[away])]
         if mended.size:
-            self._go_back(who[mended])
-            seen[:, mended] = self.view_point(who[mended], hand, point)
+            self._go_back(active[mended])
+            seen[:, mended] = self.view_point(active[mended], side, point)
             lost[mended] = np.isnan(seen[0, mended])
 
-    def _go_back(self, who: Indices) -> None:
-        self.seat.drive(who, {"X": self._seen_from[0, who], "Y": self._seen_from[1, who]})
+    def _go_back(self, active: Indices) -> None:
+        self.controls.drive(active, {"X": self._seen_from[0, active], "Y": self._seen_from[1, active]})
 
-    def _ran_away(self, who: Indices, hand: int, point: str) -> None:
-        for session in who:
+    def _ran_away(self, active: Indices, side: int, point: str) -> None:
+        for session in active:
             one = np.array([session])
-            self.crew.give_up(
+            self.operators.give_up(
                 one,
-                f"{self.seat.model.name}: point {point} runs away from the mark in the {side_name(hand)} eye: "
-                f"{self._why_it_ran_away(one, hand, point)}",
+                f"{self.controls.model.name}: point {point} runs away from the mark in the {side_name(side)} eye: "
+                f"{self._why_it_ran_away(one, side, point)}",
             )
 
-    def _why_it_ran_away(self, one: Indices, hand: int, point: str) -> str:
+    def _why_it_ran_away(self, one: Indices, side: int, point: str) -> str:
         """Go back to where the point was seen and try each wheel to find out what is wrong."""
-        seat = self.seat
+        controls = self.controls
         reasons = []
         for axis, mirror, fitting in (
             (0, "left to right", "diapositive lever"),
             (1, "top to bottom", "Dove prisms"),
         ):
             self._go_back(one)
-            counters, seen = seat.counters(one), self.view_point(one, hand, point)
-            seat.turn(one, np.eye(2)[:, [axis]])
-            counters_then, seen_then = seat.counters(one), self.view_point(one, hand, point)
+            counters, seen = controls.counters(one), self.view_point(one, side, point)
+            controls.turn(one, np.eye(2)[:, [axis]])
+            counters_then, seen_then = controls.counters(one), self.view_point(one, side, point)
             if counters_then[axis, 0] < counters[axis, 0]:
                 reasons.append(f"the {'XY'[axis]} wheel turns the wrong way (its collar)")
             elif seen_then[axis, 0] > seen[axis, 0]:
@@ -172,28 +181,28 @@ class DivergenceMonitor:
         self._times = np.zeros((displacements, sessions), dtype=int)
         self._any_grew = False
 
-    def is_converging(self, who: Indices, seen: Array) -> bool:
+    def is_converging(self, active: Indices, seen: Array) -> bool:
         """Whether all displacements ``(k, m)`` in um are seen and small, and none ever grew; if not, ask on."""
         now = np.abs(seen)
         well = not self._any_grew and bool(now.max(initial=0.0) <= DIVERGENCE_UM)
         if well:
-            put(now, who, self._before)
+            put(now, active, self._before)
         return well
 
-    def has_grown(self, who: Indices) -> BoolArray:
+    def has_grown(self, active: Indices) -> BoolArray:
         """Return which of the displacements ``(k, m)`` had grown when they were last seen."""
-        return take(self._times, who) > 0
+        return take(self._times, active) > 0
 
-    def is_diverging(self, who: Indices, seen: Array) -> BoolArray:
+    def is_diverging(self, active: Indices, seen: Array) -> BoolArray:
         """Return which of the displacements ``(k, m)`` in um have grown in look after look."""
         now = np.abs(seen)
-        grown = (now > 1.4 * take(self._before, who)) & (now > DIVERGENCE_UM)
-        put(now, who, self._before)
+        grown = (now > 1.4 * take(self._before, active)) & (now > DIVERGENCE_UM)
+        put(now, active, self._before)
         if not grown.any() and not self._any_grew:
             return grown
         self._any_grew = True
-        times = np.where(grown, take(self._times, who) + 1, 0)
-        self._times[:, who] = times
+        times = np.where(grown, take(self._times, active) + 1, 0)
+        self._times[:, active] = times
         return np.asarray(times >= DIVERGENCE_LOOKS)
 
 

@@ -73,7 +73,7 @@ class OrientationRecord:
 class RoundBatch:
     """A round of those sessions that measured in it; arrays have all sessions as their last axis."""
 
-    who: Indices
+    active: Indices
     settings: Mapping[str, Array]
     parallaxes: Mapping[str, Array]
     mean: Array
@@ -85,7 +85,7 @@ class RoundBatch:
     @cached_property
     def sessions(self) -> frozenset[int]:
         """Who measured in it, to ask for one."""
-        return frozenset(self.who.tolist())
+        return frozenset(self.active.tolist())
 
     def of(self, session: int) -> Round:
         """Return one session's round."""
@@ -194,8 +194,8 @@ def unknown_elements(method: str, model: ModelJob) -> tuple[str, ...]:
 
 
 def relative_orientation(
-    bench: Workstation,
-    who: Indices,
+    workstation: Workstation,
+    active: Indices,
     model: ModelJob,
     method: str,
     case: str,
@@ -210,25 +210,31 @@ def relative_orientation(
     mean goes on by' (dependent: on the by that was turned). Those whose residual parallaxes at all standard points
     then have a larger rms than tolerated, in mm, give up, and so do those whose prints show too few of the points.
     """
-    crew, seat = bench.crew, bench.seat
-    if not seat.has_parallax_elements:
-        crew.give_up(
-            who, f"an {seat.manual.name} has no by' and by\" to measure parallaxes with: it is oriented empirically"
+    operators, controls = workstation.operators, workstation.controls
+    if not controls.has_parallax_elements:
+        operators.give_up(
+            active,
+            f"an {controls.manual.name} has no by' and by\" to measure parallaxes with: it is oriented empirically",
         )
         raise AllGaveUpError
     done = []
     positions = {model.standard_points[label]: label for label in model.all_positions()}
-    for them, points in bench.group_by_points(who, list(positions)):
+    for them, points in workstation.group_by_points(active, list(positions)):
         there = [positions[point] for point in points]
         labels = [label for label in there if label in CASES[case]]
         if determine_orientation(labels):
-            found = _oriented(bench, them, model, method, case, labels, readings, base)
+            found = _oriented(workstation, them, model, method, case, labels, readings, base)
             done.append(
-                (them, assess_residuals(bench, crew.remaining(them), model, found, there, readings, tolerated_rms))
+                (
+                    them,
+                    assess_residuals(
+                        workstation, operators.remaining(them), model, found, there, readings, tolerated_rms
+                    ),
+                )
             )
         else:
-            crew.give_up(them, _too_few(model, case, labels))
-    return merge_groups(done, method, case, crew.size, "numerical")
+            operators.give_up(them, _too_few(model, case, labels))
+    return merge_groups(done, method, case, operators.size, "numerical")
 
 
 def _too_few(model: ModelJob, case: str, labels: Sequence[str]) -> str:
@@ -239,8 +245,8 @@ def _too_few(model: ModelJob, case: str, labels: Sequence[str]) -> str:
 
 
 def _oriented(
-    bench: Workstation,
-    who: Indices,
+    workstation: Workstation,
+    active: Indices,
     model: ModelJob,
     method: str,
     case: str,
@@ -249,44 +255,44 @@ def _oriented(
     base: float,
 ) -> OrientationRecordBatch:
     """Return what came of the rounds on the points at some positions, the best settings standing."""
-    crew, seat, plan = bench.crew, bench.seat, bench.job.plan
+    operators, controls, plan = workstation.operators, workstation.controls, workstation.job.plan
     unknowns = unknown_elements(method, model)
     measured_with = {"both": (1, 2), "by1": (1,), "by2": (2,)}[plan.measure_with]
     points = [model.standard_points[label] for label in labels]
     rounds: list[RoundBatch] = []
-    done, rough_rounds = np.zeros((2, crew.size), dtype=np.intp)
-    best = _Best(unknowns, crew.size)
-    measuring = who
+    done, rough_rounds = np.zeros((2, operators.size), dtype=np.intp)
+    best = _Best(unknowns, operators.size)
+    measuring = active
     while measuring.size:
-        settings = expand_to_batch(seat.elements(measuring, unknowns), measuring, crew.size)
-        bench.begin_round(measuring, int(done[measuring].max()) + 1)
-        seen = bench.parallaxes(measuring, points, readings, measured_with)
-        measuring = crew.remaining(measuring)
+        settings = expand_to_batch(controls.elements(measuring, unknowns), measuring, operators.size)
+        workstation.begin_round(measuring, int(done[measuring].max()) + 1)
+        seen = workstation.parallaxes(measuring, points, readings, measured_with)
+        measuring = operators.remaining(measuring)
         apart = seen.disagrees(measuring)
         together = exclude(measuring, apart)
         rough_rounds[apart] += 1
-        _bring_together(bench, apart, model, points, unknowns, base, seen.disagreement, rough_rounds)
+        _bring_together(workstation, apart, model, points, unknowns, base, seen.disagreement, rough_rounds)
         done[together] += 1
         mean, rms = _mean_and_rms(seen.parallax_mm, together)
         falling = together[rms[together] < STILL_FALLING * best.rms[together]]
         best.see(together, settings, mean, rms)
         to_clear = seen.parallax_mm - mean if method == "independent" else seen.parallax_mm
         corrections, sigmas = compute_corrections(
-            bench, falling, model, seen.places, to_clear, unknowns, np.full(falling.size, base), labels
+            workstation, falling, model, seen.places, to_clear, unknowns, np.full(falling.size, base), labels
         )
-        falling = crew.remaining(falling)
+        falling = operators.remaining(falling)
         rounds.append(
             RoundBatch(together, settings, dict(zip(labels, seen.parallax_mm, strict=True)), mean, rms, falling, sigmas)
         )
         if falling.size:
-            noted = crew.noted_elements(falling, settings, rounds[-2].settings if len(rounds) > 1 else {})
-            seat.set_elements(falling, {n: (noted[n] + corrections[n])[falling] for n in unknowns})
-        measuring = crew.remaining(np.sort(np.concatenate([falling, apart])))
+            noted = operators.noted_elements(falling, settings, rounds[-2].settings if len(rounds) > 1 else {})
+            controls.set_elements(falling, {n: (noted[n] + corrections[n])[falling] for n in unknowns})
+        measuring = operators.remaining(np.sort(np.concatenate([falling, apart])))
         measuring = measuring[done[measuring] < MAX_ROUNDS]
-    who = crew.remaining(who)
-    seat.set_if_changed(who, {name: kept[who] for name, kept in best.settings.items()})
-    _set_mean_on_by(bench, who, model, "by1" if method == "independent" else unknowns[3], best.mean)
-    bench.begin_round(who, int(done[who].max(initial=0)) + 1)
+    active = operators.remaining(active)
+    controls.set_if_changed(active, {name: kept[active] for name, kept in best.settings.items()})
+    _set_mean_on_by(workstation, active, model, "by1" if method == "independent" else unknowns[3], best.mean)
+    workstation.begin_round(active, int(done[active].max(initial=0)) + 1)
     return OrientationRecordBatch(method, case, rounds, rough_rounds, {}, {}, {})
 
 
@@ -298,12 +304,12 @@ def merge_groups(
     elements: dict[str, Array] = {}
     residuals = {label: np.full(sessions, np.nan) for label in labels}
     places = {label: np.full((3, sessions), np.nan) for label in labels}
-    for who, found in groups:
+    for active, found in groups:
         for name, counts in found.elements.items():
-            elements.setdefault(name, np.zeros(sessions))[who] = counts[who]
+            elements.setdefault(name, np.zeros(sessions))[active] = counts[active]
         for label in found.residuals:
-            residuals[label][who] = found.residuals[label][who]
-            places[label][:, who] = found.places[label][:, who]
+            residuals[label][active] = found.residuals[label][active]
+            places[label][:, active] = found.places[label][:, active]
     rounds = [each for _, found in groups for each in found.rounds]
     rough = np.sum([found.rough_rounds for _, found in groups], axis=0, dtype=np.intp)
     return OrientationRecordBatch(
@@ -319,26 +325,26 @@ class _Best:
         self.mean = np.zeros(sessions)
         self.rms = np.full(sessions, np.inf)
 
-    def see(self, who: Indices, settings: Mapping[str, Array], mean: Array, rms: Array) -> None:
+    def see(self, active: Indices, settings: Mapping[str, Array], mean: Array, rms: Array) -> None:
         """Keep the settings where the rms is smaller than any before."""
-        better = who[rms[who] < self.rms[who]]
+        better = active[rms[active] < self.rms[active]]
         self.mean[better], self.rms[better] = mean[better], rms[better]
         for name, kept in self.settings.items():
             kept[better] = settings[name][better]
 
 
-def _mean_and_rms(p: Array, who: Indices) -> tuple[Array, Array]:
+def _mean_and_rms(p: Array, active: Indices) -> tuple[Array, Array]:
     """Return the mean parallax, none while they are gross, and the rms about it ``(sessions,)``."""
     gross = np.sqrt(np.mean(p**2, axis=0)) > GROSS_MM
     mean = np.where(gross, 0.0, p.mean(axis=0))
     rms = np.full(p.shape[-1], np.nan)
-    rms[who] = np.sqrt(np.mean((p - mean) ** 2, axis=0))[who]
+    rms[active] = np.sqrt(np.mean((p - mean) ** 2, axis=0))[active]
     return mean, rms
 
 
 def assess_residuals(
-    bench: Workstation,
-    who: Indices,
+    workstation: Workstation,
+    active: Indices,
     model: ModelJob,
     found: OrientationRecordBatch,
     labels: Sequence[str],
@@ -346,26 +352,28 @@ def assess_residuals(
     tolerated_rms: float,
 ) -> OrientationRecordBatch:
     """Return an orientation with what is left at standard points; those for whom it is too much give up."""
-    crew = bench.crew
+    operators = workstation.operators
     names = [model.standard_points[label] for label in labels]
-    measured = bench.seat.has_parallax_elements
-    left = bench.parallaxes(who, names, readings) if measured else bench.look_at_parallaxes(who, names)
-    who = crew.remaining(who)
-    apart = left.disagrees(who)
-    crew.give_up(
+    measured = workstation.controls.has_parallax_elements
+    left = (
+        workstation.parallaxes(active, names, readings) if measured else workstation.look_at_parallaxes(active, names)
+    )
+    active = operators.remaining(active)
+    apart = left.disagrees(active)
+    operators.give_up(
         apart, lambda session: f"{model.name}: the images of {left.disagreement[session]} cannot be fused any more"
     )
-    who = crew.remaining(who)
-    there = [name for name in ALL_ELEMENTS if name in bench.seat.manual.elements]
+    active = operators.remaining(active)
+    there = [name for name in ALL_ELEMENTS if name in workstation.controls.manual.elements]
     orientations = replace(
         found,
-        elements=expand_to_batch(bench.seat.elements(who, there), who, crew.size),
+        elements=expand_to_batch(workstation.controls.elements(active, there), active, operators.size),
         residuals=dict(zip(labels, left.parallax_mm, strict=True)),
         places=dict(zip(labels, np.moveaxis(left.places, 1, 0), strict=True)),
     )
     rms, worst = orientations.rms, np.abs(left.parallax_mm).argmax(axis=0)
-    crew.give_up(
-        who[rms[who] > tolerated_rms],
+    operators.give_up(
+        active[rms[active] > tolerated_rms],
         lambda session: (
             f"{model.name}: y-parallaxes of {rms[session]:.3f} mm rms remain, {tolerated_rms:.3f} tolerated; the "
             f"largest is {left.parallax_mm[worst[session], session]:+.3f} at point {names[worst[session]]}: "
@@ -376,23 +384,25 @@ def assess_residuals(
     return orientations
 
 
-def expand_to_batch(values: Mapping[str, Array], who: Indices, sessions: int) -> dict[str, Array]:
+def expand_to_batch(values: Mapping[str, Array], active: Indices, sessions: int) -> dict[str, Array]:
     """Return values ``(m,)`` of those who act among all sessions."""
     spread = {name: np.zeros(sessions) for name in values}
     for name, each in values.items():
-        spread[name][who] = each
+        spread[name][active] = each
     return spread
 
 
-def _set_mean_on_by(bench: Workstation, who: Indices, model: ModelJob, by: str, mean: Array) -> None:
-    if who.size:
+def _set_mean_on_by(workstation: Workstation, active: Indices, model: ModelJob, by: str, mean: Array) -> None:
+    if active.size:
         sense = 1.0 if model.side_of(int(by[-1])) == 1 else -1.0
-        bench.seat.set_elements(who, {by: bench.seat.elements(who, [by])[by] + sense * mean[who]})
+        workstation.controls.set_elements(
+            active, {by: workstation.controls.elements(active, [by])[by] + sense * mean[active]}
+        )
 
 
 def _bring_together(
-    bench: Workstation,
-    who: Indices,
+    workstation: Workstation,
+    active: Indices,
     model: ModelJob,
     points: Sequence[str],
     unknowns: Sequence[str],
@@ -401,35 +411,35 @@ def _bring_together(
     rough_rounds: npt.NDArray[np.intp],
 ) -> None:
     """Orient roughly, where images are too far apart for by, from the Y readings of each eye alone."""
-    crew, seat = bench.crew, bench.seat
-    crew.give_up(
-        who[rough_rounds[who] > MAX_ROUGH_ROUNDS],
+    operators, controls = workstation.operators, workstation.controls
+    operators.give_up(
+        active[rough_rounds[active] > MAX_ROUGH_ROUNDS],
         lambda session: f"{model.name}: the images of {apart[session]} stay too far apart to be fused",
     )
-    for session in crew.remaining(who):
+    for session in operators.remaining(active):
         one = np.array([session])
-        crew.remark(
+        operators.remark(
             one,
             f"{model.name}: the images of {apart[session]} are too far apart for by: rough orientation, each eye alone",
         )
-        level = float(seat.counters(one)[2, 0])
-        readings = [bench.point_monocularly(one, hand, points, level) for hand in (1, 2)]
-        if not crew.remaining(one).size:
+        level = float(controls.counters(one)[2, 0])
+        readings = [workstation.point_monocularly(one, side, points, level) for side in (1, 2)]
+        if not operators.remaining(one).size:
             continue
-        left, right = (seat.frame_positions(one, each[:, :, one], np.array([level])) for each in readings)
+        left, right = (controls.frame_positions(one, each[:, :, one], np.array([level])) for each in readings)
         where_they_meet = base / (left[0] - right[0] + base)
-        places, parallaxes = np.zeros((3, *left.shape[1:-1], crew.size)), np.zeros((len(points), crew.size))
+        places, parallaxes = np.zeros((3, *left.shape[1:-1], operators.size)), np.zeros((len(points), operators.size))
         parallaxes[:, one] = (left[1] - right[1]) * where_they_meet
         places[:, :, one] = left * where_they_meet
-        settings = seat.elements(one, unknowns)
-        corrections, _ = compute_corrections(bench, one, model, places, parallaxes, unknowns, np.array([base]))
-        if crew.remaining(one).size:
-            seat.set_elements(one, {name: settings[name] + corrections[name][one] for name in unknowns})
+        settings = controls.elements(one, unknowns)
+        corrections, _ = compute_corrections(workstation, one, model, places, parallaxes, unknowns, np.array([base]))
+        if operators.remaining(one).size:
+            controls.set_elements(one, {name: settings[name] + corrections[name][one] for name in unknowns})
 
 
 def compute_corrections(
-    bench: Workstation,
-    who: Indices,
+    workstation: Workstation,
+    active: Indices,
     model: ModelJob,
     places: Array,
     parallaxes: Array,
@@ -442,28 +452,29 @@ def compute_corrections(
     Places ``(3, n, sessions)`` and parallaxes ``(n, sessions)`` in mm, bases ``(m,)``; labels are the positions, which
     a closed form asks for. Those whose points do not determine the elements give up.
     """
-    nothing = {name: np.zeros(bench.crew.size) for name in unknowns}
-    if not who.size:
+    nothing = {name: np.zeros(workstation.operators.size) for name in unknowns}
+    if not active.size:
         return nothing, nothing
     hands = [f"{name[:-1]}{model.side_of(int(name[-1]))}" for name in unknowns]
-    left = projector_pose(bench, who, model.left_projector, np.zeros(who.size))
-    right = projector_pose(bench, who, model.right_projector, base)
-    bench.compute(who)
-    in_frame = places[:, :, who] * np.array([1.0, 1.0, -1.0])[:, None, None]
+    left = projector_pose(workstation, active, model.left_projector, np.zeros(active.size))
+    right = projector_pose(workstation, active, model.right_projector, base)
+    workstation.compute(active)
+    in_frame = places[:, :, active] * np.array([1.0, 1.0, -1.0])[:, None, None]
     try:
-        solution = element_corrections(parallaxes[:, who], in_frame, left, right, hands)
+        solution = element_corrections(parallaxes[:, active], in_frame, left, right, hands)
     except Undetermined as undetermined:
-        bench.crew.give_up(who, f"{model.name}: {undetermined}")
+        workstation.operators.give_up(active, f"{model.name}: {undetermined}")
         return nothing, nothing
     factors = np.array([1.0 if name[:2] in ("by", "bz") else 1.0 / GON for name in unknowns])[:, None]
     found = np.array([solution.unknowns, solution.sigmas])
-    if bench.job.plan.solution == "hallert":
-        on_pattern = _on_pattern(bench, who, labels, places[:, :, who], base)
+    if workstation.job.plan.solution == "hallert":
+        on_pattern = _on_pattern(workstation, active, labels, places[:, :, active], base)
         if on_pattern.any():
-            b, d, h = _pattern(places[:, :, who[on_pattern]], base[on_pattern])
-            found[:, :, on_pattern] = regular_corrections(parallaxes[:, who[on_pattern]], b, d, h, hands)
+            b, d, h = _pattern(places[:, :, active[on_pattern]], base[on_pattern])
+            found[:, :, on_pattern] = regular_corrections(parallaxes[:, active[on_pattern]], b, d, h, hands)
     values, sigmas = (
-        expand_to_batch(dict(zip(unknowns, factors * each, strict=True)), who, bench.crew.size) for each in found
+        expand_to_batch(dict(zip(unknowns, factors * each, strict=True)), active, workstation.operators.size)
+        for each in found
     )
     return values, sigmas
 
@@ -475,26 +486,31 @@ def _pattern(places: Array, base: Array) -> tuple[Array, Array, Array]:
     return base, (rows @ y) / np.abs(rows).sum(), z.mean(axis=0)
 
 
-def _on_pattern(bench: Workstation, who: Indices, labels: Sequence[str], places: Array, base: Array) -> BoolArray:
+def _on_pattern(
+    workstation: Workstation, active: Indices, labels: Sequence[str], places: Array, base: Array
+) -> BoolArray:
     """Return whose points ``(3, n, m)`` lie near enough to the pattern of six or nine for the closed form."""
     if not labels:
-        return np.zeros(who.size, dtype=bool)
+        return np.zeros(active.size, dtype=bool)
     if "".join(labels) not in (CASES["A"], CASES["D"]):
-        bench.crew.remark(
-            who, f"{bench.seat.model.name}: no closed form for the points {' '.join(labels)}, so by least squares"
+        workstation.operators.remark(
+            active,
+            f"{workstation.controls.model.name}: no closed form for the points {' '.join(labels)}, so by least squares",
         )
-        return np.zeros(who.size, dtype=bool)
+        return np.zeros(active.size, dtype=bool)
     pattern = np.array(_pattern(places, base))
     x, y = np.array(REGULAR_POINTS)[:, : len(labels), None]
     off = np.abs(places - [x * pattern[0], y * pattern[1], np.broadcast_to(pattern[2], places[2].shape)])
     near = np.asarray((off <= OFF_PATTERN * pattern[2]).all(axis=(0, 1)))
-    bench.crew.remark(who[~near], f"{bench.seat.model.name}: the points lie off the pattern, so by least squares")
+    workstation.operators.remark(
+        active[~near], f"{workstation.controls.model.name}: the points lie off the pattern, so by least squares"
+    )
     return near
 
 
-def projector_pose(bench: Workstation, who: Indices, projector: int, x: Array) -> ProjectorPose:
+def projector_pose(workstation: Workstation, active: Indices, projector: int, x: Array) -> ProjectorPose:
     """Return how projectors stand by their counters, the centres at x ``(m,)`` of the instrument frame."""
-    counts = bench.seat.elements(who, [f"{name}{projector}" for name in (*TILTS, "by", "bz")])
-    omega, phi, kappa = bench.seat.manual.tilts(counts, projector)
+    counts = workstation.controls.elements(active, [f"{name}{projector}" for name in (*TILTS, "by", "bz")])
+    omega, phi, kappa = workstation.controls.manual.tilts(counts, projector)
     by, bz = counts[f"by{projector}"], counts[f"bz{projector}"]
     return ProjectorPose(np.array([x, -by, bz]), GON * np.array([omega, phi, wrap_gon(kappa)]))

@@ -113,9 +113,9 @@ class Slips:
         """Take one of the points near for the point of the occasion, if that happens; `factor` is that of the rate."""
         if not near:
             return
-        planted, dice = self._planted_here(each, ("wrong point",)), self._dice[each.session]
-        if planted or dice.slip_draws(self._rate("wrong point") * factor):
-            other = near[0 if planted else dice.choice(len(near))]
+        planted, random = self._planted_here(each, ("wrong point",)), self._dice[each.session]
+        if planted or random.slip_draws(self._rate("wrong point") * factor):
+            other = near[0 if planted else random.choice(len(near))]
             self._taken[each.session] = (each.point, other)
             self._happened(each, "wrong point", each.point, other)
 
@@ -145,7 +145,7 @@ class Slips:
         return written
 
     def _written(self, each: SlipContext, shown: float, misread: float, factor: float) -> tuple[SlipKind | None, float]:
-        dice = self._dice[each.session]
+        random = self._dice[each.session]
         if self._planted[each.session]:
             possible = _written_wrongly(shown, each.item)
             planted = self._planted_here(each, _plain_to_see(possible, shown))
@@ -154,8 +154,8 @@ class Slips:
         if abs(misread - shown) > LAST_DIGIT / 2.0:
             return "last digit" if abs(misread - shown) < 1.5 * LAST_DIGIT else "gross", misread
         for kind, ways in _written_wrongly(shown, each.item).items():
-            if kind in _RATES and dice.slip_draws(self._rate(kind) * factor):
-                return kind, ways[dice.choice(len(ways))]
+            if kind in _RATES and random.slip_draws(self._rate(kind) * factor):
+                return kind, ways[random.choice(len(ways))]
         return None, misread
 
     def note_entry(self, session: int, point: str, item: str, number: int) -> None:

@@ -116,24 +116,24 @@ class StereoPatch:
 class StereoView:
     """The eyes of one person at a line on the ground at the mark."""
 
-    def __init__(self, bench: Workstation, person: Person) -> None:
-        self._bench = bench
+    def __init__(self, workstation: Workstation, person: Person) -> None:
+        self._workstation = workstation
         self._person = person
-        self._who = np.zeros(1, dtype=np.intp)
+        self._active = np.zeros(1, dtype=np.intp)
         self._elements: dict[str, float] = {}
         self.read_projectors()
 
     def read_projectors(self) -> None:
         """Read off how the projectors stand."""
         names = [f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz", "c") for n in (1, 2)]
-        counts = self._bench.seat.elements(self._who, [*names, "bx"])
+        counts = self._workstation.controls.elements(self._active, [*names, "bx"])
         self._elements = {name: float(each[0]) for name, each in counts.items()}
 
-    def camera(self, hand: int) -> tuple[Array, Array]:
+    def camera(self, side: int) -> tuple[Array, Array]:
         """Return centre ``(3,)`` and rotation ``(3, 3)`` of the left-hand (1) or right-hand (2) photograph's camera."""
-        n = self._bench.seat.projector(hand)
-        turned = rotation(*(tilt * GON for tilt in self._bench.seat.manual.tilts(self._elements, n)))
-        x = 0.0 if hand == 1 else self._elements["bx"]
+        n = self._workstation.controls.projector(side)
+        turned = rotation(*(tilt * GON for tilt in self._workstation.controls.manual.tilts(self._elements, n)))
+        x = 0.0 if side == 1 else self._elements["bx"]
         centre = np.array([x, -self._elements[f"by{n}"], self._elements[f"bz{n}"]])
         return centre, turned
 
@@ -141,9 +141,9 @@ class StereoView:
         """Return the derivatives ``(2 eyes, 2, 3)`` of what the eyes see by displacements from the mark ``(3,)``."""
         steps = _NUDGE_MM * np.concatenate([np.eye(3), -np.eye(3)], axis=1)
         seen = []
-        for hand in (1, 2):
-            n = self._bench.seat.projector(hand)
-            centre, turned = self.camera(hand)
+        for side in (1, 2):
+            n = self._workstation.controls.projector(side)
+            centre, turned = self.camera(side)
             images = image_of((mark[:, None] + steps), centre[:, None], turned, self._elements[f"c{n}"])
             swing = plane_rotation(self._elements[f"kappa{n}"] * GON)
             seen.append(swing @ (images[:, :3] - images[:, 3:]) / (2.0 * _NUDGE_MM))
@@ -151,9 +151,13 @@ class StereoView:
 
     def look(self, pitch: float = FINE_MM) -> StereoPatch:
         """Look with both eyes, a picture element being so many mm of the photographs; whoever looks spends the time."""
-        bench = self._bench
-        mark = bench.seat.model_position(self._who, bench.seat.counters(self._who))[:, 0] * (1.0, 1.0, -1.0)
-        magnification = 2.0 * bench.seat.manual.field_radius_mm / (SIDE * pitch)
+        workstation = self._workstation
+        mark = workstation.controls.model_position(self._active, workstation.controls.counters(self._active))[:, 0] * (
+            1.0,
+            1.0,
+            -1.0,
+        )
+        magnification = 2.0 * workstation.controls.manual.field_radius_mm / (SIDE * pitch)
         pictures = np.array([self._picture(eye, magnification) for eye in (1, 2)])
         shown = self.displacements(mark)
         return StereoPatch(pictures, pitch, shown, pitch / float(np.abs(np.linalg.det(shown[0, :, :2])) ** 0.5))

@@ -34,11 +34,11 @@ class Timesheet:
         self.by_activity: dict[str, Array] = defaultdict(partial(np.zeros, sessions))
         self.by_act: dict[str, Array] = defaultdict(partial(np.zeros, sessions))
 
-    def add(self, who: Indices, seconds: float, form: str, act: Act) -> None:
+    def add(self, active: Indices, seconds: float, form: str, act: Act) -> None:
         """Write down that those who act spent so many seconds each."""
         activity = _OF_ACT.get(act) or _OF_FORM.get(form, form)
-        add_at(seconds, who, self.by_activity[activity])
-        add_at(seconds, who, self.by_act[act])
+        add_at(seconds, active, self.by_activity[activity])
+        add_at(seconds, active, self.by_act[act])
 
     def activities_of(self, session: int) -> dict[str, float]:
         """Return the seconds of one session by activity, in the order in which they were first taken up."""

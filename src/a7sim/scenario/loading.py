@@ -68,8 +68,8 @@ def load_scenario(
     path = find_scenario(name)
     try:
         raw = _with_skill_as_table(read_toml(path))
-    except A7SimError as mistake:
-        raise ScenarioError(str(path), [str(mistake).removeprefix(str(path)).lstrip(":, ")]) from mistake
+    except A7SimError as error:
+        raise ScenarioError(str(path), [str(error).removeprefix(str(path)).lstrip(":, ")]) from error
     for key, text in (overrides or {}).items():
         _set(raw, key, _value_of(text), f"--set {key}={text}")
     for key, value in (settings or {}).items():

@@ -26,8 +26,8 @@ def run_all_methods(
     out: Path | None = None,
     watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    cable: PortAdapter = direct,
-    keeping: JournalOptions | None = None,
+    port_adapter: PortAdapter = direct,
+    journal_options: JournalOptions | None = None,
 ) -> Document:
     """Measure the strip of a scenario in every way it asks for and return the document of results.
 
@@ -37,7 +37,7 @@ def run_all_methods(
     Raises Mistake for what does not make a strip.
     """
     if "plotter" in scenario.work:
-        document = run(scenario, seed, out, watcher, force, cable, keeping)
+        document = run(scenario, seed, out, watcher, force, port_adapter, journal_options)
     else:
         document = results.results_header(scenario, seed) | {"status": "complete", "message": ""}
         if out is not None:

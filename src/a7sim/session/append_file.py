@@ -33,7 +33,7 @@ class AppendOnlyFile:
         self._path = path
         self._durability = durability
         self._size = size
-        self._trouble: JournalWriteError | None = None
+        self._error: JournalWriteError | None = None
         self._pending = threading.Event()
         self._closing = threading.Event()
         try:
@@ -54,8 +54,8 @@ class AppendOnlyFile:
 
         Raises JournalStopped where that fails: then the line is not there, and no other can be added.
         """
-        if self._trouble is not None:
-            raise self._trouble
+        if self._error is not None:
+            raise self._error
         try:
             written = os.write(self._file, line)
             while written < len(line):
@@ -74,11 +74,11 @@ class AppendOnlyFile:
         self._pending.set()
         if self._syncing.is_alive():
             self._syncing.join()
-        if self._durability != "none" and self._trouble is None:
+        if self._durability != "none" and self._error is None:
             self._sync()
         os.close(self._file)
-        if self._trouble is not None:
-            raise self._trouble
+        if self._error is not None:
+            raise self._error
 
     def _sync_now_and_then(self) -> None:
         while not self._closing.is_set():
@@ -94,10 +94,10 @@ class AppendOnlyFile:
             self._failed(error)
 
     def _failed(self, error: OSError) -> JournalWriteError:
-        self._trouble = write_failure_message(self._path, error)
+        self._error = write_failure_message(self._path, error)
         with suppress(OSError):
             os.ftruncate(self._file, self._size)
-        return self._trouble
+        return self._error
 
 
 def is_being_written(path: Path) -> bool:

@@ -14,93 +14,93 @@ from a7sim.operator.driver import BoolArray
 class BatchDriver:
     """`Hands` on a fleet: numbers cross as the command language would print them."""
 
-    def __init__(self, fleet: AutographBatch) -> None:
-        self._fleet = fleet
+    def __init__(self, batch: AutographBatch) -> None:
+        self._batch = batch
 
     def variant(self) -> str:
-        return self._fleet.variant.name
+        return self._batch.variant.name
 
-    def reset(self, who: Indices) -> None:
-        self._fleet.reset(who)
+    def reset(self, active: Indices) -> None:
+        self._batch.reset(active)
 
-    def set_height_gear(self, who: Indices, height_gear: str | float, plan_gear: str) -> None:
-        self._fleet.set_height_gear(who, height_gear)
+    def set_height_gear(self, active: Indices, height_gear: str | float, plan_gear: str) -> None:
+        self._batch.set_height_gear(active, height_gear)
 
-    def set_base_mode(self, who: Indices, mode: str) -> None:
-        self._fleet.set_base_mode(who, mode)
+    def set_base_mode(self, active: Indices, mode: str) -> None:
+        self._batch.set_base_mode(active, mode)
 
-    def set_fitting(self, who: Indices, name: str, position: str) -> None:
-        self._fleet.set_fitting(who, name, position)
+    def set_fitting(self, active: Indices, name: str, position: str) -> None:
+        self._batch.set_fitting(active, name, position)
 
-    def fitting(self, who: Indices, name: str) -> npt.NDArray[np.str_]:
-        return self._fleet.fitting(who, name)
+    def fitting(self, active: Indices, name: str) -> npt.NDArray[np.str_]:
+        return self._batch.fitting(active, name)
 
-    def set_element(self, who: Indices, name: str, values: Array) -> None:
-        self._fleet.set_element(who, name, values.round(2))
+    def set_element(self, active: Indices, name: str, values: Array) -> None:
+        self._batch.set_element(active, name, values.round(2))
 
-    def turn_element(self, who: Indices, name: str, amounts: Array) -> None:
-        self._fleet.turn_element(who, name, amounts.round(5))
+    def turn_element(self, active: Indices, name: str, amounts: Array) -> None:
+        self._batch.turn_element(active, name, amounts.round(5))
 
-    def preset(self, who: Indices, readings: Mapping[str, float]) -> None:
+    def preset(self, active: Indices, readings: Mapping[str, float]) -> None:
         for axis, reading in readings.items():
-            self._fleet.preset(who, axis, round(reading, 2))
+            self._batch.preset(active, axis, round(reading, 2))
 
-    def preset_one(self, who: Indices, axis: str, readings: Array) -> None:
-        for session, reading in zip(who, readings.tolist(), strict=True):
-            self._fleet.preset(np.array([session]), axis, round(reading, 2))
+    def preset_one(self, active: Indices, axis: str, readings: Array) -> None:
+        for session, reading in zip(active, readings.tolist(), strict=True):
+            self._batch.preset(np.array([session]), axis, round(reading, 2))
 
-    def load(self, who: Indices, projector: int, photograph: str) -> None:
-        self._fleet.load(who, projector, photograph)
+    def load(self, active: Indices, projector: int, photograph: str) -> None:
+        self._batch.load(active, projector, photograph)
 
-    def unload(self, who: Indices, projector: int) -> None:
-        self._fleet.unload(who, projector)
+    def unload(self, active: Indices, projector: int) -> None:
+        self._batch.unload(active, projector)
 
-    def loaded(self, who: Indices, projector: int) -> str:
-        return self._fleet.loaded(projector)
+    def loaded(self, active: Indices, projector: int) -> str:
+        return self._batch.loaded(projector)
 
-    def fiducials(self, who: Indices, projector: int) -> tuple[list[str], Array]:
-        names, displacements = self._fleet.carriers(projector).fiducial_displacements(who)
+    def fiducials(self, active: Indices, projector: int) -> tuple[list[str], Array]:
+        names, displacements = self._batch.carriers(projector).fiducial_displacements(active)
         return list(names), displacements.round(3)
 
-    def centring(self, who: Indices, projector: int) -> Array:
-        return self._fleet.carriers(projector).centring[:, who].round(3)
+    def centring(self, active: Indices, projector: int) -> Array:
+        return self._batch.carriers(projector).centring[:, active].round(3)
 
-    def centre(self, who: Indices, projector: int, values: Array) -> None:
-        self._fleet.carriers(projector).centre(who, values.round(3))
+    def centre(self, active: Indices, projector: int, values: Array) -> None:
+        self._batch.carriers(projector).centre(active, values.round(3))
 
-    def prints(self, who: Indices, projector: int) -> dict[str, Array]:
-        sketch = self._fleet.carriers(projector).sketch(who)
+    def prints(self, active: Indices, projector: int) -> dict[str, Array]:
+        sketch = self._batch.carriers(projector).sketch(active)
         return {name: places.round(1) for name, places in sketch.items()}
 
-    def elements(self, who: Indices, names: Sequence[str]) -> dict[str, Array]:
-        return self._fleet.elements(who, names)
+    def elements(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
+        return self._batch.elements(active, names)
 
-    def counters(self, who: Indices) -> Array:
-        return self._fleet.counters(who)
+    def counters(self, active: Indices) -> Array:
+        return self._batch.counters(active)
 
-    def counter(self, who: Indices, axis: str) -> Array:
-        return self._fleet.counter(who, axis)
+    def counter(self, active: Indices, axis: str) -> Array:
+        return self._batch.counter(active, axis)
 
-    def drive(self, who: Indices, readings: Mapping[str, Array]) -> BoolArray:
-        went = [self._fleet.drive(who, axis, each.round(2)) for axis, each in readings.items()]
+    def drive(self, active: Indices, readings: Mapping[str, Array]) -> BoolArray:
+        went = [self._batch.drive(active, axis, each.round(2)) for axis, each in readings.items()]
         return np.asarray(np.all(went, axis=0))
 
-    def turn(self, who: Indices, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
-        self._fleet.turn_handwheels(who, wheels.round(4))
+    def turn(self, active: Indices, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
+        self._batch.turn_handwheels(active, wheels.round(4))
         if element is not None and amounts is not None:
-            self.turn_element(who, element, amounts)
+            self.turn_element(active, element, amounts)
 
-    def view_point(self, who: Indices, eye: int, point: str) -> Array:
-        return self._fleet.eyepiece(who, eye, point).round(2)
+    def view_point(self, active: Indices, eye: int, point: str) -> Array:
+        return self._batch.eyepiece(active, eye, point).round(2)
 
-    def view_point_stereo(self, who: Indices, point: str) -> Array:
-        return self._fleet.both_eyepieces(who, point).round(2)
+    def view_point_stereo(self, active: Indices, point: str) -> Array:
+        return self._batch.both_eyepieces(active, point).round(2)
 
-    def record(self, who: Indices, point: str) -> None:
+    def record(self, active: Indices, point: str) -> None:
         """Nobody keeps what a crowd registers."""
 
-    def note(self, who: Indices, text: str) -> None:
+    def note(self, active: Indices, text: str) -> None:
         """Nobody keeps what a crowd notes."""
 
-    def pop_errors(self, who: Indices) -> dict[int, list[str]]:
-        return self._fleet.pop_errors(who)
+    def pop_errors(self, active: Indices) -> dict[int, list[str]]:
+        return self._batch.pop_errors(active)

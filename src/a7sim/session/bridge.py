@@ -38,7 +38,7 @@ def run_bridge(
     out: Path | None = None,
     watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    keeping: JournalOptions | None = None,
+    journal_options: JournalOptions | None = None,
 ) -> Document:
     """Bridge a strip, work the same models independently, and return both on the ground; with `out`, leave the files.
 
@@ -48,13 +48,13 @@ def run_bridge(
     a folder that cannot be used, before anything is written.
     """
     watcher = watcher or ProgressCallbacks()
-    keeping = keeping or JournalOptions()
+    journal_options = journal_options or JournalOptions()
     if len(scenario.models) < 2 or "outside" not in {model.base for model in scenario.models}:
         raise A7SimError("models: expected a strip with base inside and outside in turn, as bridging needs")
-    journal = Journal(keeping)
+    journal = Journal(journal_options)
     session = open_session(scenario, seed, journal.on_link_event)
     job = session.job
-    keeping.prepare(out, force, (INDEPENDENT,))
+    journal_options.prepare(out, force, (INDEPENDENT,))
     done: list[Document] = []
     places: dict[str, Places] = {}
     document = document_header("bridge") | request_document(scenario)
@@ -84,8 +84,8 @@ def run_bridge(
         seed,
         folder,
         watcher,
-        force or keeping.resumes,
-        keeping=keeping.for_part(folder),
+        force or journal_options.resumes,
+        journal_options=journal_options.for_part(folder),
     )
     document |= {"status": alone["status"], "message": alone["message"]}
     document["independent"] = {"strip": alone.get("strip", {}), "hours": alone["operator"]["hours"]}
@@ -115,29 +115,29 @@ def bridge_over_link(scenario: Scenario, seed: int) -> BridgeResult:
     try:
         for each in bridge_strip(session.person, session.job):
             models.append(_as_model(each.model.name, each.coordinates_of(0)))
-    except (OperatorGaveUp, Undetermined) as trouble:
-        message = str(trouble)
+    except (OperatorGaveUp, Undetermined) as error:
+        message = str(error)
     operator = hours_document(session.person.clock.now, session.person.timesheet)
     return _bridging(models, message, operator, scenario, session.scene)
 
 
 def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[BridgeResult]:
     """Bridge the strip once a seed, all sessions at once, each to the digit what `bridged_alone` gives."""
-    crowd = open_batch(scenario, seeds)
+    batch = open_batch(scenario, seeds)
     models: list[list[Model]] = [[] for _ in seeds]
-    for each in bridge_strip_batch(crowd.bench):
+    for each in bridge_strip_batch(batch.workstation):
         for session in each.sessions.tolist():
             models[session].append(_as_model(each.model.name, each.coordinates_of(session)))
-    crew = crowd.bench.crew
+    operators = batch.workstation.operators
     return [
         _bridging(
             models[session],
-            crew.reasons.get(session, ""),
-            hours_document(float(crew.seconds[session]), crew.timesheet, session),
+            operators.reasons.get(session, ""),
+            hours_document(float(operators.seconds[session]), operators.timesheet, session),
             scenario,
             scene,
         )
-        for session, scene in enumerate(crowd.scenes)
+        for session, scene in enumerate(batch.scenes)
     ]
 
 

@@ -62,19 +62,19 @@ def compile_model(
     out: Path | None = None,
     watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    keeping: JournalOptions | None = None,
+    journal_options: JournalOptions | None = None,
 ) -> Document:
     """Let the operator compile a model and return the document of results; with `out`, leave map and files there.
 
     `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for what cannot be compiled.
     """
     watcher = watcher or ProgressCallbacks()
-    keeping = keeping or JournalOptions()
+    journal_options = journal_options or JournalOptions()
     _see_that_it_can_be(scenario, wanted)
-    journal = Journal(keeping)
+    journal = Journal(journal_options)
     session = open_session(scenario, seed, journal.on_link_event)
     order = _order(wanted, scenario, session.scene)
-    keeping.prepare(out, force)
+    journal_options.prepare(out, force)
     document = document_header("compile") | {
         **request_document(scenario),
         "software": f"a7sim {a7sim.__version__}",

@@ -40,7 +40,7 @@ def run_grid_test(
     out: Path | None = None,
     watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    keeping: JournalOptions | None = None,
+    journal_options: JournalOptions | None = None,
 ) -> Document:
     """Test both projectors of a scenario's instrument and return the document; with `out`, leave the files there.
 
@@ -48,12 +48,12 @@ def run_grid_test(
     or the instrument cannot fill and for a folder that cannot be used, before anything is written.
     """
     watcher = watcher or ProgressCallbacks()
-    keeping = keeping or JournalOptions()
-    journal = Journal(keeping)
+    journal_options = journal_options or JournalOptions()
+    journal = Journal(journal_options)
     session = open_session(scenario, seed, journal.on_link_event)
     autograph = session.autograph
     document = _header(scenario, seed, order, autograph)
-    keeping.prepare(out, force)
+    journal_options.prepare(out, force)
     sheets: list[ProjectorReadings] = []
 
     def leaves() -> dict[str, str]:

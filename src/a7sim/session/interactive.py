@@ -31,33 +31,33 @@ class InteractiveSession:
         self.folder = begun.journalled.path.parent if begun else folder
         self._scenario, self._seed = scenario, seed
         self._journal = Journal(JournalOptions(resumes=begun is not None))
-        self._desk: SharedInstrument | None = None
+        self._instrument: SharedInstrument | None = None
         self._held = False
 
     def open(self) -> Client:
         """Return a client of the instrument. Raises Mistake where the journal cannot be written or gone on with."""
-        if self._desk is None:
-            self._desk = self._anew() if self.begun is None else self._again(self.begun)
-        client = Client(InProcessSerial(desk=self._desk, clock=self.clock, timeout=TIMEOUT_S))
+        if self._instrument is None:
+            self._instrument = self._anew() if self.begun is None else self._again(self.begun)
+        client = Client(InProcessSerial(instrument=self._instrument, clock=self.clock, timeout=TIMEOUT_S))
         if self._held:
             client.ask("SYST:LOCK:REQ?")
         return client
 
     def _anew(self) -> SharedInstrument:
         scenario, seed = self._scenario, self._seed
-        desk = SharedInstrument(
+        instrument = SharedInstrument(
             build_autograph(scenario.instrument, build_scene(scenario, seed).mountable, seed),
             self._journal.on_link_event,
         )
         self.folder = new_folder(self.folder)
-        self._journal.recording(self.folder, make_header(COMMAND, scenario, seed), desk)
-        return desk
+        self._journal.recording(self.folder, make_header(COMMAND, scenario, seed), instrument)
+        return instrument
 
     def _again(self, begun: ResumableSession) -> SharedInstrument:
-        desk, now, held_by = restore_instrument(begun, self._journal, from_checkpoint=True)
+        instrument, now, held_by = restore_instrument(begun, self._journal, from_checkpoint=True)
         self.clock.advance_to(now)
         self._held = held_by is not None
-        return desk
+        return instrument
 
     def history(self) -> Iterator[Event]:
         """Yield what was said in the session that is gone on with, and what was answered."""
@@ -70,5 +70,5 @@ class InteractiveSession:
 
     def close(self) -> None:
         """End the journal, which can be gone on with. Raises Mistake where it cannot be written to its end."""
-        if self._desk is not None:
+        if self._instrument is not None:
             self._journal.close(None)

@@ -92,13 +92,13 @@ class Journal:
     would be written is compared with it; then it is written on.
     """
 
-    def __init__(self, keeping: JournalOptions | None = None) -> None:
+    def __init__(self, journal_options: JournalOptions | None = None) -> None:
         self.lines_over_the_link = 0
-        self._keeping = keeping or JournalOptions()
+        self._journal_options = journal_options or JournalOptions()
         self._unwritten: list[LinkEvent] = []
         self._file: AppendOnlyFile | None = None
         self._states: Path | None = None
-        self._desk: SharedInstrument | None = None
+        self._instrument: SharedInstrument | None = None
         self._there: JournalFile | None = None
         self._chain = ChecksumChain()
         self._line = 0
@@ -106,14 +106,14 @@ class Journal:
         self._since_checkpoint = 0
         self._changes = 0
 
-    def recording(self, folder: Path | None, header: Header, desk: SharedInstrument | None) -> "Journal":
+    def recording(self, folder: Path | None, header: Header, instrument: SharedInstrument | None) -> "Journal":
         """Begin to write, where there is a folder; about a desk, where there is one.
 
         A session that is resumed sets aside what is torn of its journal. Raises Mistake where it cannot be written.
         """
-        self._desk = desk
+        self._instrument = instrument
         if folder is not None:
-            if self._keeping.resumes:
+            if self._journal_options.resumes:
                 self._there = read_journal(folder / JOURNAL)
                 save_truncated_tail(self._there)
             self._begin(folder, self._there.size if self._there else 0, b"")
@@ -129,10 +129,10 @@ class Journal:
         self._unwritten.clear()
         return self
 
-    def resume_at(self, there: JournalFile, desk: SharedInstrument, checkpoints: list[Checkpoint]) -> "Journal":
+    def resume_at(self, there: JournalFile, instrument: SharedInstrument, checkpoints: list[Checkpoint]) -> "Journal":
         """Go on behind a journal whose session stands at a desk. Raises Mistake where it cannot be written."""
         save_truncated_tail(there)
-        self._desk = desk
+        self._instrument = instrument
         self._begin(there.path.parent, there.size, to_lines(checkpoints))
         self._chain.crc, self._line = there.crc, len(there)
         last = checkpoints[-1].line if checkpoints else 1
@@ -141,8 +141,8 @@ class Journal:
         return self
 
     def _begin(self, folder: Path, size: int, states: bytes) -> None:
-        self._file = AppendOnlyFile(folder / JOURNAL, self._keeping.durability, size)
-        if self._keeping.states:
+        self._file = AppendOnlyFile(folder / JOURNAL, self._journal_options.durability, size)
+        if self._journal_options.states:
             self._states = folder / STATES
             self._states.write_bytes(states)
 
@@ -158,13 +158,17 @@ class Journal:
         if event.direction in "<>":
             self.lines_over_the_link += 1
         if self._file is None:
-            if self._desk is None:
+            if self._instrument is None:
                 self._unwritten.append(event)
             return
         at_once, self._time = False, event.time
         if event.direction == ">":
-            if self._since_checkpoint >= LINES_PER_CHECKPOINT and self._desk is not None and self._desk.is_idle:
-                self._checkpoint(event.time, self._desk)
+            if (
+                self._since_checkpoint >= LINES_PER_CHECKPOINT
+                and self._instrument is not None
+                and self._instrument.is_idle
+            ):
+                self._checkpoint(event.time, self._instrument)
             at_once = is_registration(event.text)
         self._since_checkpoint += 1
         self._write(Event(event.time, event.client, event.direction, event.text), at_once)
@@ -195,8 +199,8 @@ class Journal:
     def close(self, error: BaseException | None) -> None:
         """Write nothing more, after a last checkpoint where nothing went wrong. Raises Mistake where that fails."""
         try:
-            if error is None and self._desk is not None and self._desk.is_idle and self._since_checkpoint:
-                self._checkpoint(self._time, self._desk)
+            if error is None and self._instrument is not None and self._instrument.is_idle and self._since_checkpoint:
+                self._checkpoint(self._time, self._instrument)
             if error is None and self._there is not None and self._line < len(self._there):
                 over = self._there.location(self._line + 1)
                 raise A7SimError(f"{over}: expected the end of the session, got a line that is left over")
@@ -208,9 +212,9 @@ class Journal:
         if file is not None:
             file.close()
 
-    def _checkpoint(self, time: float, desk: SharedInstrument) -> None:
-        state = desk.state(self._changes)
-        self._changes = len(desk.autograph.recorder.changes)
+    def _checkpoint(self, time: float, instrument: SharedInstrument) -> None:
+        state = instrument.state(self._changes)
+        self._changes = len(instrument.autograph.recorder.changes)
         self._since_checkpoint = 0
         found = state_hash(state)
         self._write(Event(time, kind="state", hash=found))

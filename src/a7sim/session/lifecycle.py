@@ -20,7 +20,7 @@ class SeatedOperator(Protocol):
     """An operator at the desk of an instrument."""
 
     person: Person
-    desk: SharedInstrument
+    instrument: SharedInstrument
 
 
 @contextmanager
@@ -41,15 +41,15 @@ def recorded_session(
     """
     document |= {"status": "failed", "message": ""}
     person = seated.person
-    with journal.recording(out, header, seated.desk):
+    with journal.recording(out, header, seated.instrument):
         person.book.listener = lambda entry: journal.on_book_entry(entry, person.clock.now)
         try:
             yield
             document["status"] = "complete"
-        except (OperatorGaveUp, Undetermined) as trouble:
-            document |= {"status": "does not fit", "message": str(trouble)}
-        except A7SimError as mistake:
-            document["message"] = str(mistake)
+        except (OperatorGaveUp, Undetermined) as error:
+            document |= {"status": "does not fit", "message": str(error)}
+        except A7SimError as error:
+            document["message"] = str(error)
             raise
         except KeyboardInterrupt:
             document |= {"status": "interrupted", "message": f"the {called} was interrupted"}

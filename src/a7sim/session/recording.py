@@ -75,9 +75,9 @@ class Recording:
         if not self._numbers:
             raise A7SimError(f"{journalled.path}: expected a session in which something was said, got none")
         self._replay = Replay(journalled, scenario)
-        self._front = SharedInstrument(self._replay.desk.autograph)
+        self._front = SharedInstrument(self._replay.instrument.autograph)
         self._next = 2
-        self._trouble = ""
+        self._error = ""
         self.frame = self._framed(0)
 
     def _list(self, number: int, event: Event) -> None:
@@ -96,7 +96,7 @@ class Recording:
 
     def open_client(self) -> Client:
         """Return a client that sees the instrument as it stands in the film."""
-        return Client(InProcessSerial(desk=self._front, timeout=TIMEOUT_S))
+        return Client(InProcessSerial(instrument=self._front, timeout=TIMEOUT_S))
 
     def seek(self, step: int) -> Frame:
         """Run on, or back, until a step is done with all that came of it; 0 is the beginning."""
@@ -104,12 +104,12 @@ class Recording:
         if self._leaps_to(end):
             self._replay = Replay(self.journalled, self._scenario)
             self._next = self._replay.seek(end)
-            self._front.autograph = self._replay.desk.autograph
+            self._front.autograph = self._replay.instrument.autograph
         while self._next < end:
             difference = self._replay.apply(self._next, self.journalled.event(self._next))
-            if difference is not None and not self._trouble:
+            if difference is not None and not self._error:
                 expected, got = difference.journalled or "nothing", difference.replayed or "nothing"
-                self._trouble = f"{self.journalled.location(difference.line)}: expected again {expected}, got {got}"
+                self._error = f"{self.journalled.location(difference.line)}: expected again {expected}, got {got}"
             self._next += 1
         self.frame = self._framed(step)
         return self.frame
@@ -163,7 +163,7 @@ class Recording:
             self._point_at(step),
             {axis: origin for axis, (origin, _) in scales.items()},
             {axis: units for axis, (_, units) in scales.items()},
-            self._trouble,
+            self._error,
         )
 
     def _point_at(self, step: int) -> str | None:

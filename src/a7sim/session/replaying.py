@@ -37,8 +37,8 @@ def scenario_of_journal(journalled: JournalFile, known: Scenario | None = None) 
     scenario = known or _scenario_beside(journalled)
     try:
         found = hash_scenario(scenario)
-    except A7SimError as mistake:
-        raise A7SimError(f"{journalled.location(1)}: {mistake}") from mistake
+    except A7SimError as error:
+        raise A7SimError(f"{journalled.location(1)}: {error}") from error
     if found != header.get("scenario_hash"):
         raise A7SimError(
             f"{journalled.location(1)}: expected the scenario and the measurements that the session began with "
@@ -97,7 +97,7 @@ class Replay:
             drawer = build_scene(scenario, seed, header.get("pictures", 1)).mountable
             autograph = build_autograph(scenario.instrument, drawer, seed)
         self.journalled = journalled
-        self.desk = SharedInstrument(
+        self.instrument = SharedInstrument(
             autograph,
             self._heard,
             TOKEN_PLACEHOLDER if settings.get("login") else None,
@@ -126,10 +126,10 @@ class Replay:
             return 2
         *before, last = known
         for each in before:
-            self.desk.autograph.restore_registrations(each.state["autograph"])
-        self.desk.restore(last.state)
+            self.instrument.autograph.restore_registrations(each.state["autograph"])
+        self.instrument.restore(last.state)
         self.checkpoints = known
-        self._changes = len(self.desk.autograph.recorder.changes)
+        self._changes = len(self.instrument.autograph.recorder.changes)
         self.time = last.t
         return last.line + 1
 
@@ -189,13 +189,13 @@ class Replay:
         return ReplayDifference(number, _shown(event.client, event.dir, event.text), replayed)
 
     def _happen(self, event: Event) -> None:
-        desk, client = self.desk, event.client
+        instrument, client = self.instrument, event.client
         if event.dir == "+":
-            desk.open(client, time=event.t)
+            instrument.open(client, time=event.t)
         elif event.dir == "-":
-            desk.close(client, event.t)
-        elif client in desk.clients:
-            engine = desk.clients[client]
+            instrument.close(client, event.t)
+        elif client in instrument.clients:
+            engine = instrument.clients[client]
             received = _bytes_of(event)
             if self._clock is None:
                 engine.feed(received, event.t)
@@ -204,8 +204,8 @@ class Replay:
                 feed_until_idle(engine, received, self._clock)
 
     def _compared(self, number: int, event: Event) -> ReplayDifference | None:
-        state = self.desk.state(self._changes)
-        self._changes = len(self.desk.autograph.recorder.changes)
+        state = self.instrument.state(self._changes)
+        self._changes = len(self.instrument.autograph.recorder.changes)
         found = state_hash(state)
         self.checkpoints.append(Checkpoint(number, event.t, found, state))
         if found == event.hash:
@@ -223,7 +223,7 @@ class Replay:
         for number in range(after + 1, len(self.journalled) + 1):
             event = self.journalled.event(number)
             if event.kind == "state":
-                return self._parts(number, self.desk.state(self._changes))
+                return self._parts(number, self.instrument.state(self._changes))
             self.apply(number, event)
         return ()
 

@@ -52,7 +52,7 @@ def find_resumable(folder: Path, command: str) -> ResumableSession:
 class RestoredInstrument(NamedTuple):
     """An instrument as a journal leaves it, its clients gone: the desk, the time there in s, and who held the lock."""
 
-    desk: SharedInstrument
+    instrument: SharedInstrument
     time: float
     lock_holder: str | None
 
@@ -67,14 +67,14 @@ def restore_instrument(begun: ResumableSession, journal: Journal, from_checkpoin
     for number, _, difference in replay_lines(replay, first):
         if difference is not None:
             raise A7SimError(f"{begun.journalled.location(number)}: {_not_again(difference)}")
-    desk = replay.desk
-    desk.listener = journal.resume_at(begun.journalled, desk, replay.checkpoints).on_link_event
+    instrument = replay.instrument
+    instrument.listener = journal.resume_at(begun.journalled, instrument, replay.checkpoints).on_link_event
     for event in replay.pending_events():
         journal.on_link_event(event)
-    held_by = desk.lock_holder
-    for client in [*desk.clients]:
-        desk.close(client, replay.time)
-    return RestoredInstrument(desk, replay.time, held_by)
+    held_by = instrument.lock_holder
+    for client in [*instrument.clients]:
+        instrument.close(client, replay.time)
+    return RestoredInstrument(instrument, replay.time, held_by)
 
 
 def _not_again(difference: ReplayDifference) -> str:

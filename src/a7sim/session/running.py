@@ -58,7 +58,7 @@ class Session:
     scene: Scene
     autograph: Autograph
     person: Person
-    desk: SharedInstrument
+    instrument: SharedInstrument
 
     @cached_property
     def job(self) -> Job:
@@ -67,16 +67,16 @@ class Session:
 
 
 def open_session(
-    scenario: Scenario, seed: int, listener: Listener | None = None, cable: PortAdapter = direct
+    scenario: Scenario, seed: int, listener: Listener | None = None, port_adapter: PortAdapter = direct
 ) -> Session:
     """Return a session ready to begin. Raises Mistake when a file of measurements is bad."""
     scene = build_scene(scenario, seed)
     autograph = build_autograph(scenario.instrument, scene.mountable, seed)
     clock = Clock()
-    desk = SharedInstrument(autograph, listener)
-    port = InProcessSerial(desk=desk, clock=clock, timeout=1.0)
-    person = Person(Client(cable(port)), clock, scenario.observer, seed)
-    return Session(scenario, seed, scene, autograph, person, desk)
+    instrument = SharedInstrument(autograph, listener)
+    port = InProcessSerial(instrument=instrument, clock=clock, timeout=1.0)
+    person = Person(Client(port_adapter(port)), clock, scenario.observer, seed)
+    return Session(scenario, seed, scene, autograph, person, instrument)
 
 
 def make_job(scenario: Scenario, scene: Scene) -> Job:
@@ -116,8 +116,8 @@ def run(
     out: Path | None = None,
     watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    cable: PortAdapter = direct,
-    keeping: JournalOptions | None = None,
+    port_adapter: PortAdapter = direct,
+    journal_options: JournalOptions | None = None,
 ) -> Document:
     """Work through a scenario up to its strip and return the document of results; with `out`, leave the files there.
 
@@ -128,11 +128,11 @@ def run(
     A session that `keeping` resumes works on in its folder, and leaves there what one without interruption leaves.
     """
     watcher = watcher or ProgressCallbacks()
-    keeping = keeping or JournalOptions()
-    journal = Journal(keeping)
-    session = open_session(scenario, seed, journal.on_link_event, cable)
+    journal_options = journal_options or JournalOptions()
+    journal = Journal(journal_options)
+    session = open_session(scenario, seed, journal.on_link_event, port_adapter)
     job = session.job
-    keeping.prepare(out, force)
+    journal_options.prepare(out, force)
     done: list[Document] = []
     document = results.results_header(scenario, seed) | {"status": "failed", "message": "", "models": done}
 

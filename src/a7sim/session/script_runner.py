@@ -31,23 +31,23 @@ class ScriptRunner:
         self,
         script: Script,
         listener: Listener | None = None,
-        desk: SharedInstrument | None = None,
+        instrument: SharedInstrument | None = None,
         clock: Clock | None = None,
     ) -> None:
         self._script = script
         self._clock = clock or Clock()
-        self.desk = desk or _fresh(script, listener)
+        self.instrument = instrument or _fresh(script, listener)
 
     def run(self, client: str | None = None) -> ExpectationFailed | None:
         """Carry out the statements up to the first that fails, and return that; an error not expected is one."""
-        engine = self.desk.open(client, time=self._clock.now)
+        engine = self.instrument.open(client, time=self._clock.now)
         for done, after in zip(self._script.statements, [*self._script.statements[1:], None], strict=False):
             failed = self._carry_out(engine, done)
             if failed is None and not _asks_for_errors(after) and engine.errors:
                 failed = ExpectationFailed(done.place, f"{_said(done)} to be obeyed", engine.errors[0])
             if failed is not None:
                 return failed
-        self.desk.close(engine.client, self._clock.now)
+        self.instrument.close(engine.client, self._clock.now)
         return None
 
     def _carry_out(self, engine: Engine, statement: Statement) -> ExpectationFailed | None:

@@ -26,13 +26,13 @@ class SessionBatch:
     scenario: Scenario
     seeds: tuple[int, ...]
     scenes: tuple[Scene, ...]
-    fleet: AutographBatch
-    bench: Workstation
+    batch: AutographBatch
+    workstation: Workstation
     job: Job
 
     def measure_models(self) -> Iterator[ModelRecordBatch]:
         """Yield the models as they are done; what a session gives up for stands in `bench.crew.reasons`."""
-        return measure_models_batch(self.bench)
+        return measure_models_batch(self.workstation)
 
     def run(self, strips: bool = True, whole: bool = True) -> list[Document]:
         """Work to the end and return a document a seed, as `run` gives it, without what is told of line and book.
@@ -55,22 +55,24 @@ class SessionBatch:
 
     def _beside(self, records: ModelRecordBatch, truth: RelativeTruth | None) -> TruthComparison:
         """Return the truth about a model of those who did it; their instruments stand as they left them."""
-        who, model, fleet = records.sessions, records.model, self.fleet
+        active, model, batch = records.sessions, records.model, self.batch
         centres = {
-            hand: {f"{axis}0": each for axis, each in fleet.readings_at(who, fleet.pose(who, projector)[0]).items()}
+            hand: {
+                f"{axis}0": each for axis, each in batch.readings_at(active, batch.pose(active, projector)[0]).items()
+            }
             for hand, projector in ((1, model.left_projector), (2, model.right_projector))
         }
-        elements = {name: counts[who] for name, counts in records.orientation.elements.items()}
-        return TruthComparison.of(truth, centres, records.orientation.method, elements, model, fleet.variant)
+        elements = {name: counts[active] for name, counts in records.orientation.elements.items()}
+        return TruthComparison.of(truth, centres, records.orientation.method, elements, model, batch.variant)
 
     def _document(self, session: int, models: list[Document], strips: bool) -> Document:
-        crew, scenario = self.bench.crew, self.scenario
-        why = crew.reasons.get(session)
+        operators, scenario = self.workstation.operators, self.scenario
+        why = operators.reasons.get(session)
         document: Document = results.results_header(scenario, self.seeds[session]) | {
             "status": "complete" if why is None else "does not fit",
             "message": why or "",
             "models": models,
-            "operator": results.hours_document(float(crew.seconds[session]), crew.timesheet, session),
+            "operator": results.hours_document(float(operators.seconds[session]), operators.timesheet, session),
         }
         if strips and why is None:
             document["strip"], _ = strip_document(scenario, ground_control(scenario, self.scenes[session]), models)
@@ -81,7 +83,7 @@ def open_batch(scenario: Scenario, seeds: Sequence[int]) -> SessionBatch:
     """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
     flight = SharedScene.of(scenario)
     scenes = tuple(flight.scene(seed) for seed in seeds)
-    fleet = build_batch(scenario.instrument, [scene.mountable for scene in scenes], seeds)
-    crew = OperatorBatch(scenario.observer, [OperatorRandom(scenario.observer, seed) for seed in seeds])
+    batch = build_batch(scenario.instrument, [scene.mountable for scene in scenes], seeds)
+    operators = OperatorBatch(scenario.observer, [OperatorRandom(scenario.observer, seed) for seed in seeds])
     job = make_job(scenario, scenes[0])
-    return SessionBatch(scenario, tuple(seeds), scenes, fleet, Workstation(crew, BatchDriver(fleet), job), job)
+    return SessionBatch(scenario, tuple(seeds), scenes, batch, Workstation(operators, BatchDriver(batch), job), job)

@@ -21,7 +21,7 @@ class SavedSession:
 
     folder: Path
     begun: ResumableSession | None
-    trouble: str = ""
+    error: str = ""
     """Why it cannot be gone on with, where `begun` is None."""
 
     @property
@@ -63,16 +63,16 @@ def _latest_first(folder: Path) -> list[Path]:
 def _left_in(folder: Path, scenario_hash: str, seed: int) -> SavedSession | None:
     try:
         header = read_journal(folder / JOURNAL).header
-    except A7SimError as mistake:
-        return SavedSession(folder, None, str(mistake))
+    except A7SimError as error:
+        return SavedSession(folder, None, str(error))
     if (header.get("scenario_hash"), header.get("seed")) != (scenario_hash, seed):
         return None
     if is_being_written(folder / JOURNAL):
         return SavedSession(folder, None, f"{folder}: somebody sits there")
     try:
         return SavedSession(folder, find_resumable(folder, COMMAND))
-    except A7SimError as mistake:
-        return SavedSession(folder, None, str(mistake))
+    except A7SimError as error:
+        return SavedSession(folder, None, str(error))
 
 
 def new_folder(folder: Path) -> Path:

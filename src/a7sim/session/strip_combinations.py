@@ -42,7 +42,7 @@ def run_combinations(
     out: Path | None = None,
     watcher: ProgressCallbacks | None = None,
     force: bool = False,
-    keeping: JournalOptions | None = None,
+    journal_options: JournalOptions | None = None,
 ) -> Document:
     """Work through a scenario once in every case and return the document of all strips that the models make.
 
@@ -51,9 +51,9 @@ def run_combinations(
     """
     watcher = watcher or ProgressCallbacks()
     check_strips_possible(scenario)
-    keeping = keeping or JournalOptions()
-    keeping.prepare(out, force, map(FOLDER_OF_CASE.format, CASES))
-    if out is not None and not keeping.resumes:
+    journal_options = journal_options or JournalOptions()
+    journal_options.prepare(out, force, map(FOLDER_OF_CASE.format, CASES))
+    if out is not None and not journal_options.resumes:
         write_header_only(out, make_header("run", scenario, seed, strips="all"))
     document = results.results_header(scenario, seed) | {"case": "all", "status": "complete", "message": ""}
     sessions: dict[str, Document] = {}
@@ -64,8 +64,8 @@ def run_combinations(
             seed,
             folder,
             watcher,
-            force or keeping.resumes,
-            keeping=keeping.for_part(folder),
+            force or journal_options.resumes,
+            journal_options=journal_options.for_part(folder),
         )
         if sessions[case]["status"] != "complete":
             document |= {"status": sessions[case]["status"], "message": f"case {case}: {sessions[case]['message']}"}

@@ -21,8 +21,8 @@ def format_event(event: Event) -> str:
     return _line(event.t, event.client, f"{_IN_WORDS.get(event.dir, event.dir)} {event.text}")
 
 
-def _line(time: float, who: str, what: str) -> str:
-    return f"{time:10.2f} {who:<9} {what}".rstrip()
+def _line(time: float, active: str, what: str) -> str:
+    return f"{time:10.2f} {active:<9} {what}".rstrip()
 
 
 @dataclass(frozen=True)

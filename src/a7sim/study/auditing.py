@@ -42,7 +42,7 @@ class AuditDifference:
 
 
 def audit_study(
-    laid: LoadedStudy, tally: Tally, picks: int, tick: Callable[[], None] = lambda: None
+    loaded: LoadedStudy, tally: Tally, picks: int, tick: Callable[[], None] = lambda: None
 ) -> list[AuditDifference]:
     """Work so many picked replicates on both benches and return a difference for every one that is not the same.
 
@@ -50,30 +50,30 @@ def audit_study(
     results that the batch bench gives: settings, readings, centres, model coordinates, strip. The picks follow from the
     study's seed, each another replicate; fewer where the study has fewer.
     """
-    picked = _picked(laid, tally, picks)
+    picked = _picked(loaded, tally, picks)
     found = []
     for i, replicates in picked.items():
-        seeds = [replicate_seed(laid.study.seed, replicate) for replicate in replicates]
+        seeds = [replicate_seed(loaded.study.seed, replicate) for replicate in replicates]
         sample = tally.sample(i)
-        task, cell = laid.task_of(i)
+        task, cell = loaded.task_of(i)
         for replicate, seed, on_the_bench in zip(replicates, seeds, task.batch_documents(cell, seeds), strict=True):
             linked = task.link_document(cell, seed)
-            kept = zip(laid.responses, sample[:, replicate].tolist(), strict=True)
+            kept = zip(loaded.responses, sample[:, replicate].tolist(), strict=True)
             differences = [
                 *((response.name, one, other) for response, one in kept if _off(one, other := response.of(linked))),
                 *_different(on_the_bench, linked),
             ]
             if differences:
-                where = (laid.cells[i].number, replicate + 1, seed)
+                where = (loaded.cells[i].number, replicate + 1, seed)
                 found.append(AuditDifference(*where, *differences[0], others=len(differences) - 1))
             tick()
     return found
 
 
-def _picked(laid: LoadedStudy, tally: Tally, picks: int) -> Mapping[int, list[int]]:
+def _picked(loaded: LoadedStudy, tally: Tally, picks: int) -> Mapping[int, list[int]]:
     """Return the picked replicates by the place of their cell."""
-    there = [(i, replicate) for i in range(len(laid.cells)) for replicate in range(tally.sample(i).shape[1])]
-    rng = np.random.default_rng(np.random.SeedSequence(laid.study.seed, spawn_key=(_STREAM,)))
+    there = [(i, replicate) for i in range(len(loaded.cells)) for replicate in range(tally.sample(i).shape[1])]
+    rng = np.random.default_rng(np.random.SeedSequence(loaded.study.seed, spawn_key=(_STREAM,)))
     picked = defaultdict(list)
     for pick in rng.permutation(len(there))[:picks].tolist():
         i, replicate = there[pick]

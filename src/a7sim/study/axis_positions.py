@@ -9,11 +9,11 @@ from a7sim.study.loading import LoadedStudy
 from a7sim.study.schema import Factor
 
 
-def axis_positions(laid: LoadedStudy) -> dict[str, Document]:
+def axis_positions(loaded: LoadedStudy) -> dict[str, Document]:
     """Return by factor what its axis counts and the place of every level; nothing of a factor that has no axis."""
-    own = {factor.name: factor for factor in laid.study.factor}
+    own = {factor.name: factor for factor in loaded.study.factor}
     found = {}
-    for name, levels in laid.factors.items():
+    for name, levels in loaded.factors.items():
         axis = _of_factor(own[name]) if name in own else _of_cases(name, levels)
         if axis and len(set(axis["at"].values())) > 1:
             found[name] = axis

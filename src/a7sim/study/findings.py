@@ -36,9 +36,9 @@ MAX_DENSITIES = 8
 """Levels of a factor whose curves can be told apart."""
 
 
-def findings_document(laid: LoadedStudy, tally: Tally) -> Document:
+def findings_document(loaded: LoadedStudy, tally: Tally) -> Document:
     """Return the document of a study; the same study and tally give the same document."""
-    study = laid.study
+    study = loaded.study
     document = document_header("study") | {
         "software": f"a7sim {a7sim.__version__}",
         "study": study.title,
@@ -49,25 +49,25 @@ def findings_document(laid: LoadedStudy, tally: Tally) -> Document:
         "seed": study.seed,
         "replicates": int(tally.done.min()),
         "strips": study.strips is not None,
-        "factors": list(laid.factors),
-        "places": {name: places for name, places in axis_positions(laid).items() if places},
-        "responses": [{"name": each.name, "unit": each.unit, "meaning": each.meaning} for each in laid.responses],
+        "factors": list(loaded.factors),
+        "places": {name: places for name, places in axis_positions(loaded).items() if places},
+        "responses": [{"name": each.name, "unit": each.unit, "meaning": each.meaning} for each in loaded.responses],
         "confidence": CONFIDENCE,
-        "cells": [_cell(laid, tally, i, cell) for i, cell in enumerate(laid.cells)],
-        "comparisons": list(_comparisons(laid, tally)),
-        "variance": list(_variance(laid, tally)),
-        "main_effects": list(_main_effects(laid, tally)),
-        "levels": list(_levels(laid, tally)),
-        "densities": list(_densities(laid, tally)),
+        "cells": [_cell(loaded, tally, i, cell) for i, cell in enumerate(loaded.cells)],
+        "comparisons": list(_comparisons(loaded, tally)),
+        "variance": list(_variance(loaded, tally)),
+        "main_effects": list(_main_effects(loaded, tally)),
+        "levels": list(_levels(loaded, tally)),
+        "densities": list(_densities(loaded, tally)),
     }
-    document["claims"] = _claims(laid, tally, document)
+    document["claims"] = _claims(loaded, tally, document)
     if study.precision is not None:
-        document["precision_reached"] = precision_reached(laid, tally)
-    document |= theory_sentence(document, laid.scenarios)
+        document["precision_reached"] = precision_reached(loaded, tally)
+    document |= theory_sentence(document, loaded.scenarios)
     return document | {"in_a_sentence": summary_sentence(document), "answer": list(_answer(document))}
 
 
-def _cell(laid: LoadedStudy, tally: Tally, i: int, cell: Cell) -> Document:
+def _cell(loaded: LoadedStudy, tally: Tally, i: int, cell: Cell) -> Document:
     sample = tally.sample(i)
     return {
         "cell": cell.number,
@@ -76,12 +76,12 @@ def _cell(laid: LoadedStudy, tally: Tally, i: int, cell: Cell) -> Document:
         "replicates": int(tally.done[i]),
         "gave_up": int(tally.done[i] - tally.count[i].max()),
         "responses": {
-            response.name: _spread(laid, tally, (i, j), sample[j]) for j, response in enumerate(laid.responses)
+            response.name: _spread(loaded, tally, (i, j), sample[j]) for j, response in enumerate(loaded.responses)
         },
     }
 
 
-def _spread(laid: LoadedStudy, tally: Tally, at: tuple[int, int], sample: Array) -> Document:
+def _spread(loaded: LoadedStudy, tally: Tally, at: tuple[int, int], sample: Array) -> Document:
     count = int(tally.count[at])
     if count == 0:
         return {"count": 0}
@@ -94,28 +94,28 @@ def _spread(laid: LoadedStudy, tally: Tally, at: tuple[int, int], sample: Array)
         "mean": mean,
         "mean_interval": mean_interval(mean, sd, count),
         "sd": sd,
-        "sd_interval": sd_interval(known, laid.study.seed, at),
+        "sd_interval": sd_interval(known, loaded.study.seed, at),
         "least": float(tally.low[at]),
         "largest": float(tally.high[at]),
         "quantiles": {f"{share:g}": {"value": v, "interval": interval} for share, (v, interval) in quantiles.items()},
-    } | _theory(laid, at, mean, sd)
+    } | _theory(loaded, at, mean, sd)
 
 
-def _theory(laid: LoadedStudy, at: tuple[int, int], mean: float, sd: float) -> Document:
+def _theory(loaded: LoadedStudy, at: tuple[int, int], mean: float, sd: float) -> Document:
     """Return what theory says of a response in a cell; nothing of strips, whose models differ in their plans."""
-    if laid.study.strips is not None:
+    if loaded.study.strips is not None:
         return {}
-    return theory_comparison(laid.scenarios[at[0]], laid.responses[at[1]].name, mean, sd)
+    return theory_comparison(loaded.scenarios[at[0]], loaded.responses[at[1]].name, mean, sd)
 
 
-def _comparisons(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
+def _comparisons(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
     """Yield every other cell beside the first, response by response, adjusted for as many comparisons."""
     first = tally.sample(0)
-    others = [tally.sample(i) for i in range(1, len(laid.cells))]
-    for j, response in enumerate(laid.responses):
+    others = [tally.sample(i) for i in range(1, len(loaded.cells))]
+    for j, response in enumerate(loaded.responses):
         found = [compare_cells(other[j], first[j]) for other in others]
         adjusted = holm([each.p for each in found])
-        for cell, each, p in zip(laid.cells[1:], found, adjusted, strict=True):
+        for cell, each, p in zip(loaded.cells[1:], found, adjusted, strict=True):
             yield {
                 "response": response.name,
                 "cell": cell.number,
@@ -131,19 +131,19 @@ def _comparisons(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
             }
 
 
-def _variance(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
-    for j, response in enumerate(laid.responses):
-        for effects in _analyses(laid, tally, j):
+def _variance(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
+    for j, response in enumerate(loaded.responses):
+        for effects in _analyses(loaded, tally, j):
             if effects:
                 yield {"response": response.name, "sources": [_effect(each) for each in effects]}
 
 
-def _analyses(laid: LoadedStudy, tally: Tally, response: int) -> Iterator[Sequence[Effect]]:
+def _analyses(loaded: LoadedStudy, tally: Tally, response: int) -> Iterator[Sequence[Effect]]:
     """Yield one analysis of a full factorial, one a factor where factors were varied one at a time, none else."""
-    factors, design = laid.factors, laid.study.design
+    factors, design = loaded.factors, loaded.study.design
     if not factors or design == "latin-hypercube":
         return
-    values = _replicates(laid, tally, response)
+    values = _replicates(loaded, tally, response)
     counts = [len(levels) for levels in factors.values()]
     if design == "full":
         yield variance_by_factor(values.reshape(*counts, values.shape[1]), list(factors))
@@ -155,49 +155,49 @@ def _analyses(laid: LoadedStudy, tally: Tally, response: int) -> Iterator[Sequen
         begin += count - 1
 
 
-def _main_effects(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
+def _main_effects(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
     """Yield what the factors of a Latin hypercube weigh, response by response; nothing of another design."""
-    if laid.study.design != "latin-hypercube":
+    if loaded.study.design != "latin-hypercube":
         return
     values = {
-        factor.name: np.array([float(cell.settings[factor.path or ""]) for cell in laid.cells])
+        factor.name: np.array([float(cell.settings[factor.path or ""]) for cell in loaded.cells])
         if factor.range
-        else [cell.levels[factor.name] for cell in laid.cells]
-        for factor in laid.study.factor
+        else [cell.levels[factor.name] for cell in loaded.cells]
+        for factor in loaded.study.factor
     }
-    for j, response in enumerate(laid.responses):
+    for j, response in enumerate(loaded.responses):
         means = np.where(tally.count[:, j] > 0, tally.mean[:, j], np.nan)
         effects = main_effects(means, values)
         if effects:
             found = {
-                "chance": noise_share(_replicates(laid, tally, j)),
+                "chance": noise_share(_replicates(loaded, tally, j)),
                 "factors": [asdict(each) for each in effects],
             }
             yield {"response": response.name} | found
 
 
-def _replicates(laid: LoadedStudy, tally: Tally, response: int) -> Array:
+def _replicates(loaded: LoadedStudy, tally: Tally, response: int) -> Array:
     """Return the replicates ``(cells, n)`` of a response that every cell has."""
-    samples = [tally.sample(i)[response] for i in range(len(laid.cells))]
+    samples = [tally.sample(i)[response] for i in range(len(loaded.cells))]
     n = min(each.size for each in samples)
     return np.array([each[:n] for each in samples])
 
 
-def _claims(laid: LoadedStudy, tally: Tally, document: Document) -> list[Document]:
+def _claims(loaded: LoadedStudy, tally: Tally, document: Document) -> list[Document]:
     responses = {each["name"]: each for each in document["responses"]}
-    names = laid.study.responses
+    names = loaded.study.responses
     return test_claims(
-        laid.study.claim, laid.cells, responses, lambda name: _replicates(laid, tally, names.index(name))
+        loaded.study.claim, loaded.cells, responses, lambda name: _replicates(loaded, tally, names.index(name))
     )
 
 
-def _levels(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
+def _levels(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
     """Yield the mean of every level of a factor, replicate by replicate that of all its cells."""
-    for j, response in enumerate(laid.responses):
-        values = _replicates(laid, tally, j)
-        for factor, levels in laid.factors.items():
-            for level in levels if len(levels) < len(laid.cells) or len(laid.factors) == 1 else ():
-                means = values[[cell.levels[factor] == level for cell in laid.cells]].mean(axis=0)
+    for j, response in enumerate(loaded.responses):
+        values = _replicates(loaded, tally, j)
+        for factor, levels in loaded.factors.items():
+            for level in levels if len(levels) < len(loaded.cells) or len(loaded.factors) == 1 else ():
+                means = values[[cell.levels[factor] == level for cell in loaded.cells]].mean(axis=0)
                 known = means[np.isfinite(means)]
                 if known.size > 1:
                     mean, sd = float(known.mean()), float(known.std(ddof=1))
@@ -206,15 +206,15 @@ def _levels(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
                     yield {"response": response.name, "factor": factor, "level": level} | found
 
 
-def _densities(laid: LoadedStudy, tally: Tally) -> Iterator[Document]:
+def _densities(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
     """Yield how a response is distributed at each level of a factor, whatever those of the others."""
-    for j, response in enumerate(laid.responses):
-        values = _replicates(laid, tally, j)
-        for factor, levels in laid.factors.items():
+    for j, response in enumerate(loaded.responses):
+        values = _replicates(loaded, tally, j)
+        for factor, levels in loaded.factors.items():
             if len(levels) > MAX_DENSITIES:
                 continue
             of_levels = {
-                level: values[[i for i, cell in enumerate(laid.cells) if cell.levels[factor] == level]].ravel()
+                level: values[[i for i, cell in enumerate(loaded.cells) if cell.levels[factor] == level]].ravel()
                 for level in levels
             }
             if curves := densities(of_levels):

@@ -23,12 +23,12 @@ CELLS, COMPARISONS, REPLICATES, PAGE = (
 FILES = (*checkpoint.KINDS, CELLS, COMPARISONS, REPLICATES, PAGE, RESULTS)
 
 
-def open_tally(laid: LoadedStudy, out: Path | None, force: bool) -> Tally:
+def open_tally(loaded: LoadedStudy, out: Path | None, force: bool) -> Tally:
     """Return the tally of a study as its folder holds it, or an empty one, and make the folder.
 
     Raises Mistake for a folder that holds something else, unless forced to begin anew.
     """
-    empty = Tally.empty(len(laid.cells), len(laid.responses))
+    empty = Tally.empty(len(loaded.cells), len(loaded.responses))
     if out is None:
         return empty
     try:
@@ -38,7 +38,7 @@ def open_tally(laid: LoadedStudy, out: Path | None, force: bool) -> Tally:
             left = checkpoint.newest_checkpoint(out)
             if left is not None:
                 _see_that_it_can_be_written(out)
-                return _not_beyond(checkpoint.load(left, laid.identity), laid, left)
+                return _not_beyond(checkpoint.load(left, loaded.identity), loaded, left)
             if any(out.iterdir()):
                 raise A7SimError(
                     f"{out}: expected an empty folder or that of a study, got another (--force writes there)"
@@ -56,18 +56,18 @@ def _see_that_it_can_be_written(folder: Path) -> None:
     TemporaryFile(dir=folder).close()
 
 
-def _not_beyond(tally: Tally, laid: LoadedStudy, path: Path) -> Tally:
+def _not_beyond(tally: Tally, loaded: LoadedStudy, path: Path) -> Tally:
     done = int(tally.done.max())
-    if done > laid.replicates:
-        raise A7SimError(f"{path}: expected {done} replicates or more, since so many are done, got {laid.replicates}")
+    if done > loaded.replicates:
+        raise A7SimError(f"{path}: expected {done} replicates or more, since so many are done, got {loaded.replicates}")
     return tally
 
 
-def write_results(out: Path, laid: LoadedStudy, tally: Tally, document: Document) -> None:
+def write_results(out: Path, loaded: LoadedStudy, tally: Tally, document: Document) -> None:
     """Leave results and tables in a folder."""
     write_atomic(out / CELLS, _cells_csv(document))
     write_atomic(out / COMPARISONS, _comparisons_csv(document))
-    write_atomic(out / REPLICATES, _replicates_csv(laid, tally))
+    write_atomic(out / REPLICATES, _replicates_csv(loaded, tally))
     write_atomic(out / RESULTS, as_json(document))
 
 
@@ -114,16 +114,16 @@ def _comparisons_csv(document: Document) -> str:
     return to_csv(header, rows)
 
 
-def _replicates_csv(laid: LoadedStudy, tally: Tally) -> str:
+def _replicates_csv(loaded: LoadedStudy, tally: Tally) -> str:
     """Return the sample, a replicate a line; nan is a session that gave up."""
     rows = (
         (
             str(cell.number),
             str(number),
-            str(replicate_seed(laid.study.seed, number - 1)),
+            str(replicate_seed(loaded.study.seed, number - 1)),
             *(f"{each:.10g}" for each in values),
         )
-        for i, cell in enumerate(laid.cells)
+        for i, cell in enumerate(loaded.cells)
         for number, values in enumerate(tally.sample(i).T.tolist(), start=1)
     )
-    return to_csv(("cell", "replicate", "seed", *laid.study.responses), rows)
+    return to_csv(("cell", "replicate", "seed", *loaded.study.responses), rows)

@@ -110,14 +110,14 @@ def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> 
     """Return the study of raw tables whose scenario stands in `folder`, or comes with a7sim. Raises StudyError."""
     if "scenario" not in raw and "photos" in raw:
         raise StudyError(source, ["expected a study, got a scenario (`a7sim run` takes it)"])
-    mistakes = [mistake.replace("the scenario", "the study") for mistake in schema_errors(raw, _expected())]
+    mistakes = [error.replace("the scenario", "the study") for error in schema_errors(raw, _expected())]
     if mistakes:
         raise StudyError(source, mistakes)
     study = msgspec.convert(raw, Study)
     try:
         cells, responses = make_cells(study), [find_response(name) for name in study.responses]
-    except A7SimError as mistake:
-        raise StudyError(source, [str(mistake)]) from mistake
+    except A7SimError as error:
+        raise StudyError(source, [str(error)]) from error
     mistakes = list(_mistakes_between(study))
     if mistakes:
         raise StudyError(source, mistakes)
@@ -126,8 +126,8 @@ def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> 
         if study.strips is not None:
             cells = make_strip_cells(cells, _models_of_strips(study, scenarios))
         validate_claims(study, cells)
-    except A7SimError as mistake:
-        raise StudyError(source, [str(mistake)]) from mistake
+    except A7SimError as error:
+        raise StudyError(source, [str(error)]) from error
     return LoadedStudy(study, tuple(cells), scenarios, tuple(responses), source)
 
 

@@ -73,7 +73,7 @@ class _Chunk:
 
 
 def run_study(
-    laid: LoadedStudy,
+    loaded: LoadedStudy,
     tally: Tally,
     executor: Executor,
     at_once: int = 1,
@@ -89,37 +89,37 @@ def run_study(
     pace = pace or ChunkPolicy()
     saved_at = -np.inf
     try:
-        for chunk, values in _results(laid, tally, executor, 2 * at_once, pace):
+        for chunk, values in _results(loaded, tally, executor, 2 * at_once, pace):
             for cell, each in zip(chunk.cells, values, strict=True):
                 tally.add(cell, each[:, int(tally.done[cell]) - chunk.first :])
             tick(len(chunk.seeds) * len(chunk.cells))
             if checkpoint is not None and time.monotonic() - saved_at > pace.save_seconds:
-                save(tally, checkpoint, laid.identity)
+                save(tally, checkpoint, loaded.identity)
                 saved_at = time.monotonic()
     finally:
         if checkpoint is not None:
-            save(tally, checkpoint, laid.identity)
+            save(tally, checkpoint, loaded.identity)
 
 
-def precision_reached(laid: LoadedStudy, tally: Tally) -> bool:
+def precision_reached(loaded: LoadedStudy, tally: Tally) -> bool:
     """Return whether the mean that a study wants to know is known well enough in every cell."""
-    wanted = laid.study.precision
+    wanted = loaded.study.precision
     if wanted is None or int(tally.done.min()) == 0:
         return False
-    column = laid.study.responses.index(wanted.response)
+    column = loaded.study.responses.index(wanted.response)
     half_widths = _TWO_SIDED_95 * tally.sd[:, column] / np.sqrt(np.maximum(tally.count[:, column], 1))
     return bool((half_widths <= wanted.half_width).all())
 
 
 def _results(
-    laid: LoadedStudy, tally: Tally, executor: Executor, most_waiting: int, pace: ChunkPolicy
+    loaded: LoadedStudy, tally: Tally, executor: Executor, most_waiting: int, pace: ChunkPolicy
 ) -> Iterator[tuple[_Chunk, Array]]:
-    for stop in _stops(laid):
+    for stop in _stops(loaded):
         if int(tally.done.min()) >= stop:
             continue
-        if _on_a_step(tally) and precision_reached(laid, tally):
+        if _on_a_step(tally) and precision_reached(loaded, tally):
             return
-        yield from _up_to(stop, laid, tally, executor, most_waiting, pace)
+        yield from _up_to(stop, loaded, tally, executor, most_waiting, pace)
 
 
 def _on_a_step(tally: Tally) -> bool:
@@ -127,17 +127,17 @@ def _on_a_step(tally: Tally) -> bool:
     return bool((tally.done == tally.done[0]).all()) and int(tally.done[0]) % STEP == 0
 
 
-def _stops(laid: LoadedStudy) -> Iterator[int]:
+def _stops(loaded: LoadedStudy) -> Iterator[int]:
     """Yield the numbers of replicates that every cell must have before the study looks whether that is enough."""
-    if laid.study.precision is not None:
-        yield from range(STEP, laid.replicates, STEP)
-    yield laid.replicates
+    if loaded.study.precision is not None:
+        yield from range(STEP, loaded.replicates, STEP)
+    yield loaded.replicates
 
 
 def _up_to(
-    stop: int, laid: LoadedStudy, tally: Tally, executor: Executor, most_waiting: int, pace: ChunkPolicy
+    stop: int, loaded: LoadedStudy, tally: Tally, executor: Executor, most_waiting: int, pace: ChunkPolicy
 ) -> Iterator[tuple[_Chunk, Array]]:
-    asked = tally.done.reshape(len(laid.tasks), -1).min(axis=1)
+    asked = tally.done.reshape(len(loaded.tasks), -1).min(axis=1)
     size = _Size(pace)
     waiting: deque[tuple[_Chunk, Future[tuple[Array, float]]]] = deque()
     try:
@@ -145,10 +145,10 @@ def _up_to(
             while int(asked.min()) < stop and len(waiting) < most_waiting:
                 at = int(asked.argmin())
                 first, last = int(asked[at]), min(int(asked[at]) + size.best, stop)
-                task = laid.tasks[at]
+                task = loaded.tasks[at]
                 cells = range(at * task.cells, (at + 1) * task.cells)
                 chunk = _Chunk(
-                    cells, first, tuple(replicate_seed(laid.study.seed, each) for each in range(first, last))
+                    cells, first, tuple(replicate_seed(loaded.study.seed, each) for each in range(first, last))
                 )
                 waiting.append((chunk, executor.submit(_timed, task, chunk.seeds)))
                 asked[at] = last

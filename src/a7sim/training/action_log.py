@@ -73,7 +73,7 @@ class Reading:
 class ActionLog:
     """What was seen at an instrument, the truth beside it; everything but the truth can be had at the link."""
 
-    deeds: list[StudentAction] = field(default_factory=list)
+    actions: list[StudentAction] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)
     sides: dict[str, int] = field(default_factory=dict)
     began: float = 0.0
@@ -85,7 +85,7 @@ class ActionLog:
 
     def copy_from(self, other: "ActionLog") -> None:
         """Know what another has seen so far, and nothing else."""
-        self.deeds, self.readings, self.sides = [*other.deeds], [*other.readings], dict(other.sides)
+        self.actions, self.readings, self.sides = [*other.actions], [*other.readings], dict(other.sides)
         self.began, self.opened, self.now, self.client = other.began, other.opened, other.now, other.client
 
     def on_link_event(self, event: LinkEvent) -> None:
@@ -112,7 +112,7 @@ class ActionLog:
         """Take note of a deed."""
         if what in PLAIN and before != after:
             self.sides[name] = 1 if after > before else -1
-        self.deeds.append(StudentAction(len(self.deeds), self.now, self.client, what, name, before, after, text))
+        self.actions.append(StudentAction(len(self.actions), self.now, self.client, what, name, before, after, text))
 
     def add_reading(self, autograph: Autograph, made: Registration) -> None:
         """Take note of a registration and of how everything stands."""
@@ -124,7 +124,7 @@ class ActionLog:
         stereo = None if left is None or right is None else (left[0] - right[0], left[1] - right[1])
         self.readings.append(
             Reading(
-                len(self.deeds) - 1,
+                len(self.actions) - 1,
                 self.now,
                 self.client,
                 made.number,
@@ -154,12 +154,12 @@ class _WitnessedRecorder(Recorder):
 
     def register(self, point: str, readings: list[tuple[str, str]]) -> Registration:
         made = super().register(point, readings)
-        self._autograph.witness.add_reading(self._autograph, made)
+        self._autograph.action_log.add_reading(self._autograph, made)
         return made
 
     def strike(self, number: int, why: str) -> None:
         super().strike(number, why)
-        self._autograph.witness.strike_reading(number)
+        self._autograph.action_log.strike_reading(number)
 
 
 class LoggedAutograph(Autograph):
@@ -167,7 +167,7 @@ class LoggedAutograph(Autograph):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.witness = ActionLog()
+        self.action_log = ActionLog()
         self.recorder = _WitnessedRecorder(self)
         self.blind = False
         """Whether pictures are left black, for who only works a journal again: they take longer than all the rest."""
@@ -194,85 +194,85 @@ class LoggedAutograph(Autograph):
         """Set an element through its counter."""
         before = self._spindle(name).at
         super().set_element(name, value)
-        self.witness.add_action("set", name, before, self._spindle(name).at)
+        self.action_log.add_action("set", name, before, self._spindle(name).at)
 
     def turn_element(self, name: str, amount: float) -> None:
         """Turn the drum of an element."""
         before = self._spindle(name).at
         super().turn_element(name, amount)
-        self.witness.add_action("turn", name, before, self._spindle(name).at)
+        self.action_log.add_action("turn", name, before, self._spindle(name).at)
 
     def drive(self, axis: str, reading: float) -> None:
         """Run a carriage to a reading."""
         before = self._counted(axis)
         super().drive(axis, reading)
-        self.witness.add_action("drive", axis, before, self._counted(axis))
+        self.action_log.add_action("drive", axis, before, self._counted(axis))
 
     def turn_handwheel(self, axis: str, amount: float) -> None:
         """Turn a handwheel."""
         before = self._counted(axis)
         super().turn_handwheel(axis, amount)
-        self.witness.add_action("wheel", axis, before, self._counted(axis))
+        self.action_log.add_action("wheel", axis, before, self._counted(axis))
 
     def preset(self, axis: str, reading: float) -> None:
         """Preset a counter."""
         before = self._counted(axis)
         super().preset(axis, reading)
-        self.witness.add_action("preset", axis, before, self._counted(axis))
+        self.action_log.add_action("preset", axis, before, self._counted(axis))
 
     def set_fitting(self, name: str, position: str) -> None:
         """Put a fitting over."""
         super().set_fitting(name, position)
-        self.witness.add_action("fit", name, text=position)
+        self.action_log.add_action("fit", name, text=position)
 
     def set_base_mode(self, mode: str) -> None:
         """Set base in or out."""
         super().set_base_mode(mode)
-        self.witness.add_action("base", text=mode)
+        self.action_log.add_action("base", text=mode)
 
     def set_height_gear(self, gear: str | float) -> None:
         """Engage a height gear."""
         super().set_height_gear(gear)
-        self.witness.add_action("gear", text=self.height_gear)
+        self.action_log.add_action("gear", text=self.height_gear)
 
     def load(self, projector: int, name: str) -> None:
         """Lay a picture on a carrier."""
         super().load(projector, name)
-        self.witness.add_action("load", str(projector), text=name)
+        self.action_log.add_action("load", str(projector), text=name)
 
     def unload(self, projector: int) -> None:
         """Take a picture off."""
         super().unload(projector)
-        self.witness.add_action("unload", str(projector))
+        self.action_log.add_action("unload", str(projector))
 
     def centre_picture(self, projector: int, dx: float, dy: float, dkappa: float) -> None:
         """Shift and turn a picture on its carrier."""
         super().centre_picture(projector, dx, dy, dkappa)
-        self.witness.add_action("centre", str(projector))
+        self.action_log.add_action("centre", str(projector))
 
     def reset(self) -> None:
         """Run everything to its zero."""
         before = {name: spindle.at for name, spindle in self._spindles.items()}
         super().reset()
-        self.witness.add_action("reset")
+        self.action_log.add_action("reset")
         for name, spindle in self._spindles.items():
             if spindle.at != before[name]:
-                self.witness.add_action("set", name, before[name], spindle.at)
+                self.action_log.add_action("set", name, before[name], spindle.at)
 
     def eyepiece(self, eyepiece: int, name: str) -> tuple[float, float] | None:
         """Look at a point through an eyepiece."""
-        self.witness.add_action("look", name)
+        self.action_log.add_action("look", name)
         return super().eyepiece(eyepiece, name)
 
     def stereo(self, name: str) -> tuple[float, float] | None:
         """Look at a point with both eyes."""
-        self.witness.add_action("look", name)
+        self.action_log.add_action("look", name)
         left, right = Autograph.eyepiece(self, 1, name), Autograph.eyepiece(self, 2, name)
         return None if left is None or right is None else (left[0] - right[0], left[1] - right[1])
 
     def picture(self, eyepiece: int, columns: int, rows: int, magnification: float) -> Any:
         """Look at the picture that an eyepiece shows."""
-        self.witness.add_action("look")
+        self.action_log.add_action("look")
         if self.blind:
             return np.zeros((rows, columns))
         return super().picture(eyepiece, columns, rows, magnification)

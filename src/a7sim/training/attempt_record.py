@@ -25,7 +25,7 @@ class AttemptRecord:
     scene: Scene
     autograph: LoggedAutograph
     """As the attempt leaves it."""
-    witness: ActionLog
+    action_log: ActionLog
     written: Mapping[str, str] = field(default_factory=dict)
     """Answers that were written down beside the journal."""
     hidden: Mapping[str, Any] = field(default_factory=dict)
@@ -34,17 +34,17 @@ class AttemptRecord:
     @property
     def actions(self) -> Sequence[StudentAction]:
         """The student's deeds."""
-        return [each for each in self.witness.deeds if each.client != OPENING]
+        return [each for each in self.action_log.actions if each.client != OPENING]
 
     @property
     def readings(self) -> Sequence[Reading]:
         """The student's registrations that were not struck out."""
-        return [each for each in self.witness.readings if each.client != OPENING and not each.struck]
+        return [each for each in self.action_log.readings if each.client != OPENING and not each.struck]
 
     @property
     def seconds(self) -> float:
         """Simulated s since the student sat down."""
-        return max(0.0, self.witness.now - self.witness.began)
+        return max(0.0, self.action_log.now - self.action_log.began)
 
     @cached_property
     def model(self) -> ModelJob:
@@ -56,9 +56,9 @@ class AttemptRecord:
     def answers(self) -> dict[str, str]:
         """What was answered, in notes at the instrument or beside the journal; the later answer counts."""
         noted: dict[str, str] = {}
-        for deed in self.actions:
-            if deed.what == "note" and deed.text.lower().startswith(ANSWER):
-                noted |= parse_answers(deed.text[len(ANSWER) :].split())
+        for action in self.actions:
+            if action.what == "note" and action.text.lower().startswith(ANSWER):
+                noted |= parse_answers(action.text[len(ANSWER) :].split())
         return noted | dict(self.written)
 
     def name_of(self, point: str) -> str:

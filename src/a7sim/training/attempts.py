@@ -32,80 +32,82 @@ STUDENT = "student"
 
 @contextmanager
 def start_attempt(
-    shelved: ExerciseFolder, seed: int, folder: Path, student: str, mode: str
+    exercise_folder: ExerciseFolder, seed: int, folder: Path, student: str, mode: str
 ) -> Iterator[AttemptEnvironment]:
     """Begin an attempt in a folder: its papers are handed out and its opening is done. Raises Mistake."""
     folder.mkdir(parents=True, exist_ok=True)
-    hand_out(shelved, seed, folder)
-    with open_environment(shelved, seed, folder, student, mode) as room:
-        run_opening(room)
-        yield room
+    hand_out(exercise_folder, seed, folder)
+    with open_environment(exercise_folder, seed, folder, student, mode) as environment:
+        run_opening(environment)
+        yield environment
 
 
 @contextmanager
-def resume_attempt(shelved: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
+def resume_attempt(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
     """Go on with an attempt that was left, or cut off. Raises Mistake."""
-    with resume_environment(shelved, seed, folder) as room:
-        if not room.action_log.opened:
-            run_opening(room)
-        yield room
+    with resume_environment(exercise_folder, seed, folder) as environment:
+        if not environment.action_log.opened:
+            run_opening(environment)
+        yield environment
 
 
-def hand_out(shelved: ExerciseFolder, seed: int, folder: Path) -> None:
+def hand_out(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> None:
     """Put the papers of an exercise into a folder."""
-    for name, text in make_papers(shelved, seed).items():
+    for name, text in make_papers(exercise_folder, seed).items():
         write_atomic(folder / name, text)
 
 
-def make_papers(shelved: ExerciseFolder, seed: int) -> Mapping[str, str]:
+def make_papers(exercise_folder: ExerciseFolder, seed: int) -> Mapping[str, str]:
     """Return the papers of an exercise by file name, none where it has none."""
-    exercise = shelved.exercise
+    exercise = exercise_folder.exercise
     if not exercise.handout:
         return {}
-    return make_handout(exercise.handout, scenario_for(shelved, seed), seed, exercise.handout_options).papers
+    return make_handout(exercise.handout, scenario_for(exercise_folder, seed), seed, exercise.handout_options).papers
 
 
-def run_opening(room: AttemptEnvironment) -> None:
+def run_opening(environment: AttemptEnvironment) -> None:
     """Do the opening of an exercise. Raises Mistake where it cannot be done."""
-    opening = room.shelved.exercise.opening
+    opening = environment.exercise_folder.exercise.opening
     if opening is not None:
-        trouble = play_item(room, opening, OPENING)
-        if trouble:
-            raise A7SimError(f"{room.shelved.name}: the opening cannot be done: {trouble}")
+        error = play_item(environment, opening, OPENING)
+        if error:
+            raise A7SimError(f"{environment.exercise_folder.name}: the opening cannot be done: {error}")
 
 
-def play_item(room: AttemptEnvironment, played: PlayedRun, client: str = STUDENT) -> str:
+def play_item(environment: AttemptEnvironment, played: PlayedRun, client: str = STUDENT) -> str:
     """Let a script or a procedure be played; return what kept it from its end, empty where nothing did."""
     if played.procedure:
-        return run_procedure(room, played, client, make_papers(room.shelved, room.seed))
-    return play_script(room, read_script(room.shelved.folder / played.script), client)
+        return run_procedure(environment, played, client, make_papers(environment.exercise_folder, environment.seed))
+    return play_script(environment, read_script(environment.exercise_folder.folder / played.script), client)
 
 
-def play_script(room: AttemptEnvironment, script: Script, client: str = STUDENT) -> str:
+def play_script(environment: AttemptEnvironment, script: Script, client: str = STUDENT) -> str:
     """Play a script at the instrument of an attempt; return what it expected in vain, empty where nothing."""
-    not_met = ScriptRunner(script, desk=room.desk, clock=room.clock).run(client)
-    if not_met is not None and client in room.desk.clients:
-        room.desk.close(client, room.clock.now)
+    not_met = ScriptRunner(script, instrument=environment.instrument, clock=environment.clock).run(client)
+    if not_met is not None and client in environment.instrument.clients:
+        environment.instrument.close(client, environment.clock.now)
     return str(not_met) if not_met is not None else ""
 
 
-def seed_for(shelved: ExerciseFolder, played: PlayedRun, otherwise: int = 1) -> int:
+def seed_for(exercise_folder: ExerciseFolder, played: PlayedRun, otherwise: int = 1) -> int:
     """Return the seed with which something is played: a script's own, or that of the exercise's reference."""
     if played.seed is not None:
         return played.seed
     if played.script:
-        return read_script(shelved.folder / played.script).seed
-    reference = shelved.exercise.reference
-    return otherwise if played is reference else seed_for(shelved, reference)
+        return read_script(exercise_folder.folder / played.script).seed
+    reference = exercise_folder.exercise.reference
+    return otherwise if played is reference else seed_for(exercise_folder, reference)
 
 
-def run_attempt(shelved: ExerciseFolder, played: PlayedRun, folder: Path, seed: int, student: str = "somebody") -> str:
+def run_attempt(
+    exercise_folder: ExerciseFolder, played: PlayedRun, folder: Path, seed: int, student: str = "somebody"
+) -> str:
     """Do an exercise from its opening to its end in a folder; return what kept it from its end."""
     folder.mkdir(parents=True, exist_ok=True)
-    hand_out(shelved, seed, folder)
-    with open_environment(shelved, seed, folder, student, "practice", dict(played.observer)) as room:
-        run_opening(room)
-        return play_item(room, played)
+    hand_out(exercise_folder, seed, folder)
+    with open_environment(exercise_folder, seed, folder, student, "practice", dict(played.observer)) as environment:
+        run_opening(environment)
+        return play_item(environment, played)
 
 
 def write_answers(folder: Path, answers: dict[str, str]) -> dict[str, str]:

@@ -47,8 +47,8 @@ def find_exercise(name: str) -> ExerciseFolder:
 
 def _folders() -> list[Path]:
     """Return the folders of the exercises that come with a7sim: number, hyphen, name, in their order."""
-    shelf = next((each for each in SEARCH_PATH if each.is_dir()), None)
-    return sorted(path.parent for path in shelf.glob(f"[0-9][0-9]-*/{FILE}")) if shelf else []
+    catalogue = next((each for each in SEARCH_PATH if each.is_dir()), None)
+    return sorted(path.parent for path in catalogue.glob(f"[0-9][0-9]-*/{FILE}")) if catalogue else []
 
 
 def read_exercise(folder: Path) -> ExerciseFolder:

@@ -38,39 +38,41 @@ class CheckResult:
 class _Run:
     """Something played: its account, and what every criterion's measure came to, which no change of a limit changes."""
 
-    account: AttemptRecord
+    record: AttemptRecord
     found: Sequence[MetricResult]
 
     @classmethod
-    def of(cls, account: AttemptRecord) -> "_Run":
-        return cls(account, evaluate_metrics(account))
+    def of(cls, record: AttemptRecord) -> "_Run":
+        return cls(record, evaluate_metrics(record))
 
     def grade(self, exercise: Exercise) -> Grade:
         """Grade it by the limits and weights of an exercise with the same measures."""
-        return grade_by(exercise, self.found, self.account.seconds)
+        return grade_by(exercise, self.found, self.record.seconds)
 
 
-def check_exercise(shelved: ExerciseFolder) -> CheckResult:
+def check_exercise(exercise_folder: ExerciseFolder) -> CheckResult:
     """Check an exercise whole."""
-    exercise = shelved.exercise
-    faults = list(_of_form(shelved))
-    if not _all_there(shelved):
-        return CheckResult(shelved.name, tuple(faults))
+    exercise = exercise_folder.exercise
+    faults = list(_of_form(exercise_folder))
+    if not _all_there(exercise_folder):
+        return CheckResult(exercise_folder.name, tuple(faults))
     with tempfile.TemporaryDirectory() as place:
         try:
-            faults += _of_tolerances(exercise, scenario_for(shelved, seed_for(shelved, exercise.reference)))
-            accounts = _accounts(shelved, Path(place))
-        except A7SimError as mistake:
-            return CheckResult(shelved.name, (*faults, str(mistake)))
-        runs = {name: _Run.of(account) for name, account in accounts.items()}
+            faults += _of_tolerances(
+                exercise, scenario_for(exercise_folder, seed_for(exercise_folder, exercise.reference))
+            )
+            accounts = _accounts(exercise_folder, Path(place))
+        except A7SimError as error:
+            return CheckResult(exercise_folder.name, (*faults, str(error)))
+        runs = {name: _Run.of(record) for name, record in accounts.items()}
         faults += _of_runs(exercise, runs)
         faults += _dead_criteria(exercise, runs)
-    return CheckResult(shelved.name, tuple(faults), runs["reference"].grade(exercise).points)
+    return CheckResult(exercise_folder.name, tuple(faults), runs["reference"].grade(exercise).points)
 
 
-def _of_form(shelved: ExerciseFolder) -> Iterator[str]:
-    exercise = shelved.exercise
-    if not shelved.text.strip():
+def _of_form(exercise_folder: ExerciseFolder) -> Iterator[str]:
+    exercise = exercise_folder.exercise
+    if not exercise_folder.text.strip():
         yield "text.md: expected the exercise in plain words, found none"
     if len(exercise.hints) < MIN_HINTS:
         yield f"hint: expected {MIN_HINTS} hints or more, got {len(exercise.hints)}"
@@ -82,14 +84,14 @@ def _of_form(shelved: ExerciseFolder) -> Iterator[str]:
     if abs(total - FULL_MARKS) > 1e-6:
         yield f"criterion: expected weights that add up to {FULL_MARKS:g}, got {total:g}"
     for played in (exercise.reference, *exercise.faulty, exercise.opening):
-        if played is not None and played.script and not (shelved.folder / played.script).is_file():
+        if played is not None and played.script and not (exercise_folder.folder / played.script).is_file():
             yield f"{played.script}: expected a script beside the exercise, found none"
 
 
-def _all_there(shelved: ExerciseFolder) -> bool:
-    exercise = shelved.exercise
+def _all_there(exercise_folder: ExerciseFolder) -> bool:
+    exercise = exercise_folder.exercise
     played = [each for each in (exercise.reference, *exercise.faulty, exercise.opening) if each is not None]
-    return all(not each.script or (shelved.folder / each.script).is_file() for each in played)
+    return all(not each.script or (exercise_folder.folder / each.script).is_file() for each in played)
 
 
 def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
@@ -104,33 +106,33 @@ def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
             yield f"{each.id}: expected excellent no worse than pass, got {each.excellent:g} and {each.passing:g}"
 
 
-def _accounts(shelved: ExerciseFolder, place: Path) -> dict[str, AttemptRecord]:
+def _accounts(exercise_folder: ExerciseFolder, place: Path) -> dict[str, AttemptRecord]:
     """Return the accounts of the reference, the faulty ones, who does nothing, who is slow, who stops early.
 
     The reference is an attempt as a student's, journal and all; the others are rehearsed.
     """
-    exercise = shelved.exercise
-    rehearsals = DryRuns(shelved)
-    accounts = {"reference": _of_reference(shelved, place)}
+    exercise = exercise_folder.exercise
+    rehearsals = DryRuns(exercise_folder)
+    accounts = {"reference": _of_reference(exercise_folder, place)}
     for i, played in enumerate(exercise.faulty, start=1):
-        accounts[f"faulty {i}"], trouble = rehearsals.run_attempt(played)
-        if trouble and played.script:
-            raise A7SimError(f"{played.script}: {trouble}")
-    seed = seed_for(shelved, exercise.reference)
-    script = read_script(shelved.folder / exercise.reference.script) if exercise.reference.script else None
+        accounts[f"faulty {i}"], error = rehearsals.run_attempt(played)
+        if error and played.script:
+            raise A7SimError(f"{played.script}: {error}")
+    seed = seed_for(exercise_folder, exercise.reference)
+    script = read_script(exercise_folder.folder / exercise.reference.script) if exercise.reference.script else None
     accounts["nothing"] = rehearsals.run_and_leave(seed, None)
     accounts["slow"] = rehearsals.run_and_leave(seed, script, 10.0 * exercise.minutes)
     accounts["half"] = rehearsals.run_and_leave(seed, _half_of(script)) if script else accounts["nothing"]
     return accounts
 
 
-def _of_reference(shelved: ExerciseFolder, place: Path) -> AttemptRecord:
-    reference = shelved.exercise.reference
-    seed = seed_for(shelved, reference)
-    trouble = run_attempt(shelved, reference, place, seed)
-    if trouble:
-        raise A7SimError(f"reference: expected it to come to its end: {trouble}")
-    return load_record(shelved, seed, place)
+def _of_reference(exercise_folder: ExerciseFolder, place: Path) -> AttemptRecord:
+    reference = exercise_folder.exercise.reference
+    seed = seed_for(exercise_folder, reference)
+    error = run_attempt(exercise_folder, reference, place, seed)
+    if error:
+        raise A7SimError(f"reference: expected it to come to its end: {error}")
+    return load_record(exercise_folder, seed, place)
 
 
 def _half_of(script: Script) -> Script:
@@ -157,10 +159,10 @@ def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
         yield "expected who does nothing not to pass, got a pass"
     for step in exercise.steps:
         measure = make_metric(step)
-        found = measure.evaluate(runs["reference"].account)
+        found = measure.evaluate(runs["reference"].record)
         if not measure.meets(found.value, step.done):
             yield f"step {step.text!r}: expected the reference to tick it, got {found.reason}"
-        if exercise.opening is not None and measure.meets(measure.evaluate(runs["nothing"].account).value, step.done):
+        if exercise.opening is not None and measure.meets(measure.evaluate(runs["nothing"].record).value, step.done):
             yield f"step {step.text!r}: expected it to be still to do after the opening, got it ticked"
 
 

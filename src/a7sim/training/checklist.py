@@ -19,20 +19,20 @@ PAPERS = (".csv", ".txt", ".md")
 class Checklist:
     """The checklist of an attempt in its room; in an exam it only says what is to be done."""
 
-    room: AttemptEnvironment
+    environment: AttemptEnvironment
     attempt: Attempt
 
     @property
     def exercise(self) -> Exercise:
         """The exercise."""
-        return self.room.shelved.exercise
+        return self.environment.exercise_folder.exercise
 
     def ticks(self) -> list[bool]:
         """Return which steps are done."""
-        account = self.room.record(written_answers(self.attempt.folder))
+        record = self.environment.record(written_answers(self.attempt.folder))
         measures = [make_metric(each) for each in self.exercise.steps]
         return [
-            measure.meets(measure.evaluate(account).value, step.done)
+            measure.meets(measure.evaluate(record).value, step.done)
             for measure, step in zip(measures, self.exercise.steps, strict=True)
         ]
 
@@ -51,7 +51,7 @@ class Checklist:
 
     def head(self) -> str:
         """Return exercise and time for people."""
-        exercise, minutes = self.exercise, self.room.record().seconds / 60.0
+        exercise, minutes = self.exercise, self.environment.record().seconds / 60.0
         exam = ", exam" if self.attempt.mode == EXAM else ""
         over = ", the time is up" if minutes > exercise.minutes else ""
         return f"{exercise.number} {exercise.title}{exam}: {minutes:.0f} of {exercise.minutes:g} minutes{over}"

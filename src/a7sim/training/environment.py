@@ -35,22 +35,22 @@ class UnreliableJournalError(A7SimError):
 class AttemptEnvironment:
     """An exercise's instrument."""
 
-    shelved: ExerciseFolder
+    exercise_folder: ExerciseFolder
     scenario: Scenario
     seed: int
     scene: Scene
-    desk: SharedInstrument
+    instrument: SharedInstrument
     clock: Clock
     autograph: LoggedAutograph
 
     @property
     def action_log(self) -> ActionLog:
         """Who saw all that happened."""
-        return self.autograph.witness
+        return self.autograph.action_log
 
     def record(self, written: dict[str, str] | None = None, hidden: dict[str, Any] | None = None) -> AttemptRecord:
         """Return the account of what has happened so far."""
-        exercise = self.shelved.exercise
+        exercise = self.exercise_folder.exercise
         return AttemptRecord(
             exercise, self.scenario, self.scene, self.autograph, self.action_log, written or {}, hidden or {}
         )
@@ -61,50 +61,67 @@ class AttemptEnvironment:
         To be asked while every client is gone.
         """
         autograph = LoggedAutograph.from_parts(self.scenario.instrument, self.scene.mountable, self.seed)
-        desk = SharedInstrument(autograph, autograph.witness.on_link_event)
-        desk.restore(self.desk.state())
-        autograph.witness.copy_from(self.action_log)
-        return replace(self, desk=desk, clock=Clock(self.clock.now), autograph=autograph)
+        instrument = SharedInstrument(autograph, autograph.action_log.on_link_event)
+        instrument.restore(self.instrument.state())
+        autograph.action_log.copy_from(self.action_log)
+        return replace(self, instrument=instrument, clock=Clock(self.clock.now), autograph=autograph)
 
 
-def header_for(shelved: ExerciseFolder, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
+def header_for(exercise_folder: ExerciseFolder, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
     """Return what the journal of an attempt says first. It names the scenario by its hash alone: it holds the truth."""
-    first = make_header_without_scenario(JOURNAL_COMMAND, exercise=shelved.name, student=student, mode=mode).line
-    return Header(first | {"title": shelved.exercise.title, "scenario_hash": hash_scenario(scenario), "seed": seed})
+    first = make_header_without_scenario(
+        JOURNAL_COMMAND, exercise=exercise_folder.name, student=student, mode=mode
+    ).line
+    return Header(
+        first | {"title": exercise_folder.exercise.title, "scenario_hash": hash_scenario(scenario), "seed": seed}
+    )
 
 
-def _built(shelved: ExerciseFolder, seed: int, observer: dict[str, Any]) -> tuple[Scenario, Scene, LoggedAutograph]:
-    scenario = scenario_for(shelved, seed, observer)
+def _built(
+    exercise_folder: ExerciseFolder, seed: int, observer: dict[str, Any]
+) -> tuple[Scenario, Scene, LoggedAutograph]:
+    scenario = scenario_for(exercise_folder, seed, observer)
     scene = build_scene(scenario, seed)
     return scenario, scene, LoggedAutograph.from_parts(scenario.instrument, scene.mountable, seed)
 
 
-def dry_run_environment(shelved: ExerciseFolder, seed: int) -> AttemptEnvironment:
+def dry_run_environment(exercise_folder: ExerciseFolder, seed: int) -> AttemptEnvironment:
     """Return the room of an attempt of which no journal is kept; the opening is still to be done."""
-    scenario, scene, autograph = _built(shelved, seed, {})
+    scenario, scene, autograph = _built(exercise_folder, seed, {})
     return AttemptEnvironment(
-        shelved, scenario, seed, scene, SharedInstrument(autograph, autograph.witness.on_link_event), Clock(), autograph
+        exercise_folder,
+        scenario,
+        seed,
+        scene,
+        SharedInstrument(autograph, autograph.action_log.on_link_event),
+        Clock(),
+        autograph,
     )
 
 
 @contextmanager
 def open_environment(
-    shelved: ExerciseFolder, seed: int, folder: Path, student: str, mode: str, observer: dict[str, Any] | None = None
+    exercise_folder: ExerciseFolder,
+    seed: int,
+    folder: Path,
+    student: str,
+    mode: str,
+    observer: dict[str, Any] | None = None,
 ) -> Iterator[AttemptEnvironment]:
     """Enter the room of a new attempt, journalled in a folder; the opening is still to be done.
 
     Raises Mistake where it cannot be written.
     """
-    scenario, scene, autograph = _built(shelved, seed, observer or {})
+    scenario, scene, autograph = _built(exercise_folder, seed, observer or {})
     journal = Journal(JournalOptions(states=False))
-    desk = SharedInstrument(autograph, tee_listener(journal.on_link_event, autograph.witness.on_link_event))
-    nominal = scenario_for(shelved, seed)
-    with journal.recording(folder, header_for(shelved, nominal, seed, student, mode), desk):
-        yield AttemptEnvironment(shelved, scenario, seed, scene, desk, Clock(), autograph)
+    instrument = SharedInstrument(autograph, tee_listener(journal.on_link_event, autograph.action_log.on_link_event))
+    nominal = scenario_for(exercise_folder, seed)
+    with journal.recording(folder, header_for(exercise_folder, nominal, seed, student, mode), instrument):
+        yield AttemptEnvironment(exercise_folder, scenario, seed, scene, instrument, Clock(), autograph)
 
 
 @contextmanager
-def resume_environment(shelved: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
+def resume_environment(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
     """Enter the room of an attempt that was left, as its journal leaves it. Raises Unreliable, Mistake."""
     there = read_journal(folder / JOURNAL)
     if there.header.get("software") != software_version():
@@ -112,25 +129,27 @@ def resume_environment(shelved: ExerciseFolder, seed: int, folder: Path) -> Iter
             f"{there.location(1)}: expected an attempt of {software_version()} to go on with, got one of "
             f"{there.header.get('software')} (a7sim train reset begins anew)"
         )
-    room, replay = _replayed(shelved, seed, there)
-    journal = Journal(JournalOptions(resumes=True, states=False)).resume_at(there, room.desk, replay.checkpoints)
-    room.desk.listener = tee_listener(journal.on_link_event, room.action_log.on_link_event)
+    environment, replay = _replayed(exercise_folder, seed, there)
+    journal = Journal(JournalOptions(resumes=True, states=False)).resume_at(
+        there, environment.instrument, replay.checkpoints
+    )
+    environment.instrument.listener = tee_listener(journal.on_link_event, environment.action_log.on_link_event)
     with journal:
         for event in replay.pending_events():
             journal.on_link_event(event)
-        for client in [*room.desk.clients]:
-            room.desk.close(client, room.clock.now)
-        yield room
+        for client in [*environment.instrument.clients]:
+            environment.instrument.close(client, environment.clock.now)
+        yield environment
 
 
-def replay_environment(shelved: ExerciseFolder, seed: int, there: JournalFile) -> AttemptEnvironment:
+def replay_environment(exercise_folder: ExerciseFolder, seed: int, there: JournalFile) -> AttemptEnvironment:
     """Return the room of an attempt as its journal leaves it. Raises Unreliable."""
-    return _replayed(shelved, seed, there)[0]
+    return _replayed(exercise_folder, seed, there)[0]
 
 
-def _replayed(shelved: ExerciseFolder, seed: int, there: JournalFile) -> tuple[AttemptEnvironment, Replay]:
-    scenario, scene, autograph = _built(shelved, seed, {})
-    expected = header_for(shelved, scenario, seed, "", "").line
+def _replayed(exercise_folder: ExerciseFolder, seed: int, there: JournalFile) -> tuple[AttemptEnvironment, Replay]:
+    scenario, scene, autograph = _built(exercise_folder, seed, {})
+    expected = header_for(exercise_folder, scenario, seed, "", "").line
     for name in ("command", "scenario_hash", "seed"):
         got = there.header.get(name)
         if got != expected[name]:
@@ -139,8 +158,8 @@ def _replayed(shelved: ExerciseFolder, seed: int, there: JournalFile) -> tuple[A
             )
     replay = Replay(there, autograph=autograph)
     autograph.blind = True
-    assert replay.desk.listener is not None
-    replay.desk.listener = tee_listener(replay.desk.listener, autograph.witness.on_link_event)
+    assert replay.instrument.listener is not None
+    replay.instrument.listener = tee_listener(replay.instrument.listener, autograph.action_log.on_link_event)
     for number, _, difference in replay_lines(replay):
         if difference is not None and not _same_but_for_pictures(difference):
             expected_, got = difference.replayed or "nothing", difference.journalled or "nothing"
@@ -148,7 +167,9 @@ def _replayed(shelved: ExerciseFolder, seed: int, there: JournalFile) -> tuple[A
                 f"{there.location(number)}: expected what the instrument does again, {expected_[:200]}, got {got[:200]}"
             )
     autograph.blind = False
-    return AttemptEnvironment(shelved, scenario, seed, scene, replay.desk, Clock(replay.time), autograph), replay
+    return AttemptEnvironment(
+        exercise_folder, scenario, seed, scene, replay.instrument, Clock(replay.time), autograph
+    ), replay
 
 
 def _same_but_for_pictures(difference: ReplayDifference) -> bool:

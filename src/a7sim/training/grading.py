@@ -79,14 +79,14 @@ class HintsTaken:
     cost: float = 0.0
 
 
-def grade_record(account: AttemptRecord, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
+def grade_record(record: AttemptRecord, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
     """Grade an account."""
-    return grade_by(account.exercise, evaluate_metrics(account), account.seconds, hints, shelved_name)
+    return grade_by(record.exercise, evaluate_metrics(record), record.seconds, hints, shelved_name)
 
 
-def evaluate_metrics(account: AttemptRecord) -> list[MetricResult]:
+def evaluate_metrics(record: AttemptRecord) -> list[MetricResult]:
     """Return what the measure of every criterion comes to, in their order."""
-    return [make_metric(each).evaluate(account) for each in account.exercise.criteria]
+    return [make_metric(each).evaluate(record) for each in record.exercise.criteria]
 
 
 def grade_by(
@@ -142,27 +142,27 @@ def grade_criterion(criterion: Criterion, found: MetricResult) -> CriterionResul
     )
 
 
-def grade_folder(shelved: ExerciseFolder, seed: int, folder: Path, hints: HintsTaken | None = None) -> Grade:
+def grade_folder(exercise_folder: ExerciseFolder, seed: int, folder: Path, hints: HintsTaken | None = None) -> Grade:
     """Grade the attempt in a folder. Raises Unreliable for a journal that cannot be relied on."""
-    return grade_record(load_record(shelved, seed, folder), hints, shelved.name)
+    return grade_record(load_record(exercise_folder, seed, folder), hints, exercise_folder.name)
 
 
-def load_record(shelved: ExerciseFolder, seed: int, folder: Path) -> AttemptRecord:
+def load_record(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> AttemptRecord:
     """Return the account of the attempt in a folder, by working it again. Raises Unreliable."""
     try:
-        room = replay_environment(shelved, seed, read_journal(folder / JOURNAL))
+        environment = replay_environment(exercise_folder, seed, read_journal(folder / JOURNAL))
     except UnreliableJournalError:
         raise
-    except A7SimError as mistake:
-        raise UnreliableJournalError(str(mistake)) from mistake
-    return make_record(room, written_answers(folder))
+    except A7SimError as error:
+        raise UnreliableJournalError(str(error)) from error
+    return make_record(environment, written_answers(folder))
 
 
-def make_record(room: AttemptEnvironment, written: dict[str, str] | None = None) -> AttemptRecord:
+def make_record(environment: AttemptEnvironment, written: dict[str, str] | None = None) -> AttemptRecord:
     """Return the account of an attempt with what was answered on paper, and what its maker of papers knows."""
-    exercise = room.shelved.exercise
-    hidden = make_handout(exercise.handout, room.scenario, room.seed, exercise.handout_options).hidden
-    return room.record(written, dict(hidden))
+    exercise = environment.exercise_folder.exercise
+    hidden = make_handout(exercise.handout, environment.scenario, environment.seed, exercise.handout_options).hidden
+    return environment.record(written, dict(hidden))
 
 
 def grade_lines(grade: Grade) -> Sequence[str]:

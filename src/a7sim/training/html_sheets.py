@@ -17,27 +17,29 @@ if TYPE_CHECKING:
 Best = Mapping[tuple[str, str], GradeRecord]
 
 
-def student_sheet(student: str, shelf: Sequence[ExerciseFolder], best: Best, graded: Sequence[GradeRecord]) -> str:
+def student_sheet(student: str, catalogue: Sequence[ExerciseFolder], best: Best, graded: Sequence[GradeRecord]) -> str:
     """Return the sheet of a student: where they stand, and for every exercise what to do better."""
     mine = {exercise: each for (name, exercise), each in best.items() if name == student}
     passed = sum(each.grade.passed for each in mine.values())
-    lead: list[Part] = [Paragraph(f"{passed} of {pluralize(len(shelf), 'exercise')} passed, {len(mine)} tried.")]
-    chapters = [Chapter("Where you stand", [_points(shelf, mine), _overview(shelf, mine, graded)])]
-    for shelved in shelf:
-        each = mine.get(shelved.name)
+    lead: list[Part] = [Paragraph(f"{passed} of {pluralize(len(catalogue), 'exercise')} passed, {len(mine)} tried.")]
+    chapters = [Chapter("Where you stand", [_points(catalogue, mine), _overview(catalogue, mine, graded)])]
+    for exercise_folder in catalogue:
+        each = mine.get(exercise_folder.name)
         if each is not None:
-            chapters.append(Chapter(f"{shelved.exercise.number} {shelved.exercise.title}", list(_of_exercise(each))))
+            chapters.append(
+                Chapter(f"{exercise_folder.exercise.number} {exercise_folder.exercise.title}", list(_of_exercise(each)))
+            )
     return page(f"{student}: exercises at the plotter", lead, chapters)
 
 
 def _overview(
-    shelf: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord], graded: Sequence[GradeRecord]
+    catalogue: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord], graded: Sequence[GradeRecord]
 ) -> TableBlock:
     rows = []
-    for shelved in shelf:
-        each = mine.get(shelved.name)
-        tried = sum(other.attempt.exercise == shelved.name for other in graded)
-        name = f"{shelved.exercise.number} {shelved.exercise.title}"
+    for exercise_folder in catalogue:
+        each = mine.get(exercise_folder.name)
+        tried = sum(other.attempt.exercise == exercise_folder.name for other in graded)
+        name = f"{exercise_folder.exercise.number} {exercise_folder.exercise.title}"
         if each is None:
             rows.append([name, "open", "", "", ""])
         else:
@@ -66,15 +68,15 @@ def _of_exercise(each: GradeRecord) -> Sequence[Part]:
     return [first, table, *better]
 
 
-def _points(shelf: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord]) -> PageFigure:
-    numbers = [str(each.exercise.number) for each in shelf]
-    points = [mine[each.name].grade.points if each.name in mine else 0.0 for each in shelf]
-    colours = [LEFT if each.name in mine and mine[each.name].grade.passed else RIGHT for each in shelf]
+def _points(catalogue: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord]) -> PageFigure:
+    numbers = [str(each.exercise.number) for each in catalogue]
+    points = [mine[each.name].grade.points if each.name in mine else 0.0 for each in catalogue]
+    colours = [LEFT if each.name in mine and mine[each.name].grade.passed else RIGHT for each in catalogue]
     said = "; ".join(f"exercise {n}: {p:g}" for n, p in zip(numbers, points, strict=True))
     with drawing("points", "Points of each exercise", said, size=(8.0, 3.2), wide=True) as drawn:
         axes = drawn.axes[0]
         axes.bar(numbers, points, color=colours, edgecolor=INK, width=0.65)
-        _what_passes(axes, shelf)
+        _what_passes(axes, catalogue)
         axes.set(xlabel="exercise", ylabel="points", ylim=(0.0, FULL_MARKS))
         axes.grid(axis="y")
         axes.set_axisbelow(True)
@@ -82,35 +84,39 @@ def _points(shelf: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord]) ->
     return drawn.picture
 
 
-def _what_passes(axes: "Axes", shelf: Sequence[ExerciseFolder]) -> None:
+def _what_passes(axes: "Axes", catalogue: Sequence[ExerciseFolder]) -> None:
     """Draw the points with which each exercise is passed."""
-    for place, shelved in enumerate(shelf):
-        limit = shelved.exercise.pass_points
+    for place, exercise_folder in enumerate(catalogue):
+        limit = exercise_folder.exercise.pass_points
         axes.plot([place - 0.45, place + 0.45], [limit] * 2, ":", color=INK, linewidth=1.6)
 
 
-def class_sheet(shelf: Sequence[ExerciseFolder], best: Best, attempts: Sequence[Attempt]) -> str:
+def class_sheet(catalogue: Sequence[ExerciseFolder], best: Best, attempts: Sequence[Attempt]) -> str:
     """Return the sheet of a class: who stands where, and which mistakes are everybody's."""
     students = sorted({each.student for each in attempts})
     lead: list[Part] = [Paragraph(f"{pluralize(len(students), 'student')}, {pluralize(len(attempts), 'attempt')}.")]
     rows = [
-        [student, str(_passed(best, [student], shelf)), *(_cell(best.get((student, each.name))) for each in shelf)]
+        [
+            student,
+            str(_passed(best, [student], catalogue)),
+            *(_cell(best.get((student, each.name))) for each in catalogue),
+        ]
         for student in students
     ]
-    totals = [_passed(best, students, [each]) for each in shelf]
+    totals = [_passed(best, students, [each]) for each in catalogue]
     rows.append(["how many passed", str(sum(totals)), *map(str, totals)])
-    columns = ["student", "passed", *(str(each.exercise.number) for each in shelf)]
+    columns = ["student", "passed", *(str(each.exercise.number) for each in catalogue)]
     table = TableBlock("Best points by exercise; in brackets: not passed", columns, rows)
     chapters = [
-        Chapter("The class", [_spread(shelf, best), table]),
-        Chapter("What went wrong", [_mistakes(shelf, best)]),
+        Chapter("The class", [_spread(catalogue, best), table]),
+        Chapter("What went wrong", [_mistakes(catalogue, best)]),
     ]
     return page("Exercises at the plotter: the class", lead, chapters)
 
 
-def _passed(best: Best, students: Sequence[str], shelf: Sequence[ExerciseFolder]) -> int:
+def _passed(best: Best, students: Sequence[str], catalogue: Sequence[ExerciseFolder]) -> int:
     """Return how many exercises of these were passed by these students, all together."""
-    grades = [best.get((student, shelved.name)) for student in students for shelved in shelf]
+    grades = [best.get((student, exercise_folder.name)) for student in students for exercise_folder in catalogue]
     return sum(each is not None and each.grade.passed for each in grades)
 
 
@@ -120,9 +126,9 @@ def _cell(each: GradeRecord | None) -> str:
     return f"{each.grade.points:g}" if each.grade.passed else f"({each.grade.points:g})"
 
 
-def _spread(shelf: Sequence[ExerciseFolder], best: Best) -> PageFigure:
-    by_exercise = [[each.grade.points for (_, name), each in best.items() if name == s.name] for s in shelf]
-    numbers = [str(each.exercise.number) for each in shelf]
+def _spread(catalogue: Sequence[ExerciseFolder], best: Best) -> PageFigure:
+    by_exercise = [[each.grade.points for (_, name), each in best.items() if name == s.name] for s in catalogue]
+    numbers = [str(each.exercise.number) for each in catalogue]
     said = "; ".join(
         f"exercise {n}: median {median(some):g} of {pluralize(len(some), 'student')}"
         if some
@@ -135,7 +141,7 @@ def _spread(shelf: Sequence[ExerciseFolder], best: Best) -> PageFigure:
             axes.plot([place] * len(some), some, "o", color=LEFT, alpha=0.5, markersize=6)
             if some:
                 axes.plot([place - 0.3, place + 0.3], [median(some)] * 2, color=RIGHT)
-        _what_passes(axes, shelf)
+        _what_passes(axes, catalogue)
         axes.set_xticks(range(len(numbers)), numbers)
         axes.set(xlabel="exercise", ylabel="points", ylim=(0.0, 1.04 * FULL_MARKS))
         axes.grid(axis="y")
@@ -143,14 +149,14 @@ def _spread(shelf: Sequence[ExerciseFolder], best: Best) -> PageFigure:
     return drawn.picture
 
 
-def _mistakes(shelf: Sequence[ExerciseFolder], best: Best) -> TableBlock:
+def _mistakes(catalogue: Sequence[ExerciseFolder], best: Best) -> TableBlock:
     rows = []
-    for shelved in shelf:
-        marked = [each.grade.marks for (_, name), each in best.items() if name == shelved.name]
-        for criterion in shelved.exercise.criteria:
+    for exercise_folder in catalogue:
+        marked = [each.grade.marks for (_, name), each in best.items() if name == exercise_folder.name]
+        for criterion in exercise_folder.exercise.criteria:
             bands = [mark.band for marks in marked for mark in marks if mark.id == criterion.id]
             failed = sum(band == "fail" for band in bands)
             if failed:
-                rows.append([f"{shelved.exercise.number}: {criterion.title}", f"{failed} of {len(bands)}"])
+                rows.append([f"{exercise_folder.exercise.number}: {criterion.title}", f"{failed} of {len(bands)}"])
     rows.sort(key=lambda row: -int(row[1].split()[0]))
     return TableBlock("Criteria that were failed, those of most students first", ["criterion", "failed"], rows)

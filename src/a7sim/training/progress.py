@@ -138,9 +138,11 @@ class Progress:
 
     # --- attempts -------------------------------------------------------------------------------------
 
-    def begin(self, student: str, shelved: ExerciseFolder, mode: str = PRACTICE, seed: int | None = None) -> Attempt:
+    def begin(
+        self, student: str, exercise_folder: ExerciseFolder, mode: str = PRACTICE, seed: int | None = None
+    ) -> Attempt:
         """Begin a new attempt; one that is open is closed. Its folder is still to be made."""
-        name = shelved.name
+        name = exercise_folder.name
         with self._writing():
             self._close_open(student, name)
             number = 1 + self._one("SELECT count(*) FROM attempt WHERE student = ? AND exercise = ?", student, name)

@@ -56,11 +56,11 @@ def grade_submission(folder: Path, seed: int | None = None) -> Submission:
     """Grade the attempt in a folder; a journal that cannot be relied on gets no grade."""
     try:
         exercise, student, mode = attempt_mode(folder)
-    except A7SimError as mistake:
-        return Submission(str(folder), error=str(mistake))
+    except A7SimError as error:
+        return Submission(str(folder), error=str(error))
     try:
         drawn = attempt_seed(student, exercise, mode) if seed is None else seed
         grade = grade_folder(find_exercise(exercise), drawn, folder, HintsTaken(*written_hints(folder)))
-    except A7SimError as mistake:
-        return Submission(str(folder), student, exercise, error=str(mistake))
+    except A7SimError as error:
+        return Submission(str(folder), student, exercise, error=str(error))
     return Submission(str(folder), student, exercise, grade)

@@ -23,13 +23,13 @@ def attempt_seed(student: str, exercise: str, mode: str = "practice") -> int:
     return int.from_bytes(digest[:4])
 
 
-def scenario_for(shelved: ExerciseFolder, seed: int, observer: Mapping[str, Any] | None = None) -> Scenario:
+def scenario_for(exercise_folder: ExerciseFolder, seed: int, observer: Mapping[str, Any] | None = None) -> Scenario:
     """Return the scenario of an exercise as a seed draws it. Raises Mistake for settings that do not fit.
 
     `observer` says who the virtual operator is, where one plays.
     """
-    exercise = shelved.exercise
-    beside = shelved.folder / exercise.scenario
+    exercise = exercise_folder.exercise
+    beside = exercise_folder.folder / exercise.scenario
     name = beside if beside.is_file() else exercise.scenario
     overrides = {path: to_toml(value) for path, value in exercise.settings.items()}
     overrides |= {f"observer.{key}": to_toml(value) for key, value in (observer or {}).items()}

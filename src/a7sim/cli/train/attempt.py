@@ -81,10 +81,10 @@ def reset_(exercise: str, home: Path | None, student: str | None) -> None:
     Example: a7sim train reset 4
     """
     with progress_in(home) as progress:
-        shelved = find_exercise(exercise)
-        attempt = progress.open_attempt(student_name(student), shelved.name)
+        exercise_folder = find_exercise(exercise)
+        attempt = progress.open_attempt(student_name(student), exercise_folder.name)
         if attempt is None:
-            click.echo(f"{shelved.name}: no attempt is open")
+            click.echo(f"{exercise_folder.name}: no attempt is open")
             return
         progress.end(attempt)
-        click.echo(f"{shelved.name}: attempt {attempt.number} is closed and kept in {attempt.folder}")
+        click.echo(f"{exercise_folder.name}: attempt {attempt.number} is closed and kept in {attempt.folder}")

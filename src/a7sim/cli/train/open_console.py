@@ -21,7 +21,7 @@ GOAL_WIDTH = 64
 """Columns, so that it has room on every terminal."""
 
 
-def open_console(room: AttemptEnvironment, checklist: Checklist, plain: bool) -> None:
+def open_console(environment: AttemptEnvironment, checklist: Checklist, plain: bool) -> None:
     """Open the console in the room of an attempt, until whoever sits there leaves. Raises Mistake without a terminal.
 
     The simulated clock goes with the wall's while somebody sits there.
@@ -38,7 +38,7 @@ def open_console(room: AttemptEnvironment, checklist: Checklist, plain: bool) ->
 
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise A7SimError("start: expected a terminal to sit at, got a file or a pipe (--script and --link need none)")
-    began, clock, so_far = time.monotonic(), room.clock, room.clock.now
+    began, clock, so_far = time.monotonic(), environment.clock, environment.clock.now
 
     def at_the_instrument() -> float:
         clock.advance_to(so_far + time.monotonic() - began)
@@ -48,10 +48,10 @@ def open_console(room: AttemptEnvironment, checklist: Checklist, plain: bool) ->
     title = f"exercise {checklist.exercise.number}"
     Console(
         ConsoleConfig(
-            lambda: Client(InProcessSerial(desk=room.desk, clock=clock, timeout=TIMEOUT_S)),
+            lambda: Client(InProcessSerial(instrument=environment.instrument, clock=clock, timeout=TIMEOUT_S)),
             at_the_instrument,
             where=title,
-            sheet=JobSheet(title, room.scenario.camera),
+            sheet=JobSheet(title, environment.scenario.camera),
             keymap=load_keymap(own_keys) if own_keys.exists() else default_keymap(),
             drawing=DrawingMode.WORDS if plain else None,
             theme="contrast" if plain else "enamel",

@@ -28,20 +28,20 @@ def list_(exercise: str | None, as_document: bool, home: Path | None, student: s
     Example: a7sim train list 4
     """
     if exercise is not None:
-        shelved = find_exercise(exercise)
-        click.echo(as_json(_of_exercise(shelved)) if as_document else f"{_shown(shelved)}\n", nl=False)
+        exercise_folder = find_exercise(exercise)
+        click.echo(as_json(_of_exercise(exercise_folder)) if as_document else f"{_shown(exercise_folder)}\n", nl=False)
         return
     name = student_name(student)
     with progress_in(home) as progress:
         best = progress.best(name)
         attempts = progress.attempts(name)
     rows = []
-    for shelved in all_exercises():
-        mine = [each for each in attempts if each.exercise == shelved.name]
-        grade = best.get((name, shelved.name))
+    for exercise_folder in all_exercises():
+        mine = [each for each in attempts if each.exercise == exercise_folder.name]
+        grade = best.get((name, exercise_folder.name))
         state = "passed" if grade and grade.grade.passed else "under way" if mine and not mine[-1].closed else ""
         points = grade.grade.points if grade else None
-        rows.append((shelved.exercise.number, shelved.exercise.title, state, points, len(mine)))
+        rows.append((exercise_folder.exercise.number, exercise_folder.exercise.title, state, points, len(mine)))
     if as_document:
         keys = ("number", "title", "state", "points", "attempts")
         exercises = [dict(zip(keys, row, strict=True)) for row in rows]
@@ -53,13 +53,13 @@ def list_(exercise: str | None, as_document: bool, home: Path | None, student: s
     Console().print(table)
 
 
-def _of_exercise(shelved: ExerciseFolder) -> Document:
-    exercise = shelved.exercise
+def _of_exercise(exercise_folder: ExerciseFolder) -> Document:
+    exercise = exercise_folder.exercise
     return document_header("train list") | {
-        "exercise": shelved.name,
+        "exercise": exercise_folder.name,
         "number": exercise.number,
         "title": exercise.title,
-        "text": shelved.text.strip(),
+        "text": exercise_folder.text.strip(),
         "minutes": exercise.minutes,
         "pass_points": exercise.pass_points,
         "hints": len(exercise.hints),
@@ -68,13 +68,13 @@ def _of_exercise(shelved: ExerciseFolder) -> Document:
     }
 
 
-def _shown(shelved: ExerciseFolder) -> str:
-    exercise = shelved.exercise
+def _shown(exercise_folder: ExerciseFolder) -> str:
+    exercise = exercise_folder.exercise
     steps = [f"  - {each.text}" for each in exercise.steps]
     criteria = [f"  {each.weight:4g}  {each.title}" for each in exercise.criteria]
     minutes, hints = pluralize(exercise.minutes, "minute"), pluralize(len(exercise.hints), "hint")
     facts = f"{minutes}, {exercise.pass_points:g} of 100 points pass, {hints}"
-    return "\n".join([shelved.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
+    return "\n".join([exercise_folder.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
 
 
 @click.command("report")
@@ -112,8 +112,10 @@ def report_(
     else:
         from a7sim.training.html_sheets import class_sheet, student_sheet  # only pages need figures
 
-        shelf = all_exercises()
-        text = class_sheet(shelf, best, attempts) if whose is None else student_sheet(whose, shelf, best, graded)
+        catalogue = all_exercises()
+        text = (
+            class_sheet(catalogue, best, attempts) if whose is None else student_sheet(whose, catalogue, best, graded)
+        )
     if out is None:
         click.echo(text, nl=False)
     else:

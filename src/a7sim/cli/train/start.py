@@ -69,45 +69,45 @@ def start_(
         raise A7SimError("train start: expected one of --script, --link and --serve, got several")
     address = _address(link) if link is not None else USUAL if serves else None
     played = read_script(script) if script is not None else None
-    shelved = find_exercise(exercise or EXAMINATION)
+    exercise_folder = find_exercise(exercise or EXAMINATION)
     with progress_in(home) as progress:
-        attempt = _attempt(progress, shelved, student_name(student), EXAM if exam else PRACTICE, anew, seed)
-    with _entered(shelved, attempt) as room:
-        checklist = Checklist(room, attempt)
-        if shelved.exercise.paper and played is None:
+        attempt = _attempt(progress, exercise_folder, student_name(student), EXAM if exam else PRACTICE, anew, seed)
+    with _entered(exercise_folder, attempt) as environment:
+        checklist = Checklist(environment, attempt)
+        if exercise_folder.exercise.paper and played is None:
             _tell_of_papers(checklist)
         elif played is not None:
-            trouble = play_script(room, played)
+            error = play_script(environment, played)
             click.echo("\n".join(checklist.lines()))
-            if trouble:
-                raise A7SimError(trouble)
+            if error:
+                raise A7SimError(error)
         elif address is not None:
             click.echo("\n".join(checklist.lines()))
-            _serve(room, address)
+            _serve(environment, address)
         else:
-            open_console(room, checklist, plain)
-    click.echo(f"a7sim train verify {shelved.exercise.number} grades it; a7sim train start goes on with it")
+            open_console(environment, checklist, plain)
+    click.echo(f"a7sim train verify {exercise_folder.exercise.number} grades it; a7sim train start goes on with it")
 
 
 def _attempt(
-    progress: Progress, shelved: ExerciseFolder, student: str, mode: str, anew: bool, seed: int | None
+    progress: Progress, exercise_folder: ExerciseFolder, student: str, mode: str, anew: bool, seed: int | None
 ) -> Attempt:
-    there = progress.open_attempt(student, shelved.name)
+    there = progress.open_attempt(student, exercise_folder.name)
     if there is not None and not anew:
         if there.mode == mode and seed in (None, there.seed):
             return there
         if there.mode == EXAM:
             raise A7SimError(
-                f"{shelved.name}: expected --exam, since an exam is under way (verify ends it, --anew drops it)"
+                f"{exercise_folder.name}: expected --exam, since an exam is under way (verify ends it, --anew drops it)"
             )
-    return progress.begin(student, shelved, mode, seed)
+    return progress.begin(student, exercise_folder, mode, seed)
 
 
-def _entered(shelved: ExerciseFolder, attempt: Attempt) -> AbstractContextManager[AttemptEnvironment]:
+def _entered(exercise_folder: ExerciseFolder, attempt: Attempt) -> AbstractContextManager[AttemptEnvironment]:
     journal = attempt.folder / JOURNAL
     if journal.exists() and b"\n" in journal.read_bytes():
-        return resume_attempt(shelved, attempt.seed, attempt.folder)
-    return start_attempt(shelved, attempt.seed, attempt.folder, attempt.student, attempt.mode)
+        return resume_attempt(exercise_folder, attempt.seed, attempt.folder)
+    return start_attempt(exercise_folder, attempt.seed, attempt.folder, attempt.student, attempt.mode)
 
 
 def _address(text: str) -> Address:
@@ -121,15 +121,15 @@ def _address(text: str) -> Address:
 
 
 def _tell_of_papers(checklist: Checklist) -> None:
-    click.echo("\n".join([*checklist.lines(), "", checklist.room.shelved.text.strip(), ""]))
+    click.echo("\n".join([*checklist.lines(), "", checklist.environment.exercise_folder.text.strip(), ""]))
     for key, about in checklist.exercise.answers.items():
         click.echo(f"a7sim train answer {key}=...   {about}")
 
 
-def _serve(room: AttemptEnvironment, address: Address) -> None:
+def _serve(environment: AttemptEnvironment, address: Address) -> None:
     first = document_header("train start") | {
-        "scenario": room.shelved.exercise.title,
-        "variant": room.scenario.instrument.variant,
+        "scenario": environment.exercise_folder.exercise.title,
+        "variant": environment.scenario.instrument.variant,
     }
-    served = ServedInstrument(first, room.desk, room.clock, Journal())
+    served = ServedInstrument(first, environment.instrument, environment.clock, Journal())
     run(serve(served, Endpoints([address]), ServerLimits(), StartupMessages(first, as_document=False, quiet=False)))

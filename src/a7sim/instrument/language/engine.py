@@ -56,14 +56,14 @@ class Engine:
     Within a long line it is the present time now and then, so that others may have their turn.
     """
 
-    def __init__(self, desk: "SharedInstrument", client: str, cr_ends_line: bool = True) -> None:
-        self.desk = desk
+    def __init__(self, instrument: "SharedInstrument", client: str, cr_ends_line: bool = True) -> None:
+        self.instrument = instrument
         self.client = client
         self.waits_until: float | None = None
         self._status = Status()
-        self._admitted = desk.token is None
+        self._admitted = instrument.token is None
         self._time = 0.0
-        self._movement_seen = desk.busy_since
+        self._movement_seen = instrument.busy_since
         self._completes_at: float | None = None
         self._cr_ends_line = cr_ends_line
         self._ends = re.compile(rb"[\r\n]" if cr_ends_line else rb"\n")
@@ -83,7 +83,7 @@ class Engine:
     def feed_with_replies(self, received: bytes, time: float) -> list[bytes]:
         """Take bytes that arrived at a simulated time in s; return the reply to each line that has one."""
         self._time = time
-        if self.waits_until is None and not self._pending and self._admitted and self.desk.listener is None:
+        if self.waits_until is None and not self._pending and self._admitted and self.instrument.listener is None:
             question = cached_query(received, self._cr_ends_line)
             if question is not None:
                 return self._answer(question)
@@ -158,18 +158,18 @@ class Engine:
             self._heard("!", f"(a line of more than {MAX_LINE_LENGTH} bytes, dropped)")
             self._status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {MAX_LINE_LENGTH} bytes a line")
             return
-        if self.desk.listener is not None:
+        if self.instrument.listener is not None:
             self._tell(strip_line_end(line))
         self._rest = parse_program(line)
         self._obey_rest(replies)
 
     def _tell(self, text: str) -> None:
         if text.strip(" \t"):
-            token = self.desk.token
+            token = self.instrument.token
             self._heard(">", text if token is None else redact_token(text, token))
 
     def _heard(self, direction: str, text: str) -> None:
-        self.desk.notify(self._time, self.client, direction, text)
+        self.instrument.notify(self._time, self.client, direction, text)
 
     def _obey_rest(self, replies: list[bytes]) -> None:
         """Obey the units of a line that are left, up to one that waits; at its end, add its reply if it has one."""
@@ -187,7 +187,7 @@ class Engine:
                 self._rest = program[place + done :]
                 return
         if self._replies:
-            if self.desk.listener is not None:
+            if self.instrument.listener is not None:
                 self._heard("<", ";".join(map(loggable_reply, self._replies)))
             replies.append(b";".join(map(_as_bytes, self._replies)) + b"\n")
             self._replies.clear()
@@ -203,7 +203,7 @@ class Engine:
         command = unit.command
         try:
             call = unit.bare or unit.call(self)
-            if command.moves and not self.desk.may_move(self.client):
+            if command.moves and not self.instrument.may_move(self.client):
                 raise CommandError(ErrorNumber.COMMAND_PROTECTED, "another client holds the lock")
             if command.waits and self._has_to_wait():
                 return False
@@ -214,19 +214,19 @@ class Engine:
             raise _error_of(refusal, unit.text) from refusal
         finally:
             if command.moves:
-                self.desk.note_movement(self._time)
+                self.instrument.note_movement(self._time)
         if reply is not None:
             self._answered(reply)
-        if command.polls and self._time < self.desk.busy_until:
-            self.waits_until = self.desk.poll_until(self._time)
+        if command.polls and self._time < self.instrument.busy_until:
+            self.waits_until = self.instrument.poll_until(self._time)
         return True
 
     def _has_to_wait(self) -> bool:
         """Wait for the movement that is going on, and once only: what others begin meanwhile is theirs to wait for."""
         if self._waited:
             self._waited = False
-        elif self._time < self.desk.busy_until:
-            self.waits_until = self.desk.busy_until
+        elif self._time < self.instrument.busy_until:
+            self.waits_until = self.instrument.busy_until
             self._waited = True
         return self._waited
 
@@ -260,12 +260,12 @@ class Engine:
     @property
     def status(self) -> Status:
         """The client's status as it stands at the time of what is being obeyed."""
-        desk, status = self.desk, self._status
-        if self._movement_seen != desk.busy_since:
-            self._movement_seen = desk.busy_since
+        instrument, status = self.instrument, self._status
+        if self._movement_seen != instrument.busy_since:
+            self._movement_seen = instrument.busy_since
             status.operation.event |= SETTLING
         others = status.operation.condition & ~SETTLING
-        status.operation.condition = others | (SETTLING if self._time < desk.busy_until else 0)
+        status.operation.condition = others | (SETTLING if self._time < instrument.busy_until else 0)
         if self._completes_at is not None and self._completes_at <= self._time:
             self._completes_at = None
             status.event |= OPERATION_COMPLETE
@@ -283,7 +283,7 @@ class Engine:
 
     def complete(self) -> None:
         """Raise the bit of operation complete when the movement that is going on now is done (`*OPC`)."""
-        self._completes_at = self.desk.busy_until
+        self._completes_at = self.instrument.busy_until
 
     def clear(self) -> None:
         """Clear events and errors (`*CLS`)."""
@@ -296,7 +296,7 @@ class Engine:
 
     def log_in(self, token: str) -> None:
         """Admit the client to an instrument that asks for a token. Raises LanguageError for a wrong one."""
-        expected = self.desk.token
+        expected = self.instrument.token
         if expected is not None and not hmac.compare_digest(token.encode(), expected.encode()):
             raise CommandError(ErrorNumber.COMMAND_PROTECTED, "this is not the token")
         self._admitted = True

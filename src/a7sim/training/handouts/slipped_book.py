@@ -93,20 +93,24 @@ def _worked(scenario: Scenario, seed: int) -> tuple[ProcedureContext, list[_Roun
     session = open_session(scenario, seed)
     seated = ProcedureContext.for_model(session.person, session.job, session.job.models[0].name)
     seated.set_up()
-    bench, model, plan = seated.bench, seated.model, session.job.plan
-    who, elements = bench.crew.active, unknown_elements(plan.method, model)
+    workstation, model, plan = seated.workstation, seated.model, session.job.plan
+    active, elements = workstation.operators.active, unknown_elements(plan.method, model)
     labels = model.points_of_case(plan.case)
     rounds = []
     for _ in range(ROUNDS):
         begun = len(session.person.book.entries)
-        before = bench.seat.elements(who, elements)
-        seen = bench.parallaxes(who, [model.standard_points[label] for label in labels], plan.parallax_readings)
+        before = workstation.controls.elements(active, elements)
+        seen = workstation.parallaxes(
+            active, [model.standard_points[label] for label in labels], plan.parallax_readings
+        )
         entries = [each for each in session.person.book.entries[begun:] if each.item in MEASURING and not each.struck]
         mean = seen.parallax_mm.mean(axis=0) if float(np.sqrt(np.mean(seen.parallax_mm**2))) < GROSS_MM else 0.0
-        base = np.full(who.size, plan.bx)
-        found, _ = compute_corrections(bench, who, model, seen.places, seen.parallax_mm - mean, elements, base, labels)
-        bench.seat.set_elements(who, {name: before[name] + found[name][who] for name in elements})
-        after = bench.seat.elements(who, elements)
+        base = np.full(active.size, plan.bx)
+        found, _ = compute_corrections(
+            workstation, active, model, seen.places, seen.parallax_mm - mean, elements, base, labels
+        )
+        workstation.controls.set_elements(active, {name: before[name] + found[name][active] for name in elements})
+        after = workstation.controls.elements(active, elements)
         counts = [{name: float(each[name][0]) for name in elements} for each in (before, after)]
         rounds.append(_Round(counts[0], counts[1], entries))
     return seated, rounds
@@ -119,7 +123,7 @@ def _copied(seated: ProcedureContext, rounds: Sequence[_Round]) -> list[BookLine
     def write(form: str, round_: int, point: str, item: str, reading: str) -> None:
         lines.append(BookLine(len(lines) + 1, form, round_, point, item, reading))
 
-    for name, position in required_fittings(seated.bench.seat.manual, model.polarity, model.base).items():
+    for name, position in required_fittings(seated.workstation.controls.manual, model.polarity, model.base).items():
         write("fittings", 0, "", name, position)
     form = "relative orientation"
     for number, worked in enumerate(rounds, start=1):

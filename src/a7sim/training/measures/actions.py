@@ -32,14 +32,14 @@ class ActionsOutOfOrder(Metric, frozen=True, kw_only=True):
     unit = "deeds"
     chains: list[list[str]]
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         missing: list[str] = []
         early: list[str] = []
         for chain in self.chains:
             last, before = -1, ""
             for deed in chain:
-                place = self._place(account, deed)
+                place = self._place(record, deed)
                 if place is None:
                     missing.append(_plainly(deed))
                 elif place < last:
@@ -50,13 +50,13 @@ class ActionsOutOfOrder(Metric, frozen=True, kw_only=True):
         told += [f"done too early: {join_words(dict.fromkeys(early))}"] if early else []
         return MetricResult(float(len(missing) + len(early)), "; ".join(told) or "everything was done, in its order")
 
-    def _place(self, account: AttemptRecord, deed: str) -> int | None:
+    def _place(self, record: AttemptRecord, deed: str) -> int | None:
         what, _, name = deed.removesuffix("!").partition(" ")
         kinds = {"move": PLAIN, "adjust": ("set", "turn")}.get(what, (what,))
         places = [
             each.index
-            for each in account.actions
-            if each.what in kinds and (not name or account.name_of(name) == each.name or name in (each.name, each.text))
+            for each in record.actions
+            if each.what in kinds and (not name or record.name_of(name) == each.name or name in (each.name, each.text))
         ]
         return (places[0] if deed.endswith("!") else places[-1]) if places else None
 
@@ -74,17 +74,17 @@ class MotorDrivenReadings(Metric, frozen=True, kw_only=True):
     handles: list[str]
     points: list[str] = field(default_factory=list)
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        readings = readings_with(account, "", self.points)
+        readings = readings_with(record, "", self.points)
         if not readings:
             return MetricResult(None, "nothing was registered")
-        ran = [each for each in readings if any(self._ran(account, each, handle) for handle in self.handles)]
-        told = f"run there at {describe_points(ran, account)}" if ran else "turned there by hand every time"
+        ran = [each for each in readings if any(self._ran(record, each, handle) for handle in self.handles)]
+        told = f"run there at {describe_points(ran, record)}" if ran else "turned there by hand every time"
         return MetricResult(float(len(ran)), f"{join_words(map(handle_label, self.handles))}: {told}")
 
-    def _ran(self, account: AttemptRecord, reading: Reading, handle: str) -> bool:
-        before = [each for each in account.actions if each.name == handle and each.index < reading.place]
+    def _ran(self, record: AttemptRecord, reading: Reading, handle: str) -> bool:
+        before = [each for each in record.actions if each.name == handle and each.index < reading.place]
         return bool(before) and before[-1].what in ("drive", "set")
 
 
@@ -96,17 +96,17 @@ class MovedElements(Metric, frozen=True, kw_only=True):
     handles: list[str]
     within: float = HALF_A_COUNT
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        moved = [handle for handle in self.handles if self._by_how_much(account, handle) > self.within + 1e-9]
+        moved = [handle for handle in self.handles if self._by_how_much(record, handle) > self.within + 1e-9]
         told = f"{join_words(map(handle_label, moved))} moved" if moved else "all of it stands where it stood"
         return MetricResult(float(len(moved)), told)
 
-    def _by_how_much(self, account: AttemptRecord, handle: str) -> float:
-        deeds = [each for each in account.actions if each.name == handle and each.what in PLAIN]
-        if not deeds:
+    def _by_how_much(self, record: AttemptRecord, handle: str) -> float:
+        actions = [each for each in record.actions if each.name == handle and each.what in PLAIN]
+        if not actions:
             return 0.0
-        moved = abs(deeds[-1].after - deeds[0].before)
+        moved = abs(actions[-1].after - actions[0].before)
         return min(moved, abs(400.0 - moved)) if handle.startswith("kappa") else moved
 
 
@@ -117,12 +117,12 @@ class UnviewedPoints(Metric, frozen=True, kw_only=True):
     unit = "points"
     points: list[str]
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         blind = []
         for point in self.points:
-            readings = readings_with(account, "", [point])
-            before = [each for each in account.actions if readings and each.index < readings[-1].place]
+            readings = readings_with(record, "", [point])
+            before = [each for each in record.actions if readings and each.index < readings[-1].place]
             looks = [each.index for each in before if each.what == "look"]
             levers = [each.index for each in before if each.what in ("fit", "base", "load")]
             if not readings or max(looks, default=-1) < max(levers, default=0):
@@ -137,11 +137,11 @@ class Minutes(Metric, frozen=True, kw_only=True):
 
     unit = "min"
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return them."""
-        minutes = account.seconds / 60.0
+        minutes = record.seconds / 60.0
         return MetricResult(
-            round(minutes, 2), f"{minutes:.1f} of {account.exercise.minutes:g} minutes at the instrument's clock"
+            round(minutes, 2), f"{minutes:.1f} of {record.exercise.minutes:g} minutes at the instrument's clock"
         )
 
 
@@ -152,10 +152,10 @@ class ElementDeviation(Metric, frozen=True, kw_only=True):
     unit = "mm or gon"
     wanted: dict[str, float]
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
         shown = {
-            name: account.autograph.counter(name) if name in AXES else account.autograph.element(name)
+            name: record.autograph.counter(name) if name in AXES else record.autograph.element(name)
             for name in self.wanted
         }
         name = max(self.wanted, key=lambda each: abs(shown[each] - self.wanted[each]))
@@ -185,19 +185,19 @@ class WrongFittings(Metric, frozen=True, kw_only=True):
     by_job: bool = False
     """Whether base and pictures must be those of the exercise's model on the job sheet."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number, the base counted where it is not as it should be."""
         if self.by_job:
-            return self._as_ordered(account.model).evaluate(account)
-        autograph = account.autograph
+            return self._as_ordered(record.model).evaluate(record)
+        autograph = record.autograph
         fittings, base = autograph.fittings.as_words(), autograph.base_mode
         lying = autograph.loaded(1), autograph.loaded(2)
         if self.point:
-            readings = readings_with(account, "", [self.point])
+            readings = readings_with(record, "", [self.point])
             if not readings:
                 return MetricResult(None, f"nothing was registered as {self.point}")
             fittings, base, lying = dict(readings[-1].fittings), readings[-1].base, readings[-1].pictures
-        polarity = self.polarity or account.model.polarity
+        polarity = self.polarity or record.model.polarity
         right = REQUIRED_FITTINGS[polarity, self.base or base].as_words()
         wrong = [f"{name} stands {at} and belongs {right[name]}" for name, at in fittings.items() if at != right[name]]
         if self.base and base != self.base:

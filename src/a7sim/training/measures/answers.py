@@ -20,9 +20,9 @@ class MissingAnswers(Metric, frozen=True, kw_only=True):
     keys: list[str] = field(default_factory=list)
     """All that the exercise asks for, where none are named."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        missing = [key for key in self.keys or account.exercise.answers if not account.answers.get(key)]
+        missing = [key for key in self.keys or record.exercise.answers if not record.answers.get(key)]
         return MetricResult(
             float(len(missing)), f"not answered: {join_words(missing)}" if missing else "all is answered"
         )
@@ -42,24 +42,24 @@ class AnswerDeviation(Metric, frozen=True, kw_only=True):
     least: float = 0.0
     """What can be read of it: no tolerance is below."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        answered = account.answers.get(self.key, "")
+        answered = record.answers.get(self.key, "")
         try:
             number = float(answered)
         except ValueError:
             said = f"expected a number, got {answered!r}" if answered else "not answered"
             return MetricResult(None, f"{self.key}: {said}")
-        value = abs(number - self._truth(account))
+        value = abs(number - self._truth(record))
         return MetricResult(round(value, 4) if math.isfinite(value) else None, f"{self.key} was answered {answered}")
 
-    def _truth(self, account: AttemptRecord) -> float:
+    def _truth(self, record: AttemptRecord) -> float:
         what, _, name = self.true.partition(" ")
         if what == "play":
-            return account.autograph.play(name)
+            return record.autograph.play(name)
         if what == "parallax":
-            return y_parallax_at(account, account.name_of(name)) or math.nan
-        return float(account.hidden.get(self.true, math.nan))
+            return y_parallax_at(record, record.name_of(name)) or math.nan
+        return float(record.hidden.get(self.true, math.nan))
 
     def floor(self, scenario: Scenario) -> float:
         """Return what can be read of it."""
@@ -75,20 +75,20 @@ class MaxAnswerDeviation(Metric, frozen=True, kw_only=True):
     least: float = 0.0
     """What can be read of them: no tolerance is below."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
         off: dict[str, float] = {}
         for key in self.keys:
             try:
-                off[key] = abs(float(account.answers.get(key, "")) - float(account.hidden[key]))
+                off[key] = abs(float(record.answers.get(key, "")) - float(record.hidden[key]))
             except (ValueError, KeyError):
-                answered = account.answers.get(key, "")
+                answered = record.answers.get(key, "")
                 said = f"expected a number, got {answered!r}" if answered else "not answered"
                 return MetricResult(None, f"{key}: {said}")
         worst = max(off, key=lambda key: off[key])
         if not math.isfinite(off[worst]):
-            return MetricResult(None, f"{worst}: expected a number, got {account.answers[worst]!r}")
-        return MetricResult(round(off[worst], 4), f"{worst} was answered {account.answers[worst]}, the furthest off")
+            return MetricResult(None, f"{worst}: expected a number, got {record.answers[worst]!r}")
+        return MetricResult(round(off[worst], 4), f"{worst} was answered {record.answers[worst]}, the furthest off")
 
     def floor(self, scenario: Scenario) -> float:
         """Return what can be read of them."""
@@ -103,18 +103,18 @@ class WrongAnswers(Metric, frozen=True, kw_only=True):
     truth = True
     keys: list[str]
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        missing = [key for key in self.keys if not account.answers.get(key)]
-        wrong = [key for key in self.keys if key not in missing and not self._right(account, key)]
+        missing = [key for key in self.keys if not record.answers.get(key)]
+        wrong = [key for key in self.keys if key not in missing and not self._right(record, key)]
         told = [f"not answered: {join_words(missing)}"] if missing else []
-        told += [f"{key} is not {account.answers[key]}" for key in wrong]
+        told += [f"{key} is not {record.answers[key]}" for key in wrong]
         return MetricResult(float(len(missing) + len(wrong)), "; ".join(told) or f"{join_words(self.keys)}: right")
 
-    def _right(self, account: AttemptRecord, key: str) -> bool:
-        right = account.hidden.get(key, ())
+    def _right(self, record: AttemptRecord, key: str) -> bool:
+        right = record.hidden.get(key, ())
         allowed = [right] if isinstance(right, str | int | float) else right
-        return _plain(account.answers[key]) in {_plain(str(each)) for each in allowed}
+        return _plain(record.answers[key]) in {_plain(str(each)) for each in allowed}
 
 
 @register_metric("place-by-scales")
@@ -126,31 +126,31 @@ class PlaceByScales(Metric, frozen=True, kw_only=True):
     keys: list[str]
     """Of the answers for x and y."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the distance from the nearest registration of the point."""
         try:
-            answered = [float(account.answers.get(key, "")) for key in self.keys]
+            answered = [float(record.answers.get(key, "")) for key in self.keys]
         except ValueError:
             return MetricResult(None, f"expected numbers for {join_words(self.keys)}")
-        readings = [each for each in account.readings if each.point == account.name_of(self.point)]
+        readings = [each for each in record.readings if each.point == record.name_of(self.point)]
         if not readings:
             return MetricResult(None, f"nothing was registered at {self.point}")
-        off = {self._off(account, each, answered): each for each in readings}
+        off = {self._off(record, each, answered): each for each in readings}
         nearest = min(off)
-        x, y = self._place(account, off[nearest])
+        x, y = self._place(record, off[nearest])
         return MetricResult(
             round(nearest, 4), f"answered {answered[0]:g}, {answered[1]:g}; the scales gave {x:.2f}, {y:.2f}"
         )
 
-    def _place(self, account: AttemptRecord, reading: Reading) -> tuple[float, float]:
-        variant = account.autograph.variant
+    def _place(self, record: AttemptRecord, reading: Reading) -> tuple[float, float]:
+        variant = record.autograph.variant
         x, y = (
             (reading.shown[axis] - variant.scales[axis].at_origin) / variant.scales[axis].units_per_mm for axis in "XY"
         )
         return x - variant.centres_on_base[0] * reading.shown["bx"], y
 
-    def _off(self, account: AttemptRecord, reading: Reading, answered: Sequence[float]) -> float:
-        x, y = self._place(account, reading)
+    def _off(self, record: AttemptRecord, reading: Reading, answered: Sequence[float]) -> float:
+        x, y = self._place(record, reading)
         return math.hypot(answered[0] - x, answered[1] - y)
 
     def floor(self, scenario: Scenario) -> float:

@@ -46,7 +46,7 @@ class Metric(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Whether it looks at what cannot be seen at the link."""
     more_is_better: ClassVar[bool] = False
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return what it comes to."""
         raise NotImplementedError
 
@@ -98,18 +98,18 @@ def handle_label(handle: str) -> str:
     return handle
 
 
-def readings_with(account: AttemptRecord, element: str, points: Sequence[str] = ()) -> list[Reading]:
+def readings_with(record: AttemptRecord, element: str, points: Sequence[str] = ()) -> list[Reading]:
     """Return the registrations of an element, or any, at points given by position or name, or anywhere."""
-    names = [account.name_of(point) for point in points]
+    names = [record.name_of(point) for point in points]
     return [
         each
-        for each in account.readings
+        for each in record.readings
         if (not element or element in each.named) and (not names or each.point in names)
     ]
 
 
-def describe_points(readings: Iterable[Reading], account: AttemptRecord) -> str:
+def describe_points(readings: Iterable[Reading], record: AttemptRecord) -> str:
     """Return at which points readings were made, as positions of the model where they have one."""
-    positions = {name: position for position, name in account.model.standard_points.items()}
+    positions = {name: position for position, name in record.model.standard_points.items()}
     names = list(dict.fromkeys(positions.get(each.point, each.point) for each in readings))
     return f"{'points' if len(names) > 1 else 'point'} {join_words(names)}"

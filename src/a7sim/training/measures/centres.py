@@ -40,19 +40,19 @@ class _Centres(Metric, frozen=True, kw_only=True):
     points: list[str] = field(default_factory=lambda: list(CASES["A"]))
     elements: list[str] = field(default_factory=lambda: ["by1", "by2"])
 
-    def _pointings(self, account: AttemptRecord, element: str) -> dict[tuple[str, float], list[Reading]]:
+    def _pointings(self, record: AttemptRecord, element: str) -> dict[tuple[str, float], list[Reading]]:
         """Return the registrations by point and level, those that belong to no level left out."""
         found: dict[tuple[str, float], list[Reading]] = {}
-        for reading in account.readings:
+        for reading in record.readings:
             level = next((each for each in self.levels if abs(reading.shown["Z"] - each) <= AT_LEVEL), None)
             if element in reading.named and level is not None:
                 found.setdefault((reading.point, level), []).append(reading)
         return found
 
-    def _centre(self, account: AttemptRecord, element: str) -> PerspectiveCentre | None:
+    def _centre(self, record: AttemptRecord, element: str) -> PerspectiveCentre | None:
         """Return the centre that follows from one's own pointings, None where they are too few or do not move."""
-        found = self._pointings(account, element)
-        names = [account.name_of(point) for point in self.points]
+        found = self._pointings(record, element)
+        names = [record.name_of(point) for point in self.points]
         whole = [name for name in names if all((name, level) in found for level in self.levels)]
         if len(whole) < MIN_POINTS:
             return None
@@ -65,8 +65,8 @@ class _Centres(Metric, frozen=True, kw_only=True):
         except Undetermined:
             return None
 
-    def _centres(self, account: AttemptRecord) -> dict[str, PerspectiveCentre]:
-        found = {element: self._centre(account, element) for element in self.elements}
+    def _centres(self, record: AttemptRecord) -> dict[str, PerspectiveCentre]:
+        found = {element: self._centre(record, element) for element in self.elements}
         return {element: centre for element, centre in found.items() if centre is not None}
 
     def _few(self, there: Mapping[str, object]) -> MetricResult:
@@ -82,13 +82,13 @@ class MissingLevels(_Centres, frozen=True, kw_only=True):
 
     unit = "registrations"
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         short = []
         for element in self.elements:
-            found = self._pointings(account, element)
+            found = self._pointings(record, element)
             for level in self.levels:
-                missing = [point for point in self.points if (account.name_of(point), level) not in found]
+                missing = [point for point in self.points if (record.name_of(point), level) not in found]
                 short += [(element, level, point) for point in missing]
         wanted = len(self.elements) * len(self.levels) * len(self.points)
         if not short:
@@ -104,13 +104,13 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
     unit = "um"
     truth = True
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it, over all registrations at the levels."""
         off: list[float] = []
         worst = (0.0, "")
         for element in self.elements:
-            eye = account.model.side_of(int(element[-1]))
-            for each in (each for some in self._pointings(account, element).values() for each in some):
+            eye = record.model.side_of(int(element[-1]))
+            for each in (each for some in self._pointings(record, element).values() for each in some):
                 seen = each.eyes[eye - 1]
                 if seen is None:
                     side = "left" if eye == 1 else "right"
@@ -118,7 +118,7 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
                         None, f"where {each.point} was registered with {handle_label(element)} the {side} eye saw none"
                     )
                 off += seen
-                place = f"{describe_points([each], account)} with {handle_label(element)} at {each.shown['Z']:.0f}"
+                place = f"{describe_points([each], record)} with {handle_label(element)} at {each.shown['Z']:.0f}"
                 worst = max(worst, (math.hypot(*seen), place))
         if not off:
             return MetricResult(None, "nothing was registered at the levels")
@@ -138,9 +138,9 @@ class PointingDisagreement(_Centres, frozen=True, kw_only=True):
 
     unit = "mm"
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        centres = self._centres(account)
+        centres = self._centres(record)
         if len(centres) < len(self.elements):
             return self._few(centres)
         element = max(centres, key=lambda each: float(centres[each].rms))
@@ -182,17 +182,15 @@ class _Answered(_Centres, frozen=True, kw_only=True):
     truth = True
     axes: list[str] = field(default_factory=lambda: ["X", "Y"])
 
-    def _against(self, account: AttemptRecord, right: Mapping[str, Mapping[str, float]], rightly: str) -> MetricResult:
+    def _against(self, record: AttemptRecord, right: Mapping[str, Mapping[str, float]], rightly: str) -> MetricResult:
         off: list[tuple[float, str]] = []
         for element, coordinates in right.items():
             for axis in self.axes:
                 key = f"{axis.lower()}{element[-1]}"
                 try:
-                    number = float(account.answers.get(key, ""))
+                    number = float(record.answers.get(key, ""))
                 except ValueError:
-                    return MetricResult(
-                        None, f"{key}: expected a number, got {account.answers.get(key) or 'no answer'}"
-                    )
+                    return MetricResult(None, f"{key}: expected a number, got {record.answers.get(key) or 'no answer'}")
                 by = abs(number - coordinates[axis])
                 off.append((by, f"{key} was answered {number:.2f}, {rightly} {by:.2f} off"))
         value, told = max(off)
@@ -203,15 +201,15 @@ class _Answered(_Centres, frozen=True, kw_only=True):
 class CentreComputationDeviation(_Answered, frozen=True, kw_only=True):
     """The largest difference of answered coordinates from those that follow from one's own registrations."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        centres = self._centres(account)
+        centres = self._centres(record)
         if len(centres) < len(self.elements):
             return self._few(centres)
         right = {
             element: {axis: float(getattr(centre, f"{axis}0")) for axis in AXES} for element, centre in centres.items()
         }
-        return self._against(account, right, "by your own registrations")
+        return self._against(record, right, "by your own registrations")
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -222,18 +220,18 @@ class CentreComputationDeviation(_Answered, frozen=True, kw_only=True):
 class CentreDeviation(_Answered, frozen=True, kw_only=True):
     """The largest difference of answered coordinates from where the centres truly are, in counter units."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it; counters are as they stood at the registrations."""
-        readings = {element: self._pointings(account, element) for element in self.elements}
+        readings = {element: self._pointings(record, element) for element in self.elements}
         if not all(readings.values()):
             return self._few({element: each for element, each in readings.items() if each})
-        right = {element: self._truly(account, element, found) for element, found in readings.items()}
-        return self._against(account, right, "by the truth")
+        right = {element: self._truly(record, element, found) for element, found in readings.items()}
+        return self._against(record, right, "by the truth")
 
     def _truly(
-        self, account: AttemptRecord, element: str, found: Mapping[tuple[str, float], list[Reading]]
+        self, record: AttemptRecord, element: str, found: Mapping[tuple[str, float], list[Reading]]
     ) -> dict[str, float]:
-        autograph = account.autograph
+        autograph = record.autograph
         centre = autograph.readings_at(autograph.pose(int(element[-1]))[0])
         every = [each for some in found.values() for each in some]
         counted = [(each.shown, autograph.readings_at(np.array(each.mark))) for each in every]

@@ -22,16 +22,16 @@ from a7sim.training.measures.base import (
 )
 
 
-def projector_poses(account: AttemptRecord, reading: Reading) -> tuple[ProjectorPose, ProjectorPose]:
+def projector_poses(record: AttemptRecord, reading: Reading) -> tuple[ProjectorPose, ProjectorPose]:
     """Return how the projectors of the left-hand and the right-hand photograph stood by their counters."""
-    zero = {name: account.autograph.element_data(name).zero for name in account.autograph.variant.elements}
+    zero = {name: record.autograph.element_data(name).zero for name in record.autograph.variant.elements}
 
     def stand(projector: int, x: float) -> ProjectorPose:
         tilts = [reading.shown[f"{name}{projector}"] - zero[f"{name}{projector}"] for name in ("omega", "phi", "kappa")]
         centre = [x, -reading.shown[f"by{projector}"], reading.shown[f"bz{projector}"]]
         return ProjectorPose(np.array(centre)[:, None], GON * np.array(tilts)[:, None])
 
-    model = account.model
+    model = record.model
     return stand(model.left_projector, 0.0), stand(model.right_projector, abs(reading.shown["bx"]))
 
 
@@ -40,11 +40,11 @@ class _Clearing(Metric, frozen=True, kw_only=True):
 
     steps: list[dict[str, str]]
 
-    def _step_of(self, account: AttemptRecord, reading: Reading) -> str | None:
+    def _step_of(self, record: AttemptRecord, reading: Reading) -> str | None:
         """Return the point of the step that a registration belongs to, None where it belongs to none."""
         for group in self.steps:
             for point, element in group.items():
-                if element in reading.named and reading.point == account.name_of(point):
+                if element in reading.named and reading.point == record.name_of(point):
                     return point
         return None
 
@@ -58,13 +58,13 @@ class MissingSteps(_Clearing, frozen=True, kw_only=True):
 
     unit = "steps"
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         first: dict[str, int] = {}
         elsewhere: list[Reading] = []
         elements = self._elements()
-        for reading in account.readings:
-            step = self._step_of(account, reading)
+        for reading in record.readings:
+            step = self._step_of(record, reading)
             if step is not None:
                 first.setdefault(step, reading.place)
             elif set(reading.named) & set(elements.values()):
@@ -77,7 +77,7 @@ class MissingSteps(_Clearing, frozen=True, kw_only=True):
             before = max([before, *places.values()])
         told = [f"not registered: {self._told(missing)}"] if missing else []
         told += [f"registered before those it rests on: {self._told(early)}"] if early else []
-        told += [f"registered where it does not belong: {self._strayed(elsewhere, account)}"] if elsewhere else []
+        told += [f"registered where it does not belong: {self._strayed(elsewhere, record)}"] if elsewhere else []
         strays = len({(each.point, each.named) for each in elsewhere})
         return MetricResult(
             float(len(missing) + len(early) + strays),
@@ -88,11 +88,10 @@ class MissingSteps(_Clearing, frozen=True, kw_only=True):
         elements = self._elements()
         return join_words(f"{handle_label(elements[point])} at {point}" for point in points)
 
-    def _strayed(self, readings: list[Reading], account: AttemptRecord) -> str:
+    def _strayed(self, readings: list[Reading], record: AttemptRecord) -> str:
         return join_words(
             dict.fromkeys(
-                f"{join_words(map(handle_label, each.named))} at {describe_points([each], account)}"
-                for each in readings
+                f"{join_words(map(handle_label, each.named))} at {describe_points([each], record)}" for each in readings
             )
         )
 
@@ -132,9 +131,9 @@ class OverCorrectionDeviation(_Clearing, frozen=True, kw_only=True):
     least: float = 0.15
     """Gon."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        turns = self._turns(account)
+        turns = self._turns(record)
         last, omega = list(self._elements().items())[-1]
         if not turns:
             return MetricResult(
@@ -148,42 +147,42 @@ class OverCorrectionDeviation(_Clearing, frozen=True, kw_only=True):
             f"{worst.needed:.2f} times: {worst.remains:.0%} of the parallax is left after the next round",
         )
 
-    def _turns(self, account: AttemptRecord) -> list[OmegaTurn]:
+    def _turns(self, record: AttemptRecord) -> list[OmegaTurn]:
         *_, (last, omega) = self._elements().items()
-        begun = [each.before for each in account.actions if each.name == omega and each.what in ("set", "turn")]
-        before = begun[0] if begun else account.autograph.element(omega)
-        readings = [each for each in account.readings if self._step_of(account, each) is not None]
+        begun = [each.before for each in record.actions if each.name == omega and each.what in ("set", "turn")]
+        before = begun[0] if begun else record.autograph.element(omega)
+        readings = [each for each in record.readings if self._step_of(record, each) is not None]
         latest: dict[str, Reading] = {}
         cleared: Reading | None = None
         turns = []
         for reading in readings:
-            step = self._step_of(account, reading) or ""
+            step = self._step_of(record, reading) or ""
             if step != last:
                 if cleared is not None:
-                    turns.append(self._turn(account, latest, cleared, before, reading.shown[omega]))
+                    turns.append(self._turn(record, latest, cleared, before, reading.shown[omega]))
                     cleared = None
                 before = reading.shown[omega]
             elif cleared is None:
                 cleared = reading
             latest[step] = reading
         if cleared is not None:
-            turns.append(self._turn(account, latest, cleared, before, account.autograph.element(omega)))
+            turns.append(self._turn(record, latest, cleared, before, record.autograph.element(omega)))
         return [each for each in turns if each is not None]
 
     def _turn(
-        self, account: AttemptRecord, latest: dict[str, Reading], cleared: Reading, before: float, left: float
+        self, record: AttemptRecord, latest: dict[str, Reading], cleared: Reading, before: float, left: float
     ) -> OmegaTurn | None:
         *_, (_, omega) = self._elements().items()
         if abs(cleared.shown[omega] - before) < self.least or set(latest) != set(self._elements()):
             return None
         marks = np.array([latest[point].mark for point in self._elements()]).T[..., None]
-        needed = float(over_correction_by_coefficients(self._coefficients(account, marks, cleared))[0])
+        needed = float(over_correction_by_coefficients(self._coefficients(record, marks, cleared))[0])
         return OmegaTurn(cleared, before, cleared.shown[omega], left, needed)
 
-    def _coefficients(self, account: AttemptRecord, marks: Array, reading: Reading) -> Array:
-        hands = [f"{name[:-1]}{account.model.side_of(int(name[-1]))}" for name in self._elements().values()]
+    def _coefficients(self, record: AttemptRecord, marks: Array, reading: Reading) -> Array:
+        hands = [f"{name[:-1]}{record.model.side_of(int(name[-1]))}" for name in self._elements().values()]
         rows = [PARALLAX_ELEMENTS.index(name) for name in hands]
-        return clearing_coefficients(marks, *projector_poses(account, reading))[rows]
+        return clearing_coefficients(marks, *projector_poses(record, reading))[rows]
 
     def floor(self, scenario: Scenario) -> float:
         """Return what half a count at either end of the shortest turn makes of it."""
@@ -198,13 +197,13 @@ class WrongMissingPoints(Metric, frozen=True, kw_only=True):
     truth = True
     key: str
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        answered = account.answers.get(self.key, "")
+        answered = record.answers.get(self.key, "")
         if not answered:
             return MetricResult(None, f"{self.key}: not answered")
         said = set(answered.replace(",", " ").replace("+", " ").split())
-        gone = set(CASES["A"]) - set(account.model.standard_points)
+        gone = set(CASES["A"]) - set(record.model.standard_points)
         wrong = sorted(said ^ gone)
         if not wrong:
             return MetricResult(0.0, f"{self.key} was answered {answered}: right")

@@ -43,10 +43,10 @@ class LevelDepthRatio(Metric, frozen=True, kw_only=True):
 
     points: list[str]
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it, by the counter of Z, which counts mm from the base line in a grid test."""
-        names = [account.name_of(point) for point in self.points]
-        depths = [-each.mark[2] for each in account.readings if each.point in names]
+        names = [record.name_of(point) for point in self.points]
+        depths = [-each.mark[2] for each in record.readings if each.point in names]
         if not depths:
             return MetricResult(None, f"nothing was registered at {join_words(self.points)}")
         high, low = min(depths), max(depths)
@@ -65,24 +65,24 @@ class AnsweredErrorDeviation(Metric, frozen=True, kw_only=True):
     reach_mm: float = 100.0
     """How far from the middle of the plate the crosses lie."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it: what stands minus what the counter shows."""
         off: dict[str, float] = {}
         for element in self.elements:
-            answered = account.answers.get(element, "")
+            answered = record.answers.get(element, "")
             try:
                 found = float(answered)
             except ValueError:
                 return MetricResult(
                     None, f"{element}: {f'expected a number, got {answered!r}' if answered else 'not answered'}"
                 )
-            autograph = account.autograph
+            autograph = record.autograph
             truth = true_errors(autograph, autograph.condition, int(element[-1]))["errors"]
             off[element] = abs(found - truth[element[:-1]])
         worst = max(off, key=lambda element: off[element])
         if not math.isfinite(off[worst]):
-            return MetricResult(None, f"{worst}: expected a number, got {account.answers[worst]!r}")
-        return MetricResult(round(off[worst], 4), f"{worst} was answered {account.answers[worst]}, the furthest off")
+            return MetricResult(None, f"{worst}: expected a number, got {record.answers[worst]!r}")
+        return MetricResult(round(off[worst], 4), f"{worst} was answered {record.answers[worst]}, the furthest off")
 
     def floor(self, scenario: Scenario) -> float:
         """Return what local errors of eight crosses let be known of c in mm, or of a tilt in gon."""

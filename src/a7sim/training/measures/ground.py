@@ -34,33 +34,33 @@ LAST = 2
 """So many registrations of a point are its reading: a point is pointed at twice."""
 
 
-def last_readings(account: AttemptRecord, points: Iterable[str], base: str = "") -> dict[str, list[Reading]]:
+def last_readings(record: AttemptRecord, points: Iterable[str], base: str = "") -> dict[str, list[Reading]]:
     """Return the last two pointings at points, with a base where it is named; points without any are left out."""
     found = {}
     for point in points:
-        name = account.name_of(point)
-        readings = pointings(account, name, base)
+        name = record.name_of(point)
+        readings = pointings(record, name, base)
         if readings:
             found[name] = readings[-LAST:]
     return found
 
 
-def pointings(account: AttemptRecord, name: str, base: str = "") -> list[Reading]:
+def pointings(record: AttemptRecord, name: str, base: str = "") -> list[Reading]:
     """Return the registrations of a point's coordinates: those that are no readings of an element just turned there."""
-    deeds = [each for each in account.actions if each.what in PLAIN]
-    there = [each for each in account.readings if each.point == name and base in ("", each.base)]
-    return [each for each in there if not _turned_there(deeds, each)]
+    actions = [each for each in record.actions if each.what in PLAIN]
+    there = [each for each in record.readings if each.point == name and base in ("", each.base)]
+    return [each for each in there if not _turned_there(actions, each)]
 
 
-def _turned_there(deeds: Sequence[StudentAction], reading: Reading) -> bool:
+def _turned_there(actions: Sequence[StudentAction], reading: Reading) -> bool:
     """Whether an element that was registered had been turned after the mark came to the point.
 
     At the console whatever is in hand is registered, so that it is named says nothing.
     """
-    for deed in reversed(deeds[: bisect_left(deeds, reading.place, key=lambda each: each.index)]):
-        if deed.name in reading.named:
+    for action in reversed(actions[: bisect_left(actions, reading.place, key=lambda each: each.index)]):
+        if action.name in reading.named:
             return True
-        if deed.name in PLAN_AXES and abs(deed.after - deed.before) >= ARRIVAL:
+        if action.name in PLAN_AXES and abs(action.after - action.before) >= ARRIVAL:
             return False
     return False
 
@@ -91,11 +91,11 @@ class MissingPointings(Metric, frozen=True, kw_only=True):
     each: int = 1
     bases: list[str] = field(default_factory=lambda: [""])
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         lacking = {
             f"{point}{f' with base {base}' if base else ''}": self.each
-            - len(pointings(account, account.name_of(point), base))
+            - len(pointings(record, record.name_of(point), base))
             for base in self.bases
             for point in self.points
         }
@@ -119,13 +119,13 @@ class HeightDeviation(Metric, frozen=True, kw_only=True):
     """Of the model, by which the counter reads metres."""
     largest: bool = False
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it, by the last two registrations of each point."""
-        readings = last_readings(account, self.points)
-        missing = [point for point in self.points if account.name_of(point) not in readings]
+        readings = last_readings(record, self.points)
+        missing = [point for point in self.points if record.name_of(point) not in readings]
         if missing:
             return MetricResult(None, f"nothing was registered at {join_words(missing)}")
-        truth = account.scene.ground_points
+        truth = record.scene.ground_points
         off = {name: float(mean_display(some)[2] - truth[name][2]) for name, some in readings.items()}
         worst = max(off, key=lambda name: abs(off[name]))
         rms = math.sqrt(sum(each**2 for each in off.values()) / len(off))
@@ -148,11 +148,11 @@ class DistanceDeviation(Metric, frozen=True, kw_only=True):
     shortest_m: float = 500.0
     """Distances shorter than that tell little of the scale."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the share in the mean of all pairs, by the last two registrations of each point."""
-        readings = last_readings(account, self.points)
-        truth = account.scene.ground_points
-        metres = 1e-3 * self.scale_number / account.autograph.variant.scales["X"].units_per_mm
+        readings = last_readings(record, self.points)
+        truth = record.scene.ground_points
+        metres = 1e-3 * self.scale_number / record.autograph.variant.scales["X"].units_per_mm
         shares = []
         for one, other in combinations(readings, 2):
             true = float(length_of((truth[other] - truth[one])[:2]))
@@ -172,17 +172,17 @@ class DistanceDeviation(Metric, frozen=True, kw_only=True):
         return um / (1.5 * scenario.plan.half_width)
 
 
-def element_at(account: AttemptRecord, name: str, place: int) -> float:
+def element_at(record: AttemptRecord, name: str, place: int) -> float:
     """Return where an element stood before a deed."""
-    moved = [each for each in account.witness.deeds if each.what in ("set", "turn") and each.name == name]
+    moved = [each for each in record.action_log.actions if each.what in ("set", "turn") and each.name == name]
     before = [each.after for each in moved if each.index < place]
     later = [each.before for each in moved if each.index >= place]
-    return before[-1] if before else later[0] if later else account.autograph.element(name)
+    return before[-1] if before else later[0] if later else record.autograph.element(name)
 
 
-def change_of_base(account: AttemptRecord, mode: str) -> StudentAction | None:
+def change_of_base(record: AttemptRecord, mode: str) -> StudentAction | None:
     """Return the student's deed by which the base was last changed over to a mode, None where it never was."""
-    changes = [each for each in account.actions if each.what == "base" and each.text == mode]
+    changes = [each for each in record.actions if each.what == "base" and each.text == mode]
     return changes[-1] if changes else None
 
 
@@ -195,14 +195,14 @@ class ElementChange(Metric, frozen=True, kw_only=True):
     base: str = "outside"
     """To which it was changed."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        change = change_of_base(account, self.base)
+        change = change_of_base(record, self.base)
         if change is None:
             return MetricResult(None, f"the base was never set {self.base}")
         moved = {}
         for name in self.elements:
-            off = account.autograph.element(name) - element_at(account, name, change.index)
+            off = record.autograph.element(name) - element_at(record, name, change.index)
             moved[name] = abs((off + 200.0) % 400.0 - 200.0) if name.startswith("kappa") else abs(off)
         worst = max(moved, key=lambda name: moved[name])
         told = [f"{handle_label(name)} by {amount:.2f}" for name, amount in moved.items() if amount > HALF_A_COUNT]
@@ -224,13 +224,13 @@ class TiePointDisagreement(Metric, frozen=True, kw_only=True):
     points: list[str]
     axes: list[str] = field(default_factory=lambda: list(AXES))
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it, by the last two registrations of each point in either model."""
-        inside, outside = (last_readings(account, self.points, base) for base in ("inside", "outside"))
-        missing = [point for point in self.points if account.name_of(point) not in inside.keys() & outside.keys()]
+        inside, outside = (last_readings(record, self.points, base) for base in ("inside", "outside"))
+        missing = [point for point in self.points if record.name_of(point) not in inside.keys() & outside.keys()]
         if missing:
             return MetricResult(None, f"not registered both with base in and with base out: {join_words(missing)}")
-        units = {"Z": account.autograph.z_units_per_mm}
+        units = {"Z": record.autograph.z_units_per_mm}
         apart = []
         for name, some in inside.items():
             difference = mean_display(outside[name]) - mean_display(some)
@@ -257,26 +257,26 @@ class ScaleTransferDeviation(Metric, frozen=True, kw_only=True):
     first: str = "1"
     base: str = "outside"
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        change = change_of_base(account, self.base)
+        change = change_of_base(record, self.base)
         if change is None:
             return MetricResult(None, f"the base was never set {self.base}")
-        models = {each.name: each for each in account.scenario.models}
-        before = self._scale(account, models[self.first], change.index)
-        after = self._scale(account, models[account.model.name], account.witness.deeds[-1].index + 1)
+        models = {each.name: each for each in record.scenario.models}
+        before = self._scale(record, models[self.first], change.index)
+        after = self._scale(record, models[record.model.name], record.action_log.actions[-1].index + 1)
         share = 1e3 * (after / before - 1.0)
         told = f"the second model is {abs(share):.2f} per mille {'larger' if share > 0 else 'smaller'} than the first"
         return MetricResult(round(abs(share), 4), told)
 
-    def _scale(self, account: AttemptRecord, model: ModelPlan, place: int) -> float:
+    def _scale(self, record: AttemptRecord, model: ModelPlan, place: int) -> float:
         at = {
-            name: element_at(account, name, place)
+            name: element_at(record, name, place)
             for name in ("bx", "by1", "by2", "bz1", "bz2")
-            if name in account.autograph.variant.elements
+            if name in record.autograph.variant.elements
         }
         base = np.array([at["bx"], at.get("by1", 0.0) - at.get("by2", 0.0), at.get("bz1", 0.0) - at.get("bz2", 0.0)])
-        stations = account.scene.stations
+        stations = record.scene.stations
         return float(length_of(base) / length_of(stations[model.right].centre - stations[model.left].centre))
 
     def floor(self, scenario: Scenario) -> float:

@@ -35,32 +35,32 @@ BYS = ("by1", "by2")
 class MeasuredRound:
     """Readings of by' and by\" made with the same settings of the five elements."""
 
-    account: AttemptRecord
+    record: AttemptRecord
     readings: Sequence[Reading]
 
     @cached_property
     def elements(self) -> Mapping[str, str]:
         """Return the five elements of the plotter by those of the hands: base out they have changed places."""
-        projectors = {1: self.account.model.left_projector, 2: self.account.model.right_projector}
+        projectors = {1: self.record.model.left_projector, 2: self.record.model.right_projector}
         return {name: f"{name[:-1]}{projectors[int(name[-1])]}" for name in FIVE}
 
     @cached_property
     def parallaxes(self) -> dict[str, float]:
         """Return the y-parallaxes in mm by position, from the means of by' and by\" against where they rest."""
         found = {}
-        for label, name in self.account.model.standard_points.items():
+        for label, name in self.record.model.standard_points.items():
             there = [each for each in self.readings if each.point == name]
             read = {by: [each.shown[by] for each in there if by in each.named] for by in BYS}
             if all(read.values()):
                 rest = {by: fmean(each.shown[by] for each in there if by not in each.named) for by in BYS}
-                sense = 1.0 if self.account.model.left_projector == 1 else -1.0
+                sense = 1.0 if self.record.model.left_projector == 1 else -1.0
                 moved = {by: fmean(read[by]) - rest[by] for by in BYS}
                 found[label] = sense * (moved["by1"] - moved["by2"]) / 2.0
         return found
 
     def has(self, case: str) -> bool:
         """Whether all points of a case were read with both."""
-        return set(CASES[case]) & set(self.account.model.standard_points) <= set(self.parallaxes)
+        return set(CASES[case]) & set(self.record.model.standard_points) <= set(self.parallaxes)
 
     def sums(self, case: str) -> list[dict[str, float]]:
         """Return the corrections in gon that follow, by element, in every way that is taught.
@@ -73,14 +73,14 @@ class MeasuredRound:
         ways = []
         for each in (p - p.mean(), p):
             if len(labels) == len(CASES[case]):
-                ways.append(multipliers(self.account.scenario, case) @ each)
+                ways.append(multipliers(self.record.scenario, case) @ each)
             ways.append(self._rigorous(labels, each))
         return [{self.elements[n]: float(v) for n, v in zip(FIVE, way, strict=True)} for way in ways]
 
     def _rigorous(self, labels: Sequence[str], p: Array) -> Array:
-        names = [self.account.name_of(label) for label in labels]
+        names = [self.record.name_of(label) for label in labels]
         marks = [np.mean([each.mark for each in self.readings if each.point == name], axis=0) for name in names]
-        left, right = projector_poses(self.account, self.readings[0])
+        left, right = projector_poses(self.record, self.readings[0])
         solution = element_corrections(p[:, None], np.array(marks).T[..., None], left, right, FIVE)
         return solution.unknowns[:, 0] / GON
 
@@ -89,15 +89,15 @@ class MeasuredRound:
         return self.readings[0].shown[element]
 
 
-def find_rounds(account: AttemptRecord) -> list[MeasuredRound]:
+def find_rounds(record: AttemptRecord) -> list[MeasuredRound]:
     """Return the rounds of measuring by' and by\"; turning one of the five elements begins a new one."""
     rounds: list[list[Reading]] = []
-    for each in (each for each in account.readings if set(each.named) & set(BYS)):
+    for each in (each for each in record.readings if set(each.named) & set(BYS)):
         if rounds and all(abs(each.shown[name] - rounds[-1][-1].shown[name]) < HALF_A_COUNT for name in FIVE):
             rounds[-1].append(each)
         else:
             rounds.append([each])
-    return [MeasuredRound(account, readings) for readings in rounds]
+    return [MeasuredRound(record, readings) for readings in rounds]
 
 
 @dataclass(frozen=True)
@@ -110,19 +110,19 @@ class AnsweredCase:
     set: Mapping[str, float]
 
 
-def answered_case(account: AttemptRecord, case: str) -> AnsweredCase | None:
+def answered_case(record: AttemptRecord, case: str) -> AnsweredCase | None:
     """Return the first round that has all of a case, and what came of it; None where there is none."""
-    rounds = find_rounds(account)
+    rounds = find_rounds(record)
     place = next((i for i, each in enumerate(rounds) if each.has(case)), None)
     if place is None:
         return None
     this, elements = rounds[place], rounds[place].elements.values()
-    after = rounds[place + 1].shows if place + 1 < len(rounds) else account.autograph.element
+    after = rounds[place + 1].shows if place + 1 < len(rounds) else record.autograph.element
     try:
         sums = this.sums(case)
     except Undetermined:
         return None
-    answers = {name: _number(account.answers.get(f"{case.lower()}-{name}", "")) for name in elements}
+    answers = {name: _number(record.answers.get(f"{case.lower()}-{name}", "")) for name in elements}
     answered = {name: value for name, value in answers.items() if value is not None}
     moved = {name: after(name) - this.shows(name) for name in elements}
     changed = {name: math.remainder(value, 400.0) for name, value in moved.items()}
@@ -154,9 +154,9 @@ class ComputationDeviation(Metric, frozen=True, kw_only=True):
     truth = True
     case: str
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        found = answered_case(account, self.case)
+        found = answered_case(record, self.case)
         if found is None:
             return MetricResult(
                 None, f"not all points of case {self.case} were read with by' and by\" at the same settings"
@@ -180,9 +180,9 @@ class SettingDeviation(Metric, frozen=True, kw_only=True):
     truth = True
     cases: list[str] = field(default_factory=lambda: ["A"])
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        there = {case: each for case in self.cases if (each := answered_case(account, case)) is not None}
+        there = {case: each for case in self.cases if (each := answered_case(record, case)) is not None}
         if len(there) < len(self.cases):
             return MetricResult(None, f"case {join_words(set(self.cases) - set(there))} was not measured whole")
         all_off = [
@@ -208,11 +208,11 @@ class ParallaxRms(Metric, frozen=True, kw_only=True):
     truth = True
     elements: list[str] = field(default_factory=lambda: list(BYS))
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
         left = [
             each.stereo[1]
-            for each in account.readings
+            for each in record.readings
             if set(each.named) & set(self.elements) and each.stereo is not None
         ]
         if not left:

@@ -32,15 +32,15 @@ class MissingReadings(Metric, frozen=True, kw_only=True):
     after: list[str] = field(default_factory=list)
     """Only those count that were made after the last movement of these handles."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         short: dict[str, list[str]] = {}
         missing = 0
-        moved = [each.index for each in account.actions if each.name in self.after and each.what in PLAIN]
+        moved = [each.index for each in record.actions if each.name in self.after and each.what in PLAIN]
         last = max(moved, default=-1)
         for point in self.points:
             for element in self.elements or [""]:
-                readings = [each for each in readings_with(account, element, [point]) if each.place > last]
+                readings = [each for each in readings_with(record, element, [point]) if each.place > last]
                 lacks = self.each - len(readings)
                 if lacks > 0:
                     missing += lacks
@@ -68,10 +68,10 @@ class WrongApproach(Metric, frozen=True, kw_only=True):
     besides: list[str] = field(default_factory=list)
     """Points at which it does not matter."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        spared = {account.name_of(point) for point in self.besides}
-        readings = [each for each in readings_with(account, "", self.points) if each.point not in spared]
+        spared = {record.name_of(point) for point in self.besides}
+        readings = [each for each in readings_with(record, "", self.points) if each.point not in spared]
         if not readings:
             return MetricResult(None, "nothing was registered")
         wrong = {
@@ -82,7 +82,7 @@ class WrongApproach(Metric, frozen=True, kw_only=True):
         if not bad:
             return MetricResult(0.0, f"{join_words(map(handle_label, self.handles))} always came from the same side")
         from_where = "larger" if self.side > 0 else "smaller"
-        told = [f"{handle_label(handle)} at {describe_points(some, account)}" for handle, some in wrong.items() if some]
+        told = [f"{handle_label(handle)} at {describe_points(some, record)}" for handle, some in wrong.items() if some]
         return MetricResult(
             float(len(bad)),
             f"{len(bad)} of {pluralize(len(readings), 'registration')} came from {from_where} readings: "
@@ -98,9 +98,9 @@ class OneSidedReadings(Metric, frozen=True, kw_only=True):
     point: str
     handles: list[str]
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        readings = readings_with(account, "", [self.point])
+        readings = readings_with(record, "", [self.point])
         if not readings:
             return MetricResult(None, f"nothing was registered at {self.point}")
         lacking = {handle: {each.sides.get(handle, 0) for each in readings} for handle in self.handles}
@@ -124,10 +124,10 @@ class ReadingsWithoutReturn(Metric, frozen=True, kw_only=True):
     away: float = 0.1
     """By how much it must have gone away, in units of its counter."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         lazy = {
-            point: [handle for handle in self.handles if not self._came_back(account, point, handle)]
+            point: [handle for handle in self.handles if not self._came_back(record, point, handle)]
             for point in self.points
         }
         lazy = {point: handles for point, handles in lazy.items() if handles}
@@ -140,14 +140,12 @@ class ReadingsWithoutReturn(Metric, frozen=True, kw_only=True):
             f"by {self.away:g} and came back",
         )
 
-    def _came_back(self, account: AttemptRecord, point: str, handle: str) -> bool:
-        readings = readings_with(account, "" if handle in AXES else handle, [point])
-        return any(self._left(account, handle, *pair) for pair in pairwise(readings))
+    def _came_back(self, record: AttemptRecord, point: str, handle: str) -> bool:
+        readings = readings_with(record, "" if handle in AXES else handle, [point])
+        return any(self._left(record, handle, *pair) for pair in pairwise(readings))
 
-    def _left(self, account: AttemptRecord, handle: str, first: Reading, then: Reading) -> bool:
-        stood = [
-            each.after for each in account.actions if each.name == handle and first.place < each.index < then.place
-        ]
+    def _left(self, record: AttemptRecord, handle: str, first: Reading, then: Reading) -> bool:
+        stood = [each.after for each in record.actions if each.name == handle and first.place < each.index < then.place]
         return any(abs(at - first.shown[handle]) >= self.away - 1e-9 for at in stood)
 
 
@@ -159,12 +157,12 @@ class TargetDeviation(Metric, frozen=True, kw_only=True):
     targets: dict[str, dict[str, float]]
     """By point, by counter or element."""
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it, by the last registration of each point."""
         off: list[tuple[float, str]] = []
         missing = []
         for point, wanted in self.targets.items():
-            readings = readings_with(account, "", [point])
+            readings = readings_with(record, "", [point])
             if not readings:
                 missing.append(point)
                 continue
@@ -194,18 +192,18 @@ class OtherElementDisplaced(Metric, frozen=True, kw_only=True):
     at: float = 0.0
     within: float = 0.005
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         told, count, all_read = [], 0, 0
         for read, other in self.pairs.items():
-            readings = [each for each in readings_with(account, read) if other not in each.named]
+            readings = [each for each in readings_with(record, read) if other not in each.named]
             all_read += len(readings)
             wrong = [each for each in readings if abs(each.shown[other] - self.at) > self.within]
             count += len(wrong)
             if wrong:
                 told.append(
                     f"{handle_label(other)} was never returned to {self.at:g} before reading {handle_label(read)} "
-                    f"at {describe_points(wrong, account)}"
+                    f"at {describe_points(wrong, record)}"
                 )
         if not all_read:
             return MetricResult(None, f"no reading of {join_words(map(handle_label, self.pairs))} was registered")
@@ -223,12 +221,12 @@ class ReadingSpread(Metric, frozen=True, kw_only=True):
     handles: list[str]
     points: list[str] = field(default_factory=list)
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
         spreads: list[tuple[float, str]] = []
         for handle in self.handles:
             readings = sorted(
-                readings_with(account, "" if handle in AXES else handle, self.points), key=lambda each: each.point
+                readings_with(record, "" if handle in AXES else handle, self.points), key=lambda each: each.point
             )
             for _, some in groupby(readings, key=lambda each: each.point):
                 group = list(some)
@@ -236,7 +234,7 @@ class ReadingSpread(Metric, frozen=True, kw_only=True):
                 if len(read) > 1:
                     spread = max(read) - min(read)
                     told = (
-                        f"{handle_label(handle)} at {describe_points(group, account)} read from {min(read):.2f} "
+                        f"{handle_label(handle)} at {describe_points(group, record)} read from {min(read):.2f} "
                         f"to {max(read):.2f}"
                     )
                     spreads.append((round(spread, 4), told))
@@ -258,16 +256,16 @@ class OppositionDeviation(Metric, frozen=True, kw_only=True):
     other: str = "by2"
     points: list[str] = field(default_factory=list)
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the largest sum at a point."""
         sums: list[tuple[float, str]] = []
-        for point in dict.fromkeys(each.point for each in readings_with(account, self.one, self.points)):
-            ones, others = readings_with(account, self.one, [point]), readings_with(account, self.other, [point])
+        for point in dict.fromkeys(each.point for each in readings_with(record, self.one, self.points)):
+            ones, others = readings_with(record, self.one, [point]), readings_with(record, self.other, [point])
             if others:
                 left = fmean(each.shown[self.one] for each in ones)
                 right = fmean(each.shown[self.other] for each in others)
                 read = f"{handle_label(self.one)} reads {left:+.3f} and {handle_label(self.other)} {right:+.3f}"
-                told = f"at {describe_points(ones, account)} {read}"
+                told = f"at {describe_points(ones, record)} {read}"
                 sums.append((round(abs(left + right), 4), told))
         if not sums:
             return MetricResult(

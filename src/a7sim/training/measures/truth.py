@@ -43,24 +43,24 @@ class MaxAtReadings(Metric, frozen=True, kw_only=True):
     """Only where one of these was registered."""
     points: list[str] = field(default_factory=list)
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        names = [account.name_of(point) for point in self.points]
+        names = [record.name_of(point) for point in self.points]
         readings = [
             each
-            for each in account.readings
+            for each in record.readings
             if (not self.elements or set(self.elements) & set(each.named)) and (not names or each.point in names)
         ]
         if not readings:
             return MetricResult(None, "nothing was registered")
         lost = [each for each in readings if self._um(each) is None]
         if lost:
-            return MetricResult(None, f"at {describe_points(lost, account)} the point was not in view")
+            return MetricResult(None, f"at {describe_points(lost, record)} the point was not in view")
         worst = max(readings, key=lambda each: self._um(each) or 0.0)
         value = self._um(worst) or 0.0
         named = join_words(map(handle_label, worst.named)) if worst.named else "the mark"
         return MetricResult(
-            round(value, 1), f"{self._called(value)} at {describe_points([worst], account)} with {named}"
+            round(value, 1), f"{self._called(value)} at {describe_points([worst], record)} with {named}"
         )
 
     def _um(self, reading: Reading) -> float | None:
@@ -122,12 +122,12 @@ class PlanDeviation(MaxAtReadings, frozen=True, kw_only=True):
         return MAX_OF_SEVERAL * BEST_POINTING_UM
 
 
-def y_parallax_at(account: AttemptRecord, point: str) -> float | None:
+def y_parallax_at(record: AttemptRecord, point: str) -> float | None:
     """Return the y-parallax in um at photo scale of a point as the projectors stand, None where it is on no picture.
 
     It is what both eyes would see with the mark on the ground there.
     """
-    autograph, model = account.autograph, account.model
+    autograph, model = record.autograph, record.model
     images = []
     for projector in (model.left_projector, model.right_projector):
         if autograph.loaded(projector) is None:
@@ -136,7 +136,7 @@ def y_parallax_at(account: AttemptRecord, point: str) -> float | None:
         if place is None:
             return None
         images.append((projector, place))
-    mark = np.array([account.scenario.plan.bx / 2.0, 0.0, -account.scenario.plan.projection_height])
+    mark = np.array([record.scenario.plan.bx / 2.0, 0.0, -record.scenario.plan.projection_height])
     for _ in range(MAX_STEPS):
         off = _misses(autograph, images, mark)
         slopes = np.array([_misses(autograph, images, mark + step) - off for step in np.eye(3)]).T
@@ -166,10 +166,10 @@ class ResidualParallax(Metric, frozen=True, kw_only=True):
     points: list[str] = field(default_factory=lambda: list(CASES["A"]))
     largest: bool = False
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
-        names = {point: account.name_of(point) for point in self.points if point in account.model.standard_points}
-        found = {point: y_parallax_at(account, name) for point, name in names.items()}
+        names = {point: record.name_of(point) for point in self.points if point in record.model.standard_points}
+        found = {point: y_parallax_at(record, name) for point, name in names.items()}
         seen = {point: value for point, value in found.items() if value is not None}
         if len(seen) < len(found) or not seen:
             return MetricResult(None, "the pictures of the model do not lie in their projectors")
@@ -193,14 +193,14 @@ class CentringDeviation(Metric, frozen=True, kw_only=True):
     truth = True
     projectors: list[int] = field(default_factory=lambda: [1, 2])
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
         left: list[tuple[float, str]] = []
         for projector in self.projectors:
-            name = account.autograph.loaded(projector)
-            if name is None or name not in account.scene.photographs:
+            name = record.autograph.loaded(projector)
+            if name is None or name not in record.scene.photographs:
                 return MetricResult(None, f"no photograph lies in projector {projector}")
-            shift, turned, _ = _lie(account, projector)
+            shift, turned, _ = _lie(record, projector)
             left.append((shift, f"{name} lies {shift:.3f} mm beside the principal point"))
             left.append((turned, f"{name} is turned by {turned:.3f} mm at its fiducials"))
         value, told = max(left)
@@ -211,10 +211,10 @@ class CentringDeviation(Metric, frozen=True, kw_only=True):
         return 1e-3 * MAX_OF_SEVERAL * BEST_FIDUCIAL_UM / 2.0
 
 
-def _lie(account: AttemptRecord, projector: int) -> tuple[float, float, float]:
+def _lie(record: AttemptRecord, projector: int) -> tuple[float, float, float]:
     """Return shift and turn in mm by which a picture lies off, and by how much its film is larger than it was."""
-    camera = account.scenario.camera
-    displaced = account.autograph.carrier(projector).fiducial_displacements()
+    camera = record.scenario.camera
+    displaced = record.autograph.carrier(projector).fiducial_displacements()
     places = {each.name: (each.x, each.y) for each in camera.fiducials}
     xy = np.array([places[name] for name, _, _ in displaced]).T
     d = np.array([(dx, dy) for _, dx, dy in displaced]).T
@@ -234,14 +234,14 @@ class PrincipalDistanceDeviation(Metric, frozen=True, kw_only=True):
     truth = True
     projectors: list[int] = field(default_factory=lambda: [1, 2])
 
-    def evaluate(self, account: AttemptRecord) -> MetricResult:
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return it."""
         off: list[tuple[float, str]] = []
         for projector in self.projectors:
-            if account.autograph.loaded(projector) is None:
+            if record.autograph.loaded(projector) is None:
                 return MetricResult(None, f"no photograph lies in projector {projector}")
-            wanted = account.scenario.camera.c * (1.0 + _lie(account, projector)[2])
-            shown = account.autograph.element(f"c{projector}")
+            wanted = record.scenario.camera.c * (1.0 + _lie(record, projector)[2])
+            shown = record.autograph.element(f"c{projector}")
             side = "long" if shown > wanted else "short"
             told = (
                 f"{handle_label(f'c{projector}')} stands at {shown:.2f}: {abs(shown - wanted):.3f} mm too {side} "

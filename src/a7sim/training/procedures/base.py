@@ -38,7 +38,7 @@ class ProcedureContext:
     """The virtual operator at the instrument of an exercise."""
 
     person: Person
-    bench: Workstation
+    workstation: Workstation
     model: ModelJob
     papers: Mapping[str, str] = field(default_factory=dict)
     """What was handed out, by file name."""
@@ -46,32 +46,32 @@ class ProcedureContext:
     @classmethod
     def for_model(cls, person: Person, job: Job, model: str) -> "ProcedureContext":
         """Return an operator who is to work on a model of a job."""
-        bench = Workstation(OperatorBatch.single(person), ScpiDriver(person), job)
-        return cls(person, bench, next(each for each in job.models if each.name == model))
+        workstation = Workstation(OperatorBatch.single(person), ScpiDriver(person), job)
+        return cls(person, workstation, next(each for each in job.models if each.name == model))
 
     def points(self) -> list[str]:
         """Return the names of the standard points that the job sheet asks for."""
-        labels = self.model.points_of_case(self.bench.job.plan.case)
+        labels = self.model.points_of_case(self.workstation.job.plan.case)
         return [self.model.standard_points[label] for label in labels]
 
     def set_up(self) -> None:
         """Bring the instrument to the settings of the job sheet, mount and centre pictures, take up the prints."""
-        bench = self.bench
-        who = bench.crew.active
+        workstation = self.workstation
+        active = workstation.operators.active
         self.begin("preparation")
-        bench.seat.prepare(who)
+        workstation.controls.prepare(active)
         self.begin("interior orientation")
-        set_base_and_fittings(bench, self.model.base, self.model.polarity)
+        set_base_and_fittings(workstation, self.model.base, self.model.polarity)
         found: dict[str, InteriorOrientationBatch] = {}
-        mount_photographs(bench, self.model, found)
-        bench.begin(who, self.model, load_prints(bench, self.model))
+        mount_photographs(workstation, self.model, found)
+        workstation.begin(active, self.model, load_prints(workstation, self.model))
 
     def take_over(self) -> None:
         """Sit down at an instrument that stands ready: base and pictures set, its counters as `*RST` leaves them."""
-        who = self.bench.crew.active
-        self.bench.seat.take_over(who)
-        self.bench.seat.counters(who)
-        self.bench.begin(who, self.model, load_prints(self.bench, self.model))
+        active = self.workstation.operators.active
+        self.workstation.controls.take_over(active)
+        self.workstation.controls.counters(active)
+        self.workstation.begin(active, self.model, load_prints(self.workstation, self.model))
 
     def answer(self, answers: Mapping[str, float], decimals: int = 2) -> None:
         """Note answers down at the instrument."""
@@ -80,21 +80,23 @@ class ProcedureContext:
 
     def begin(self, form: str) -> None:
         """Begin a form of the book."""
-        self.bench.crew.begin(self.bench.crew.active, self.model.name, form)
+        self.workstation.operators.begin(self.workstation.operators.active, self.model.name, form)
         self.person.note(f"{self.model.name}: {form}")
 
 
 def perturb_elements(seated: ProcedureContext, elements: Mapping[str, float]) -> None:
     """Turn elements by so much, by mistake."""
-    who = seated.bench.crew.active
-    standing = seated.bench.seat.elements(who, list(elements))
-    seated.bench.seat.turn_elements(who, {name: standing[name] + amount for name, amount in elements.items()})
+    active = seated.workstation.operators.active
+    standing = seated.workstation.controls.elements(active, list(elements))
+    seated.workstation.controls.turn_elements(
+        active, {name: standing[name] + amount for name, amount in elements.items()}
+    )
 
 
 def misplace_fittings(seated: ProcedureContext, fittings: Mapping[str, str]) -> None:
     """Put fittings into positions, by mistake."""
     for name, position in fittings.items():
-        seated.bench.hands.set_fitting(np.asarray(seated.bench.crew.active), name, position)
+        seated.workstation.driver.set_fitting(np.asarray(seated.workstation.operators.active), name, position)
 
 
 Procedure = Callable[..., None]
@@ -115,16 +117,18 @@ def procedure(name: str) -> Callable[[Procedure], Procedure]:
 
 
 def run_procedure(
-    room: AttemptEnvironment, played: PlayedRun, client: str, papers: Mapping[str, str] | None = None
+    environment: AttemptEnvironment, played: PlayedRun, client: str, papers: Mapping[str, str] | None = None
 ) -> str:
     """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake.
 
     `papers` are what was handed out, by file name.
     """
-    port = InProcessSerial(desk=room.desk, clock=room.clock, client=client, timeout=1.0)
-    observer = scenario_for(room.shelved, room.seed, played.observer).observer
-    person = Person(Client(port), room.clock, observer, room.seed)
-    seated = ProcedureContext.for_model(person, make_job(room.scenario, room.scene), room.shelved.exercise.model)
+    port = InProcessSerial(instrument=environment.instrument, clock=environment.clock, client=client, timeout=1.0)
+    observer = scenario_for(environment.exercise_folder, environment.seed, played.observer).observer
+    person = Person(Client(port), environment.clock, observer, environment.seed)
+    seated = ProcedureContext.for_model(
+        person, make_job(environment.scenario, environment.scene), environment.exercise_folder.exercise.model
+    )
     person.book.listener = _Button(person.client, seated.model).written
     try:
         PROCEDURES[played.procedure](replace(seated, papers=papers or {}), **played.options)
@@ -185,7 +189,7 @@ def measure_parallaxes(seated: ProcedureContext, readings: int = 2) -> None:
     seated.take_over()
     seated.begin("y-parallaxes")
     for _ in range(readings):
-        seated.bench.parallaxes(seated.bench.crew.active, seated.points(), 1)
+        seated.workstation.parallaxes(seated.workstation.operators.active, seated.points(), 1)
 
 
 @procedure("relative orientation")
@@ -193,13 +197,13 @@ def relative_orientation(seated: ProcedureContext) -> None:
     """Relative orientation as the scenario's plan has it, of pictures that lie ready; then a look at every point."""
     seated.take_over()
     seated.begin("relative orientation")
-    orient_model(seated.bench, seated.model)
+    orient_model(seated.workstation, seated.model)
     seated.begin("last look")
-    seated.bench.look_at_parallaxes(seated.bench.crew.active, seated.points())
+    seated.workstation.look_at_parallaxes(seated.workstation.operators.active, seated.points())
 
 
 @procedure("day's work")
 def full_day(seated: ProcedureContext) -> None:
     """All models of the scenario from the first picture to the last centre."""
-    for _ in measure_models(seated.person, seated.bench.job):
+    for _ in measure_models(seated.person, seated.workstation.job):
         pass

@@ -20,27 +20,31 @@ def prepared_model(seated: ProcedureContext, model: str = "", orient: bool = Tru
 
     The Z counter is left so that it reads from the base line.
     """
-    bench, chosen = seated.bench, find_model(seated, model)
-    ProcedureContext(seated.person, bench, chosen).set_up()
+    workstation, chosen = seated.workstation, find_model(seated, model)
+    ProcedureContext(seated.person, workstation, chosen).set_up()
     if orient:
-        orient_model(bench, chosen)
-    who = bench.crew.active
-    heights = bench.seat.elements_from_zero(who, [f"bz{chosen.left_projector}"])[f"bz{chosen.left_projector}"]
-    bench.seat.shift_counter(who, "Z", bench.seat.units_per_mm * heights - bench.seat.centre(who, 1)[2])
+        orient_model(workstation, chosen)
+    active = workstation.operators.active
+    heights = workstation.controls.elements_from_zero(active, [f"bz{chosen.left_projector}"])[
+        f"bz{chosen.left_projector}"
+    ]
+    workstation.controls.shift_counter(
+        active, "Z", workstation.controls.units_per_mm * heights - workstation.controls.centre(active, 1)[2]
+    )
 
 
 def take_over(seated: ProcedureContext, model: ModelJob) -> None:
     """Go on at an instrument that somebody else left, a model mounted in it and its counters not preset."""
-    bench = seated.bench
-    who = bench.crew.active
-    bench.seat.take_over(who)
-    bench.seat.counters(who)
-    bench.begin(who, model, load_prints(bench, model))
+    workstation = seated.workstation
+    active = workstation.operators.active
+    workstation.controls.take_over(active)
+    workstation.controls.counters(active)
+    workstation.begin(active, model, load_prints(workstation, model))
 
 
 def find_model(seated: ProcedureContext, name: str) -> ModelJob:
     """Return a model of the job sheet, that of the exercise where none is named."""
-    return next((each for each in seated.bench.job.models if each.name == name), seated.model)
+    return next((each for each in seated.workstation.job.models if each.name == name), seated.model)
 
 
 @procedure("absolute orientation")
@@ -54,11 +58,11 @@ def absolute_orientation(
 
     By mistake control is `misread` by so many m in X, Y, Z; only `points` are read; elements are `knocked` in the end.
     """
-    bench = seated.bench
+    workstation = seated.workstation
     model = seated.model if points is None else replace(seated.model, other_points=tuple(points))
     take_over(seated, model)
     seated.begin("absolute orientation")
-    absolute_orientation_at(bench, model, misread_control(bench.job.control, misread or {}))
+    absolute_orientation_at(workstation, model, misread_control(workstation.job.control, misread or {}))
     perturb_elements(seated, knocked or {})
 
 
@@ -77,27 +81,27 @@ def a8_model(
     By mistake it is not made `level`, scale units are taken for mm instead of `doubled`, control is `misread`, only
     `points` are read, elements are `knocked` in the end.
     """
-    bench, crew = seated.bench, seated.bench.crew
+    workstation, operators = seated.workstation, seated.workstation.operators
     name = seated.model.standard_points[place]
     others = seated.model.other_points if points is None else tuple(points)
     model = replace(seated.model, other_points=(*others, name))
     take_over(seated, model)
     seated.begin("relative orientation")
-    orient_model(bench, model)
+    orient_model(workstation, model)
     seated.begin("absolute orientation")
     if level:
-        control = misread_control(bench.job.control, misread or {})
-        on_ground = absolute_orientation_at(bench, model, control)[0]
+        control = misread_control(workstation.job.control, misread or {})
+        on_ground = absolute_orientation_at(workstation, model, control)[0]
         reading, bx = np.array(on_ground.points[name]), on_ground.elements["bx"]
     else:
-        wanted = dict.fromkeys([*bench.job.control, *model.other_points])
-        shown = [each for each in wanted if bench.has_point(crew.active, each).all()]
-        reading = bench.measure_points(crew.active, shown)[:, shown.index(name), 0]
-        bx = float(bench.seat.bx(crew.active)[0])
-    scales = [bench.seat.manual.scales[axis] for axis in "XY"]
+        wanted = dict.fromkeys([*workstation.job.control, *model.other_points])
+        shown = [each for each in wanted if workstation.has_point(operators.active, each).all()]
+        reading = workstation.measure_points(operators.active, shown)[:, shown.index(name), 0]
+        bx = float(workstation.controls.bx(operators.active)[0])
+    scales = [workstation.controls.manual.scales[axis] for axis in "XY"]
     x, y = (each - scale.at_origin for each, scale in zip(reading[:2].tolist(), scales, strict=True))
     mm = 1.0 / scales[0].units_per_mm if doubled else 1.0
-    left = bench.seat.manual.centres_on_base[0] * bx
+    left = workstation.controls.manual.centres_on_base[0] * bx
     seated.person.note(f"{ANSWER}x{place}={mm * x - left:.2f} y{place}={mm * y:.2f}")
     perturb_elements(seated, knocked or {})
 
@@ -128,32 +132,34 @@ def base_change(
     By mistake the one that should be `kept` is turned as well, the `counters` are not preset, the `scale` is not
     carried on, common points are not `read_again`, fittings are left in `wrong_fittings` or elements `knocked`.
     """
-    bench, model = seated.bench, seated.model
-    crew, plan = bench.crew, bench.job.plan
-    who = crew.active
-    models = bench.job.models
+    workstation, model = seated.workstation, seated.model
+    operators, plan = workstation.operators, workstation.job.plan
+    active = operators.active
+    models = workstation.job.models
     first = models[models.index(model) - 1]
     take_over(seated, first)
     seated.begin("common points")
     common = [name for name in map(model.standard_points.get, "135") if name]
-    readings = bench.measure_points(who, common)
+    readings = workstation.measure_points(active, common)
     before = {name: readings[:, i] for i, name in enumerate(common)}
     seated.begin("interior orientation")
     if counters:
-        extend_strip(bench, model)
-    set_base_and_fittings(bench, model.base, model.polarity)
-    mount_photographs(bench, model, {})
-    bench.begin(crew.active, model, load_prints(bench, model))
-    copy_common_photo_orientation(bench, model)
+        extend_strip(workstation, model)
+    set_base_and_fittings(workstation, model.base, model.polarity)
+    mount_photographs(workstation, model, {})
+    workstation.begin(operators.active, model, load_prints(workstation, model))
+    copy_common_photo_orientation(workstation, model)
     seated.begin("relative orientation")
     method = "dependent" if kept else "independent"
-    tolerated = bench.job.tolerated_parallax_mm
-    relative_orientation(bench, crew.active, model, method, plan.case, plan.parallax_readings, plan.bx, tolerated)
+    tolerated = workstation.job.tolerated_parallax_mm
+    relative_orientation(
+        workstation, operators.active, model, method, plan.case, plan.parallax_readings, plan.bx, tolerated
+    )
     seated.begin("scale")
     if scale:
-        transfer_scale(bench, crew.active, model, before)
+        transfer_scale(workstation, operators.active, model, before)
     seated.begin("model coordinates")
     if read_again:
-        bench.measure_points(crew.active, common)
+        workstation.measure_points(operators.active, common)
     perturb_elements(seated, knocked or {})
     misplace_fittings(seated, wrong_fittings or {})

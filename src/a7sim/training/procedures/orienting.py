@@ -34,19 +34,19 @@ def clear_the_model(
     """
     seated.take_over()
     seated.begin("relative orientation")
-    bench = seated.bench
+    workstation = seated.workstation
     if names_missing:
         gone = sorted(set(CASES["A"]) - set(seated.model.points_of_case("A")))
         seated.person.note(f"{ANSWER}missing={missing or ','.join(gone)}")
     empirical_orientation(
-        bench,
-        bench.crew.active,
+        workstation,
+        workstation.operators.active,
         seated.model,
         method,
         case,
         over_correction,
         1,
-        bench.job.tolerated_parallax_mm,
+        workstation.job.tolerated_parallax_mm,
     )
 
 
@@ -64,41 +64,45 @@ def numerical_orientation(
     `sense` is that in which the corrections are set, `slip_gon` by how much the sum for phi' is out.
     """
     seated.take_over()
-    bench, model = seated.bench, seated.model
-    who, unknowns = bench.crew.active, unknown_elements(INDEPENDENT, model)
+    workstation, model = seated.workstation, seated.model
+    active, unknowns = workstation.operators.active, unknown_elements(INDEPENDENT, model)
     for number, case in enumerate(cases, start=1):
         seated.begin(f"relative orientation, case {case}")
-        bench.begin_round(who, number)
-        settings = bench.seat.elements(who, unknowns)
+        workstation.begin_round(active, number)
+        settings = workstation.controls.elements(active, unknowns)
         labels = model.points_of_case(case)
         seen = _parallaxes(seated, case, readings)
         mean = seen.parallax_mm.mean(axis=0)
-        base = np.full(who.size, bench.job.plan.bx)
-        found, _ = compute_corrections(bench, who, model, seen.places, seen.parallax_mm - mean, unknowns, base, labels)
+        base = np.full(active.size, workstation.job.plan.bx)
+        found, _ = compute_corrections(
+            workstation, active, model, seen.places, seen.parallax_mm - mean, unknowns, base, labels
+        )
         found["phi1"] = found["phi1"] + slip_gon
         seated.answer({f"{case.lower()}-{name}": float(found[name][0]) for name in unknowns})
-        noted = bench.crew.noted_elements(who, settings, {})
-        bench.seat.set_elements(who, {name: noted[name] + sense * found[name] for name in unknowns})
+        noted = workstation.operators.noted_elements(active, settings, {})
+        workstation.controls.set_elements(active, {name: noted[name] + sense * found[name] for name in unknowns})
         if mean_on_by == "at once":
             _put_on_by(seated, mean)
     if mean_on_by == "in the end":
-        bench.begin_round(who, len(cases) + 1)
+        workstation.begin_round(active, len(cases) + 1)
         _put_on_by(seated, _parallaxes(seated, "A", readings).parallax_mm.mean(axis=0))
 
 
 def _parallaxes(seated: ProcedureContext, case: str, readings: int) -> Parallaxes:
-    bench, model = seated.bench, seated.model
+    workstation, model = seated.workstation, seated.model
     points = [model.standard_points[label] for label in model.points_of_case(case)]
-    seen = bench.parallaxes(bench.crew.active, points, readings)
-    bench.crew.give_up(seen.disagrees(bench.crew.active), f"{model.name}: images too far apart to be fused")
+    seen = workstation.parallaxes(workstation.operators.active, points, readings)
+    workstation.operators.give_up(
+        seen.disagrees(workstation.operators.active), f"{model.name}: images too far apart to be fused"
+    )
     return seen
 
 
 def _put_on_by(seated: ProcedureContext, mean: Array) -> None:
     """Set by of the left-hand photograph's projector on by a mean parallax."""
-    bench, by = seated.bench, f"by{seated.model.left_projector}"
-    who = bench.crew.active
-    bench.seat.set_elements(who, {by: bench.seat.elements(who, [by])[by] + mean})
+    workstation, by = seated.workstation, f"by{seated.model.left_projector}"
+    active = workstation.operators.active
+    workstation.controls.set_elements(active, {by: workstation.controls.elements(active, [by])[by] + mean})
 
 
 @procedure("perspective centres")
@@ -129,7 +133,7 @@ def model_with_its_centres(
     """
     seated.set_up()
     seated.begin("relative orientation")
-    orient_model(seated.bench, seated.model)
+    orient_model(seated.workstation, seated.model)
     find_centres(seated, hands, swapped, height_in_mm)
     perturb_elements(seated, knocked or {})
     misplace_fittings(seated, wrong_fittings or {})
@@ -137,15 +141,15 @@ def model_with_its_centres(
 
 def find_centres(seated: ProcedureContext, hands: Sequence[int], swapped: bool, height_in_mm: bool) -> None:
     """Preset the counters at point 1, point at both levels and answer the centres."""
-    bench, model, plan = seated.bench, seated.model, seated.bench.job.plan
+    workstation, model, plan = seated.workstation, seated.model, seated.workstation.job.plan
     seated.begin("model coordinates")
-    bench.look_at_parallaxes(bench.crew.active, [model.standard_points["1"]])
-    bench.seat.preset(bench.crew.active, plan.preset)
-    for hand in hands:
-        seated.begin(f"{side_name(hand)} perspective centre")
-        centre = centre_of(observe_centre(bench, bench.crew.active, model, hand), 0)
+    workstation.look_at_parallaxes(workstation.operators.active, [model.standard_points["1"]])
+    workstation.controls.preset(workstation.operators.active, plan.preset)
+    for side in hands:
+        seated.begin(f"{side_name(side)} perspective centre")
+        centre = centre_of(observe_centre(workstation, workstation.operators.active, model, side), 0)
         X, Y, Z = (float(each) for each in (centre.X0, centre.Y0, centre.Z0))
         if height_in_mm:
-            Z = plan.centre_levels[0] + (Z - plan.centre_levels[0]) / bench.seat.units_per_mm
-        projector = bench.seat.projector(3 - hand if swapped else hand)
+            Z = plan.centre_levels[0] + (Z - plan.centre_levels[0]) / workstation.controls.units_per_mm
+        projector = workstation.controls.projector(3 - side if swapped else side)
         seated.answer({f"x{projector}": X, f"y{projector}": Y, f"z{projector}": Z})

@@ -23,10 +23,10 @@ def grid_test(
 
     By mistake errors are answered in the other `sense`, tilts in radians, or fewer `projectors` are tested.
     """
-    job = seated.bench.job
+    job = seated.workstation.job
     order = GridTestPlan(job.certificate, job.grid_plate, crosses, levels, pointings, seated.model.polarity)
-    bench = Workstation(seated.bench.crew, seated.bench.hands, order.job)
-    for sheet in measure_grid_batch(bench, order):
+    workstation = Workstation(seated.workstation.operators, seated.workstation.driver, order.job)
+    for sheet in measure_grid_batch(workstation, order):
         for name in ANSWERED:
             error = sense * float(sheet.test.errors[name][0])
             shown = error / GON if name != "c" and in_gon else error

@@ -27,7 +27,7 @@ LIMIT = Choice(("MINimum", "MAXimum", "DEFault"), optional=True)
 
 def autograph_for(engine: "Engine") -> "Autograph":
     """Return the instrument that an engine speaks for."""
-    return engine.desk.autograph
+    return engine.instrument.autograph
 
 
 def format_fixed(value: float, decimals: int = 2) -> str:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def _identity(engine: "Engine", call: Call) -> str:
     autograph = autograph_for(engine)
-    return f"WILD HEERBRUGG,{autograph.variant.name},{autograph.serial},{engine.desk.version}"
+    return f"WILD HEERBRUGG,{autograph.variant.name},{autograph.serial},{engine.instrument.version}"
 
 
 def _clear(engine: "Engine", call: Call) -> None:
@@ -57,7 +57,7 @@ def _preset_status(engine: "Engine", call: Call) -> None:
 
 
 def _release(engine: "Engine", call: Call) -> None:
-    engine.desk.release_lock(engine.client)
+    engine.instrument.release_lock(engine.client)
 
 
 def _log_in(engine: "Engine", call: Call) -> None:
@@ -111,7 +111,7 @@ SYSTEM = [
     Command("SYSTem:HELP:HEADers?", lambda e, c: ",".join(map(quote_text, e.headers)), help="all headers, in quotes"),
     Command(
         "SYSTem:LOCK:REQuest?",
-        lambda e, c: "1" if e.desk.request_lock(e.client) else "0",
+        lambda e, c: "1" if e.instrument.request_lock(e.client) else "0",
         help="1: this client alone may turn now; 0: another may",
     ),
     Command(
