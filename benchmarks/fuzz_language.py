@@ -214,9 +214,9 @@ def fuzz(lines, seed):
     """Try so many lines and return the tally. Raises Broken, or whatever the engine raises."""
     author, tally = Author(seed), Counter()
     with reported() as numbers:
-        instruments = instruments(seed)
+        supply = instruments(seed)
         while tally["lines"] < lines:
-            instrument = next(instruments)
+            instrument = next(supply)
             fuzzed = Fuzzed(instrument, numbers, instrument.token is None)
             for _ in range(min(LINES_AN_INSTRUMENT, lines - tally["lines"])):
                 fuzzed.hears(author.line())

@@ -1,4 +1,4 @@
-"""The served instrument over TCP (issue 5): many clients at one instrument, each with its limits, none in another's way."""
+"""The instrument served over TCP: each of many clients has its own limits and none delays another (issue 5)."""
 
 import selectors
 import socket
