@@ -12,7 +12,7 @@ import numpy as np
 from figures import Figure, Target, tell
 
 from a7sim.scenario import load_scenario
-from a7sim.session.a8_vs_comparator import compare_a8_to_comparator
+from a7sim.strip_methods.a8_vs_comparator import compare_a8_to_comparator
 
 P_TABLE = {"comparator": ((7, 11, 15), (15, 28, 31)), "a8": ((15, 19, 22), (33, 43, 44))}
 """cm: mean square and largest residuals in x, y, z at 36 checks."""

@@ -39,8 +39,8 @@ def timed(work: Callable[[], object], times: int = 40) -> float:
 
 def frame_times(columns: int, rows: int) -> tuple[float, float]:
     """Return ms to render both eyes' pictures over the language, and to draw them in half-blocks."""
-    from a7sim.console.rasterize import apply_vignette, half_blocks, overlay_mark
-    from a7sim.link.client import Client
+    from a7sim.console.drawing.rasterize import apply_vignette, half_blocks, overlay_mark
+    from a7sim.link.client.client import Client
 
     with Client.open("a7sim://akwanga?seed=7") as client:
         client.send('PHOT1:LOAD "101";:PHOT2:LOAD "102";:BASE:BX 194.99;:DRIV:X 97;Z -320')

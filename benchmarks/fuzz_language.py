@@ -23,8 +23,8 @@ from a7sim.instrument.language import MAX_LINE_LENGTH, SharedInstrument
 from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.status import QUEUE_LENGTH, Status
 from a7sim.instrument.language.table import Choice, Quantity, short_form
+from a7sim.link.client.replies import parse_reply
 from a7sim.link.clock import Clock
-from a7sim.link.replies import parse_reply
 from a7sim.link.simulated_wait import feed_until_idle
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene

@@ -16,13 +16,13 @@ from figures import Figure, Target, tell
 
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import SharedInstrument
+from a7sim.journal.append_file import DURABILITIES
+from a7sim.journal.format import read_journal
+from a7sim.journal.replay import Replay, replay_lines
+from a7sim.journal.writer import Journal, JournalOptions, make_header
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import run
-from a7sim.session.append_file import DURABILITIES
-from a7sim.session.journal import Journal, JournalOptions, make_header
-from a7sim.session.journal_format import read_journal
-from a7sim.session.replaying import Replay, replay_lines
 
 ASKED_OF = 100_000
 """Events of the session that is to be sought in within a second."""

@@ -22,8 +22,8 @@ from figures import Figure, Target, tell
 
 from a7sim.cli.run import command as run
 from a7sim.cli.serve import command as serve
-from a7sim.session.journal_format import read_journal
-from a7sim.session.replaying import Replay, replay_lines
+from a7sim.journal.format import read_journal
+from a7sim.journal.replay import Replay, replay_lines
 
 RUN = ("dewitt-pair", "--seed", "7", "--set", "plan.parallax_readings=1", "--quiet")
 STEPS = 150

@@ -8,7 +8,7 @@ import time
 
 from figures import Figure, Target, tell
 
-from a7sim.link.client import Client
+from a7sim.link.client.client import Client
 from a7sim.operator import measure_models
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session, run

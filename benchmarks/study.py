@@ -22,8 +22,8 @@ from a7sim.reduction import Model, absolute_orientation, formed_strip
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session.session_batch import open_batch
-from a7sim.session.strips import ground_control, models_from_documents
 from a7sim.standard_points import CASES
+from a7sim.strip_methods.strip import ground_control, models_from_documents
 from a7sim.study.loading import StudyError, load_study
 from a7sim.study.running import ChunkPolicy
 from a7sim.study.simulating import replicate_seed

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from figures import Figure, Target, tell
 
-from a7sim.session.journal_format import read_journal
+from a7sim.journal.format import read_journal
 from a7sim.training.attempts import run_attempt
 from a7sim.training.catalogue import find_exercise
 from a7sim.training.environment import replay_environment

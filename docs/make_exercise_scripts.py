@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from a7sim.geometry import GON
-from a7sim.link.client import Client
+from a7sim.link.client.client import Client
 from a7sim.link.headers import header, registration_word, short_form
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.plotters import REQUIRED_FITTINGS

@@ -12,9 +12,9 @@ from tests.sitting_down import Person
 
 from a7sim.console.app import Console
 from a7sim.console.config import ConsoleConfig
-from a7sim.console.job_sheet import JobSheet
-from a7sim.console.rasterize import DrawingMode
-from a7sim.link.client import Client
+from a7sim.console.drawing.job_sheet import JobSheet
+from a7sim.console.drawing.rasterize import DrawingMode
+from a7sim.link.client.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.training.attempts import start_attempt
 from a7sim.training.catalogue import find_exercise

@@ -18,8 +18,8 @@ from a7sim.instrument.language.commands import COMMANDS
 from a7sim.instrument.language.commands.carriages import MAX_READING
 from a7sim.instrument.language.commands.pictures import MAX_PICTURE
 from a7sim.instrument.language.table import Choice, Command, Quantity, QuotedOrNumber, short_form
+from a7sim.link.client.replies import parse_reply, part_as_text
 from a7sim.link.clock import Clock
-from a7sim.link.replies import parse_reply, part_as_text
 from a7sim.link.simulated_wait import feed_until_idle
 from a7sim.plotters import VARIANTS
 from a7sim.scenario import load_scenario

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
-from a7sim.link.addresses import Address
-from a7sim.link.client_session import ServerLimits
 from a7sim.link.clock import Clock, WallClock
-from a7sim.link.serving import Endpoints, Server
+from a7sim.link.server.addresses import Address
+from a7sim.link.server.client_session import ServerLimits
+from a7sim.link.server.serving import Endpoints, Server
 from a7sim.plotters import VARIANTS
 
 ANYWHERE = Address("127.0.0.1", 0)

@@ -11,12 +11,12 @@ from textual.widgets import Input, OptionList
 
 from a7sim.console.app import Console
 from a7sim.console.config import ConsoleConfig
-from a7sim.console.eyepiece_widget import EyepieceWidget
-from a7sim.console.job_sheet import JobSheet
-from a7sim.console.rasterize import DrawingMode, picture_size
-from a7sim.console.selection import STEP_SIZES
+from a7sim.console.drawing.job_sheet import JobSheet
+from a7sim.console.drawing.rasterize import DrawingMode, picture_size
+from a7sim.console.state.selection import STEP_SIZES
+from a7sim.console.widgets.eyepiece_widget import EyepieceWidget
 from a7sim.instrument.language import Listener
-from a7sim.link.client import Client
+from a7sim.link.client.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.scenario import load_scenario
 from tests.door import Door, with_photographs

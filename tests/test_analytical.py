@@ -14,10 +14,10 @@ from a7sim.reduction.strips import is_centre
 from a7sim.scenario import GridTest, Observer, load_scenario
 from a7sim.scenario.schema import FilmDeformation
 from a7sim.scene import build_scene
-from a7sim.session import a8_strip
-from a7sim.session.a8_strip import strip_on_a8
-from a7sim.session.a8_vs_comparator import compare_a8_to_comparator
-from a7sim.session.comparator import strip_by_comparator
+from a7sim.strip_methods import a8_strip
+from a7sim.strip_methods.a8_strip import strip_on_a8
+from a7sim.strip_methods.a8_vs_comparator import compare_a8_to_comparator
+from a7sim.strip_methods.comparator import strip_by_comparator
 
 MILLIMETRE = 0.001
 

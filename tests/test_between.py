@@ -6,9 +6,9 @@ import threading
 from contextlib import contextmanager
 
 from a7sim.errors import A7SimError
-from a7sim.link import recording_proxy
+from a7sim.link.client import recording_proxy
+from a7sim.link.client.recording_proxy import POLL_INTERVAL_S, RecordingProxy
 from a7sim.link.clock import WallClock
-from a7sim.link.recording_proxy import POLL_INTERVAL_S, RecordingProxy
 from tests.served import PATIENCE
 
 AT_ONCE = struct.pack("ii", 1, 0)

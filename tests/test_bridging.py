@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from a7sim.errors import A7SimError
-from a7sim.operator import bridging
-from a7sim.operator.bridging import bridge_strip_batch
-from a7sim.operator.operator_batch import AllGaveUpError
-from a7sim.operator.workstation import Parallaxes, Workstation
+from a7sim.operator.driving.workstation import Parallaxes, Workstation
+from a7sim.operator.people.operator_batch import AllGaveUpError
+from a7sim.operator.procedures import bridging
+from a7sim.operator.procedures.bridging import bridge_strip_batch
 from a7sim.reduction import similarity_by_quaternion
 from a7sim.scenario import ScenarioError, load_scenario
 from a7sim.scenario.schema import GroundPoint

@@ -5,7 +5,7 @@ from itertools import islice
 
 import pytest
 
-from a7sim.operator.bridging import bridge_strip_batch
+from a7sim.operator.procedures.bridging import bridge_strip_batch
 from a7sim.report.render import render_report
 from a7sim.report.session_folder import read_session
 from a7sim.scenario import load_scenario

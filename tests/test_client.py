@@ -9,11 +9,11 @@ import serial
 import a7sim
 from a7sim.errors import A7SimError
 from a7sim.instrument.language import SharedInstrument
-from a7sim.link.client import Client, Identity, InstrumentError
-from a7sim.link.completion import completions
-from a7sim.link.exchange import send_line
-from a7sim.link.ports import open_port, port_errors
-from a7sim.link.replies import MalformedReplyError, parse_reply
+from a7sim.link.client.client import Client, Identity, InstrumentError
+from a7sim.link.client.completion import completions
+from a7sim.link.client.exchange import send_line
+from a7sim.link.client.ports import open_port, port_errors
+from a7sim.link.client.replies import MalformedReplyError, parse_reply
 from tests.door import MODEL_1
 from tests.test_language import EXAMPLES
 from tests.wires import new_desk, served

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 
 from a7sim.errors import A7SimError
-from a7sim.operator.compilation import Compilation
-from a7sim.operator.level_model import level_model
-from a7sim.operator.map_lines import Area, LineTarget, SpotHeights, Tracing, as_polyline
-from a7sim.operator.models import measure_models_batch
-from a7sim.operator.operator_batch import OperatorBatch
-from a7sim.operator.plotting import CompiledMap, MapRequest, _heights
-from a7sim.operator.scpi_driver import ScpiDriver
-from a7sim.operator.stereo_view import FINE_MM, StereoView
-from a7sim.operator.workstation import Workstation
+from a7sim.operator.driving.scpi_driver import ScpiDriver
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.mapping.compilation import Compilation
+from a7sim.operator.mapping.level_model import level_model
+from a7sim.operator.mapping.map_lines import Area, LineTarget, SpotHeights, Tracing, as_polyline
+from a7sim.operator.mapping.plotting import CompiledMap, MapRequest, _heights
+from a7sim.operator.mapping.stereo_view import FINE_MM, StereoView
+from a7sim.operator.people.operator_batch import OperatorBatch
+from a7sim.operator.procedures.models import measure_models_batch
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import open_session
 from a7sim.session.compiling import CompilationRequest, compile_model
 from a7sim.session.map_svg import index_contours, to_geojson, to_svg
-from a7sim.session.strips import given_control, ground_control
+from a7sim.strip_methods.strip import given_control, ground_control
 from tests.sessions import without_errors
 from tests.test_cli import a7sim
 

@@ -7,21 +7,21 @@ from typing import Any
 
 import pytest
 
+from a7sim.console.actions.view import MAGNIFICATIONS
 from a7sim.console.app import Console
 from a7sim.console.config import ConsoleConfig
-from a7sim.console.drum_panels import DrumScrolled, ElementsPanel
-from a7sim.console.eyepiece_widget import EyepieceWidget
+from a7sim.console.drawing.rasterize import DrawingMode
 from a7sim.console.keymap import actions_for
-from a7sim.console.panels import BookPanel
-from a7sim.console.rasterize import DrawingMode
-from a7sim.console.sketch_panel import PointClicked
-from a7sim.console.view_actions import MAGNIFICATIONS
+from a7sim.console.widgets.drum_panels import DrumScrolled, ElementsPanel
+from a7sim.console.widgets.eyepiece_widget import EyepieceWidget
+from a7sim.console.widgets.panels import BookPanel
+from a7sim.console.widgets.sketch_panel import PointClicked
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import LinkEvent, SharedInstrument
-from a7sim.link.addresses import Address
-from a7sim.link.client import Client
+from a7sim.link.client.client import Client
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.link.serving import Endpoints
+from a7sim.link.server.addresses import Address
+from a7sim.link.server.serving import Endpoints
 from a7sim.scenario import load_scenario
 from tests.door import Door, with_model, with_photographs
 from tests.served import Served

@@ -9,14 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.cli import main
-from a7sim.console import rasterize
 from a7sim.console.config import best_drawing, speaks_utf8
-from a7sim.console.descriptions import describe_image, describe_parallax
-from a7sim.console.drums import ROLLING_FRAMES, bar, rolling_frame
+from a7sim.console.drawing import rasterize
+from a7sim.console.drawing.descriptions import describe_image, describe_parallax
+from a7sim.console.drawing.drums import ROLLING_FRAMES, bar, rolling_frame
+from a7sim.console.drawing.rasterize import DrawingMode, Run
+from a7sim.console.drawing.sketch import draw_points, overlay_mark
 from a7sim.console.keymap import actions_for, default_keymap, key_name, load_keymap, sample
-from a7sim.console.rasterize import DrawingMode, Run
-from a7sim.console.selection import STEP_SIZES, ControlSelection
-from a7sim.console.sketch import draw_points, overlay_mark
+from a7sim.console.state.selection import STEP_SIZES, ControlSelection
 from a7sim.errors import A7SimError
 from a7sim.plotters import VARIANTS
 

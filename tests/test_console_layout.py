@@ -12,10 +12,10 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 
 from a7sim.console.app import Console
-from a7sim.console.drum_panels import CounterPanel
+from a7sim.console.drawing.rasterize import DrawingMode, Greys
 from a7sim.console.instrument_thread import ConnectionLost, InstrumentThread
 from a7sim.console.keymap import default_keymap
-from a7sim.console.rasterize import DrawingMode, Greys
+from a7sim.console.widgets.drum_panels import CounterPanel
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import SharedInstrument
 from a7sim.scenario import load_scenario

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from a7sim.console.selection import STEP_SIZES
+from a7sim.console.state.selection import STEP_SIZES
 from a7sim.instrument.language import LinkEvent
 from tests.door import with_photographs
 from tests.served import Served

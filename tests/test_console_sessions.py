@@ -22,12 +22,12 @@ from textual.widgets import OptionList
 from a7sim.cli import main
 from a7sim.cli.console_setup import LocalConsole
 from a7sim.console.app import Console
-from a7sim.console.rasterize import DrawingMode
+from a7sim.console.drawing.rasterize import DrawingMode
 from a7sim.errors import A7SimError
+from a7sim.journal.format import read_journal
+from a7sim.journal.replay import Replay, replay_lines
+from a7sim.journal.session_files import JOURNAL
 from a7sim.scenario import load_scenario
-from a7sim.session.journal_format import read_journal
-from a7sim.session.replaying import Replay, replay_lines
-from a7sim.session.session_files import JOURNAL
 from tests.sitting_down import PATIENCE_S, Person
 
 SEED = 7

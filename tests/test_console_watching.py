@@ -11,24 +11,24 @@ from textual.widgets import Static
 
 from a7sim.cli.console_setup import is_url, playback_console, remote_console
 from a7sim.console.app import Console
-from a7sim.console.drum_panels import DrumScrolled
-from a7sim.console.eyepiece_widget import EyepieceWidget
-from a7sim.console.job_sheet import JobSheet
-from a7sim.console.rasterize import DrawingMode
-from a7sim.console.readouts import parse_readouts, readouts_query
+from a7sim.console.drawing.job_sheet import JobSheet
+from a7sim.console.drawing.rasterize import DrawingMode
+from a7sim.console.state.readouts import parse_readouts, readouts_query
+from a7sim.console.widgets.drum_panels import DrumScrolled
+from a7sim.console.widgets.eyepiece_widget import EyepieceWidget
 from a7sim.errors import A7SimError
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import SharedInstrument
-from a7sim.link.client import Client
+from a7sim.journal import recording as recording_module
+from a7sim.journal import writer as journal_module
+from a7sim.journal.format import read_journal
+from a7sim.journal.recording import Recording, open_recording
+from a7sim.journal.writer import Journal, make_header
+from a7sim.link.client.client import Client
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.plotters import VARIANTS
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from a7sim.session import journal as journal_module
-from a7sim.session import recording as film_module
-from a7sim.session.journal import Journal, make_header
-from a7sim.session.journal_format import read_journal
-from a7sim.session.recording import Recording, open_recording
 from tests.door import with_model
 from tests.served import Served
 from tests.sitting_down import Person
@@ -106,7 +106,7 @@ def test_a_film_stands_the_same_whichever_way_it_came_there(session: Path, monke
         there.append((frame, dials_of(straight)))
     assert straight.journalled.header["command"] == "serve" and frame.error == ""
     jumping = film(session)
-    monkeypatch.setattr(film_module, "LEAP", 5)
+    monkeypatch.setattr(recording_module, "LEAP", 5)
     for step in (17, 3, 9, 8, 0, 15, 1, 17):
         assert (jumping.seek(step), dials_of(jumping)) == there[step]
     assert there[11][1].struck == 0 and there[12][1].struck == 1
@@ -114,7 +114,7 @@ def test_a_film_stands_the_same_whichever_way_it_came_there(session: Path, monke
 
 
 def test_checkpoints_make_a_jump_say_few_lines_again(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(film_module, "LEAP", 5)
+    monkeypatch.setattr(recording_module, "LEAP", 5)
     jumping = film(session)
     said: list[int] = []
     say = jumping._replay.__class__.apply
@@ -212,7 +212,7 @@ def test_hands_are_off_in_one_sentence_and_nothing_turns(session: Path) -> None:
 
 def test_a_session_plays_at_its_pace_to_its_end_and_again(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     wall = [100.0]
-    monkeypatch.setattr("a7sim.console.playback.monotonic", lambda: wall[0])
+    monkeypatch.setattr("a7sim.console.widgets.playback.monotonic", lambda: wall[0])
 
     async def sitting(person: Person) -> None:
         playback = person.console.playback
@@ -232,7 +232,7 @@ def test_a_session_plays_at_its_pace_to_its_end_and_again(session: Path, monkeyp
         assert "playing 10x" in progress(person)
         await person.press("space")
         assert await after(100.0) == 5
-        monkeypatch.setattr("a7sim.console.playback.RUN_S", -1.0)
+        monkeypatch.setattr("a7sim.console.widgets.playback.RUN_S", -1.0)
         before = playback.frame.step
         await person.press("]", "]", "]", "space")
         assert math.isinf(playback.speed)

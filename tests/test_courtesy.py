@@ -2,7 +2,7 @@
 
 import pytest
 
-from a7sim.link import cpu_yield
+from a7sim.link.server import cpu_yield
 
 
 class Machine:

@@ -24,17 +24,22 @@ from a7sim.geometry import (
     turn_of,
 )
 from a7sim.operator import OperatorGaveUp, empirical
-from a7sim.operator.empirical import clearing_steps, over_correction, over_correction_by_coefficients, perturb_elements
-from a7sim.operator.models import measure_models_batch, orient_model
-from a7sim.operator.operator_batch import OperatorBatch
-from a7sim.operator.scpi_driver import ScpiDriver
-from a7sim.operator.workstation import Workstation
+from a7sim.operator.driving.scpi_driver import ScpiDriver
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.people.operator_batch import OperatorBatch
+from a7sim.operator.procedures.empirical import (
+    clearing_steps,
+    over_correction,
+    over_correction_by_coefficients,
+    perturb_elements,
+)
+from a7sim.operator.procedures.models import measure_models_batch, orient_model
 from a7sim.reduction import ProjectorPose, element_corrections, orientation_by_schut, relative_orientation
 from a7sim.reduction.hallert import REGULAR_POINTS, nine_point_corrections, regular_corrections
+from a7sim.report.session_tables import session_tables
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session, run
 from a7sim.session.session_batch import open_batch
-from a7sim.session.tables import session_tables
 from a7sim.standard_points import CASES, PLACES
 from tests.sessions import tilted_flight, without_errors
 
@@ -251,7 +256,7 @@ def test_setting_off_reaches_two_gon_on_both_sides_and_never_beyond(monkeypatch)
         perturb_elements(*given)
         raise _IsReady
 
-    monkeypatch.setattr(import_module("a7sim.operator.models"), "set_off", only_set_off)
+    monkeypatch.setattr(import_module("a7sim.operator.procedures.models"), "set_off", only_set_off)
     off = []
     for seed in range(6):
         session, bench = ready(without_errors(load_scenario("akwanga", TWO_GON_OFF)), seed)

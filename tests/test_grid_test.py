@@ -15,8 +15,8 @@ from a7sim.geometry import GON, at_level, ray_of, rotation
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import SharedInstrument
 from a7sim.operator import measure_models
-from a7sim.operator.grid_test import GridTestPlan, level_heights, measure_grid, measure_grid_batch
-from a7sim.operator.workstation import Workstation
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.procedures.grid_test import GridTestPlan, level_heights, measure_grid, measure_grid_batch
 from a7sim.plotters import VARIANTS
 from a7sim.reduction import Elements, Undetermined, grid_test, perspective_centre_of_levels, plate_placement
 from a7sim.reduction.grid_test import HELD_AT_ONE_LEVEL, UNKNOWNS

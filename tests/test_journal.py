@@ -18,18 +18,19 @@ from a7sim import __version__
 from a7sim.cli.replay import PlaybackClock
 from a7sim.errors import A7SimError
 from a7sim.instrument.language import LinkEvent
+from a7sim.journal import append_file
+from a7sim.journal.append_file import AppendOnlyFile, JournalWriteError
+from a7sim.journal.checkpoints import read_checkpoints
+from a7sim.journal.format import ChecksumChain, read_journal
+from a7sim.journal.replay import Replay, replay_lines
+from a7sim.journal.resuming import find_resumable
+from a7sim.journal.scripts import find_script, read_script
+from a7sim.journal.writer import Header, Journal, JournalOptions, make_header, make_header_without_scenario
 from a7sim.link.clock import Clock
 from a7sim.scenario import find_scenario, from_data, hash_scenario, load_scenario, to_data
 from a7sim.scene import PICTURES
-from a7sim.session import append_file, run, strip_combinations
-from a7sim.session.append_file import AppendOnlyFile, JournalWriteError
-from a7sim.session.checkpoints import read_checkpoints
-from a7sim.session.journal import Header, Journal, JournalOptions, make_header, make_header_without_scenario
-from a7sim.session.journal_format import ChecksumChain, read_journal
-from a7sim.session.replaying import Replay, replay_lines
-from a7sim.session.resuming import find_resumable
+from a7sim.session import run, strip_combinations
 from a7sim.session.running import ProgressCallbacks
-from a7sim.session.scripts import find_script, read_script
 from tests.processes import ANYWHERE, COMMAND, Running, a7sim, said_here
 from tests.served import Line
 

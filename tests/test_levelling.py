@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from a7sim.geometry import GON, rotation
-from a7sim.operator.job import ModelJob
-from a7sim.operator.levelling import MAX_ROUNDS, levelled_by_all_elements, levelled_by_common_phi
+from a7sim.operator.driving.job import ModelJob
+from a7sim.operator.procedures.levelling import MAX_ROUNDS, levelled_by_all_elements, levelled_by_common_phi
 from a7sim.plotters import A7, A8
+from a7sim.report.session_tables import session_tables
 from a7sim.scenario import load_scenario
 from a7sim.session.session_batch import open_batch
-from a7sim.session.tables import session_tables
 from a7sim.session.truth import RelativePose
 from tests.sessions import without_errors
 

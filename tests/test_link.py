@@ -11,7 +11,7 @@ import serial
 import a7sim
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
-from a7sim.link.client import Client, InstrumentError
+from a7sim.link.client.client import Client, InstrumentError
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.plotters import VARIANTS

@@ -13,7 +13,7 @@ import pytest
 
 from a7sim.geometry import GON
 from a7sim.operator import OperatorGaveUp, measure_models
-from a7sim.operator.controls import wrap_gon
+from a7sim.operator.driving.controls import wrap_gon
 from a7sim.scenario import Observer, load_scenario
 from a7sim.session import open_session, run
 from a7sim.session.session_batch import open_batch

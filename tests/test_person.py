@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from a7sim.operator import OperatorGaveUp, measure_models
-from a7sim.operator.fatigue import HOUR, acuity_factor, slip_factor
-from a7sim.operator.slips import neighbours, transpositions
+from a7sim.operator.people.fatigue import HOUR, acuity_factor, slip_factor
+from a7sim.operator.people.slips import neighbours, transpositions
 from a7sim.scenario import PROFILES, Observer, ScenarioError, load_scenario, observer_of_skill, scenario_schema
 from a7sim.scenario.schema import FilmDeformation, PlannedSlip
 from a7sim.session import open_session, run

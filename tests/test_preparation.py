@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from a7sim.cli import cli
 from a7sim.errors import A7SimError
-from a7sim.operator.preparation import FlightPlan, choose_settings
+from a7sim.operator.mapping.preparation import FlightPlan, choose_settings
 from a7sim.plotters import A7, A8
 
 AKWANGA = FlightPlan.of_heights(152.676, 91.0, (430.24, 487.92), photo_scale=8000.0)

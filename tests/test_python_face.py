@@ -14,7 +14,7 @@ import a7sim
 from a7sim import Client, InstrumentError, Mistake, Operator, Scenario, Study, connect
 
 ROOT = Path(__file__).parents[1]
-TOLD = ("a7sim.api", "a7sim.link.client", "a7sim.scenario.schema", "a7sim.instrument.autograph", "a7sim.text")
+TOLD = ("a7sim.api", "a7sim.link.client.client", "a7sim.scenario.schema", "a7sim.instrument.autograph", "a7sim.text")
 """Modules whose docstrings have examples."""
 
 

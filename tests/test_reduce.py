@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from a7sim import computing
+from a7sim import processing
 from a7sim.errors import A7SimError
 from a7sim.geometry import GON, rotation
 from tests.processes import a7sim_here
@@ -82,7 +82,7 @@ def test_the_published_pair_comes_out_to_its_digits(reference):
 def test_another_published_pair_comes_out_to_its_digits(reference, tmp_path):
     expected = toml(reference / "02_calgary_lab_pair_27_28.toml")
     path = pair_file(tmp_path / "pair.csv", expected["relative_a"]["points"])
-    document = computing.relative(path, expected["c_mm"], (0.0, 0.0), "dependent", expected["bx_mm"]).document
+    document = processing.relative(path, expected["c_mm"], (0.0, 0.0), "dependent", expected["bx_mm"]).document
     values = [document["elements"][name]["value"] for name in ("omega2", "phi2", "kappa2")]
     degrees = expected["relative_a"]["expected_omega_phi_kappa_deg"]
     np.testing.assert_allclose(np.degrees(np.array(values) * GON), degrees, atol=2e-4)
@@ -173,7 +173,7 @@ def test_a_hundred_megabytes_of_noise_are_refused_unread(tmp_path):
     with path.open("wb") as file:
         file.truncate(100_000_000)
     with pytest.raises(A7SimError, match="at most"):
-        computing.relative(path, 152.0, (0.0, 0.0), "dependent", 92.0)
+        processing.relative(path, 152.0, (0.0, 0.0), "dependent", 92.0)
 
 
 def test_an_unknown_role_is_named_with_its_line(tmp_path):

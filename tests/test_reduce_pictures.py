@@ -6,10 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from a7sim import computing
-from a7sim.computing.interior import FlightHeights
+from a7sim import processing
 from a7sim.errors import A7SimError
 from a7sim.geometry import GON, radially_displaced, refracted, rotation
+from a7sim.processing.interior import FlightHeights
 from tests.test_reduce import pair_file, reduce, toml
 
 
@@ -62,7 +62,7 @@ def test_shrunk_film_comes_back_and_shortens_the_principal_distance(tmp_path, ki
     places = [*CORNERS, ("p", 40.0, -70.0)]
     counts = [("9", name, *(100.0 * (turn @ (0.9999 * np.array([x, y])) + 120.0))) for name, x, y in places]
     path = counts_file(tmp_path / "counts.csv", counts)
-    outcome = computing.interior(path, camera_file(tmp_path / "camera.toml", CORNERS), kind, 0.01)
+    outcome = processing.interior(path, camera_file(tmp_path / "camera.toml", CORNERS), kind, 0.01)
     (picture,) = outcome.document["photographs"]
     np.testing.assert_allclose(picture["points"]["p"], [40.0, -70.0], atol=1e-9)
     assert picture["film"]["shrinkage_ppm"] == pytest.approx([100.01, 100.01], abs=0.01)
@@ -81,9 +81,9 @@ def test_lens_and_refraction_are_taken_off_and_pairs_are_written(tmp_path):
             seen = radially_displaced(refracted(np.array([x + shift, y]), 152.0, 3000.0, 500.0), [2e-8, -1e-12])
             rows.append((photo, name, seen[0] + 0.02, seen[1] - 0.01))
     path = counts_file(tmp_path / "counts.csv", rows)
-    outcome = computing.interior(path, camera, corrections=("lens", "refraction"), flight=FlightHeights(3000.0, 500.0))
+    outcome = processing.interior(path, camera, corrections=("lens", "refraction"), flight=FlightHeights(3000.0, 500.0))
     assert outcome.document["about"] == "principal point"
-    computing.write_result(outcome, tmp_path / "o")
+    processing.write_result(outcome, tmp_path / "o")
     with (tmp_path / "o" / "pairs.csv").open(encoding="utf-8") as file:
         found = list(csv.DictReader(file))
     assert [row["model"] for row in found] == ["27-28"] * 2
@@ -92,23 +92,23 @@ def test_lens_and_refraction_are_taken_off_and_pairs_are_written(tmp_path):
         seen = [float(row[column]) for column in ("xl", "yl", "xr", "yr")]
         np.testing.assert_allclose(seen, [x, y, x - 90.0, y], atol=1e-6)
     with pytest.raises(A7SimError, match="--flying-height"):
-        computing.interior(path, camera, corrections=("curvature",))
+        processing.interior(path, camera, corrections=("curvature",))
 
 
 def test_confused_and_missing_fiducials_and_bad_cameras_are_named(tmp_path):
     camera = camera_file(tmp_path / "camera.toml", CORNERS)
     swapped = [("7", name, x, y) for name, (_, x, y) in zip("1324", CORNERS, strict=True)]
     with pytest.raises(A7SimError, match="photo 7: expected counts of the fiducials that lie as in the camera"):
-        computing.interior(counts_file(tmp_path / "counts.csv", swapped), camera)
+        processing.interior(counts_file(tmp_path / "counts.csv", swapped), camera)
     mirrored = counts_file(tmp_path / "counts.csv", [("7", name, -x, y) for name, x, y in CORNERS])
-    assert "mirrored" in computing.interior(mirrored, camera).document["warnings"][0]
+    assert "mirrored" in processing.interior(mirrored, camera).document["warnings"][0]
     few = counts_file(tmp_path / "few.csv", [("7", *CORNERS[0]), ("7", *CORNERS[1])])
     with pytest.raises(A7SimError, match=r"few\.csv, photo 7: expected 3 fiducials"):
-        computing.interior(few, camera)
+        processing.interior(few, camera)
     for text in ("c = 'x'\n", "camera = 3\n", "c = \n", ""):
         (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
         with pytest.raises(A7SimError, match=r"^[^\n]*bad\.toml[^\n]*$"):
-            computing.interior(few, tmp_path / "bad.toml")
+            processing.interior(few, tmp_path / "bad.toml")
 
 
 def six_points(rng, noise, n=15):
@@ -127,7 +127,7 @@ def six_points(rng, noise, n=15):
 @pytest.mark.parametrize("method", ["coplanarity", "parallax", "schut", "robust"])
 def test_every_method_orients_a_faultless_pair_alike(tmp_path, method):
     path = pair_file(tmp_path / "pair.csv", six_points(np.random.default_rng(1), 0.0))
-    document = computing.relative(path, 152.0, (0.0, 0.0), "dependent", 92.0, method).document
+    document = processing.relative(path, 152.0, (0.0, 0.0), "dependent", 92.0, method).document
     np.testing.assert_allclose(document["rotation"], rotation(0.02, -0.01, 0.03), atol=1e-9)
     assert document["elements"]["by2"]["value"] == pytest.approx(2.0, abs=1e-7)
     assert document["statistics"]["redundancy"] == 10
@@ -142,8 +142,8 @@ def test_the_robust_method_names_the_point_with_the_blunder(tmp_path):
     done = reduce("relative", path, "--c", 152, "--method", "robust")
     assert "blunder at point 7:" in done.stdout
     assert "taken out" in done.stdout
-    document = computing.write_result(
-        computing.relative(path, 152.0, (0.0, 0.0), "dependent", 92.0, "robust"), tmp_path / "o"
+    document = processing.write_result(
+        processing.relative(path, 152.0, (0.0, 0.0), "dependent", 92.0, "robust"), tmp_path / "o"
     )
     model = (tmp_path / "o" / "models.csv").read_text(encoding="utf-8")
     assert "pair,8," in model
@@ -166,7 +166,7 @@ def test_all_methods_stand_side_by_side(tmp_path):
         assert float(row["difference"]) == pytest.approx(max(values) - min(values), rel=1e-3, abs=1e-9)
     assert float(rows["omega2"]["difference"]) < 0.01
     with pytest.raises(A7SimError, match="dependent"):
-        computing.relative(path, 152.0, (0.0, 0.0), "independent", 92.0, "all")
+        processing.relative(path, 152.0, (0.0, 0.0), "independent", 92.0, "all")
 
 
 def test_both_similarities_agree_and_say_so(reference, tmp_path):
@@ -174,9 +174,9 @@ def test_both_similarities_agree_and_say_so(reference, tmp_path):
     path = tmp_path / "common.csv"
     rows = [",".join(str(p[k]) for k in ("id", "x", "y", "z", "X", "Y", "Z")) for p in common]
     path.write_text("point,x,y,z,X,Y,Z\n" + "\n".join(rows[::-1]) + "\n", encoding="utf-8")
-    document = computing.similarity(path, "both").document
+    document = processing.similarity(path, "both").document
     assert max(document["compare"]["largest_difference"].values()) < 1e-9
-    alone = computing.similarity(path, "quaternion").document
+    alone = processing.similarity(path, "quaternion").document
     assert [alone["method"], alone["iterations"]] == ["quaternion", 0]
     np.testing.assert_allclose(alone["sigma"]["scale"], document["sigma"]["scale"], rtol=1e-9)
 
@@ -194,12 +194,12 @@ def test_a_centre_comes_from_pointings_at_any_number_of_levels(tmp_path):
     rows = [f"{name},{level},{x},{y}" for (name, level), (x, y) in pointings((5100, 4900, 5000, 5200)).items()]
     path = tmp_path / "levels.csv"
     path.write_text("point,level,X,Y\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    document = computing.centres(path, method="levels").document
+    document = processing.centres(path, method="levels").document
     assert [document[name] for name in ("X0", "Y0", "Z0")] == pytest.approx([4999.3, 4992.5, 7573.0], abs=1e-6)
     assert document["pointing_rms"] < 1e-9
     path.write_text("point,level,X,Y\n" + "\n".join(rows[:-1]) + "\n", encoding="utf-8")
     with pytest.raises(A7SimError, match="none of point p5 at 5200"):
-        computing.centres(path, method="levels")
+        processing.centres(path, method="levels")
 
 
 def test_a_centre_comes_from_a_grid_plate(tmp_path):
@@ -216,11 +216,11 @@ def test_a_centre_comes_from_a_grid_plate(tmp_path):
     angles = [document["angles"][name]["value"] * GON for name in ("omega", "phi", "kappa")]
     assert angles == pytest.approx([0.01, -0.02, 0.5], abs=1e-9)
     with pytest.raises(A7SimError, match="--c"):
-        computing.centres(path, method="grid")
+        processing.centres(path, method="grid")
 
 
 def test_centres_of_an_a8_come_from_its_base_scale(tmp_path):
     path = tmp_path / "a8.csv"
     path.write_text("model,base,column,height\n1,180,420,15\n", encoding="utf-8")
-    document = computing.centres(path, method="a8").document
+    document = processing.centres(path, method="a8").document
     assert document["models"]["1"] == {"left": [155.0, 200.0, 435.0], "right": [245.0, 200.0, 435.0]}

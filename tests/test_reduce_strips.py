@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from a7sim import computing
-from a7sim.computing.strips import PairCamera
+from a7sim import processing
 from a7sim.errors import A7SimError
 from a7sim.geometry import rotation
+from a7sim.processing.strips import PairCamera
 from a7sim.reduction.absolute import Ground
 from a7sim.reduction.cards import deck_lines, read_cards
 from a7sim.reduction.strips import Model
@@ -99,7 +99,7 @@ def test_the_order_of_rows_and_models_changes_nothing(tmp_path_factory, seed, me
     models, ground = flat_strip(rng, int(rng.integers(3, 6)), noise=0.02)
     folder = tmp_path_factory.mktemp("order")
     documents = [
-        computing.strip(
+        processing.strip(
             models_file(folder / "m.csv", models, order), ground_file(folder / "g.csv", ground, order), method=method
         ).document
         for order in (None, shuffle)
@@ -115,7 +115,7 @@ def test_the_order_of_pairs_and_photographs_changes_nothing(tmp_path_factory, se
     for shuffle in (None, np.random.default_rng(seed + 1)):
         path, ground = pairs_file(folder / "p.csv", np.random.default_rng(seed), 4, shuffle)
         known = ground_file(folder / "g.csv", ground, shuffle)
-        documents.append(computing.strip(path, known, PairCamera(C), degree=2).document)
+        documents.append(processing.strip(path, known, PairCamera(C), degree=2).document)
     assert largest_difference(*documents) < 1e-9
     assert documents[0] == documents[1]
 
@@ -140,7 +140,7 @@ def test_the_order_of_cards_changes_nothing(tmp_path_factory, seed):
     documents = []
     for each in (lines, shuffled):
         path.write_text("".join(f"{line}\n" for line in each), encoding="ascii")
-        documents.append(computing.strip(path).document)
+        documents.append(processing.strip(path).document)
     assert largest_difference(*documents) < 1e-9
 
 
@@ -149,7 +149,7 @@ def test_the_order_of_cards_changes_nothing(tmp_path_factory, seed):
 def test_a_strip_without_errors_comes_back_exactly(tmp_path_factory, seed):
     models, ground = flat_strip(np.random.default_rng(seed), 4)
     folder = tmp_path_factory.mktemp("exact")
-    document = computing.strip(models_file(folder / "m.csv", models), ground_file(folder / "g.csv", ground)).document
+    document = processing.strip(models_file(folder / "m.csv", models), ground_file(folder / "g.csv", ground)).document
     for name, place in zip(ground.points, ground.coordinates.T, strict=True):
         np.testing.assert_allclose(document["points"][name], place, rtol=1e-9)
 
@@ -157,13 +157,13 @@ def test_a_strip_without_errors_comes_back_exactly(tmp_path_factory, seed):
 def test_cards_and_models_of_one_strip_agree_to_the_digits_of_the_cards(tmp_path):
     models, ground = flat_strip(np.random.default_rng(1), 4)
     (tmp_path / "deck").write_text("".join(f"{line}\n" for line in deck_lines(ground, models)), encoding="ascii")
-    from_cards = computing.strip(tmp_path / "deck").document
+    from_cards = processing.strip(tmp_path / "deck").document
     known = ground_file(tmp_path / "g.csv", ground)
-    from_models = computing.strip(models_file(tmp_path / "m.csv", models), known).document
+    from_models = processing.strip(models_file(tmp_path / "m.csv", models), known).document
     assert [from_cards["input"], from_models["input"]] == ["cards", "models"]
     for name, place in from_cards["points"].items():
         np.testing.assert_allclose(place, from_models["points"][name], atol=0.05)
-    with_checks = computing.strip(tmp_path / "deck", known).document
+    with_checks = processing.strip(tmp_path / "deck", known).document
     assert with_checks["accuracy_m"]["checks"]["points"] == 8
 
 
@@ -178,7 +178,7 @@ def test_a_strip_in_toml_is_the_strip_in_csv(tmp_path):
             for row in rows
         ]
         each.with_suffix(".toml").write_text("\n".join(tables), encoding="utf-8")
-    written = [computing.strip(path.with_suffix(end), known.with_suffix(end)).document for end in (".csv", ".toml")]
+    written = [processing.strip(path.with_suffix(end), known.with_suffix(end)).document for end in (".csv", ".toml")]
     assert written[0] == written[1]
 
 
@@ -206,15 +206,15 @@ def test_out_holds_the_printed_document_the_tables_and_the_cards(tmp_path):
         assert residuals[point]["role"] == each["role"]
         assert float(residuals[point]["Z"]) == pytest.approx(each["Z"], abs=6e-7)
     assert (out / "strip.pat").read_text(encoding="utf-8").count("-99\n") == 3
-    again = computing.block([out / "models.csv"], known).document
+    again = processing.block([out / "models.csv"], known).document
     assert again["s0_m"] == pytest.approx(0.2, rel=0.2)
 
 
 def test_output_cards_are_a_deck_again(tmp_path):
     models, ground = flat_strip(np.random.default_rng(3), 4, noise=0.02)
     path, known = models_file(tmp_path / "m.csv", models), ground_file(tmp_path / "g.csv", ground)
-    first = computing.write_result(computing.strip(path, known), tmp_path / "o")
-    again = computing.strip(tmp_path / "o" / "strip.crd").document
+    first = processing.write_result(processing.strip(path, known), tmp_path / "o")
+    again = processing.strip(tmp_path / "o" / "strip.crd").document
     assert again["absolute"]["scale"] == pytest.approx(1.0, abs=1e-5)
     for point, residual in again["residuals_m"].items():
         given = first["residuals_m"][point]
@@ -258,7 +258,7 @@ def test_polynomials_take_a_bow_away_and_name_it(tmp_path):
     bent = ground.coordinates.copy()
     bent[2] += 3.0 * (x / 2250.0) ** 2
     known = ground_file(tmp_path / "g.csv", Ground(ground.points, bent, ground.roles))
-    document = computing.strip(models_file(tmp_path / "m.csv", models), known, degree=2).document
+    document = processing.strip(models_file(tmp_path / "m.csv", models), known, degree=2).document
     polynomial = document["polynomial"]
     assert document["accuracy_m"]["checks"]["height"] > 0.3
     assert polynomial["accuracy_m"]["checks"]["height"] < 0.02
@@ -273,7 +273,7 @@ def test_differences_to_given_coordinates_are_tabled(tmp_path):
     moved = Ground(ground.points, ground.coordinates + np.array([[0.3], [0.0], [-0.4]]), ground.roles)
     other = ground_file(tmp_path / "other.csv", moved)
     out = tmp_path / "o"
-    document = computing.write_result(computing.strip(path, known, against=other), out)
+    document = processing.write_result(processing.strip(path, known, against=other), out)
     assert document["compare"]["rms"] == pytest.approx({"X": 0.3, "Y": 0.0, "Z": 0.4}, abs=1e-6)
     assert document["compare"]["largest"]["Z"] == pytest.approx(0.4, abs=1e-6)
     header, *rows = (out / "compare.csv").read_text(encoding="utf-8").splitlines()
@@ -285,7 +285,7 @@ def test_differences_to_given_coordinates_are_tabled(tmp_path):
 def test_models_of_several_files_are_connected_and_closing_differences_given(tmp_path):
     models, _ = flat_strip(np.random.default_rng(6), 4, noise=0.02)
     paths = [models_file(tmp_path / f"{model.name}.csv", [model]) for model in models]
-    one, other = (computing.connect(each).document for each in (paths, paths[::-1]))
+    one, other = (processing.connect(each).document for each in (paths, paths[::-1]))
     assert one == other
     assert [join["models"] for join in one["joins"]] == [["1", "2"], ["2", "3"]]
     assert set(one["joins"][0]["differences_mm"]) == {"110", "111", "112", "113", "2:centre"}
@@ -300,7 +300,7 @@ def test_one_model_goes_to_the_ground_with_plan_and_height_control_only(tmp_path
         for name, (x, y, z), role in zip(ground.points, ground.coordinates.T, roles, strict=True)
     ]
     (tmp_path / "g.csv").write_text("point,X,Y,Z,role\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    document = computing.absolute(models_file(tmp_path / "m.csv", models), tmp_path / "g.csv").document
+    document = processing.absolute(models_file(tmp_path / "m.csv", models), tmp_path / "g.csv").document
     assert document["absolute"]["scale"] > 0.0
     assert document["residuals_m"]["100"]["Z"] is None or np.isnan(document["residuals_m"]["100"]["Z"])
     for axis in "XYZ":
@@ -321,8 +321,8 @@ def test_a_block_of_two_strips_comes_back_exactly(tmp_path):
     ]
     paths = [models_file(tmp_path / "1.csv", first), models_file(tmp_path / "2.csv", renamed)]
     known = ground_file(tmp_path / "g.csv", ground)
-    outcome = computing.block(paths, known)
-    document = computing.write_result(outcome, tmp_path / "o")
+    outcome = processing.block(paths, known)
+    document = processing.write_result(outcome, tmp_path / "o")
     assert document["s0_m"] < 1e-6
     assert document["accuracy_m"]["checks"]["height"] < 1e-6
     assert len(document["models"]) == 6
@@ -330,7 +330,7 @@ def test_a_block_of_two_strips_comes_back_exactly(tmp_path):
     assert (tmp_path / "o" / "strip-1.crd").exists()
     assert (tmp_path / "o" / "strip-2.crd").exists()
     with pytest.raises(A7SimError, match=r"1\.csv: expected models of its own"):
-        computing.block([paths[0], paths[0]], known)
+        processing.block([paths[0], paths[0]], known)
 
 
 @pytest.mark.parametrize("columns", [80, 100])

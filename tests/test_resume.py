@@ -6,10 +6,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from a7sim.journal.resuming import find_resumable
+from a7sim.journal.writer import JournalOptions
 from a7sim.scenario import load_scenario
 from a7sim.session.bridge import INDEPENDENT, run_bridge
-from a7sim.session.journal import JournalOptions
-from a7sim.session.resuming import find_resumable
 from tests.processes import said_here
 
 JOURNAL = "session.jsonl"

@@ -15,7 +15,7 @@ from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session import run
 from a7sim.session.strip_combinations import run_combinations
-from a7sim.session.strips import (
+from a7sim.strip_methods.strip import (
     card_numbers,
     ground_control,
     models_from_documents,

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from a7sim.errors import A7SimError
-from a7sim.session.script_runner import ScriptRunner
-from a7sim.session.scripts import Expect, SourceLocation, find_script, read_script
+from a7sim.journal.script_runner import ScriptRunner
+from a7sim.journal.scripts import Expect, SourceLocation, find_script, read_script
 
 SCRIPTS = Path(__file__).parents[1] / "scenarios" / "scripts"
 FIRST = "scenario akwanga seed 7\n"

@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from a7sim.errors import A7SimError
-from a7sim.link.checked_port import TwinCheckedPort, open_checked_port
+from a7sim.link.client.checked_port import TwinCheckedPort, open_checked_port
 from a7sim.result_documents import as_json
 from a7sim.scenario import load_scenario
 from a7sim.session import run

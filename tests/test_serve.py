@@ -14,9 +14,9 @@ from a7sim.instrument import Autograph
 from a7sim.instrument.language import MAX_LINE_LENGTH, MAX_REPLY, SharedInstrument
 from a7sim.instrument.language.status import QUEUE_LENGTH
 from a7sim.instrument.language.syntax import MAX_NUMBER_LENGTH
-from a7sim.link.client_session import ServerLimits
-from a7sim.link.connections import MAX_READ, MAX_UNREAD, QUICK_ACKNOWLEDGEMENT
-from a7sim.link.serving import MAX_REJECTION_NOTICES, Endpoints
+from a7sim.link.server.client_session import ServerLimits
+from a7sim.link.server.connections import MAX_READ, MAX_UNREAD, QUICK_ACKNOWLEDGEMENT
+from a7sim.link.server.serving import MAX_REJECTION_NOTICES, Endpoints
 from a7sim.plotters import VARIANTS
 from tests.served import ANYWHERE, PATIENCE, Line, Served
 

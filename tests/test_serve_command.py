@@ -13,7 +13,7 @@ import pytest
 import serial
 
 import a7sim
-from a7sim.link.client import Client
+from a7sim.link.client.client import Client
 from tests.processes import ANYWHERE, SERVE, Running, said_here
 from tests.served import PATIENCE
 

@@ -14,11 +14,11 @@ import a7sim
 from a7sim.errors import A7SimError
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
-from a7sim.link.client import Client
-from a7sim.link.client_session import ServerLimits
-from a7sim.link.connections import MAX_UNREAD
-from a7sim.link.faults import ConnectionDropped, FaultInjector, FaultRates, parse_faults
-from a7sim.link.serving import Endpoints
+from a7sim.link.client.client import Client
+from a7sim.link.server.client_session import ServerLimits
+from a7sim.link.server.connections import MAX_UNREAD
+from a7sim.link.server.faults import ConnectionDropped, FaultInjector, FaultRates, parse_faults
+from a7sim.link.server.serving import Endpoints
 from a7sim.plotters import VARIANTS
 from tests.door import with_model
 from tests.served import ANYWHERE, PATIENCE, Served

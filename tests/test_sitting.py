@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from a7sim.errors import A7SimError
-from a7sim.operator.grid_test import GridTestPlan
+from a7sim.operator.procedures.grid_test import GridTestPlan
 from a7sim.scenario import load_scenario
 from a7sim.session import run
 from a7sim.session.bridge import run_bridge

@@ -7,11 +7,11 @@ import pytest
 
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import SharedInstrument
+from a7sim.journal.checkpoints import Checkpoint, differences, read_checkpoints, state_hash, to_lines
 from a7sim.link.clock import Clock
 from a7sim.link.simulated_wait import feed_until_idle
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from a7sim.session.checkpoints import Checkpoint, differences, read_checkpoints, state_hash, to_lines
 
 LINES = {
     "akwanga": [

@@ -10,8 +10,8 @@ from a7sim.scene import build_scene
 from a7sim.session.all_methods import run_all_methods_batch
 from a7sim.session.combination_batch import combine_strips
 from a7sim.session.strip_combinations import combinations
-from a7sim.session.strips import ground_control, models_from_documents, orient_strip, oriented_strip_document
 from a7sim.standard_points import CASES
+from a7sim.strip_methods.strip import ground_control, models_from_documents, orient_strip, oriented_strip_document
 from a7sim.study import claims
 from a7sim.study import figures as figures_of_study
 from a7sim.study.cells import Cell

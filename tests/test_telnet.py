@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from a7sim.link.telnet import MAX_SUBNEGOTIATION_LENGTH, Telnet
+from a7sim.link.server.telnet import MAX_SUBNEGOTIATION_LENGTH, Telnet
 
 WILL_BINARY, WONT_BINARY = b"\xff\xfb\x00", b"\xff\xfc\x00"
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import pytest
 from msgspec.structs import replace as changed
 
-from a7sim.session.journal_format import ChecksumChain, read_journal
+from a7sim.journal.format import ChecksumChain, read_journal
 from a7sim.training.attempts import resume_attempt, run_attempt, start_attempt, write_answers
 from a7sim.training.catalogue import ExerciseError, all_exercises, find_exercise, read_exercise
 from a7sim.training.checking import check_exercise
 from a7sim.training.environment import UnreliableJournalError
 from a7sim.training.exercise import MetricSpec, PlayedRun
 from a7sim.training.grading import grade_folder
-from a7sim.training.measures import MetricResult, make_metric
+from a7sim.training.metrics import MetricResult, make_metric
 from a7sim.training.variation import attempt_seed, scenario_for
 
 EXERCISES = all_exercises()

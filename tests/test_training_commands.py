@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from a7sim.errors import A7SimError
-from a7sim.link.client import Client
+from a7sim.link.client.client import Client
 from a7sim.training.attempts import run_attempt
 from a7sim.training.catalogue import find_exercise
 from a7sim.training.exercise import PlayedRun

@@ -8,7 +8,7 @@ import pytest
 from a7sim.training.catalogue import ExerciseError, find_exercise, read_exercise
 from a7sim.training.environment import open_environment
 from a7sim.training.exercise import MetricSpec
-from a7sim.training.measures import make_metric
+from a7sim.training.metrics import make_metric
 from a7sim.training.progress import Progress
 from a7sim.training.variation import scenario_for
 

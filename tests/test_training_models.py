@@ -12,7 +12,7 @@ from a7sim.training.catalogue import find_exercise
 from a7sim.training.exercise import PlayedRun
 from a7sim.training.grading import grade_record, load_record
 from a7sim.training.handouts import make_handout
-from a7sim.training.measures.ground import element_at, last_readings
+from a7sim.training.metrics.ground import element_at, last_readings
 from a7sim.training.variation import scenario_for
 
 PERFECT = {

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.geometry import GON, PARALLAX_ELEMENTS
-from a7sim.operator.empirical import clearing_coefficients, over_correction_by_coefficients
+from a7sim.operator.procedures.empirical import clearing_coefficients, over_correction_by_coefficients
 from a7sim.reduction import ProjectorPose, perspective_centre
 from a7sim.reduction.hallert import regular_corrections
 from a7sim.scenario import load_scenario
@@ -16,8 +16,8 @@ from a7sim.training.catalogue import find_exercise
 from a7sim.training.exercise import PlayedRun
 from a7sim.training.forms import FIVE, computation_form, multipliers
 from a7sim.training.grading import grade_folder
-from a7sim.training.measures.centres import sigmas_of_centre
-from a7sim.training.measures.clearing import OmegaTurn
+from a7sim.training.metrics.centres import sigmas_of_centre
+from a7sim.training.metrics.clearing import OmegaTurn
 
 heights = st.floats(min_value=290.0, max_value=360.0)
 widths = st.floats(min_value=160.0, max_value=195.0)

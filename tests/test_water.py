@@ -10,22 +10,22 @@ from click.testing import CliRunner
 
 from a7sim.cli import cli
 from a7sim.operator import OperatorGaveUp, measure_models
-from a7sim.operator.compilation import Compilation
-from a7sim.operator.level_model import level_model
-from a7sim.operator.map_lines import Area, Tracing
-from a7sim.operator.models import measure_models_batch
-from a7sim.operator.operator_batch import OperatorBatch
-from a7sim.operator.scpi_driver import ScpiDriver
-from a7sim.operator.stereo_view import StereoView
-from a7sim.operator.workstation import Workstation
+from a7sim.operator.driving.scpi_driver import ScpiDriver
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.mapping.compilation import Compilation
+from a7sim.operator.mapping.level_model import level_model
+from a7sim.operator.mapping.map_lines import Area, Tracing
+from a7sim.operator.mapping.stereo_view import StereoView
+from a7sim.operator.people.operator_batch import OperatorBatch
+from a7sim.operator.procedures.models import measure_models_batch
 from a7sim.scenario import load_scenario
 from a7sim.scenario.schema import Water
 from a7sim.scene import build_scene
 from a7sim.scene.content import WATER_TONE
 from a7sim.session import open_session
 from a7sim.session.session_batch import open_batch
-from a7sim.session.strips import ground_control
 from a7sim.standard_points import CASES, determine_orientation
+from a7sim.strip_methods.strip import ground_control
 from tests.sessions import read_once, without_errors
 from tests.test_crowd import same_to_the_digit
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import SharedInstrument
-from a7sim.link.serving import Endpoints
+from a7sim.link.server.serving import Endpoints
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from tests.served import ANYWHERE, Served

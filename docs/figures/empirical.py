@@ -10,11 +10,11 @@ import numpy as np
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
-from a7sim.operator.empirical import over_correction
-from a7sim.operator.models import measure_models_batch, orient_model
-from a7sim.operator.operator_batch import OperatorBatch
-from a7sim.operator.scpi_driver import ScpiDriver
-from a7sim.operator.workstation import Workstation
+from a7sim.operator.driving.scpi_driver import ScpiDriver
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.people.operator_batch import OperatorBatch
+from a7sim.operator.procedures.empirical import over_correction
+from a7sim.operator.procedures.models import measure_models_batch, orient_model
 from a7sim.scenario import load_scenario
 from a7sim.session import open_session
 

@@ -10,7 +10,7 @@ from a7sim.scenario import schema as scenario_schema
 from a7sim.study import schema as study_schema
 from a7sim.study.responses import RESPONSES
 from a7sim.training import exercise as exercise_schema
-from a7sim.training.measures import MEASURES
+from a7sim.training.metrics import MEASURES
 
 SCENARIO_OPENING = """# Scenario files
 

@@ -1,7 +1,7 @@
-"""A simulated Wild A7 Autograph, the language it is worked in, and the operator who works it.
+"""A simulated Wild A7 Autograph, its command language, and a virtual operator.
 
-Importing it teaches pyserial the URL ``a7sim://SCENARIO?seed=N``. What a script takes from it (`__all__`) is imported
-when it is asked for.
+Importing the package registers the URL ``a7sim://SCENARIO?seed=N`` with pyserial. The public names (`__all__`) are
+imported on first use.
 """
 
 from importlib import import_module
@@ -12,16 +12,18 @@ import serial
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Autograph": "a7sim.instrument",
-    "Client": "a7sim.link.client",
-    "InstrumentError": "a7sim.link.client",
     "A7SimError": "a7sim.errors",
+    "Autograph": "a7sim.instrument",
+    "Client": "a7sim.link.client.client",
+    "InstrumentError": "a7sim.link.client.client",
     "Operator": "a7sim.api",
     "Scenario": "a7sim.scenario",
     "Study": "a7sim.api",
     "connect": "a7sim.api",
 }
-_ROOMS = ("computing", "reduction")
+_PACKAGES = ("processing", "reduction")
+_RENAMED = {"InstrumentRefused": "InstrumentError", "Mistake": "A7SimError", "computing": "processing"}
+"""Public names of release 0.1.0: each still works and warns."""
 
 __all__ = [
     "A7SimError",
@@ -31,8 +33,8 @@ __all__ = [
     "Operator",
     "Scenario",
     "Study",
-    "computing",
     "connect",
+    "processing",
     "reduction",
 ]
 
@@ -41,11 +43,16 @@ if "a7sim.link" not in serial.protocol_handler_packages:
 
 
 def __getattr__(name: str) -> Any:
-    if name in _ROOMS:
+    if name in _PACKAGES:
         return import_module(f"a7sim.{name}")
-    if name not in _HOMES:
-        raise AttributeError(f"module 'a7sim' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    if name in _RENAMED:
+        from a7sim.deprecation import warn_renamed  # noqa: PLC0415
+
+        warn_renamed(f"a7sim.{name}", f"a7sim.{_RENAMED[name]}")
+        return __getattr__(_RENAMED[name])
+    raise AttributeError(f"module 'a7sim' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

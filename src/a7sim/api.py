@@ -3,15 +3,16 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
+from a7sim.deprecation import warn_renamed
 from a7sim.errors import A7SimError
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
-from a7sim.link.checked_port import TwinCheckedPort, open_checked_port
-from a7sim.link.client import Client
+from a7sim.link.client.checked_port import TwinCheckedPort, open_checked_port
+from a7sim.link.client.client import Client
+from a7sim.link.client.ports import TIMEOUT_S
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.link.ports import TIMEOUT_S
 from a7sim.result_documents import Document
 from a7sim.scenario import Scenario
 from a7sim.session import ProgressCallbacks
@@ -60,7 +61,7 @@ class Operator:
     and operator.
 
     >>> from a7sim import Operator
-    >>> results = Operator("dewitt-pair", seed=7).work()
+    >>> results = Operator("dewitt-pair", seed=7).run()
     >>> results["status"], [model["model"] for model in results["models"]]
     ('complete', ['1'])
     """
@@ -95,6 +96,11 @@ class Operator:
                 self.scenario, self.seed, folder, watcher, force, lambda twin: TwinCheckedPort(served, twin, link)
             )
 
+    def work(self, *args: Any, **kwargs: Any) -> Document:
+        """Call `run`: the name of this method in release 0.1.0. Warns."""
+        warn_renamed("Operator.work", "Operator.run")
+        return self.run(*args, **kwargs)
+
 
 @dataclass(frozen=True)
 class Study:
@@ -102,7 +108,7 @@ class Study:
 
     >>> from a7sim import Study
     >>> study = Study.load("levels", replicates=2)
-    >>> study.laid.study.design, len(study.laid.cells)
+    >>> study.loaded.study.design, len(study.loaded.cells)
     ('full', 7)
     """
 
@@ -127,6 +133,17 @@ class Study:
         if folder is not None:
             write_results(folder, self.loaded, tally, document)
         return document
+
+    def work(self, *args: Any, **kwargs: Any) -> Document:
+        """Call `run`: the name of this method in release 0.1.0. Warns."""
+        warn_renamed("Study.work", "Study.run")
+        return self.run(*args, **kwargs)
+
+    @property
+    def laid(self) -> LoadedStudy:
+        """`loaded`: its name in release 0.1.0. Warns."""
+        warn_renamed("Study.laid", "Study.loaded")
+        return self.loaded
 
 
 def _chosen(scenario: Name | Scenario, seed: int | None) -> tuple[Scenario, int]:

@@ -49,7 +49,7 @@ def command(
 
     Example: a7sim calibrate grid-test --points 25 --out runs/grid-test
     """
-    from a7sim.operator.grid_test import GridTestPlan
+    from a7sim.operator.procedures.grid_test import GridTestPlan
     from a7sim.session.grid_test import report_tables, run_grid_test
 
     order = resolve_request(scenario, asked, kept)

@@ -51,8 +51,8 @@ def command(
 
     Example: a7sim compile akwanga --model 1 --contour 460 --interval 10 --line road1 --out runs/sheet
     """
+    from a7sim.report.map_tables import map_tables
     from a7sim.session.compiling import CompilationRequest, compile_model
-    from a7sim.session.map_tables import map_tables
 
     order = resolve_request(scenario, asked, kept)
     wanted = CompilationRequest(name, contours, interval, lines, map_scale, tremor)

@@ -12,8 +12,8 @@ from a7sim.cli import options
 from a7sim.cli.browser import browser_options, is_browser_child, serve_in_browser
 from a7sim.cli.completers import scenario_argument
 from a7sim.cli.prompt import data_folder
-from a7sim.console.descriptions import ACUITY_UM
-from a7sim.console.rasterize import DrawingMode
+from a7sim.console.drawing.descriptions import ACUITY_UM
+from a7sim.console.drawing.rasterize import DrawingMode
 from a7sim.errors import A7SimError
 from a7sim.scenario import load_scenario
 
@@ -89,7 +89,7 @@ def command(
     _see_that_textual_is_there()
     from a7sim.cli.console_setup import LocalConsole, is_url, playback_console, remote_console  # only who sits down
     from a7sim.console.app import Console
-    from a7sim.console.job_sheet import JobSheet
+    from a7sim.console.drawing.job_sheet import JobSheet
     from a7sim.console.keymap import default_keymap, load_keymap, sample
 
     _refuse_beside("--watch", watch, connect=connect, seed=seed, variant=variant, out=out, go_on=go_on)

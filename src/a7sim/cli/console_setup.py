@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 
 from a7sim.cli.link_options import token_from
 from a7sim.cli.prompt import data_folder
+from a7sim.console.actions.preset_recovery import LoggedLine
 from a7sim.console.config import ConsoleConfig, ResumeOffer
-from a7sim.console.header_footer import format_elapsed
-from a7sim.console.job_sheet import JobSheet
-from a7sim.console.preset_recovery import LoggedLine
+from a7sim.console.drawing.job_sheet import JobSheet
+from a7sim.console.widgets.header_footer import format_elapsed
 from a7sim.errors import A7SimError
-from a7sim.link.client import Client
+from a7sim.link.client.client import Client
 from a7sim.link.clock import Clock, WallClock
 from a7sim.scenario import Scenario, scenario_name
 
 if TYPE_CHECKING:
-    from a7sim.session.interactive import InteractiveSession
-    from a7sim.session.session_store import SavedSession
+    from a7sim.journal.interactive import InteractiveSession
+    from a7sim.journal.session_store import SavedSession
 
 SESSIONS_FOLDER = "sessions"
 
@@ -69,7 +69,7 @@ class LocalConsole:
     def _last(self) -> "SavedSession | None":
         if not self._folder.exists():
             return None
-        from a7sim.session.session_store import last_session  # only where there may be one
+        from a7sim.journal.session_store import last_session  # only where there may be one
 
         return last_session(self._folder, self._scenario, self._seed)
 
@@ -99,7 +99,7 @@ class LocalConsole:
     def _opened(self) -> Client:
         """Sit down in the chair, which is built when the instrument is first spoken to."""
         if self._interactive is None:
-            from a7sim.session.interactive import InteractiveSession  # beside the first paint of the screen
+            from a7sim.journal.interactive import InteractiveSession  # beside the first paint of the screen
 
             begun = self._left.begun if self._left else None
             self._interactive = InteractiveSession(self._scenario, self._seed, self._folder, self._clock, begun)
@@ -146,7 +146,7 @@ def _watching_now(url: str) -> Callable[[], str]:
 
 def playback_console(session: str) -> ConsoleConfig:
     """Return a seat from which a session that is over is watched. Raises Mistake where there is none."""
-    from a7sim.session.recording import open_recording  # only for who watches one
+    from a7sim.journal.recording import open_recording  # only for who watches one
 
     recording = open_recording(session)
     title = str(recording.journalled.header.get("title", ""))

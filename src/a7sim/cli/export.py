@@ -7,11 +7,11 @@ import click
 
 from a7sim.cli import options
 from a7sim.errors import A7SimError
+from a7sim.journal.session_files import BOOK, write_atomic
 from a7sim.report.asciicast import make_cast
 from a7sim.report.card_decks import strip_deck
 from a7sim.report.forms import forms_text
 from a7sim.report.session_folder import SessionFolder, read_session
-from a7sim.session.session_files import BOOK, write_atomic
 
 _OPTION_OF = {"speed": "asciicast", "way": "cards"}
 

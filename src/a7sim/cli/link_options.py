@@ -8,7 +8,7 @@ import click
 
 from a7sim.cli.options import TOKEN_VARIABLE, Number, combine_options, token_file
 from a7sim.errors import A7SimError
-from a7sim.link.ports import TIMEOUT_S
+from a7sim.link.client.ports import TIMEOUT_S
 
 MAX_TOKEN_LENGTH = 1000
 """Characters: a line of the language has room for it, even if all are quotes that have to be doubled."""

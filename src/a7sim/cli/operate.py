@@ -49,7 +49,7 @@ def command(
     Example: a7sim operate akwanga --link tcp://127.0.0.1:5025
     """
     from a7sim.api import Operator
-    from a7sim.session.tables import session_tables
+    from a7sim.report.session_tables import session_tables
 
     loaded, seed = resolve_scenario(scenario, asked, {"plan.case": case, "plan.method": method})
     token = token_from(token_file)

@@ -8,7 +8,7 @@ from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from a7sim.cli import options
-from a7sim.operator.preparation import FlightPlan, FlightSettings, ModelScale, choose_settings
+from a7sim.operator.mapping.preparation import FlightPlan, FlightSettings, ModelScale, choose_settings
 from a7sim.plotters import VARIANTS
 from a7sim.result_documents import as_json, document_header
 from a7sim.text_tables import text_table

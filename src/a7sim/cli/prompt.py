@@ -9,9 +9,9 @@ from pathlib import Path
 
 import click
 
-from a7sim.link.client import Client
-from a7sim.link.completion import completions
-from a7sim.link.exchange import send_line
+from a7sim.link.client.client import Client
+from a7sim.link.client.completion import completions
+from a7sim.link.client.exchange import send_line
 
 HISTORY = "send-history"
 

@@ -10,15 +10,15 @@ import click
 from a7sim.cli import options
 from a7sim.cli.run_options import DURABILITY
 from a7sim.errors import A7SimError
-from a7sim.link.addresses import Address, parse_address
+from a7sim.journal.append_file import Durability
+from a7sim.journal.session_files import prepare_folder
+from a7sim.journal.writer import Header, Journal, JournalOptions, make_header, make_header_without_scenario
+from a7sim.link.client.ports import open_port
+from a7sim.link.client.recording_proxy import RecordingProxy
 from a7sim.link.clock import WallClock
-from a7sim.link.ports import open_port
-from a7sim.link.recording_proxy import RecordingProxy
+from a7sim.link.server.addresses import Address, parse_address
 from a7sim.result_documents import as_json, document_header
 from a7sim.scenario import load_scenario
-from a7sim.session.append_file import Durability
-from a7sim.session.journal import Header, Journal, JournalOptions, make_header, make_header_without_scenario
-from a7sim.session.session_files import prepare_folder
 
 _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 

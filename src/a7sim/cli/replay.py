@@ -9,17 +9,17 @@ import click
 from a7sim.cli import EXIT_DIFFERS, options
 from a7sim.cli.completers import session_argument
 from a7sim.errors import A7SimError
+from a7sim.journal.checkpoints import StateDifference
+from a7sim.journal.find_line import find_line
+from a7sim.journal.format import JournalFile, read_journal
+from a7sim.journal.replay import Replay, ReplayDifference, knows_scenario, replay_lines
+from a7sim.journal.script_runner import ScriptRunner
+from a7sim.journal.scripts import SUFFIX, find_script, read_script
+from a7sim.journal.session_files import JOURNAL, prepare_folder
+from a7sim.journal.transcript import TranscriptListener, format_event
+from a7sim.journal.writer import Journal, make_header
 from a7sim.result_documents import as_json, document_header
 from a7sim.scenario import load_scenario
-from a7sim.session.checkpoints import StateDifference
-from a7sim.session.find_line import find_line
-from a7sim.session.journal import Journal, make_header
-from a7sim.session.journal_format import JournalFile, read_journal
-from a7sim.session.replaying import Replay, ReplayDifference, knows_scenario, replay_lines
-from a7sim.session.script_runner import ScriptRunner
-from a7sim.session.scripts import SUFFIX, find_script, read_script
-from a7sim.session.session_files import JOURNAL, prepare_folder
-from a7sim.session.transcript import TranscriptListener, format_event
 from a7sim.text import pluralize
 
 _MAX_PARTS = 20

@@ -17,9 +17,9 @@ def command(folder: Path, out: Path | None, shown: bool) -> None:
 
     Example: a7sim report runs/akwanga --open
     """
+    from a7sim.journal.session_files import REPORT, write_atomic
     from a7sim.report.render import render_report
     from a7sim.report.session_folder import read_session
-    from a7sim.session.session_files import REPORT, write_atomic
 
     out = out or folder / REPORT
     write_atomic(out, render_report(read_session(folder)))

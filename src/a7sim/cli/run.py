@@ -46,9 +46,9 @@ def command(
 
     Example: a7sim run akwanga --case E --seed 7 --out runs/akwanga-e
     """
+    from a7sim.report.session_tables import session_tables, strips_table
     from a7sim.session.all_methods import run_all_methods
     from a7sim.session.strip_combinations import run_combinations
-    from a7sim.session.tables import session_tables, strips_table
 
     order = resolve_request(scenario, asked, kept, {"plan.case": case, "plan.method": method})
     every_case = order.setting("strips", strips) == "all"

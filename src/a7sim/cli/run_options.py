@@ -16,16 +16,16 @@ from a7sim.cli import EXIT_DOES_NOT_FIT, options
 from a7sim.cli.completers import CaseInsensitiveChoice
 from a7sim.cli.usage_errors import parameter_label
 from a7sim.errors import A7SimError
+from a7sim.journal.append_file import DURABILITIES, Durability
 from a7sim.scenario import PROFILES, Observer, Provenance, Scenario, load_scenario, scenario_name, with_provenance
-from a7sim.session.append_file import DURABILITIES, Durability
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from a7sim.journal.resuming import ResumableSession
+    from a7sim.journal.writer import JournalOptions
     from a7sim.result_documents import Document
     from a7sim.session import ProgressCallbacks
-    from a7sim.session.journal import JournalOptions
-    from a7sim.session.resuming import ResumableSession
 
 DURABILITY = click.option(
     "--durability",
@@ -69,7 +69,7 @@ class OutputOptions:
     @property
     def journal_options(self) -> "JournalOptions":
         """How the journal is kept."""
-        from a7sim.session.journal import JournalOptions
+        from a7sim.journal.writer import JournalOptions
 
         return JournalOptions(self.durability, self.resume is not None)
 
@@ -190,7 +190,7 @@ def resolve_resume(folder: Path, *beside: str) -> "ResumableSession":
 
     Raises Mistake where anything but what is named stands `beside` it, since the journal says what was asked for.
     """
-    from a7sim.session.resuming import find_resumable
+    from a7sim.journal.resuming import find_resumable
 
     _see_that_resume_stands_alone(beside)
     return find_resumable(folder, click.get_current_context().info_name or "")

@@ -10,9 +10,9 @@ import msgspec
 
 from a7sim.cli import options
 from a7sim.cli.link_options import link_options, token_from
-from a7sim.link.client import Client
-from a7sim.link.exchange import Exchange, send_line
-from a7sim.link.ports import port_errors
+from a7sim.link.client.client import Client
+from a7sim.link.client.exchange import Exchange, send_line
+from a7sim.link.client.ports import port_errors
 
 EXIT_REFUSED = 1
 

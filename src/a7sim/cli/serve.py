@@ -25,17 +25,17 @@ from a7sim.errors import A7SimError
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
 from a7sim.instrument.language.shared_instrument import POLL_SECONDS
-from a7sim.link.addresses import Address, parse_address
-from a7sim.link.client_session import ServerLimits
+from a7sim.journal.append_file import JournalWriteError
+from a7sim.journal.resuming import ResumableSession, restore_instrument
+from a7sim.journal.writer import Journal, JournalOptions, make_header
 from a7sim.link.clock import Clock, WallClock
-from a7sim.link.event_loop import run
-from a7sim.link.faults import EXAMPLE, parse_faults
-from a7sim.link.serving import Endpoints, Server
+from a7sim.link.server.addresses import Address, parse_address
+from a7sim.link.server.client_session import ServerLimits
+from a7sim.link.server.event_loop import run
+from a7sim.link.server.faults import EXAMPLE, parse_faults
+from a7sim.link.server.serving import Endpoints, Server
 from a7sim.result_documents import Document, as_json, document_header
 from a7sim.scenario import Scenario
-from a7sim.session.append_file import JournalWriteError
-from a7sim.session.journal import Journal, JournalOptions, make_header
-from a7sim.session.resuming import ResumableSession, restore_instrument
 
 USUAL = Address("127.0.0.1", 5025)
 

@@ -10,26 +10,26 @@ from textual.app import App, SystemCommand
 from textual.filter import ANSIToTruecolor, LineFilter
 from textual.screen import Screen
 
-from a7sim.console.actions import ACTIONS_WHILE_DISCONNECTED, Actions
-from a7sim.console.binocular import Binocular, ViewSettings
-from a7sim.console.book import RecordedEntry
+from a7sim.console.actions.message_handlers import MessageHandlers
+from a7sim.console.actions.navigation import CounterOrigins, print_position
+from a7sim.console.actions.table import ACTIONS_WHILE_DISCONNECTED, Actions
 from a7sim.console.config import ConsoleConfig, ResumeOffer, best_drawing, speaks_utf8
-from a7sim.console.dialogs import Choose
-from a7sim.console.drum_panels import DrumScrolled
-from a7sim.console.eyepiece_widget import EyepieceWidget
-from a7sim.console.header_footer import header_text, hints, hints_to_watch, key_labels
+from a7sim.console.drawing.sketch import Place
 from a7sim.console.instrument_thread import InstrumentThread
 from a7sim.console.keymap import actions_by_key, actions_for, key_display, key_name
-from a7sim.console.main_screen import WELCOME, MainScreen
-from a7sim.console.message_handlers import MessageHandlers
 from a7sim.console.messages import Connected, ConnectionLost, ViewResult
-from a7sim.console.navigation import CounterOrigins, print_position
-from a7sim.console.playback import Playback
-from a7sim.console.readouts import Readouts
-from a7sim.console.selection import ControlSelection
-from a7sim.console.sketch import Place
-from a7sim.console.sketch_panel import PointClicked
+from a7sim.console.state.readouts import Readouts
+from a7sim.console.state.selection import ControlSelection
 from a7sim.console.themes import DRUMS, THEMES
+from a7sim.console.widgets.binocular import Binocular, ViewSettings
+from a7sim.console.widgets.book import RecordedEntry
+from a7sim.console.widgets.dialogs import Choose
+from a7sim.console.widgets.drum_panels import DrumScrolled
+from a7sim.console.widgets.eyepiece_widget import EyepieceWidget
+from a7sim.console.widgets.header_footer import header_text, hints, hints_to_watch, key_labels
+from a7sim.console.widgets.main_screen import WELCOME, MainScreen
+from a7sim.console.widgets.playback import Playback
+from a7sim.console.widgets.sketch_panel import PointClicked
 
 SETTLING_S = 0.02
 """Between two keys for a dialog, where they were pressed before anything answered."""

@@ -5,15 +5,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from a7sim.console.descriptions import ACUITY_UM
-from a7sim.console.job_sheet import JobSheet
+from a7sim.console.actions.preset_recovery import LoggedLine
+from a7sim.console.drawing.descriptions import ACUITY_UM
+from a7sim.console.drawing.job_sheet import JobSheet
+from a7sim.console.drawing.rasterize import DrawingMode
 from a7sim.console.keymap import Keymap, default_keymap
-from a7sim.console.preset_recovery import LoggedLine
-from a7sim.console.rasterize import DrawingMode
-from a7sim.link.client import Client
+from a7sim.link.client.client import Client
 
 if TYPE_CHECKING:
-    from a7sim.session.recording import Recording
+    from a7sim.journal.recording import Recording
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from collections.abc import Callable
 import numpy as np
 from serial import SerialException
 
+from a7sim.console.drawing.rasterize import Greys
 from a7sim.console.messages import CommandsRejected, Connected, ConnectionLost, StationMessage, ViewRequest, ViewResult
-from a7sim.console.rasterize import Greys
-from a7sim.console.readouts import Readouts, parse_readouts, readouts_query
+from a7sim.console.state.readouts import Readouts, parse_readouts, readouts_query
 from a7sim.errors import A7SimError
-from a7sim.link.client import Client, InstrumentError
+from a7sim.link.client.client import Client, InstrumentError
 from a7sim.plotters import VARIANTS, Variant
 
 POLL_S = 0.5

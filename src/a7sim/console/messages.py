@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from a7sim.console.rasterize import Greys
-from a7sim.console.readouts import Readouts
-from a7sim.link.client import Identity
+from a7sim.console.drawing.rasterize import Greys
+from a7sim.console.state.readouts import Readouts
+from a7sim.link.client.client import Identity
 from a7sim.plotters import Variant
 
 

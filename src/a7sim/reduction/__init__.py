@@ -1,9 +1,10 @@
-"""The computing room: observations in, orientations, centres, models and strips out.
+"""Least-squares reductions: observations in, orientations, perspective centres, models and strips out.
 
-It knows neither instrument nor operator. Functions work on component-first arrays, a batch being one more axis at the
-end; what observations leave open is `Undetermined`, never nonsense.
+The package imports neither instrument nor operator. Functions take component-first arrays; a batch is one more axis at
+the end. Observations that do not determine the result raise `Undetermined`.
 """
 
+from a7sim.deprecation import renamed_attributes
 from a7sim.reduction.absolute import AbsoluteOrientation, Ground, GroundFit, absolute_orientation
 from a7sim.reduction.block import BlockAdjustment, block_adjustment
 from a7sim.reduction.cards import Deck, deck_lines, free_format_lines, is_deck, output_lines, read_cards, write_cards
@@ -93,3 +94,16 @@ __all__ = [
     "strip_adjustment",
     "write_cards",
 ]
+
+__getattr__ = renamed_attributes(
+    __name__,
+    {
+        "PictureLie": "PicturePlacement",
+        "PlateLie": "PlatePlacement",
+        "Stand": "ProjectorPose",
+        "adjusted": "solve_least_squares",
+        "picture_lie": "picture_placement",
+        "plate_lie": "plate_placement",
+    },
+)
+"""Public names of release 0.1.0: each still works and warns."""

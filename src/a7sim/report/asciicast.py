@@ -9,14 +9,14 @@ from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from a7sim.errors import A7SimError
-from a7sim.operator.observation_book import BookEntry
+from a7sim.journal.format import read_journal
+from a7sim.journal.session_files import JOURNAL
+from a7sim.operator.people.observation_book import BookEntry
+from a7sim.report import session_tables
+from a7sim.report.map_tables import map_tables
 from a7sim.report.session_folder import SessionFolder
-from a7sim.session import tables
 from a7sim.session.bridge import bridge_tables as of_bridge
 from a7sim.session.grid_test import report_tables as of_grid_test
-from a7sim.session.journal_format import read_journal
-from a7sim.session.map_tables import map_tables
-from a7sim.session.session_files import JOURNAL
 
 COLUMNS, LINES = 100, 32
 
@@ -73,7 +73,7 @@ def _lines(kept: SessionFolder) -> Iterator[CastLine]:
     yield from notes
     yield from (_reading(entry) for entry in kept.book if entry.reading or not notes)
     for model in document.get("models", ()):
-        yield CastLine(model["finished_at_s"], _printed(Group(*tables.model_tables(model))))
+        yield CastLine(model["finished_at_s"], _printed(Group(*session_tables.model_tables(model))))
     yield CastLine(3600.0 * document["operator"]["hours"], _printed(_end(kept)))
 
 
@@ -106,7 +106,7 @@ def _end(kept: SessionFolder) -> RenderableType:
     """Return what the command shows at its end, but for the models, which have been shown when they were done."""
     document = kept.document
     if kept.command == "run":
-        return tables.session_tables({**document, "models": ()})
+        return session_tables.session_tables({**document, "models": ()})
     shown: RenderableType = {"calibrate": of_grid_test, "compile": map_tables, "bridge": of_bridge}[kept.command](
         document
     )

@@ -3,11 +3,11 @@
 import numpy as np
 
 from a7sim.errors import A7SimError
+from a7sim.journal.session_files import CARDS, MODELS_OF_WAY, STRIP, STRIP_OF_WAY
 from a7sim.reduction import Ground, Model, Undetermined
 from a7sim.report.session_folder import SessionFolder
 from a7sim.result_documents import Document
-from a7sim.session.session_files import CARDS, MODELS_OF_WAY, STRIP, STRIP_OF_WAY
-from a7sim.session.strips import models_from_documents, orient_strip, strip_cards
+from a7sim.strip_methods.strip import models_from_documents, orient_strip, strip_cards
 
 
 def strip_deck(kept: SessionFolder, way: str | None = None) -> str:

@@ -7,7 +7,9 @@ from pathlib import Path
 
 from rich.text import Text
 
+from a7sim.journal.session_files import RESIDUALS, STRIP, STRIP_OF_WAY, SVG
 from a7sim.reduction.strips import is_centre
+from a7sim.report import session_tables
 from a7sim.report.figures.grid import grid_residuals
 from a7sim.report.figures.model import (
     centre_residuals,
@@ -19,17 +21,15 @@ from a7sim.report.figures.model import (
 from a7sim.report.figures.sessions import all_strips, hours
 from a7sim.report.figures.strip import Places, plan_and_profile, residuals_in_height, residuals_in_plan
 from a7sim.report.forms import make_forms
+from a7sim.report.map_tables import map_tables
 from a7sim.report.page import Chapter, Details, PageFigure, Part, TableBlock
 from a7sim.report.pointing_rays import pointing_rays
 from a7sim.report.session_folder import SessionFolder
 from a7sim.report.terminal import terminal_parts
 from a7sim.result_documents import Document
-from a7sim.session import tables
 from a7sim.session.bridge import INDEPENDENT
 from a7sim.session.bridge import bridge_tables as of_bridge
 from a7sim.session.grid_test import report_tables as of_grid_test
-from a7sim.session.map_tables import map_tables
-from a7sim.session.session_files import RESIDUALS, STRIP, STRIP_OF_WAY, SVG
 
 Chapters = Iterator[Chapter]
 
@@ -53,7 +53,7 @@ def _of_run(kept: SessionFolder) -> Chapters:
     for name, strip in document.get("ways", {}).items():
         yield _of_strip(strip, _places(kept, STRIP_OF_WAY.format(name.lower())), f"Strip, {name}", f"w{name}")
     if "a8_minus_comparator_m" in document:
-        each = tables.accuracy_table({"points": document["a8_minus_comparator_m"]})
+        each = session_tables.accuracy_table({"points": document["a8_minus_comparator_m"]})
         yield Chapter("A8 minus comparator", list(terminal_parts(each, caption="A8 minus comparator, m")))
 
 
@@ -63,24 +63,24 @@ def _of_model(kept: SessionFolder, model: Document, name: str) -> Chapter:
     parts: list[Part] = [residual_parallaxes(model, f"{name}p")]
     if orientation["rounds"]:
         parts.append(iterations(model, f"{name}i"))
-    parts += terminal_parts(tables.rounds_table(orientation))
+    parts += terminal_parts(session_tables.rounds_table(orientation))
     parts += [Details("Residual y-parallaxes in a table", [parallax_table(model)])]
-    parts += terminal_parts(tables.elements_table(orientation["elements"], model["truth"].get("elements", {})))
+    parts += terminal_parts(session_tables.elements_table(orientation["elements"], model["truth"].get("elements", {})))
     rays = {side: pointing_rays(kept, model, side) for side in model["perspective_centres"]}
     parts += [perspective_centre(model, side, rays[side], f"{name}c{side}") for side in rays]
-    parts += terminal_parts(tables.centres_table(model))
+    parts += terminal_parts(session_tables.centres_table(model))
     missed = centre_residuals(model, rays)
     if missed is not None:
         parts.append(Details("Rays of the points beside the centres", [missed]))
     if "absolute_orientation" in model:
-        parts += terminal_parts(tables.ground_table(model["absolute_orientation"]))
-    parts += terminal_parts(tables.truth_table(model["truth"]))
+        parts += terminal_parts(session_tables.ground_table(model["absolute_orientation"]))
+    parts += terminal_parts(session_tables.truth_table(model["truth"]))
     return Chapter(title, parts)
 
 
 def _of_strip(strip: Document, places: Places, title: str, name: str) -> Chapter:
     shown = [] if "message" in strip else _strip_figures(strip, places, title, name)
-    return Chapter(title, [*shown, *terminal_parts(*tables.strip_tables(strip), caption=title)])
+    return Chapter(title, [*shown, *terminal_parts(*session_tables.strip_tables(strip), caption=title)])
 
 
 def _strip_figures(strip: Document, places: Places, title: str, name: str) -> list[Part]:
@@ -96,7 +96,7 @@ def _of_all_strips(document: Document) -> Chapter:
     figures = [all_strips(document["strips"], "all")] if document["strips"] else []
     spent = {f"case {case}": each["hours"] for case, each in document["sessions"].items()}
     times = [hours(spent, "cases", "Hours at the instrument by case")] if spent else []
-    return Chapter("Strips of all cases", [*figures, *terminal_parts(tables.strips_table(document)), *times])
+    return Chapter("Strips of all cases", [*figures, *terminal_parts(session_tables.strips_table(document)), *times])
 
 
 def _of_calibration(kept: SessionFolder) -> Chapters:
@@ -150,7 +150,7 @@ def _of_operator(kept: SessionFolder) -> Chapters:
                 [(what, f"{each:.4f}") for what, each in operator[key].items()],
             )
         )
-    parts += terminal_parts(tables.hours_table(operator))
+    parts += terminal_parts(session_tables.hours_table(operator))
     parts += terminal_parts(*(Text(remark) for remark in operator["remarks"]))
     slips = kept.document["truth"]["slips"]
     if slips:

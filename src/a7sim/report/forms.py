@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from a7sim.errors import A7SimError
-from a7sim.operator.observation_book import BookEntry
+from a7sim.journal.session_files import BOOK
+from a7sim.operator.people.observation_book import BookEntry
 from a7sim.report.page import Paragraph, Part, TableBlock
 from a7sim.report.session_folder import SessionFolder
 from a7sim.result_documents import Document
-from a7sim.session.session_files import BOOK
 
 PAGE_BREAK = "\f"
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import msgspec
 
 from a7sim.errors import A7SimError
-from a7sim.operator.observation_book import COLUMNS, BookEntry
+from a7sim.journal.session_files import BOOK, JOURNAL, RESULTS
+from a7sim.operator.people.observation_book import COLUMNS, BookEntry
 from a7sim.result_documents import SCHEMA_VERSION, Document
-from a7sim.session.session_files import BOOK, JOURNAL, RESULTS
 from a7sim.table_files import read_text
 
 COMMANDS = ("run", "calibrate", "compile", "bridge")

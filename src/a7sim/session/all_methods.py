@@ -4,20 +4,20 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from a7sim.errors import A7SimError
+from a7sim.journal.session_files import MODELS_OF_WAY, RESULTS, STRIP_OF_WAY, prepare_folder, write_atomic
+from a7sim.journal.writer import JournalOptions
 from a7sim.reduction import Undetermined
 from a7sim.result_documents import Document, as_json, differences_document
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene, SharedScene, build_scene
 from a7sim.session import results
-from a7sim.session.a8_strip import strip_on_a8
-from a7sim.session.a8_vs_comparator import coordinate_differences
 from a7sim.session.bridge import BridgeResult, bridge_batch, bridge_over_link
-from a7sim.session.comparator import StripResult, strip_by_comparator
-from a7sim.session.journal import JournalOptions
 from a7sim.session.running import PortAdapter, ProgressCallbacks, direct, run
 from a7sim.session.session_batch import open_batch
-from a7sim.session.session_files import MODELS_OF_WAY, RESULTS, STRIP_OF_WAY, prepare_folder, write_atomic
-from a7sim.session.strips import oriented_strip_document
+from a7sim.strip_methods.a8_strip import strip_on_a8
+from a7sim.strip_methods.a8_vs_comparator import coordinate_differences
+from a7sim.strip_methods.comparator import StripResult, strip_by_comparator
+from a7sim.strip_methods.strip import oriented_strip_document
 
 
 def run_all_methods(

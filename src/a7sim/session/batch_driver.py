@@ -8,7 +8,7 @@ import numpy.typing as npt
 from a7sim.batch import Indices
 from a7sim.geometry import Array
 from a7sim.instrument.autograph_batch import AutographBatch
-from a7sim.operator.driver import BoolArray
+from a7sim.operator.driving.driver import BoolArray
 
 
 class BatchDriver:

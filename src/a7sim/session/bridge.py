@@ -10,20 +10,20 @@ from rich.text import Text
 
 import a7sim
 from a7sim.errors import A7SimError
+from a7sim.journal.session_files import MODELS, RESULTS, write_atomic
+from a7sim.journal.writer import Journal, JournalOptions, make_header
 from a7sim.operator import OperatorGaveUp
-from a7sim.operator.bridging import BridgedModels, bridge_strip, bridge_strip_batch
+from a7sim.operator.procedures.bridging import BridgedModels, bridge_strip, bridge_strip_batch
 from a7sim.reduction import Ground, Model, Strip, Undetermined, absolute_orientation, strip_adjustment
 from a7sim.result_documents import Document, absolute_document, adjustment_document, as_json, document_header
 from a7sim.scenario import Scenario, amend_provenance
 from a7sim.scene import Scene
-from a7sim.session.comparator import StripResult
-from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.lifecycle import recorded_session
 from a7sim.session.results import hours_document, models_csv, request_document
 from a7sim.session.running import ProgressCallbacks, open_session, run
 from a7sim.session.session_batch import open_batch
-from a7sim.session.session_files import MODELS, RESULTS, write_atomic
-from a7sim.session.strips import OrientedStrip, ground_control
+from a7sim.strip_methods.comparator import StripResult
+from a7sim.strip_methods.strip import OrientedStrip, ground_control
 from a7sim.text_tables import text_table
 
 INDEPENDENT = "independent"

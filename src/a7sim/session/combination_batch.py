@@ -12,7 +12,7 @@ from a7sim.reduction import Ground, GroundFit, Model, Strip, Undetermined, forme
 from a7sim.reduction.absolute import fitted_to_ground, root_mean_square
 from a7sim.result_documents import Document
 from a7sim.scenario.schema import StripPlan
-from a7sim.session.strips import models_from_documents, orient_strip, oriented_strip_document
+from a7sim.strip_methods.strip import models_from_documents, orient_strip, oriented_strip_document
 
 CHUNK_SIZE = 64
 """Replicates on one array, so that memory stays small."""

@@ -12,19 +12,19 @@ import numpy as np
 import a7sim
 from a7sim.errors import A7SimError
 from a7sim.geometry import Array, length_of
-from a7sim.operator.map_lines import CONTOUR, LineTarget, TracedLine, Tracing
-from a7sim.operator.plotting import TABLE_GEARS, CompiledMap, MapRequest, compile_map
+from a7sim.journal.session_files import GEOJSON, SVG
+from a7sim.journal.writer import Journal, JournalOptions, make_header
+from a7sim.operator.mapping.map_lines import CONTOUR, LineTarget, TracedLine, Tracing
+from a7sim.operator.mapping.plotting import TABLE_GEARS, CompiledMap, MapRequest, compile_map
 from a7sim.plotters import BASE_COMPONENTS, VARIANTS
 from a7sim.result_documents import Document, absolute_document, document_header
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
-from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.lifecycle import recorded_session
 from a7sim.session.map_svg import to_geojson, to_svg
 from a7sim.session.results import request_document
 from a7sim.session.running import ProgressCallbacks, Session, open_session
-from a7sim.session.session_files import GEOJSON, SVG
-from a7sim.session.strips import given_control
+from a7sim.strip_methods.strip import given_control
 
 OLD_MAP_M = 5.0
 """What an operator is told of a line comes from an old map, to the nearest so many metres."""

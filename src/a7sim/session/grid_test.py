@@ -13,17 +13,17 @@ import a7sim
 from a7sim.geometry import GON, angles_of
 from a7sim.instrument import Autograph
 from a7sim.instrument.condition import draw_condition
-from a7sim.operator.controls import side_name, wrap_gon
-from a7sim.operator.grid_test import GridTestPlan, ProjectorReadings, measure_grid
+from a7sim.journal.session_files import RESIDUALS
+from a7sim.journal.writer import Journal, JournalOptions, make_header
+from a7sim.operator.driving.controls import side_name, wrap_gon
+from a7sim.operator.procedures.grid_test import GridTestPlan, ProjectorReadings, measure_grid
 from a7sim.reduction import Adjustment
 from a7sim.reduction.grid_test import UNKNOWNS
 from a7sim.result_documents import Document, document_header, statistics_document
 from a7sim.scenario import Condition, Scenario
-from a7sim.session.journal import Journal, JournalOptions, make_header
 from a7sim.session.lifecycle import recorded_session
 from a7sim.session.results import request_document
 from a7sim.session.running import ProgressCallbacks, open_session
-from a7sim.session.session_files import RESIDUALS
 from a7sim.table_files import to_csv
 from a7sim.text import pluralize
 from a7sim.text_tables import text_table

@@ -8,12 +8,12 @@ from typing import Protocol
 
 from a7sim.errors import A7SimError
 from a7sim.instrument.language import SharedInstrument
+from a7sim.journal.session_files import BOOK, RESULTS, write_atomic
+from a7sim.journal.writer import Header, Journal
 from a7sim.operator import OperatorGaveUp, Person
 from a7sim.reduction import Undetermined
 from a7sim.result_documents import Document, as_json
-from a7sim.session.journal import Header, Journal
 from a7sim.session.results import operator_document, slips_document
-from a7sim.session.session_files import BOOK, RESULTS, write_atomic
 
 
 class SeatedOperator(Protocol):

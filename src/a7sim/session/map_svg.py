@@ -10,8 +10,8 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from a7sim.geometry import Array, length_of
-from a7sim.operator.map_lines import CONTOUR, TracedLine
-from a7sim.operator.plotting import CompiledMap
+from a7sim.operator.mapping.map_lines import CONTOUR, TracedLine
+from a7sim.operator.mapping.plotting import CompiledMap
 
 INDEX_EVERY = 5
 """Every so manieth contour of an equal interval is drawn heavier and has its height written on it."""

@@ -9,8 +9,8 @@ import msgspec
 import a7sim
 from a7sim.geometry import Array
 from a7sim.operator import ModelRecord, Person
-from a7sim.operator.absolute import GroundOrientation
-from a7sim.operator.timesheet import Timesheet
+from a7sim.operator.people.timesheet import Timesheet
+from a7sim.operator.procedures.absolute import GroundOrientation
 from a7sim.reduction import Model, PerspectiveCentre
 from a7sim.result_documents import Document, document_header
 from a7sim.scenario import Scenario, ScenarioWithProvenance

@@ -8,18 +8,7 @@ from pathlib import Path
 from a7sim.errors import A7SimError
 from a7sim.instrument import Autograph, build_autograph
 from a7sim.instrument.language import Listener, SharedInstrument
-from a7sim.link.client import Client, Port
-from a7sim.link.clock import Clock
-from a7sim.link.inprocess import InProcessSerial
-from a7sim.operator import Job, ModelJob, Person, measure_models
-from a7sim.reduction import Ground, Model, Undetermined
-from a7sim.result_documents import Document, as_json
-from a7sim.scenario import Scenario
-from a7sim.scene import Scene, build_scene
-from a7sim.session import results
-from a7sim.session.journal import Journal, JournalOptions, make_header
-from a7sim.session.lifecycle import recorded_session
-from a7sim.session.session_files import (
+from a7sim.journal.session_files import (
     CARD_KEY,
     CARDS,
     MODELS,
@@ -28,7 +17,19 @@ from a7sim.session.session_files import (
     STRIP,
     write_atomic,
 )
-from a7sim.session.strips import (
+from a7sim.journal.writer import Journal, JournalOptions, make_header
+from a7sim.link.client.client import Client, Port
+from a7sim.link.clock import Clock
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.operator import Job, ModelJob, Person, measure_models
+from a7sim.reduction import Ground, Model, Undetermined
+from a7sim.result_documents import Document, as_json
+from a7sim.scenario import Scenario
+from a7sim.scene import Scene, build_scene
+from a7sim.session import results
+from a7sim.session.lifecycle import recorded_session
+from a7sim.session.truth import TruthComparison
+from a7sim.strip_methods.strip import (
     OrientedStrip,
     given_control,
     ground_control,
@@ -37,7 +38,6 @@ from a7sim.session.strips import (
     oriented_strip_document,
     strip_cards,
 )
-from a7sim.session.truth import TruthComparison
 from a7sim.table_files import to_csv
 
 PortAdapter = Callable[[InProcessSerial], Port]

@@ -5,18 +5,18 @@ from dataclasses import dataclass
 
 from a7sim.instrument.autograph_batch import AutographBatch, build_batch
 from a7sim.operator import Job
-from a7sim.operator.models import ModelRecordBatch, measure_models_batch
-from a7sim.operator.operator_batch import OperatorBatch
-from a7sim.operator.random_draws import OperatorRandom
-from a7sim.operator.workstation import Workstation
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.people.operator_batch import OperatorBatch
+from a7sim.operator.people.random_draws import OperatorRandom
+from a7sim.operator.procedures.models import ModelRecordBatch, measure_models_batch
 from a7sim.result_documents import Document
 from a7sim.scenario import Scenario
 from a7sim.scene import RelativeTruth, Scene, SharedScene
 from a7sim.session import results
 from a7sim.session.batch_driver import BatchDriver
 from a7sim.session.running import make_job, strip_document
-from a7sim.session.strips import ground_control
 from a7sim.session.truth import TruthComparison
+from a7sim.strip_methods.strip import ground_control
 
 
 @dataclass(frozen=True)

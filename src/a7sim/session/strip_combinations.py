@@ -8,6 +8,8 @@ from pathlib import Path
 import msgspec
 
 from a7sim.errors import A7SimError
+from a7sim.journal.session_files import RESULTS, STRIPS, write_atomic
+from a7sim.journal.writer import JournalOptions, make_header, write_header_only
 from a7sim.operator import ModelJob
 from a7sim.reduction import Ground, Model, Undetermined
 from a7sim.result_documents import Document, as_json
@@ -15,11 +17,9 @@ from a7sim.scenario import Scenario, amend_provenance
 from a7sim.scenario.schema import StripPlan
 from a7sim.scene import build_scene
 from a7sim.session import results
-from a7sim.session.journal import JournalOptions, make_header, write_header_only
 from a7sim.session.running import ProgressCallbacks, make_job, run
-from a7sim.session.session_files import RESULTS, STRIPS, write_atomic
-from a7sim.session.strips import ground_control, models_from_documents, orient_strip, oriented_strip_document
 from a7sim.standard_points import CASES
+from a7sim.strip_methods.strip import ground_control, models_from_documents, orient_strip, oriented_strip_document
 
 MAX_STRIPS = 700
 """Strips of one command: five cases in up to four models."""

@@ -5,8 +5,8 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from a7sim.errors import A7SimError
+from a7sim.journal.session_files import RESULTS, write_atomic
 from a7sim.result_documents import Document, as_json
-from a7sim.session.session_files import RESULTS, write_atomic
 from a7sim.study import checkpoint
 from a7sim.study.loading import LoadedStudy
 from a7sim.study.page import study_page

@@ -12,8 +12,8 @@ from a7sim.scene import build_scene
 from a7sim.session.all_methods import run_all_methods, run_all_methods_batch
 from a7sim.session.combination_batch import Cases, Replicate, cases_of_strips, combine_strips
 from a7sim.session.strip_combinations import with_case
-from a7sim.session.strips import ground_control
 from a7sim.standard_points import CASES
+from a7sim.strip_methods.strip import ground_control
 from a7sim.study.responses import find_response, is_path, needs_strip
 
 _STREAM = 9

@@ -15,7 +15,7 @@ import numpy as np
 
 from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array, near_vertical_parallax_coefficients
 from a7sim.operator import ModelJob
-from a7sim.operator.relative import unknown_elements
+from a7sim.operator.procedures.relative import unknown_elements
 from a7sim.plotters import LEAST_COUNT, VARIANTS
 from a7sim.reduction import perspective_centre
 from a7sim.reduction.least_squares import solve_least_squares

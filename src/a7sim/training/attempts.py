@@ -6,10 +6,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from a7sim.errors import A7SimError
-from a7sim.session.journal_format import read_journal
-from a7sim.session.script_runner import ScriptRunner
-from a7sim.session.scripts import Script, read_script
-from a7sim.session.session_files import JOURNAL, write_atomic
+from a7sim.journal.format import read_journal
+from a7sim.journal.script_runner import ScriptRunner
+from a7sim.journal.scripts import Script, read_script
+from a7sim.journal.session_files import JOURNAL, write_atomic
 from a7sim.table_files import read_text
 from a7sim.training.attempt_record import parse_answers
 from a7sim.training.environment import AttemptEnvironment, open_environment, resume_environment

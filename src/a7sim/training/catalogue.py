@@ -12,7 +12,7 @@ from a7sim.scenario.validation import schema_errors
 from a7sim.table_files import read_toml
 from a7sim.training.exercise import Exercise, ExerciseFolder, MetricSpec
 from a7sim.training.handouts import HANDOUTS
-from a7sim.training.measures import MEASURES, make_metric
+from a7sim.training.metrics import MEASURES, make_metric
 from a7sim.training.procedures import PROCEDURES
 
 SEARCH_PATH = bundled_dirs("exercises")

@@ -8,15 +8,15 @@ from pathlib import Path
 from msgspec.structs import replace as changed
 
 from a7sim.errors import A7SimError
+from a7sim.journal.scripts import Script, SendLine, read_script
 from a7sim.scenario import Scenario
-from a7sim.session.scripts import Script, SendLine, read_script
 from a7sim.text import pluralize
 from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.attempts import run_attempt, seed_for
 from a7sim.training.dry_runs import DryRuns
 from a7sim.training.exercise import FULL_MARKS, Exercise, ExerciseFolder
 from a7sim.training.grading import Grade, evaluate_metrics, grade_by, load_record
-from a7sim.training.measures import MetricResult, make_metric
+from a7sim.training.metrics import MetricResult, make_metric
 from a7sim.training.variation import scenario_for
 
 MIN_HINTS, MIN_FAULTY = 2, 2

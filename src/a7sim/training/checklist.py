@@ -6,7 +6,7 @@ from pathlib import Path
 from a7sim.training.attempts import ANSWERS, HINTS, written_answers
 from a7sim.training.environment import AttemptEnvironment
 from a7sim.training.exercise import Exercise
-from a7sim.training.measures import make_metric
+from a7sim.training.metrics import make_metric
 from a7sim.training.progress import EXAM, Attempt
 
 TICKED, OPEN = "[x]", "[ ]"

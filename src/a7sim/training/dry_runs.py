@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from a7sim.session.scripts import Script
+from a7sim.journal.scripts import Script
 from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.attempts import play_item, play_script, run_opening, seed_for
 from a7sim.training.environment import AttemptEnvironment, dry_run_environment

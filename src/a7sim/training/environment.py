@@ -9,13 +9,13 @@ from typing import Any
 
 from a7sim.errors import A7SimError
 from a7sim.instrument.language import LinkEvent, Listener, SharedInstrument
+from a7sim.journal.format import JournalFile, read_journal
+from a7sim.journal.replay import Replay, ReplayDifference, replay_lines
+from a7sim.journal.session_files import JOURNAL
+from a7sim.journal.writer import Header, Journal, JournalOptions, make_header_without_scenario, software_version
 from a7sim.link.clock import Clock
 from a7sim.scenario import Scenario, hash_scenario
 from a7sim.scene import Scene, build_scene
-from a7sim.session.journal import Header, Journal, JournalOptions, make_header_without_scenario, software_version
-from a7sim.session.journal_format import JournalFile, read_journal
-from a7sim.session.replaying import Replay, ReplayDifference, replay_lines
-from a7sim.session.session_files import JOURNAL
 from a7sim.training.action_log import ActionLog, LoggedAutograph
 from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.exercise import ExerciseFolder

@@ -7,14 +7,14 @@ from pathlib import Path
 import msgspec
 
 from a7sim.errors import A7SimError
-from a7sim.session.journal_format import read_journal
-from a7sim.session.session_files import JOURNAL
+from a7sim.journal.format import read_journal
+from a7sim.journal.session_files import JOURNAL
 from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.attempts import written_answers
 from a7sim.training.environment import AttemptEnvironment, UnreliableJournalError, replay_environment
 from a7sim.training.exercise import FULL_MARKS, Criterion, Exercise, ExerciseFolder
 from a7sim.training.handouts import make_handout
-from a7sim.training.measures import MetricResult, make_metric
+from a7sim.training.metrics import MetricResult, make_metric
 
 JUST_PASSED = 0.6
 """Share of its weight that a criterion earns at the limit of its pass band; from there it rises to all of it."""

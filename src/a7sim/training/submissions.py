@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from a7sim.errors import A7SimError
-from a7sim.session.session_files import JOURNAL
+from a7sim.journal.session_files import JOURNAL
 from a7sim.training.attempts import attempt_mode, written_hints
 from a7sim.training.catalogue import find_exercise
 from a7sim.training.grading import Grade, HintsTaken, grade_folder

@@ -7,13 +7,13 @@ from typing import Any, Literal
 import click
 from rich.console import Console
 
-from a7sim import computing
+from a7sim import processing
 from a7sim.cli.options import FILE, HEIGHT, Number, principal_distance
 from a7sim.cli.reduce import options, tables
-from a7sim.computing import ProcessingResult
-from a7sim.computing.interior import FlightHeights
-from a7sim.computing.strips import PairCamera
 from a7sim.errors import A7SimError
+from a7sim.processing import ProcessingResult
+from a7sim.processing.interior import FlightHeights
+from a7sim.processing.strips import PairCamera
 from a7sim.reduction.strips import JoinMethod
 from a7sim.result_documents import Document, as_json
 
@@ -56,7 +56,7 @@ def command() -> None:
 )
 @click.option(
     "--correct",
-    type=click.Choice(computing.CORRECTIONS),
+    type=click.Choice(processing.CORRECTIONS),
     multiple=True,
     help="Correct the points and bring them to the principal point; may be given several times.",
 )
@@ -85,7 +85,7 @@ def interior(
             f"--flying-height: expected more than the ground height of {ground_height:g} m, got {flying_height:g}"
         )
     flight = None if flying_height is None else FlightHeights(flying_height, ground_height)
-    outcome = computing.interior(counts, camera, method, count_mm, correct, flight)
+    outcome = processing.interior(counts, camera, method, count_mm, correct, flight)
     _deliver(outcome, as_document, out, tables.interior_tables)
 
 
@@ -103,7 +103,7 @@ def interior(
 )
 @click.option(
     "--method",
-    type=click.Choice(computing.RELATIVE_METHODS),
+    type=click.Choice(processing.RELATIVE_METHODS),
     default="coplanarity",
     show_default=True,
     help="robust takes out the points with blunders and names them; all sets the methods side by side.",
@@ -116,7 +116,7 @@ def relative(
     y0: float,
     bx: float,
     unknowns: Literal["independent", "dependent"],
-    method: computing.RelativeMethod,
+    method: processing.RelativeMethod,
     out: Path | None,
     as_document: bool,
 ) -> None:
@@ -126,13 +126,13 @@ def relative(
 
     Example: a7sim reduce relative scenarios/dewitt-pair.csv --c 152.113
     """
-    _deliver(computing.relative(pair, c, (x0, y0), unknowns, bx, method), as_document, out, tables.relative_tables)
+    _deliver(processing.relative(pair, c, (x0, y0), unknowns, bx, method), as_document, out, tables.relative_tables)
 
 
 @command.command("centres")
 @click.argument("pointings", type=FILE)
 @click.option(
-    "--method", type=click.Choice(computing.CENTRE_METHODS), default="two-levels", show_default=True, help="See above."
+    "--method", type=click.Choice(processing.CENTRE_METHODS), default="two-levels", show_default=True, help="See above."
 )
 @click.option("--z1", type=HEIGHT, default=4900.0, show_default=True, help="Z-counter reading of X1, Y1.")
 @click.option("--z2", type=HEIGHT, default=5100.0, show_default=True, help="Z-counter reading of X2, Y2.")
@@ -140,7 +140,7 @@ def relative(
 @options.documented
 def centres(
     pointings: Path,
-    method: computing.CentreMethod,
+    method: processing.CentreMethod,
     z1: float,
     z2: float,
     c: float | None,
@@ -157,25 +157,25 @@ def centres(
 
     Example: a7sim reduce centres pointings.csv --z1 4900 --z2 5100
     """
-    _deliver(computing.centres(pointings, z1, z2, method, c), as_document, out, tables.centres_tables)
+    _deliver(processing.centres(pointings, z1, z2, method, c), as_document, out, tables.centres_tables)
 
 
 @command.command("similarity")
 @click.argument("common", type=FILE)
 @click.option(
     "--method",
-    type=click.Choice(computing.SIMILARITY_METHODS),
+    type=click.Choice(processing.SIMILARITY_METHODS),
     default="iteration",
     show_default=True,
     help="both sets the methods side by side.",
 )
 @options.documented
-def similarity(common: Path, method: computing.SimilarityMethod, out: Path | None, as_document: bool) -> None:
+def similarity(common: Path, method: processing.SimilarityMethod, out: Path | None, as_document: bool) -> None:
     """Compute the similarity of COMMON (point,x,y,z,X,Y,Z): X = scale R x + T.
 
     Example: a7sim reduce similarity common.csv --method both
     """
-    _deliver(computing.similarity(common, method), as_document, out, tables.similarity_tables)
+    _deliver(processing.similarity(common, method), as_document, out, tables.similarity_tables)
 
 
 @command.command("connect")
@@ -189,7 +189,7 @@ def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_d
 
     Example: a7sim reduce connect models.csv --method centre
     """
-    _deliver(computing.connect(models, method), as_document, out, tables.connection_tables)
+    _deliver(processing.connect(models, method), as_document, out, tables.connection_tables)
 
 
 @command.command("strip")
@@ -229,7 +229,7 @@ def strip(
     """
     degree: Literal[2, 3] | None = None if polynomial is None else 2 if polynomial == "2" else 3
     camera = None if c is None else PairCamera(c, (x0, y0), bx)
-    outcome = computing.strip(file, ground, camera, method, degree, against)
+    outcome = processing.strip(file, ground, camera, method, degree, against)
     _deliver(outcome, as_document, out, tables.strip_tables)
 
 
@@ -243,7 +243,7 @@ def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, 
 
     Example: a7sim reduce absolute model.csv --ground ground.csv
     """
-    _deliver(computing.absolute(model, ground, against), as_document, out, tables.absolute_tables)
+    _deliver(processing.absolute(model, ground, against), as_document, out, tables.absolute_tables)
 
 
 @command.command("block")
@@ -272,14 +272,14 @@ def block(
 
     Example: a7sim reduce block strip1.csv strip2.csv --ground ground.csv
     """
-    _deliver(computing.block(models, ground, height_weight, against), as_document, out, tables.block_tables)
+    _deliver(processing.block(models, ground, height_weight, against), as_document, out, tables.block_tables)
 
 
 def _deliver(
     outcome: ProcessingResult, as_document: bool, out: Path | None, shown: Callable[[Document], list[Any]]
 ) -> None:
     """Write an outcome where it is wanted and print it, as JSON or as the table a surveyor files."""
-    document = outcome.document if out is None else computing.write_result(outcome, out)
+    document = outcome.document if out is None else processing.write_result(outcome, out)
     if as_document:
         click.echo(as_json(document), nl=False)
         return

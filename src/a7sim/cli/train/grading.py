@@ -10,8 +10,8 @@ from a7sim.cli import EXIT_DIFFERS, options
 from a7sim.cli.completers import exercise_argument
 from a7sim.cli.train.options import last_attempt, progress_in, student_name, student_options
 from a7sim.errors import A7SimError
+from a7sim.journal.session_files import JOURNAL
 from a7sim.result_documents import as_json, document_header
-from a7sim.session.session_files import JOURNAL
 from a7sim.training.attempts import ANSWERS
 from a7sim.training.catalogue import find_exercise
 from a7sim.training.environment import UnreliableJournalError

@@ -8,11 +8,11 @@ from textwrap import fill
 from a7sim.cli.console import KEYMAP
 from a7sim.cli.prompt import data_folder
 from a7sim.errors import A7SimError
-from a7sim.link.client import Client
+from a7sim.journal.format import Event, read_journal
+from a7sim.journal.session_files import JOURNAL
+from a7sim.link.client.client import Client
+from a7sim.link.client.ports import TIMEOUT_S
 from a7sim.link.inprocess import InProcessSerial
-from a7sim.link.ports import TIMEOUT_S
-from a7sim.session.journal_format import Event, read_journal
-from a7sim.session.session_files import JOURNAL
 from a7sim.training.checklist import Checklist
 from a7sim.training.environment import AttemptEnvironment
 from a7sim.training.exercise import OPENING
@@ -30,11 +30,11 @@ def open_console(environment: AttemptEnvironment, checklist: Checklist, plain: b
         from a7sim.console.app import Console  # only who sits down loads the screen
     except ImportError as error:
         raise A7SimError("start: expected textual to be installed: pip install 'a7sim[console]'") from error
+    from a7sim.console.actions.preset_recovery import LoggedLine
     from a7sim.console.config import ConsoleConfig
-    from a7sim.console.job_sheet import JobSheet
+    from a7sim.console.drawing.job_sheet import JobSheet
+    from a7sim.console.drawing.rasterize import DrawingMode
     from a7sim.console.keymap import default_keymap, load_keymap
-    from a7sim.console.preset_recovery import LoggedLine
-    from a7sim.console.rasterize import DrawingMode
 
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise A7SimError("start: expected a terminal to sit at, got a file or a pipe (--script and --link need none)")

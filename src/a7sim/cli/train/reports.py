@@ -9,8 +9,8 @@ from a7sim.cli import options
 from a7sim.cli.completers import exercise_argument
 from a7sim.cli.train.options import progress_in, student_name, student_options
 from a7sim.errors import A7SimError
+from a7sim.journal.session_files import write_atomic
 from a7sim.result_documents import Document, as_json, document_header
-from a7sim.session.session_files import write_atomic
 from a7sim.text import pluralize
 from a7sim.text_tables import text_table
 from a7sim.training.catalogue import all_exercises, find_exercise

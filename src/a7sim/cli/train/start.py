@@ -12,14 +12,14 @@ from a7sim.cli.serve import USUAL, ServedInstrument, StartupMessages, serve
 from a7sim.cli.train.open_console import open_console
 from a7sim.cli.train.options import progress_in, student_name, student_options
 from a7sim.errors import A7SimError
-from a7sim.link.addresses import Address, parse_address
-from a7sim.link.client_session import ServerLimits
-from a7sim.link.event_loop import run
-from a7sim.link.serving import Endpoints
+from a7sim.journal.scripts import read_script
+from a7sim.journal.session_files import JOURNAL
+from a7sim.journal.writer import Journal
+from a7sim.link.server.addresses import Address, parse_address
+from a7sim.link.server.client_session import ServerLimits
+from a7sim.link.server.event_loop import run
+from a7sim.link.server.serving import Endpoints
 from a7sim.result_documents import document_header
-from a7sim.session.journal import Journal
-from a7sim.session.scripts import read_script
-from a7sim.session.session_files import JOURNAL
 from a7sim.training.attempts import play_script, resume_attempt, start_attempt
 from a7sim.training.catalogue import find_exercise
 from a7sim.training.checklist import Checklist

@@ -5,7 +5,7 @@ import math
 from a7sim.reduction import Ground
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.strips import given_control
+from a7sim.strip_methods.strip import given_control
 from a7sim.table_files import to_csv
 from a7sim.training.handouts.base import Handout, handout
 

@@ -12,8 +12,8 @@ from a7sim.reduction import Ground, Model
 from a7sim.reduction.strips import formed_strip, is_centre
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.comparator import strip_by_comparator
-from a7sim.session.strips import given_control, orient_strip
+from a7sim.strip_methods.comparator import strip_by_comparator
+from a7sim.strip_methods.strip import given_control, orient_strip
 from a7sim.table_files import to_csv
 from a7sim.training.handouts.base import Handout, handout
 from a7sim.training.handouts.control import control_csv

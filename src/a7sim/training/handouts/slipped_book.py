@@ -10,10 +10,10 @@ from typing import get_args
 import numpy as np
 
 from a7sim.errors import A7SimError
-from a7sim.operator.fittings import required_fittings
-from a7sim.operator.observation_book import BookEntry
-from a7sim.operator.relative import GROSS_MM, compute_corrections, unknown_elements
-from a7sim.operator.slips import neighbours, transpositions
+from a7sim.operator.driving.fittings import required_fittings
+from a7sim.operator.people.observation_book import BookEntry
+from a7sim.operator.people.slips import neighbours, transpositions
+from a7sim.operator.procedures.relative import GROSS_MM, compute_corrections, unknown_elements
 from a7sim.plotters import POSITIONS_OF
 from a7sim.scenario import Scenario
 from a7sim.scenario.schema import SlipKind

@@ -6,16 +6,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from a7sim.errors import A7SimError
-from a7sim.link.client import Client
+from a7sim.link.client.client import Client
 from a7sim.link.headers import quote_text, registration_word
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.operator import Job, ModelJob, OperatorGaveUp, Person, measure_models
-from a7sim.operator.interior import InteriorOrientationBatch
-from a7sim.operator.models import load_prints, mount_photographs, orient_model, set_base_and_fittings
-from a7sim.operator.observation_book import BookEntry
-from a7sim.operator.operator_batch import OperatorBatch
-from a7sim.operator.scpi_driver import ScpiDriver
-from a7sim.operator.workstation import Workstation
+from a7sim.operator.driving.scpi_driver import ScpiDriver
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.people.observation_book import BookEntry
+from a7sim.operator.people.operator_batch import OperatorBatch
+from a7sim.operator.procedures.interior import InteriorOrientationBatch
+from a7sim.operator.procedures.models import load_prints, mount_photographs, orient_model, set_base_and_fittings
 from a7sim.plotters import VARIANTS
 from a7sim.reduction import Undetermined
 from a7sim.session.running import make_job

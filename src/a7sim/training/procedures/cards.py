@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from a7sim.computing.strips import strip
+from a7sim.processing.strips import strip
 from a7sim.reduction import Ground, Model, deck_lines
 from a7sim.reduction.strips import is_centre
 from a7sim.result_documents import Document

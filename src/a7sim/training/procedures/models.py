@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from a7sim.operator.absolute import absolute_orientation_at
-from a7sim.operator.bridging import copy_common_photo_orientation, extend_strip, transfer_scale
-from a7sim.operator.job import ModelJob
-from a7sim.operator.models import load_prints, mount_photographs, orient_model, set_base_and_fittings
-from a7sim.operator.relative import relative_orientation
+from a7sim.operator.driving.job import ModelJob
+from a7sim.operator.procedures.absolute import absolute_orientation_at
+from a7sim.operator.procedures.bridging import copy_common_photo_orientation, extend_strip, transfer_scale
+from a7sim.operator.procedures.models import load_prints, mount_photographs, orient_model, set_base_and_fittings
+from a7sim.operator.procedures.relative import relative_orientation
 from a7sim.training.attempt_record import ANSWER
 from a7sim.training.procedures.base import ProcedureContext, misplace_fittings, perturb_elements, procedure
 

@@ -6,12 +6,12 @@ from typing import Literal
 import numpy as np
 
 from a7sim.geometry import Array
-from a7sim.operator.centres import centre_of, observe_centre
-from a7sim.operator.controls import side_name
-from a7sim.operator.empirical import empirical_orientation
-from a7sim.operator.models import orient_model
-from a7sim.operator.relative import compute_corrections, unknown_elements
-from a7sim.operator.workstation import Parallaxes
+from a7sim.operator.driving.controls import side_name
+from a7sim.operator.driving.workstation import Parallaxes
+from a7sim.operator.procedures.centres import centre_of, observe_centre
+from a7sim.operator.procedures.empirical import empirical_orientation
+from a7sim.operator.procedures.models import orient_model
+from a7sim.operator.procedures.relative import compute_corrections, unknown_elements
 from a7sim.standard_points import CASES
 from a7sim.training.attempt_record import ANSWER
 from a7sim.training.procedures.base import ProcedureContext, misplace_fittings, perturb_elements, procedure

@@ -1,8 +1,8 @@
 """The grid test of a projector by few crosses."""
 
 from a7sim.geometry import GON
-from a7sim.operator.grid_test import GridTestPlan, measure_grid_batch
-from a7sim.operator.workstation import Workstation
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.procedures.grid_test import GridTestPlan, measure_grid_batch
 from a7sim.training.attempt_record import ANSWER
 from a7sim.training.procedures.base import ProcedureContext, procedure
 

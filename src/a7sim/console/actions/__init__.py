@@ -1,0 +1,1 @@
+"""Actions of the console, one module a group of keys."""

@@ -1,0 +1,62 @@
+"""What all deeds have in common: the console they are done at, and readings that somebody types in."""
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, cast
+
+from a7sim.console.state.readouts import Readouts
+from a7sim.console.state.selection import ControlSelection
+from a7sim.console.widgets.dialogs import Ask
+from a7sim.plotters import Variant
+
+if TYPE_CHECKING:
+    from a7sim.console.app import Console
+
+PROJECTORS = {1: "left", 2: "right"}
+
+_READING = r"([XYZ])\s*=?\s*([-+]?[0-9]*\.?[0-9]+)"
+
+
+class ActionBase:
+    """Somebody at a console, the only class that has these deeds."""
+
+    @property
+    def _console(self) -> "Console":
+        return cast("Console", self)
+
+    def _at(self) -> tuple[Variant, Readouts]:
+        console = self._console
+        assert console.met is not None and console.dials is not None
+        return console.met.variant, console.dials
+
+    def _hold(self, selection: ControlSelection) -> None:
+        console = self._console
+        console.selection = selection
+        console.refresh_panels()
+
+    def _ask_number(self, question: str, note: str, then: Callable[[float], None]) -> None:
+        console = self._console
+
+        def answered(answer: str | None) -> None:
+            if answer is None:
+                return
+            try:
+                then(float(answer))
+            except ValueError:
+                console.say(f"{question}: expected a number, got {answer!r}", refused=True)
+
+        console.push_screen(Ask(question, note=note), answered)
+
+    def _ask_axes(self, question: str, note: str, then: Callable[[list[tuple[str, str]]], None]) -> None:
+        console = self._console
+
+        def answered(answer: str | None) -> None:
+            if answer is None:
+                return
+            found = re.findall(_READING, answer.upper())
+            if not found or re.sub(_READING + r"[\s,;]*", "", answer.upper()).strip():
+                console.say(f"{question}: expected readings {note}, got {answer!r}", refused=True)
+            else:
+                then(found)
+
+        console.push_screen(Ask(question, note=note), answered)

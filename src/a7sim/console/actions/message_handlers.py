@@ -1,0 +1,147 @@
+"""What the station tells, and what becomes of it: what the console knows, the banner, the book, the first keys."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from textual.message import Message
+
+from a7sim.console.actions.base import ActionBase
+from a7sim.console.actions.navigation import CounterOrigins, fetch_sketch
+from a7sim.console.actions.preset_recovery import recover_presets
+from a7sim.console.drawing.descriptions import describe_error
+from a7sim.console.drawing.sketch import Place
+from a7sim.console.messages import CommandsRejected, Connected, ConnectionLost, StationMessage, ViewResult
+from a7sim.console.state.readouts import Readouts, unquote
+from a7sim.console.widgets.book import RecordedEntry, read_book
+from a7sim.console.widgets.playback import TICK_S
+from a7sim.link.client.client import Client
+
+
+class StationUpdate(Message):
+    """The station tells something."""
+
+    def __init__(self, news: StationMessage) -> None:
+        super().__init__()
+        self.news = news
+
+
+class AnswerReady(Message):
+    """Something that was asked has been answered: what is to be done with it."""
+
+    def __init__(self, then: Callable[[], None]) -> None:
+        super().__init__()
+        self.then = then
+
+
+class MessageHandlers(ActionBase):
+    """What is asked of the station, and told by it."""
+
+    def ask(self, work: Callable[[Client], Any], then: Callable[[Any], None]) -> None:
+        """Have something asked in the station's thread, and go on with the answer in the screen's."""
+        console = self._console
+
+        def order(client: Client) -> None:
+            answer = work(client)
+            console.post_message(AnswerReady(partial(then, answer)))
+
+        console.thread.submit(order)
+
+    def call_after_orders(self, then: Callable[[], None]) -> None:
+        """Go on when all that was ordered so far is said, and what came of it is known."""
+        self.ask(lambda _: None, lambda _: then())
+
+    def _tell(self, news: StationMessage) -> None:
+        self._console.post_message(StationUpdate(news))
+
+    def on_answer_ready(self, done: AnswerReady) -> None:
+        """Go on with an answer, unless the screen is gone."""
+        if self._console.main.is_there:
+            done.then()
+
+    def on_station_update(self, told: StationUpdate) -> None:
+        """Show what the station tells, unless the screen is gone."""
+        console = self._console
+        if not console.main.is_there:
+            return
+        match told.news:
+            case Connected():
+                self._meet(told.news)
+            case Readouts():
+                self._read(told.news)
+            case ViewResult():
+                console.sight = told.news
+                console.draw()
+            case CommandsRejected():
+                console.say(" · ".join(describe_error(error) for error in told.news.errors), refused=True)
+            case ConnectionLost():
+                self._lose(told.news)
+
+    def _meet(self, met: Connected) -> None:
+        console = self._console
+        first = console.met is None
+        console.met = met
+        console.selection = console.selection.valid_for(met.variant)
+        if console.silent is not None:
+            console.silent = None
+            console.say("the instrument answers again")
+        else:
+            console.say(console.config.greeting() or "l lays pictures; ? is help")
+        if first:
+            self._begin(met)
+        console.main.warn(None)
+        console.call_after_refresh(console.look)
+
+    def _begin(self, met: Connected) -> None:
+        """Take up what was there before anybody sat down here."""
+        console = self._console
+        past = console.config.history
+        watching = console.config.watching
+        self.ask(
+            lambda client: recover_presets(met.variant, past(), "" if watching else unquote(client.ask("GEAR:HEIG?"))),
+            self._recall,
+        )
+        if console.playback is not None:
+            console.playback.go_to(0)
+            console.set_interval(TICK_S, console.playback.tick)
+
+    def _recall(self, presets: CounterOrigins) -> None:
+        if presets != CounterOrigins():
+            self._console.presets = presets
+
+    def _lose(self, silent: ConnectionLost) -> None:
+        console = self._console
+        if silent != console.silent:
+            console.silent = silent
+            console.forget_early_keys()
+            if console.playback is not None:
+                console.playback.interrupted()
+            console.main.warn(f"The instrument does not answer: {silent.why}. Trying again every second; q leaves.")
+
+    def _read(self, dials: Readouts) -> None:
+        console = self._console
+        before, console.dials = console.dials, dials
+        for projector, picture in enumerate(dials.pictures, start=1):
+            if before is None or before.pictures[projector - 1] != picture:
+                self.ask(partial(fetch_sketch, projector, picture), partial(self._sketch, projector))
+        if console.config.watching or (before is None and console.config.alone):
+            self._keep_book(dials)
+        console.refresh_panels()
+        if before is None:
+            console.press_early_keys()
+
+    def _keep_book(self, dials: Readouts) -> None:
+        """Have the book as the recorder has it."""
+        console = self._console
+        if (dials.records, dials.struck) != (len(console.entries), sum(entry.struck for entry in console.entries)):
+            self.ask(partial(read_book, records=dials.records), self._open_book)
+
+    def _open_book(self, entries: tuple[RecordedEntry, ...]) -> None:
+        console = self._console
+        console.entries = entries
+        console.refresh_panels()
+
+    def _sketch(self, projector: int, points: dict[str, Place]) -> None:
+        console = self._console
+        console.sketches[projector] = points
+        console.refresh_panels()

@@ -1,0 +1,1 @@
+"""Drawing in characters: eyepieces, drums, sketches, descriptions in words."""

@@ -1,0 +1,1 @@
+"""State of the console: readouts and the selected control."""

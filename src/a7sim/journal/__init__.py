@@ -1,0 +1,1 @@
+"""Journals of sessions: format, writer, checkpoints, replay, resume, recordings and scripts."""

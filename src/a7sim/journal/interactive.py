@@ -1,0 +1,74 @@
+"""A person's chair at an instrument in this process: what is said from it is journalled, and can be gone on with."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from a7sim.instrument import build_autograph
+from a7sim.instrument.language import SharedInstrument
+from a7sim.journal.format import Event
+from a7sim.journal.resuming import ResumableSession, restore_instrument
+from a7sim.journal.session_store import COMMAND, new_folder
+from a7sim.journal.writer import Journal, JournalOptions, make_header
+from a7sim.link.client.client import Client
+from a7sim.link.client.ports import TIMEOUT_S
+from a7sim.link.clock import Clock
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.scenario import Scenario
+from a7sim.scene import build_scene
+
+
+class InteractiveSession:
+    """A chair at the instrument of a scenario, which is built when somebody first speaks to it.
+
+    The journal is begun in a new folder of the name `folder`; or it goes on, where `begun` is a session that was left.
+    """
+
+    def __init__(
+        self, scenario: Scenario, seed: int, folder: Path, clock: Clock, begun: ResumableSession | None = None
+    ) -> None:
+        self.clock = clock
+        self.begun = begun
+        self.folder = begun.journalled.path.parent if begun else folder
+        self._scenario, self._seed = scenario, seed
+        self._journal = Journal(JournalOptions(resumes=begun is not None))
+        self._instrument: SharedInstrument | None = None
+        self._held = False
+
+    def open(self) -> Client:
+        """Return a client of the instrument. Raises Mistake where the journal cannot be written or gone on with."""
+        if self._instrument is None:
+            self._instrument = self._anew() if self.begun is None else self._again(self.begun)
+        client = Client(InProcessSerial(instrument=self._instrument, clock=self.clock, timeout=TIMEOUT_S))
+        if self._held:
+            client.ask("SYST:LOCK:REQ?")
+        return client
+
+    def _anew(self) -> SharedInstrument:
+        scenario, seed = self._scenario, self._seed
+        instrument = SharedInstrument(
+            build_autograph(scenario.instrument, build_scene(scenario, seed).mountable, seed),
+            self._journal.on_link_event,
+        )
+        self.folder = new_folder(self.folder)
+        self._journal.recording(self.folder, make_header(COMMAND, scenario, seed), instrument)
+        return instrument
+
+    def _again(self, begun: ResumableSession) -> SharedInstrument:
+        instrument, now, held_by = restore_instrument(begun, self._journal, from_checkpoint=True)
+        self.clock.advance_to(now)
+        self._held = held_by is not None
+        return instrument
+
+    def history(self) -> Iterator[Event]:
+        """Yield what was said in the session that is gone on with, and what was answered."""
+        there = self.begun.journalled if self.begun else None
+        for number in range(2, len(there) + 1 if there else 0):
+            assert there is not None
+            event = there.event(number)
+            if event.dir in ("<", ">"):
+                yield event
+
+    def close(self) -> None:
+        """End the journal, which can be gone on with. Raises Mistake where it cannot be written to its end."""
+        if self._instrument is not None:
+            self._journal.close(None)

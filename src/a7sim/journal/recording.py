@@ -1,0 +1,195 @@
+"""A film of a session: its journal worked again on a fresh instrument, on and back, for somebody who watches."""
+
+import re
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from a7sim.errors import A7SimError
+from a7sim.instrument.language import LinkEvent, SharedInstrument
+from a7sim.journal.find_line import find_line
+from a7sim.journal.format import ChecksumChain, Event, JournalFile, read_journal
+from a7sim.journal.replay import Replay
+from a7sim.journal.script_runner import ScriptRunner
+from a7sim.journal.scripts import SUFFIX, find_script, read_script
+from a7sim.journal.session_files import JOURNAL
+from a7sim.journal.writer import is_registration, make_header
+from a7sim.link.client.client import Client
+from a7sim.link.client.ports import TIMEOUT_S
+from a7sim.link.inprocess import InProcessSerial
+from a7sim.scenario import Scenario
+
+_SAID = (">", "!")
+
+_DRAWS = re.compile(r"EYEP\w*:PICT\w*\?|COUN\?;:PROJ1:", re.IGNORECASE)
+"""A line by which a screen is drawn: it is said again, and is no step."""
+
+_POINT = re.compile(r'(?:EYEP\w*(?::STER\w*)?\?|REC(?:ORD)?)\s+"((?:[^"]|"")+)"', re.IGNORECASE)
+
+MAX_REPLAYED_LINES = 200
+"""Lines that are said again rather than a checkpoint behind them sought."""
+
+_LOOKED_BACK = 200
+"""Steps back in which the point is looked for that is worked at."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where a film stands: steps are the lines that were said, but for those that drew a screen; 0 is before them."""
+
+    step: int
+    time: float
+    """Simulated s."""
+    line: str = ""
+    """Who said something last, and what."""
+    point: str | None = None
+    """The point that was last looked at or registered."""
+    origins: dict[str, float] = field(default_factory=dict)
+    """What each counter shows in the origin of the frame."""
+    units: dict[str, float] = field(default_factory=dict)
+    """Units a mm of each counter."""
+    error: str = ""
+    """Where what was filmed did not happen again."""
+
+
+class Recording:
+    """A session worked again, and an instrument's front at which it is seen.
+
+    The front has a desk of its own, so that who looks is not a client of the session. Whoever runs the film and whoever
+    looks do so one after the other.
+    """
+
+    def __init__(self, journalled: JournalFile, scenario: Scenario | None = None) -> None:
+        """Make the film of a journal, whose scenario stands beside it unless it is given. Raises Mistake."""
+        self.journalled = journalled
+        self._scenario = scenario
+        self._numbers: list[int] = []
+        self._times: list[float] = []
+        self._records: list[int] = []
+        self._checkpoints: list[int] = []
+        for number in range(2, len(journalled) + 1):
+            self._list(number, journalled.event(number))
+        if not self._numbers:
+            raise A7SimError(f"{journalled.path}: expected a session in which something was said, got none")
+        self._replay = Replay(journalled, scenario)
+        self._front = SharedInstrument(self._replay.instrument.autograph)
+        self._next = 2
+        self._error = ""
+        self.frame = self._framed(0)
+
+    def _list(self, number: int, event: Event) -> None:
+        if event.kind == "state":
+            self._checkpoints.append(number)
+        elif event.dir in _SAID and not _DRAWS.match(event.text):
+            self._numbers.append(number)
+            self._times.append(event.t)
+            if is_registration(event.text):
+                self._records.append(len(self._numbers))
+
+    @property
+    def steps(self) -> int:
+        """How many lines were said that drew no screen."""
+        return len(self._numbers)
+
+    def open_client(self) -> Client:
+        """Return a client that sees the instrument as it stands in the film."""
+        return Client(InProcessSerial(instrument=self._front, timeout=TIMEOUT_S))
+
+    def seek(self, step: int) -> Frame:
+        """Run on, or back, until a step is done with all that came of it; 0 is the beginning."""
+        end = self._numbers[step] if step < self.steps else len(self.journalled) + 1
+        if self._leaps_to(end):
+            self._replay = Replay(self.journalled, self._scenario)
+            self._next = self._replay.seek(end)
+            self._front.autograph = self._replay.instrument.autograph
+        while self._next < end:
+            difference = self._replay.apply(self._next, self.journalled.event(self._next))
+            if difference is not None and not self._error:
+                expected, got = difference.journalled or "nothing", difference.replayed or "nothing"
+                self._error = f"{self.journalled.location(difference.line)}: expected again {expected}, got {got}"
+            self._next += 1
+        self.frame = self._framed(step)
+        return self.frame
+
+    def _leaps_to(self, end: int) -> bool:
+        """Whether it is quicker to go on from a checkpoint than from here."""
+        at = bisect_left(self._checkpoints, end) - 1
+        return end < self._next or (at >= 0 and self._checkpoints[at] - self._next > MAX_REPLAYED_LINES)
+
+    def advance_until(self, enough: Callable[[], bool]) -> Frame:
+        """Run on, a step at least if there is one, until that is enough."""
+        frame = self.frame
+        while frame.step < self.steps:
+            frame = self.seek(frame.step + 1)
+            if enough():
+                break
+        return frame
+
+    def step_at(self, time: float) -> int:
+        """Return the last step that was done by a simulated time in s."""
+        return bisect_right(self._times, time)
+
+    def next_record(self, step: int, way: int) -> int | None:
+        """Return the next step, on or back, at which something was registered or struck out; None where none was."""
+        at = bisect_right(self._records, step) if way > 0 else bisect_left(self._records, step) - 1
+        return self._records[at] if 0 <= at < len(self._records) else None
+
+    def find_step(self, words: str) -> int:
+        """Return the step that a number, a time, @LINE or the text of a note names. Raises Mistake for another."""
+        if words.isdecimal() and int(words) <= self.steps:
+            return int(words)
+        line = None if words.isdecimal() else find_line(self.journalled, words)
+        if line is None:
+            raise A7SimError(
+                f"jump to {words}: expected a step up to {self.steps}, a time up to {self._times[-1]:.0f}s, "
+                f"@{len(self.journalled)} or the text of a note"
+            )
+        answers = self.journalled.event(line).dir == "<"
+        return min(bisect_left(self._numbers, line) + (not answers), self.steps)
+
+    def _framed(self, step: int) -> Frame:
+        scales = self._front.autograph.counter_scales
+        said = ""
+        if step:
+            event = self.journalled.event(self._numbers[step - 1])
+            said = f"{event.client}: {event.text}"
+        return Frame(
+            step,
+            self._times[step - 1] if step else 0.0,
+            said,
+            self._point_at(step),
+            {axis: origin for axis, (origin, _) in scales.items()},
+            {axis: units for axis, (_, units) in scales.items()},
+            self._error,
+        )
+
+    def _point_at(self, step: int) -> str | None:
+        for number in reversed(self._numbers[max(0, step - _LOOKED_BACK) : step]):
+            named = _POINT.findall(self.journalled.event(number).text)
+            if named:
+                return str(named[-1]).replace('""', '"')
+        return None
+
+
+def open_recording(session: str) -> Recording:
+    """Return the film of a session's folder, of a journal, or of a script as it is played. Raises Mistake."""
+    path = Path(session)
+    if path.is_dir():
+        return Recording(read_journal(path / JOURNAL))
+    if session.endswith(SUFFIX) or not path.exists():
+        return _played(find_script(session))
+    return Recording(read_journal(path))
+
+
+def _played(file: Path) -> Recording:
+    """Return the film of a script that is played up to its end, or to where it and the instrument part."""
+    script = read_script(file)
+    heard: list[LinkEvent] = []
+    ScriptRunner(script, heard.append).run()
+    chain = ChecksumChain()
+    header = chain.line(make_header("replay", script.scenario, script.seed, script=file.name).line)
+    lines = [chain.line(Event(each.time, each.client, each.direction, each.text)) for each in heard]
+    return Recording(JournalFile(file, msgspec.json.decode(header), [header, *lines], b"", chain.crc), script.scenario)

@@ -1,0 +1,247 @@
+"""A journal worked again on a fresh instrument: every reply and every checkpoint compared with what stands there."""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from a7sim.errors import A7SimError
+from a7sim.instrument import Autograph, build_autograph
+from a7sim.instrument.language import MAX_LINE_LENGTH, LinkEvent, SharedInstrument
+from a7sim.instrument.language.shared_instrument import POLL_SECONDS
+from a7sim.instrument.language.token_redaction import TOKEN_PLACEHOLDER
+from a7sim.journal.checkpoints import Checkpoint, StateDifference, differences, read_checkpoints, state_hash
+from a7sim.journal.format import Event, JournalFile
+from a7sim.journal.session_files import SCENARIO_SUFFIX, STATES
+from a7sim.link.clock import Clock
+from a7sim.link.simulated_wait import feed_until_idle
+from a7sim.scenario import Scenario, from_data, hash_scenario
+from a7sim.scene import build_scene
+
+RECORDED = "record"
+"""The command whose journals hold what crossed a line, and nothing of how the instrument waited."""
+
+
+def scenario_of_journal(journalled: JournalFile, known: Scenario | None = None) -> tuple[Scenario, int]:
+    """Return the scenario and the seed of a session, the scenario from beside the journal unless it is known.
+
+    Raises Mistake where they are not those the session was begun with.
+    """
+    header = journalled.header
+    if not knows_scenario(journalled):
+        raise A7SimError(
+            f"{journalled.location(1)}: expected a session whose scenario is known, got one that names none"
+        )
+    scenario = known or _scenario_beside(journalled)
+    try:
+        found = hash_scenario(scenario)
+    except A7SimError as error:
+        raise A7SimError(f"{journalled.location(1)}: {error}") from error
+    if found != header.get("scenario_hash"):
+        raise A7SimError(
+            f"{journalled.location(1)}: expected the scenario and the measurements that the session began with "
+            f"(hash {str(header.get('scenario_hash'))[:12]}), got others ({found[:12]})"
+        )
+    return scenario, header["seed"]
+
+
+def knows_scenario(journalled: JournalFile) -> bool:
+    """Whether it is said of what scenario the instrument is."""
+    return journalled.header.get("scenario_hash") is not None
+
+
+def _scenario_beside(journalled: JournalFile) -> Scenario:
+    """Return the scenario of a journal, which in version 2 stood in its header. Raises Mistake where there is none."""
+    path, where = journalled.path.with_suffix(SCENARIO_SUFFIX), journalled.location(1)
+    data = journalled.header.get("scenario")
+    if data is None:
+        where = str(path)
+        try:
+            data = msgspec.json.decode(path.read_bytes())
+        except OSError as error:
+            raise A7SimError(f"{path}: expected the scenario of the session: {error.strerror}") from error
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise A7SimError(f"{path}: expected the scenario of the session as JSON, got something else") from error
+    try:
+        return from_data(data)
+    except A7SimError as mistake:
+        raise A7SimError(f"{where}: {mistake}") from mistake
+
+
+@dataclass(frozen=True)
+class ReplayDifference:
+    """Where a replay first differs: the line, what the journal has and what the instrument says; '' for nothing."""
+
+    line: int
+    journalled: str
+    replayed: str
+    parts: tuple[StateDifference, ...] = ()
+    """Of the state, at the next checkpoint whose state is known."""
+
+
+class Replay:
+    """A fresh instrument to which the lines of a journal are said again, from the first or from a checkpoint.
+
+    Where the journal is not asked what the instrument is, that is handed in.
+    """
+
+    def __init__(
+        self, journalled: JournalFile, known: Scenario | None = None, autograph: Autograph | None = None
+    ) -> None:
+        header = journalled.header
+        settings = header.get("settings", {})
+        if autograph is None:
+            scenario, seed = scenario_of_journal(journalled, known)
+            drawer = build_scene(scenario, seed, header.get("pictures", 1)).mountable
+            autograph = build_autograph(scenario.instrument, drawer, seed)
+        self.journalled = journalled
+        self.instrument = SharedInstrument(
+            autograph,
+            self._heard,
+            TOKEN_PLACEHOLDER if settings.get("login") else None,
+            0.0 if settings.get("realtime") else POLL_SECONDS,
+            str(header.get("software", "")).removeprefix("a7sim "),
+        )
+        self.time = 0.0
+        self.checkpoints: list[Checkpoint] = []
+        """Those passed, their states as they are here."""
+        self._clock = Clock() if header.get("command") == RECORDED else None
+        self._said: deque[LinkEvent] = deque()
+        self._changes = 0
+
+    def _heard(self, event: LinkEvent) -> None:
+        if self._clock is None or event.direction == "<":
+            self._said.append(event)
+
+    def seek(self, line: int) -> int:
+        """Go to the last checkpoint before a line whose state is known; return the line that comes next."""
+        known: list[Checkpoint] = []
+        for checkpoint in read_checkpoints(self.journalled.path.with_name(STATES)):
+            if checkpoint.line >= line or not self._is_of_the_journal(checkpoint):
+                break
+            known.append(checkpoint)
+        if not known:
+            return 2
+        *before, last = known
+        for each in before:
+            self.instrument.autograph.restore_registrations(each.state["autograph"])
+        self.instrument.restore(last.state)
+        self.checkpoints = known
+        self._changes = len(self.instrument.autograph.recorder.changes)
+        self.time = last.t
+        return last.line + 1
+
+    def _is_of_the_journal(self, checkpoint: Checkpoint) -> bool:
+        number = checkpoint.line
+        return 1 < number <= len(self.journalled) and self.journalled.event(number).hash == checkpoint.hash
+
+    def apply(self, number: int, event: Event) -> ReplayDifference | None:
+        """Let an event of the journal happen again; return how it differs, if it does."""
+        self.time = event.t
+        if event.kind == "state":
+            return self._compared(number, event)
+        if event.kind:
+            return None
+        if self._clock is not None:
+            return self._say_as_recorded(number, event)
+        if event.dir != "<":
+            left = self._left_over(number)
+            self._happen(event)
+            if left is not None:
+                return left
+        return self._expected(number, event)
+
+    def _say_as_recorded(self, number: int, event: Event) -> ReplayDifference | None:
+        """Compare replies only, in their order: lines may have been sent before they came."""
+        if event.dir == "<":
+            return self._expected(number, event)
+        if event.dir == "-":
+            self._said.clear()
+        self._happen(event)
+        return None
+
+    def final_difference(self) -> ReplayDifference | None:
+        """Return what the instrument still says where the journal ends, if it does."""
+        return self._left_over(len(self.journalled) + 1)
+
+    def pending_events(self) -> list[LinkEvent]:
+        """Return what the instrument still says where the journal ends: it broke off before that was written."""
+        left = list(self._said)
+        self._said.clear()
+        return left
+
+    def _left_over(self, number: int) -> ReplayDifference | None:
+        if not self._said:
+            return None
+        said = self._said.popleft()
+        self._said.clear()
+        return ReplayDifference(number, "", _shown(said.client, said.direction, said.text))
+
+    def _expected(self, number: int, event: Event) -> ReplayDifference | None:
+        said = self._said.popleft() if self._said else None
+        if said is not None:
+            same = (said.direction, said.text) == (event.dir, event.text)
+            if same and (self._clock is not None or (said.time, said.client) == (event.t, event.client)):
+                return None
+        replayed = "" if said is None else _shown(said.client, said.direction, said.text)
+        return ReplayDifference(number, _shown(event.client, event.dir, event.text), replayed)
+
+    def _happen(self, event: Event) -> None:
+        instrument, client = self.instrument, event.client
+        if event.dir == "+":
+            instrument.open(client, time=event.t)
+        elif event.dir == "-":
+            instrument.close(client, event.t)
+        elif client in instrument.clients:
+            engine = instrument.clients[client]
+            received = _bytes_of(event)
+            if self._clock is None:
+                engine.feed(received, event.t)
+            else:
+                self._clock.advance_to(event.t)
+                feed_until_idle(engine, received, self._clock)
+
+    def _compared(self, number: int, event: Event) -> ReplayDifference | None:
+        state = self.instrument.state(self._changes)
+        self._changes = len(self.instrument.autograph.recorder.changes)
+        found = state_hash(state)
+        self.checkpoints.append(Checkpoint(number, event.t, found, state))
+        if found == event.hash:
+            return None
+        return ReplayDifference(number, f"state {event.hash}", f"state {found}", self._parts(number, state))
+
+    def _parts(self, number: int, state: dict[str, Any]) -> tuple[StateDifference, ...]:
+        for checkpoint in read_checkpoints(self.journalled.path.with_name(STATES)):
+            if checkpoint.line == number and self._is_of_the_journal(checkpoint):
+                return tuple(differences(checkpoint.state, state))
+        return ()
+
+    def state_differences(self, after: int) -> tuple[StateDifference, ...]:
+        """Return in what the state differs at the first checkpoint after a line, the rest up to there said again."""
+        for number in range(after + 1, len(self.journalled) + 1):
+            event = self.journalled.event(number)
+            if event.kind == "state":
+                return self._parts(number, self.instrument.state(self._changes))
+            self.apply(number, event)
+        return ()
+
+
+def replay_lines(replay: Replay, first: int = 2) -> Iterator[tuple[int, Event, ReplayDifference | None]]:
+    """Say the lines of a journal again, from a line on; yield each with its number and how it differs."""
+    for number in range(first, len(replay.journalled) + 1):
+        event = replay.journalled.event(number)
+        yield number, event, replay.apply(number, event)
+
+
+def _bytes_of(event: Event) -> bytes:
+    if event.dir == "~":
+        return b""
+    if event.dir == "!":
+        return b"x" * (MAX_LINE_LENGTH + 1) + b"\n"
+    return event.text.encode("latin-1", "replace") + (b"\r\n" if event.text.endswith("\r") else b"\n")
+
+
+def _shown(client: str, direction: str, text: str) -> str:
+    return f"{client} {direction} {text}".rstrip()

@@ -1,0 +1,82 @@
+"""Going on with a session that was cut off, from what its folder holds."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from a7sim.errors import A7SimError
+from a7sim.instrument.language import SharedInstrument
+from a7sim.journal.format import SCHEMA_VERSION, JournalFile, read_journal
+from a7sim.journal.replay import Replay, ReplayDifference, replay_lines, scenario_of_journal
+from a7sim.journal.session_files import JOURNAL
+from a7sim.journal.writer import Journal, software_version
+from a7sim.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class ResumableSession:
+    """A session that was begun: what its journal holds, and the scenario and the seed that stand there."""
+
+    journalled: JournalFile
+    scenario: Scenario
+    seed: int
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What was asked for beside the scenario, by name."""
+        return dict(self.journalled.header["settings"])
+
+    def setting(self, name: str) -> Any:
+        """Return what was asked for beside the scenario, None where nothing was said of it."""
+        return self.settings.get(name)
+
+
+def find_resumable(folder: Path, command: str) -> ResumableSession:
+    """Return the session that a command began in a folder. Raises Mistake where that cannot be gone on with."""
+    journalled = read_journal(folder / JOURNAL)
+    for name, expected in (("command", command), ("software", software_version())):
+        got = journalled.header.get(name)
+        if got != expected:
+            raise A7SimError(
+                f"{journalled.location(1)}: expected a session of {expected} to go on with, got one of {got}"
+            )
+    version = journalled.header["schema_version"]
+    if version != SCHEMA_VERSION:
+        raise A7SimError(
+            f"{journalled.location(1)}: expected schema_version {SCHEMA_VERSION} to go on with, got {version}, "
+            "which can be replayed only"
+        )
+    return ResumableSession(journalled, *scenario_of_journal(journalled))
+
+
+class RestoredInstrument(NamedTuple):
+    """An instrument as a journal leaves it, its clients gone: the desk, the time there in s, and who held the lock."""
+
+    instrument: SharedInstrument
+    time: float
+    lock_holder: str | None
+
+
+def restore_instrument(begun: ResumableSession, journal: Journal, from_checkpoint: bool = False) -> RestoredInstrument:
+    """Return an instrument as its journal leaves it; the journal goes on.
+
+    All that it holds happens again, or what stands behind its last checkpoint. Raises Mistake where it does not.
+    """
+    replay = Replay(begun.journalled)
+    first = replay.seek(len(begun.journalled) + 1) if from_checkpoint else 2
+    for number, _, difference in replay_lines(replay, first):
+        if difference is not None:
+            raise A7SimError(f"{begun.journalled.location(number)}: {_not_again(difference)}")
+    instrument = replay.instrument
+    instrument.listener = journal.resume_at(begun.journalled, instrument, replay.checkpoints).on_link_event
+    for event in replay.pending_events():
+        journal.on_link_event(event)
+    held_by = instrument.lock_holder
+    for client in [*instrument.clients]:
+        instrument.close(client, replay.time)
+    return RestoredInstrument(instrument, replay.time, held_by)
+
+
+def _not_again(difference: ReplayDifference) -> str:
+    expected, got = difference.journalled or "nothing", difference.replayed or "nothing"
+    return f"expected what the instrument does again, {got}, got another's, {expected}"

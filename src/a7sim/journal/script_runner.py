@@ -1,0 +1,92 @@
+"""A script played: its lines said to a fresh instrument, what it expects compared with what comes."""
+
+from dataclasses import dataclass
+
+from a7sim.instrument import build_autograph
+from a7sim.instrument.language import Engine, Listener, SharedInstrument
+from a7sim.instrument.language.engine import MAX_LINE_LENGTH
+from a7sim.journal.scripts import Expect, Script, SendLine, SourceLocation, Statement, Wait
+from a7sim.link.client.replies import Part, parse_reply, part_as_text
+from a7sim.link.clock import Clock
+from a7sim.link.simulated_wait import feed_until_idle
+from a7sim.scene import build_scene
+
+
+@dataclass(frozen=True)
+class ExpectationFailed:
+    """Where a script and the instrument part: what was expected there, and what came."""
+
+    place: SourceLocation
+    expected: str
+    got: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: expected {self.expected}, got {self.got}"
+
+
+class ScriptRunner:
+    """The operator of a script, at a fresh instrument or at a desk that is there."""
+
+    def __init__(
+        self,
+        script: Script,
+        listener: Listener | None = None,
+        instrument: SharedInstrument | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self._script = script
+        self._clock = clock or Clock()
+        self.instrument = instrument or _fresh(script, listener)
+
+    def run(self, client: str | None = None) -> ExpectationFailed | None:
+        """Carry out the statements up to the first that fails, and return that; an error not expected is one."""
+        engine = self.instrument.open(client, time=self._clock.now)
+        for done, after in zip(self._script.statements, [*self._script.statements[1:], None], strict=False):
+            failed = self._carry_out(engine, done)
+            if failed is None and not _asks_for_errors(after) and engine.errors:
+                failed = ExpectationFailed(done.place, f"{_said(done)} to be obeyed", engine.errors[0])
+            if failed is not None:
+                return failed
+        self.instrument.close(engine.client, self._clock.now)
+        return None
+
+    def _carry_out(self, engine: Engine, statement: Statement) -> ExpectationFailed | None:
+        if isinstance(statement, Wait):
+            self._clock.advance(statement.seconds)
+            return None
+        reply = feed_until_idle(engine, _said(statement).encode("latin-1", "replace") + b"\n", self._clock)
+        if isinstance(statement, SendLine):
+            return None
+        taken = parse_reply(reply)
+        answer = () if taken is None else tuple(field for part in taken.parts for field in _fields(part))
+        if statement.matches(answer):
+            return None
+        errors = f" ({engine.errors[0]})" if engine.errors else ""
+        return ExpectationFailed(statement.place, str(statement), (", ".join(answer) or "no answer") + errors)
+
+
+def _fresh(script: Script, listener: Listener | None) -> SharedInstrument:
+    scene = build_scene(script.scenario, script.seed)
+    return SharedInstrument(build_autograph(script.scenario.instrument, scene.mountable, script.seed), listener)
+
+
+def _said(statement: Statement) -> str:
+    if isinstance(statement, Wait):
+        return f"wait {statement.seconds:g}"
+    return (statement.query if isinstance(statement, Expect) else statement.text)[: MAX_LINE_LENGTH + 1]
+
+
+def _asks_for_errors(statement: Statement | None) -> bool:
+    return isinstance(statement, Expect) and any(word in statement.query.upper() for word in ("ERR", "*ESR", "*STB"))
+
+
+def _fields(part: Part) -> list[str]:
+    """Return the values of an answer, texts with their quotes."""
+    text, fields, within = part_as_text(part), [""], False
+    for character in text:
+        within ^= character == '"'
+        if character == "," and not within:
+            fields.append("")
+        else:
+            fields[-1] += character
+    return fields

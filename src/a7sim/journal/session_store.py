@@ -1,0 +1,107 @@
+"""The shelf of a person's sessions: a folder each, the last to go on with, and room for the next."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from a7sim.errors import A7SimError
+from a7sim.journal.append_file import is_being_written
+from a7sim.journal.format import read_journal
+from a7sim.journal.resuming import ResumableSession, find_resumable
+from a7sim.journal.session_files import JOURNAL
+from a7sim.scenario import Scenario, hash_scenario
+
+COMMAND = "console"
+
+
+@dataclass(frozen=True)
+class SavedSession:
+    """A session that was left or cut off."""
+
+    folder: Path
+    begun: ResumableSession | None
+    error: str = ""
+    """Why it cannot be gone on with, where `begun` is None."""
+
+    @property
+    def ended_at_s(self) -> float:
+        """The simulated time in s at which it was left."""
+        journalled = self.begun.journalled if self.begun else ()
+        return self.begun.journalled.event(len(journalled)).t if self.begun and len(journalled) > 1 else 0.0
+
+    @property
+    def has_changes(self) -> bool:
+        """Whether anything was done, and not only looked at."""
+        if self.begun is None:
+            return False
+        there = self.begun.journalled
+        events = (there.event(number) for number in range(len(there), 1, -1))
+        return any(event.dir == ">" and _does(event.text) for event in events)
+
+    @property
+    def last_activity(self) -> float:
+        """When something was last said, in s of the wall's calendar."""
+        return (self.folder / JOURNAL).stat().st_mtime
+
+
+def _does(line: str) -> bool:
+    return any(unit and "?" not in unit for unit in line.split(";"))
+
+
+def last_session(folder: Path, scenario: Scenario, seed: int) -> SavedSession | None:
+    """Return the last session of a scenario and a seed in a folder of this name, numbered or not, if there is one."""
+    wanted = hash_scenario(scenario), seed
+    return next((left for each in _latest_first(folder) if (left := _left_in(each, *wanted)) is not None), None)
+
+
+def _latest_first(folder: Path) -> list[Path]:
+    there = [each for each in _numbered(folder).values() if (each / JOURNAL).is_file()]
+    return sorted(there, key=lambda each: (each / JOURNAL).stat().st_mtime, reverse=True)
+
+
+def _left_in(folder: Path, scenario_hash: str, seed: int) -> SavedSession | None:
+    try:
+        header = read_journal(folder / JOURNAL).header
+    except A7SimError as error:
+        return SavedSession(folder, None, str(error))
+    if (header.get("scenario_hash"), header.get("seed")) != (scenario_hash, seed):
+        return None
+    if is_being_written(folder / JOURNAL):
+        return SavedSession(folder, None, f"{folder}: somebody sits there")
+    try:
+        return SavedSession(folder, find_resumable(folder, COMMAND))
+    except A7SimError as error:
+        return SavedSession(folder, None, str(error))
+
+
+def new_folder(folder: Path) -> Path:
+    """Make a folder of this name, numbered where there are such, and return it. Raises Mistake where that cannot be."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        for each in _free(folder):
+            try:
+                each.mkdir()
+            except FileExistsError:
+                continue
+            return each
+    except OSError as error:
+        raise A7SimError(f"{folder}: expected a folder that can be written: {error.strerror}") from error
+    raise AssertionError("there is always another number")
+
+
+def _numbered(folder: Path) -> dict[int, Path]:
+    """Return what is there of this name, by its number; 1 has none."""
+    if not folder.parent.is_dir():
+        return {}
+    found = (
+        (re.fullmatch(rf"{re.escape(folder.name)}(?:-(\d+))?", each.name), each) for each in folder.parent.iterdir()
+    )
+    return {int(match[1] or 1): each for match, each in found if match}
+
+
+def _free(folder: Path) -> Iterator[Path]:
+    number = max(_numbered(folder), default=0)
+    while True:
+        number += 1
+        yield folder if number == 1 else folder.with_name(f"{folder.name}-{number}")

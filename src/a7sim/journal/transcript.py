@@ -1,0 +1,40 @@
+"""A session told line by line, for people."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from a7sim.instrument.language import LinkEvent, Listener
+from a7sim.journal.format import Event
+
+_IN_WORDS = {"+": "+ comes", "-": "- goes", "~": "~ goes on"}
+
+
+def format_event(event: Event) -> str:
+    """Return a line of a journal for people."""
+    if event.kind == "entry":
+        words = (event.model, event.form, event.point, event.item, event.reading, event.remark)
+        return _line(event.t, "book", f"{event.number}: {', '.join(word for word in words if word)}")
+    if event.kind == "strike":
+        return _line(event.t, "book", f"{event.number} struck out: {event.struck}")
+    if event.kind:
+        return _line(event.t, event.kind, event.hash)
+    return _line(event.t, event.client, f"{_IN_WORDS.get(event.dir, event.dir)} {event.text}")
+
+
+def _line(time: float, active: str, what: str) -> str:
+    return f"{time:10.2f} {active:<9} {what}".rstrip()
+
+
+@dataclass(frozen=True)
+class TranscriptListener:
+    """A listener that tells people what it hears when it is due, and lets another listener hear it first."""
+
+    tell: Callable[[str], None]
+    until: Callable[[float], None]
+    first: Listener
+
+    def on_link_event(self, event: LinkEvent) -> None:
+        """Tell what happened on the link."""
+        self.first(event)
+        self.until(event.time)
+        self.tell(format_event(Event(event.time, event.client, event.direction, event.text)))

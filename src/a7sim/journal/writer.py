@@ -1,0 +1,282 @@
+"""The journal of a session as it is written: what crossed the link and what the operator wrote down, in order."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import msgspec
+
+import a7sim
+from a7sim.errors import A7SimError
+from a7sim.instrument.language import LinkEvent, SharedInstrument
+from a7sim.journal.append_file import AppendOnlyFile, Durability, JournalWriteError, write_failure_message
+from a7sim.journal.checkpoints import LINES_PER_CHECKPOINT, Checkpoint, state_hash, to_lines
+from a7sim.journal.format import SCHEMA_VERSION, ChecksumChain, Event, JournalFile, has_header, read_journal
+from a7sim.journal.session_files import JOURNAL, SCENARIO_SUFFIX, STATES, TORN, prepare_folder
+from a7sim.operator.people.observation_book import BookEntry
+from a7sim.scenario import Scenario, hash_scenario, to_data
+from a7sim.scene import PICTURES
+
+_REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
+
+_MAX_SHOWN_LENGTH = 300
+
+
+def is_registration(line: str) -> bool:
+    """Return whether a line registers something or strikes it out."""
+    return _REGISTERS.search(line) is not None
+
+
+def software_version() -> str:
+    """Return the name and version under which journals are written."""
+    return f"a7sim {a7sim.__version__}"
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a journal says first, and the scenario, which stands in a file of its own since it holds truth."""
+
+    line: dict[str, Any]
+    scenario: Scenario | None = None
+
+
+def make_header(command: str, scenario: Scenario, seed: int, **settings: Any) -> Header:
+    """Return what a journal says first: all that a session follows from, beside what is said in it."""
+    line = {
+        "schema_version": SCHEMA_VERSION,
+        "software": software_version(),
+        "command": command,
+        "title": scenario.title,
+        "scenario_hash": hash_scenario(scenario),
+        "seed": seed,
+        "variant": scenario.instrument.variant,
+        "pictures": PICTURES,
+        "settings": settings,
+    }
+    return Header(line, scenario)
+
+
+def make_header_without_scenario(command: str, **settings: Any) -> Header:
+    """Return what a journal says first where nobody knows what the instrument is of."""
+    first = {"schema_version": SCHEMA_VERSION, "software": software_version(), "command": command}
+    return Header(first | {"scenario_hash": None, "settings": settings})
+
+
+@dataclass(frozen=True)
+class JournalOptions:
+    """How a session is kept: when its journal is on the disk, and whether it goes on from a journal that is there."""
+
+    durability: Durability = "records"
+    resumes: bool = False
+    states: bool = True
+    """Whether states are kept beside the journal, for seeking in it; they are part of the truth."""
+
+    def prepare(self, folder: Path | None, force: bool, parts: Iterable[str] = ()) -> None:
+        """See that a session and its parts can be left in a folder, unless it is there already. Raises Mistake."""
+        if folder is not None and not self.resumes:
+            prepare_folder(folder, force, parts)
+
+    def for_part(self, folder: Path | None) -> "JournalOptions":
+        """Return how a session is kept that is part of another, which may have been cut off before this one began."""
+        begun = folder is not None and has_header(folder / JOURNAL)
+        return replace(self, resumes=self.resumes and begun)
+
+
+class Journal:
+    """A journal, which hears from when it is made and writes from when it is opened, as a context.
+
+    A session that is resumed is worked again from its beginning: as long as the journal that is there lasts, what
+    would be written is compared with it; then it is written on.
+    """
+
+    def __init__(self, journal_options: JournalOptions | None = None) -> None:
+        self.lines_over_the_link = 0
+        self._journal_options = journal_options or JournalOptions()
+        self._unwritten: list[LinkEvent] = []
+        self._file: AppendOnlyFile | None = None
+        self._states: Path | None = None
+        self._instrument: SharedInstrument | None = None
+        self._there: JournalFile | None = None
+        self._chain = ChecksumChain()
+        self._line = 0
+        self._time = 0.0
+        self._since_checkpoint = 0
+        self._changes = 0
+
+    def recording(self, folder: Path | None, header: Header, instrument: SharedInstrument | None) -> "Journal":
+        """Begin to write, where there is a folder; about a desk, where there is one.
+
+        A session that is resumed sets aside what is torn of its journal. Raises Mistake where it cannot be written.
+        """
+        self._instrument = instrument
+        if folder is not None:
+            if self._journal_options.resumes:
+                self._there = read_journal(folder / JOURNAL)
+                save_truncated_tail(self._there)
+            self._begin(folder, self._there.size if self._there else 0, b"")
+            try:
+                if self._there is None:
+                    _leave_scenario(folder, header)
+                self._write(header.line)
+                for event in self._unwritten:
+                    self.on_link_event(event)
+            except BaseException:
+                self._close()
+                raise
+        self._unwritten.clear()
+        return self
+
+    def resume_at(self, there: JournalFile, instrument: SharedInstrument, checkpoints: list[Checkpoint]) -> "Journal":
+        """Go on behind a journal whose session stands at a desk. Raises Mistake where it cannot be written."""
+        save_truncated_tail(there)
+        self._instrument = instrument
+        self._begin(there.path.parent, there.size, to_lines(checkpoints))
+        self._chain.crc, self._line = there.crc, len(there)
+        last = checkpoints[-1].line if checkpoints else 1
+        self._since_checkpoint = sum(not there.event(number).kind for number in range(last + 1, len(there) + 1))
+        self._changes = sum(len(each.state["autograph"]["registered"]) for each in checkpoints)
+        return self
+
+    def _begin(self, folder: Path, size: int, states: bytes) -> None:
+        self._file = AppendOnlyFile(folder / JOURNAL, self._journal_options.durability, size)
+        if self._journal_options.states:
+            self._states = folder / STATES
+            self._states.write_bytes(states)
+
+    def on_link_event(self, event: LinkEvent) -> None:
+        """Write what happened on the link. Raises JournalStopped where that fails, unless somebody just went."""
+        try:
+            self._hear(event)
+        except JournalWriteError:
+            if event.direction != "-":
+                raise
+
+    def _hear(self, event: LinkEvent) -> None:
+        if event.direction in "<>":
+            self.lines_over_the_link += 1
+        if self._file is None:
+            if self._instrument is None:
+                self._unwritten.append(event)
+            return
+        at_once, self._time = False, event.time
+        if event.direction == ">":
+            if (
+                self._since_checkpoint >= LINES_PER_CHECKPOINT
+                and self._instrument is not None
+                and self._instrument.is_idle
+            ):
+                self._checkpoint(event.time, self._instrument)
+            at_once = is_registration(event.text)
+        self._since_checkpoint += 1
+        self._write(Event(event.time, event.client, event.direction, event.text), at_once)
+
+    def on_book_entry(self, entry: BookEntry, time: float) -> None:
+        """Write an entry of the observation book, or that it was struck out. Raises Mistake where that fails."""
+        if self._file is None:
+            return
+        self._time = time
+        if entry.struck:
+            self._write(Event(time, kind="strike", number=entry.number, struck=entry.struck))
+        else:
+            self._write(
+                Event(
+                    time,
+                    kind="entry",
+                    number=entry.number,
+                    model=entry.model,
+                    form=entry.form,
+                    round=entry.round,
+                    point=entry.point,
+                    item=entry.item,
+                    reading=entry.reading,
+                    remark=entry.remark,
+                )
+            )
+
+    def close(self, error: BaseException | None) -> None:
+        """Write nothing more, after a last checkpoint where nothing went wrong. Raises Mistake where that fails."""
+        try:
+            if error is None and self._instrument is not None and self._instrument.is_idle and self._since_checkpoint:
+                self._checkpoint(self._time, self._instrument)
+            if error is None and self._there is not None and self._line < len(self._there):
+                over = self._there.location(self._line + 1)
+                raise A7SimError(f"{over}: expected the end of the session, got a line that is left over")
+        finally:
+            self._close()
+
+    def _close(self) -> None:
+        file, self._file = self._file, None
+        if file is not None:
+            file.close()
+
+    def _checkpoint(self, time: float, instrument: SharedInstrument) -> None:
+        state = instrument.state(self._changes)
+        self._changes = len(instrument.autograph.recorder.changes)
+        self._since_checkpoint = 0
+        found = state_hash(state)
+        self._write(Event(time, kind="state", hash=found))
+        if self._states is not None:
+            try:
+                with self._states.open("ab") as states:
+                    states.write(to_lines([Checkpoint(self._line, time, found, state)]))
+            except OSError as error:
+                raise write_failure_message(self._states, error) from error
+
+    def _write(self, data: Any, at_once: bool = False) -> None:
+        if self._file is None:
+            return
+        line = self._chain.line(data)
+        self._line += 1
+        if self._there is not None and self._line <= len(self._there):
+            if line != self._there.lines[self._line - 1]:
+                raise A7SimError(_not_the_same(self._there, self._line, line))
+        else:
+            self._file.add(line + b"\n", at_once)
+
+    def __enter__(self) -> "Journal":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file is not None:
+            self.close(error)
+
+
+def write_header_only(folder: Path, header: Header) -> None:
+    """Leave a journal of nothing but its header: what is worked in a folder's folders. Raises Mistake."""
+    file = AppendOnlyFile(folder / JOURNAL)
+    _leave_scenario(folder, header)
+    file.add(ChecksumChain().line(header.line) + b"\n")
+    file.close()
+
+
+def _leave_scenario(folder: Path, header: Header) -> None:
+    if header.scenario is not None:
+        data = msgspec.json.format(msgspec.json.encode(to_data(header.scenario))) + b"\n"
+        file = AppendOnlyFile((folder / JOURNAL).with_suffix(SCENARIO_SUFFIX), "always")
+        try:
+            file.add(data)
+        finally:
+            file.close()
+
+
+def save_truncated_tail(there: JournalFile) -> None:
+    """Put what is torn of a journal beside it. Raises Mistake where that cannot be written."""
+    if there.truncated_tail:
+        try:
+            (there.path.parent / TORN).write_bytes(there.truncated_tail)
+        except OSError as error:
+            raise A7SimError(f"{there.path}: expected a journal that can be written: {error.strerror}") from error
+
+
+def _not_the_same(there: JournalFile, number: int, line: bytes) -> str:
+    was, is_now = (each[:_MAX_SHOWN_LENGTH].decode("utf-8", "replace") for each in (there.lines[number - 1], line))
+    if number == 1:
+        return (
+            f"{there.location(number)}: expected a session of {software_version()} and its scenario, got another: {was}"
+        )
+    return f"{there.location(number)}: expected what this session does again, {is_now}, got another's, {was}"

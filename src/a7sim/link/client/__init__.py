@@ -1,0 +1,1 @@
+"""Client side of a link: ports, lines, replies, the recording proxy."""

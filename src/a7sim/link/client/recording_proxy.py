@@ -1,0 +1,132 @@
+"""Between a client and an instrument: lines and replies go through whole, and somebody hears each before it goes on."""
+
+import socket
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from a7sim.errors import A7SimError
+from a7sim.instrument.language import MAX_LINE_LENGTH, LinkEvent, Listener, loggable_reply, redact_token
+from a7sim.link.client.ports import open_port, port_errors
+from a7sim.link.client.replies import MalformedReplyError, Part, parse_reply
+from a7sim.link.clock import WallClock
+
+POLL_INTERVAL_S = 0.1
+"""How often somebody who waits looks whether to stop."""
+
+_AT_ONCE = 65536
+
+
+class RecordingProxy:
+    """A door with an instrument behind it, to which one client at a time is let through.
+
+    What the listener raises ends it: neither line nor reply goes on that was not heard.
+    """
+
+    def __init__(self, url: str, listener: Listener, clock: WallClock, stop: threading.Event) -> None:
+        self._url = url
+        self._listener = listener
+        self._clock = clock
+        self._stop = stop
+        self._one_at_a_time = threading.Lock()
+        self._clients = 0
+        self._error: A7SimError | None = None
+
+    def serve(self, door: socket.socket) -> None:
+        """Let clients through until it is told to stop. Raises Mistake where the instrument or the listener fails."""
+        door.settimeout(POLL_INTERVAL_S)
+        while not self._stop.is_set():
+            try:
+                client, _ = door.accept()
+            except TimeoutError:
+                continue
+            with client:
+                self._let_through(client)
+            if self._error is not None:
+                raise self._error
+
+    def _let_through(self, client: socket.socket) -> None:
+        self._clients += 1
+        name = f"client{self._clients}"
+        client.settimeout(POLL_INTERVAL_S)
+        gone = threading.Event()
+        with port_errors(self._url):
+            port = open_port(self._url, POLL_INTERVAL_S)
+            try:
+                self._hear(name, "+", "")
+                replies = threading.Thread(
+                    target=self._until_gone, args=(gone, self._replies, port, client, name, gone), daemon=True
+                )
+                replies.start()
+                self._until_gone(gone, self._lines, client, port, name, gone)
+                replies.join()
+                self._hear(name, "-", "")
+            finally:
+                gone.set()
+                port.close()
+
+    def _until_gone(self, gone: threading.Event, carry: Callable[..., None], *between: Any) -> None:
+        try:
+            carry(*between)
+        except A7SimError as error:
+            self._error = error
+        except OSError:
+            if not gone.is_set() and carry == self._replies:
+                self._error = A7SimError(f"{self._url}: the line to the instrument broke")
+        finally:
+            gone.set()
+
+    def _lines(self, client: socket.socket, port: Any, name: str, gone: threading.Event) -> None:
+        come, too_long = b"", False
+        while not gone.is_set() and not self._stop.is_set():
+            try:
+                more = client.recv(_AT_ONCE)
+            except TimeoutError:
+                continue
+            if not more:
+                return
+            *lines, come = (come + more).split(b"\n")
+            for line in lines:
+                if too_long or len(line.removesuffix(b"\r")) > MAX_LINE_LENGTH:
+                    self._hear(name, "!", f"(a line of more than {MAX_LINE_LENGTH} bytes)")
+                elif line.strip(b" \t\r"):
+                    self._hear(name, ">", redact_token(line.removesuffix(b"\r").decode("latin-1"), None))
+                port.write(line + b"\n")
+                too_long = False
+            if len(come) > MAX_LINE_LENGTH + 1:
+                port.write(come)
+                come, too_long = b"", True
+
+    def _replies(self, port: Any, client: socket.socket, name: str, gone: threading.Event) -> None:
+        come = bytearray()
+        while True:
+            more = port.read(max(1, port.in_waiting))
+            come += more
+            while (taken := _taken(come)) is not None:
+                text, length = taken
+                self._hear(name, "<", text)
+                client.sendall(bytes(come[:length]))
+                del come[:length]
+            if not more and (gone.is_set() or self._stop.is_set()):
+                return
+
+    def _hear(self, client: str, direction: str, text: str) -> None:
+        with self._one_at_a_time:
+            self._listener(LinkEvent(self._clock.now, client, direction, text))
+
+
+def _taken(come: bytearray) -> tuple[str, int] | None:
+    """Return the text of the first whole reply and how many bytes it is."""
+    try:
+        taken = parse_reply(come)
+    except MalformedReplyError:
+        end = come.find(b"\n") + 1
+        return (come[: end - 1].decode("latin-1"), end) if end else None
+    return None if taken is None else (";".join(map(_heard, taken.parts)), taken.length)
+
+
+def _heard(part: Part) -> str:
+    if isinstance(part, str):
+        return part
+    length = str(len(part))
+    return loggable_reply(f"#{len(length)}{length}".encode("ascii") + part)

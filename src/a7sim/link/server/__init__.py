@@ -1,0 +1,1 @@
+"""Server side of a link: endpoints, client sessions, pacing and faults."""

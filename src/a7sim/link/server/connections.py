@@ -1,0 +1,163 @@
+"""TCP as a wire, bare or with telnet and RFC 2217 on it: asyncio protocols that call the conversation directly."""
+
+import asyncio
+import socket
+from contextlib import suppress
+from typing import Protocol, cast
+
+from a7sim.link.server.client_session import ClientSession, Transport
+from a7sim.link.server.telnet import Telnet
+
+MAX_READ = 16 * 1024
+"""Bytes taken from a socket at once."""
+
+MAX_UNREAD = 64 * 1024
+"""Bytes of replies that may wait for a client to read them before it is obeyed no more."""
+
+QUICK_ACKNOWLEDGEMENT: int | None = getattr(socket, "TCP_QUICKACK", None)
+"""An option of Linux."""
+
+FAREWELL = 1.0
+"""s that a client has to hear why it is turned away."""
+
+
+class Host(Protocol):
+    """Who opens a conversation for every wire."""
+
+    def accept(self, wire: Transport, serial: bool) -> ClientSession | bytes:
+        """Return a conversation, or why there is none, as a line."""
+
+    def release(self, wire: Transport) -> None:
+        """Take note that a wire is no more."""
+
+
+class TcpConnection(asyncio.BufferedProtocol):
+    """A TCP connection. All share one buffer, since what is read is taken out of it at once."""
+
+    serial = False
+
+    def __init__(self, host: Host, buffer: memoryview) -> None:
+        self._host = host
+        self._buffer = buffer
+        self._transport: asyncio.Transport
+        self._conversation: ClientSession | None = None
+        self._answered = False
+
+    # --- what asyncio tells ---------------------------------------------------------------------------
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin a conversation, or turn the client away."""
+        self._transport = cast(asyncio.Transport, transport)
+        self._socket = self._transport.get_extra_info("socket")
+        self._transport.set_write_buffer_limits(high=MAX_UNREAD)
+        welcomed = self._host.accept(self, self.serial)
+        if isinstance(welcomed, ClientSession):
+            self._conversation = welcomed
+        else:
+            self._turn_away(welcomed)
+
+    def _turn_away(self, why: bytes) -> None:
+        self.write(why)
+        with suppress(OSError):
+            self._transport.write_eof()
+        asyncio.get_running_loop().call_later(FAREWELL, self._transport.abort)
+
+    def get_buffer(self, sizehint: int) -> memoryview:
+        """Return the buffer for the next read."""
+        return self._buffer
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """Hand on what was read."""
+        self._take(self._buffer[:nbytes].tobytes())
+
+    def _take(self, data: bytes) -> None:
+        if self._conversation is not None:
+            self._answered = False
+            self._conversation.data_received(data)
+            if not self._answered:
+                self._acknowledge()
+
+    def _acknowledge(self) -> None:
+        """Let the client know at once that a command has come, since no reply says so.
+
+        Otherwise one that sends small pieces by Nagle's algorithm, as pyserial's does, waits 40 ms with the next.
+        """
+        if QUICK_ACKNOWLEDGEMENT is not None and not self._transport.is_closing():
+            self._socket.setsockopt(socket.IPPROTO_TCP, QUICK_ACKNOWLEDGEMENT, 1)
+
+    def eof_received(self) -> bool:
+        """Keep the line until all is answered."""
+        if self._conversation is None:
+            return False
+        self._conversation.eof_received()
+        return True
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End the conversation."""
+        if self._conversation is not None:
+            self._conversation.connection_lost()
+            self._conversation = None
+        self._host.release(self)
+
+    def pause_writing(self) -> None:
+        """Tell that the client does not read."""
+        if self._conversation is not None:
+            self._conversation.pause_writing()
+
+    def resume_writing(self) -> None:
+        """Tell that it has read."""
+        if self._conversation is not None:
+            self._conversation.resume_writing()
+
+    # --- what the conversation asks -------------------------------------------------------------------
+
+    def write(self, data: bytes) -> None:
+        """Send bytes, unless the line is cut."""
+        if not self._transport.is_closing():
+            self._answered = True
+            self._transport.write(data)
+
+    def pause_reading(self) -> None:
+        """Receive nothing more for the time being."""
+        self._transport.pause_reading()
+
+    def resume_reading(self) -> None:
+        """Receive again."""
+        self._transport.resume_reading()
+
+    def close(self, farewell: bytes = b"") -> None:
+        """Hang up when all is sent, the farewell as well."""
+        if farewell:
+            self.write(farewell)
+        self._transport.close()
+
+    def abort(self) -> None:
+        """Hang up at once."""
+        self._transport.abort()
+
+
+class TelnetConnection(TcpConnection):
+    """A TCP connection that passes for a serial port (RFC 2217)."""
+
+    serial = True
+
+    def __init__(self, host: Host, buffer: memoryview) -> None:
+        super().__init__(host, buffer)
+        self._telnet = Telnet()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin a conversation, and negotiate."""
+        cast(asyncio.Transport, transport).write(self._telnet.greeting())
+        super().connection_made(transport)
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """Hand on what of it is data, and answer the rest."""
+        data, answer = self._telnet.received(self._buffer[:nbytes].tobytes())
+        if answer:
+            super().write(answer)
+        if data:
+            self._take(data)
+
+    def write(self, data: bytes) -> None:
+        """Send bytes as telnet sends them."""
+        super().write(self._telnet.escape(data))

@@ -1,0 +1,173 @@
+"""A pseudo-terminal as a wire: a serial port of this machine under a name of one's own."""
+
+import asyncio
+import fcntl
+import os
+import termios
+import tty
+from pathlib import Path
+
+from a7sim.errors import A7SimError
+from a7sim.link.server.client_session import ClientSession
+from a7sim.link.server.connections import MAX_UNREAD, Host
+from a7sim.link.server.cpu_yield import YieldPolicy
+
+POLLS_BEFORE_SLEEP = 8
+"""A client that was answered mostly asks again at once: so often the wire looks before it sleeps until it is woken."""
+
+MAX_READ = 4096
+"""Bytes that a terminal of Linux holds."""
+
+PTY_DIRECTORY = "/dev/pts/"
+"""Where the links lead that may be overwritten."""
+
+
+class PtyConnection:
+    """The instrument's end of a pseudo-terminal, and the link to the other end.
+
+    It keeps the other end open itself, so that clients may come and go. Like a cable of three wires it cannot tell
+    one from the next; a client that is dropped leaves an empty line, on which a new conversation begins.
+    """
+
+    def __init__(self, host: Host, link: Path) -> None:
+        """Make the terminal and the link. Raises Mistake where there is something else in the link's place."""
+        self._host = host
+        self._link = link
+        self._unsent = bytearray()
+        self._clogged = False
+        self._reading = False
+        self._courtesy = YieldPolicy()
+        self._loop = asyncio.get_running_loop()
+        self._near, self._far = os.openpty()
+        tty.setraw(self._far)
+        os.set_blocking(self._near, False)
+        self.device = os.ttyname(self._far)
+        try:
+            fcntl.lockf(self._far, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _make_link(link, self.device)
+        except BaseException:
+            self._close_ends()
+            raise
+        self._conversation = self._welcomed()
+        self.resume_reading()
+
+    def _welcomed(self) -> ClientSession:
+        welcomed = self._host.accept(self, serial=True)
+        if isinstance(welcomed, bytes):
+            raise A7SimError(
+                f"--pty: expected fewer lines than clients are allowed: {welcomed.decode('ascii').strip()}"
+            )
+        return welcomed
+
+    def remove(self) -> None:
+        """Take link and terminal away."""
+        self._conversation.connection_lost()
+        self.pause_reading()
+        self._loop.remove_writer(self._near)
+        if self._link.is_symlink() and str(self._link.readlink()) == self.device:
+            self._link.unlink()
+        self._close_ends()
+
+    def _close_ends(self) -> None:
+        os.close(self._near)
+        os.close(self._far)
+
+    def _readable(self) -> None:
+        near, received = self._near, self._conversation.data_received
+        for _ in range(POLLS_BEFORE_SLEEP):
+            try:
+                data = os.read(near, MAX_READ)
+            except (BlockingIOError, InterruptedError):
+                if not self._courtesy.yield_cpu():
+                    return
+            else:
+                received(data)
+                if not self._reading:
+                    return
+
+    def _writable(self) -> None:
+        self._unsent = self._unsent[self._sent(self._unsent) :]
+        if not self._unsent:
+            self._loop.remove_writer(self._near)
+        if self._clogged and len(self._unsent) <= MAX_UNREAD // 4:
+            self._clogged = False
+            self._conversation.resume_writing()
+
+    def _sent(self, data: bytes | bytearray) -> int:
+        try:
+            return os.write(self._near, data)
+        except (BlockingIOError, InterruptedError):
+            return 0
+
+    # --- what the conversation asks -------------------------------------------------------------------
+
+    def write(self, data: bytes) -> None:
+        """Send bytes, now or as soon as they can go."""
+        if not self._unsent:
+            sent = self._sent(data)
+            if sent == len(data):
+                return
+            data = data[sent:]
+            self._loop.add_writer(self._near, self._writable)
+        self._unsent += data
+        if not self._clogged and len(self._unsent) > MAX_UNREAD:
+            self._clogged = True
+            self._conversation.pause_writing()
+
+    def pause_reading(self) -> None:
+        """Receive nothing more for the time being."""
+        self._reading = False
+        self._loop.remove_reader(self._near)
+
+    def resume_reading(self) -> None:
+        """Receive again."""
+        if not self._reading:
+            self._reading = True
+            self._loop.add_reader(self._near, self._readable)
+
+    def close(self, farewell: bytes = b"") -> None:
+        """Begin anew: there is nobody who could be told."""
+        self.abort()
+
+    def abort(self) -> None:
+        """Forget the client with all that is on the line, and begin anew."""
+        self._conversation.connection_lost()
+        self._host.release(self)
+        self._loop.remove_writer(self._near)
+        self._unsent.clear()
+        self._clogged = False
+        termios.tcflush(self._far, termios.TCIOFLUSH)
+        self._conversation = self._welcomed()
+        self.resume_reading()
+
+
+def _make_link(link: Path, device: str) -> None:
+    temporary = link.with_name(f".{link.name}.{os.getpid()}")
+    try:
+        if os.path.lexists(link) and not (link.is_symlink() and str(link.readlink()).startswith(PTY_DIRECTORY)):
+            raise A7SimError(f"--pty {link}: expected nothing there or an old link to a terminal, got something else")
+        if _is_served(link):
+            raise A7SimError(
+                f"--pty {link}: expected a path of its own, got that of another instrument, which is served"
+            )
+        temporary.unlink(missing_ok=True)
+        temporary.symlink_to(device)
+        temporary.replace(link)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise A7SimError(f"--pty {link}: expected a place where a link can be made: {error.strerror}") from error
+
+
+def _is_served(link: Path) -> bool:
+    """Whether somebody holds the lock that every server has on its terminal; `flock` is left to clients."""
+    try:
+        terminal = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        fcntl.lockf(terminal, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(terminal)
+    return False

@@ -1,0 +1,114 @@
+"""The instrument at its doors: TCP, RFC 2217 and pseudo-terminals, one loop, one desk, an engine for every client."""
+
+import asyncio
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from a7sim.errors import A7SimError
+from a7sim.instrument.language import ErrorNumber, SharedInstrument, format_entry
+from a7sim.link.clock import Clock, WallClock
+from a7sim.link.server.addresses import Address
+from a7sim.link.server.client_session import ClientSession, ServerLimits, Transport
+from a7sim.link.server.connections import MAX_READ, TcpConnection, TelnetConnection
+from a7sim.link.server.pty_connection import PtyConnection
+from a7sim.text import pluralize
+
+MAX_REJECTION_NOTICES = 64
+"""Clients at a time that are told why they are turned away; the others are just turned away."""
+
+LISTEN_BACKLOG = 512
+"""Connections that may wait to be taken in, and are taken in before the clients have their turn."""
+
+
+@dataclass(frozen=True)
+class Endpoints:
+    """Where the instrument is to be reached."""
+
+    tcp: Sequence[Address] = ()
+    rfc2217: Sequence[Address] = ()
+    pty: Sequence[Path] = ()
+
+
+class Server:
+    """An instrument that is served, from `open` to `close`."""
+
+    def __init__(self, instrument: SharedInstrument, clock: Clock | WallClock, terms: ServerLimits) -> None:
+        self.instrument = instrument
+        self._clock = clock
+        self._terms = terms
+        self._buffer = memoryview(bytearray(MAX_READ))
+        self._wires: set[Transport] = set()
+        self._turned_away: set[Transport] = set()
+        self._listeners: list[asyncio.Server] = []
+        self._terminals: list[PtyConnection] = []
+
+    async def open(self, doors: Endpoints) -> list[dict[str, Any]]:
+        """Open all doors and return what each is, as a document. Raises Mistake, and then none is open."""
+        try:
+            opened = [await self._listen("tcp", TcpConnection, address) for address in doors.tcp]
+            opened += [await self._listen("rfc2217", TelnetConnection, address) for address in doors.rfc2217]
+            opened += [self._lay(path) for path in doors.pty]
+        except BaseException:
+            await self.close()
+            raise
+        return opened
+
+    async def _listen(self, kind: str, wire: type[TcpConnection], address: Address) -> dict[str, Any]:
+        loop = asyncio.get_running_loop()
+        try:
+            listener = await loop.create_server(
+                lambda: wire(self, self._buffer), address.host, address.port, backlog=LISTEN_BACKLOG
+            )
+        except OSError as error:
+            raise A7SimError(f"--{kind} {address}: expected an address to listen on: {_reason(error)}") from error
+        self._listeners.append(listener)
+        host, port = listener.sockets[0].getsockname()[:2]
+        return {"kind": kind, "host": host, "port": port, "url": f"{kind}://{Address(host, port)}"}
+
+    def _lay(self, path: Path) -> dict[str, Any]:
+        terminal = PtyConnection(self, path)
+        self._terminals.append(terminal)
+        return {"kind": "pty", "path": str(path), "device": terminal.device, "url": str(path)}
+
+    async def close(self) -> None:
+        """Close all doors; every client is cut off."""
+        for listener in self._listeners:
+            listener.close()
+        for terminal in self._terminals:
+            terminal.remove()
+            self._wires.discard(terminal)
+        self._terminals.clear()
+        for wire in [*self._wires, *self._turned_away]:
+            wire.abort()
+        await asyncio.sleep(0)
+
+    @property
+    def clients(self) -> int:
+        """How many there are, each terminal counted as one."""
+        return len(self._wires)
+
+    def accept(self, wire: Transport, serial: bool) -> ClientSession | bytes:
+        """Return a conversation for a wire, or why there is none, as a line."""
+        most = self._terms.max_clients
+        if len(self._wires) >= most:
+            if len(self._turned_away) >= MAX_REJECTION_NOTICES:
+                wire.abort()
+            self._turned_away.add(wire)
+            text = format_entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {pluralize(most, 'client')} at a time")
+            return f"{text}\n".encode("ascii")
+        self._wires.add(wire)
+        return ClientSession(self.instrument, self._clock, self._terms, wire, self.instrument.client_count + 1, serial)
+
+    def release(self, wire: Transport) -> None:
+        """Take note that a wire is no more."""
+        self._wires.discard(wire)
+        self._turned_away.discard(wire)
+
+
+def _reason(error: OSError) -> str:
+    """Return what the operating system says, without what asyncio adds; a name that leads nowhere is below 0."""
+    number = error.errno or 0
+    return os.strerror(number) if number > 0 else error.strerror or str(error)

@@ -1,0 +1,1 @@
+"""Driving an instrument: the driver protocol, controls, pointing and the floating mark."""

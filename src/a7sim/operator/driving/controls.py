@@ -1,0 +1,340 @@
+"""The chair at the instrument: elements, counters and carriages, and where the mark is by what they show."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from a7sim.batch import Indices, put, take
+from a7sim.geometry import GON, Array, mxv, plane_rotation
+from a7sim.operator.driving.driver import BoolArray, InstrumentDriver
+from a7sim.operator.driving.job import Job, ModelJob
+from a7sim.operator.people.operator_batch import OperatorBatch
+from a7sim.plotters import LEAST_COUNT, VARIANTS, Variant
+
+STEADY = ("kappa1", "kappa2", "by1", "by2", "bx")
+"""Elements on which the places of images depend to first order."""
+
+ROUNDED_AWAY = 0.51
+"""Of a count: by no more can a counter and the drum beneath it differ."""
+
+TURNED_DECIMALS = 5
+"""With which a drum is turned."""
+
+
+class Controls:
+    """The hands of a crew on their instruments. Lengths in mm at instrument scale, readings as counters show them.
+
+    Arrays have the sessions as their last axis: all of them in what is kept here, those that act in what is handed
+    over.
+    """
+
+    def __init__(self, operators: OperatorBatch, driver: InstrumentDriver, job: Job) -> None:
+        self.operators = operators
+        self.driver = driver
+        self.job = job
+        self.model: ModelJob
+        self.manual: Variant = VARIANTS["A7"]
+        self.units_per_mm = 1.0
+        """Of the Z counter."""
+        self.z = np.zeros(operators.size)
+        """How far the mark stood below the base line when the counters were last read."""
+        self.c = job.certificate.c
+        self._plane = _by_dimensions(np.ones(2))
+        """Units of the X and Y counters a mm."""
+        self._settings = {name: np.zeros(operators.size) for name in STEADY}
+        self._left_at: dict[str, Array] = {}
+        """Where drums were left by these hands ``(sessions,)``, between two counts too; nan where that is not known."""
+        self._offset = np.zeros((3, operators.size))
+
+    def prepare(self, active: Indices) -> None:
+        """Bring the instruments to their zeros, engage the gears, set base and projection height."""
+        plan, driver = self.job.plan, self.driver
+        gear = self._learn_manual()
+        driver.set_height_gear(active, 1.0, plan.plan_gear)
+        driver.reset(active)
+        self.spend_setting(active, 6)
+        self._left_at.clear()
+        self.run_element(active, "bx", np.full(active.size, plan.bx))
+        driver.drive(active, {"Z": np.full(active.size, -plan.projection_height)})
+        self._count_from_origin(active, "XY")
+        driver.drive(active, dict(zip("XY", self._offset[:2, active], strict=True)))
+        height = driver.counter(active, "Z")
+        driver.set_height_gear(active, gear, plan.plan_gear)
+        self.give_up_on_errors(active, "preparing the instrument")
+        self._offset[2, active] = driver.counter(active, "Z") - self.units_per_mm * height
+
+    def take_over(self, active: Indices) -> None:
+        """Sit down at instruments that somebody else has prepared by the job sheet, their counters not yet preset."""
+        self._learn_manual()
+        self._left_at.clear()
+        self._count_from_origin(active, "XYZ")
+
+    def _learn_manual(self) -> str | float:
+        """Read up on the plotter; return the height gear that the job sheet asks for."""
+        gear = self.job.plan.height_gear
+        self.manual = VARIANTS[self.driver.variant()]
+        self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
+        self._plane = _by_dimensions(np.array([self.manual.scales[axis].units_per_mm for axis in "XY"]))
+        return gear
+
+    def _count_from_origin(self, active: Indices, axes: str) -> None:
+        for axis in axes:
+            self._offset["XYZ".index(axis), active] = self.manual.scales[axis].at_origin
+
+    def begin(self, active: Indices, model: ModelJob) -> None:
+        """Take up a model whose pictures are mounted."""
+        self.model = model
+        self.read_settings(active)
+
+    def preset(self, active: Indices, readings: tuple[float, float, float]) -> None:
+        """Make the counters that can be preset show these readings where the mark stands."""
+        wanted = {a: reading for a, reading in zip("XYZ", readings, strict=True) if self.manual.scales[a].preset}
+        before = self.driver.counters(active)
+        self.spend_setting(active)
+        self.driver.preset(active, wanted)
+        self.give_up_on_errors(active, "presetting the counters")
+        for axis, reading in wanted.items():
+            self._offset["XYZ".index(axis), active] += reading - before["XYZ".index(axis)]
+
+    def shift_counter(self, active: Indices, axis: str, by: Array) -> Array:
+        """Make a counter read so much more ``(m,)``, its carriage on a full count; return by how much it does."""
+        self.drive(active, {axis: self.driver.counter(active, axis)})
+        before = self.driver.counter(active, axis)
+        self.spend_setting(active)
+        self.driver.preset_one(active, axis, np.round(before + by, 2))
+        self.give_up_on_errors(active, f"presetting the {axis} counter")
+        more = np.round(self.driver.counter(active, axis) - before, 2)
+        self._offset["XYZ".index(axis), active] += more
+        return np.asarray(more)
+
+    def set_height_gear(self, active: Indices, gear: str | float) -> None:
+        """Engage a height gear; the Z counter goes on from what it shows, the carriage standing on a full count."""
+        self.drive(active, {"Z": self.driver.counter(active, "Z")})
+        height = (self.driver.counter(active, "Z") - self._offset[2, active]) / self.units_per_mm
+        self.spend_setting(active)
+        self.driver.set_height_gear(active, gear, self.job.plan.plan_gear)
+        self.give_up_on_errors(active, f"engaging the height gear {gear}")
+        self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
+        self._offset[2, active] = self.driver.counter(active, "Z") - self.units_per_mm * height
+
+    def spend_setting(self, active: Indices, times: int = 1) -> None:
+        """Let the time of setting something go by."""
+        self.operators.spend(active, times * self.operators.observer.seconds_to_set, "setting")
+
+    # --- elements -------------------------------------------------------------------------------------
+
+    def elements(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
+        """Read the counters of elements ``(m,)``; one that the instrument has not stands at nothing."""
+        there = [name for name in names if name in self.manual.elements]
+        seen = self.driver.elements(active, there) if there else {}
+        return {name: seen.get(name, np.zeros(active.size)) for name in names}
+
+    def elements_from_zero(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
+        """Read the counters of elements ``(m,)`` from their zeros; one that the instrument has not stands there."""
+        return {
+            name: counts - (self.manual.elements[name].zero if name in self.manual.elements else 0.0)
+            for name, counts in self.elements(active, names).items()
+        }
+
+    @property
+    def has_parallax_elements(self) -> bool:
+        """Whether y-parallaxes can be measured: with by' and by", which not every plotter has."""
+        return not self.manual.missing_elements("by1", "by2")
+
+    def set_elements(self, active: Indices, settings: Mapping[str, Array]) -> None:
+        """Set elements through their counters to values ``(m,)``, and enter them in the book."""
+        for name, value in settings.items():
+            counts = counter_value(name, value)
+            self.spend_setting(active)
+            self.run_element(active, name, counts)
+            self.give_up_on_errors(active, f"setting {name}")
+            self.operators.enter(active, "", f"set {name}", counts)
+        self.read_settings(self.operators.remaining(active))
+
+    def set_if_changed(self, active: Indices, settings: Mapping[str, Array]) -> None:
+        """Set those elements whose counters do not yet show the values ``(m,)`` that they have to."""
+        for name, wanted in settings.items():
+            if not active.size:
+                return
+            off = _difference(name, counter_value(name, wanted), self.elements(active, [name])[name])
+            changed = self.operators.is_active(active) & (np.abs(off) > LEAST_COUNT / 2.0)
+            if changed.any():
+                self.set_elements(active[changed], {name: wanted[changed]})
+
+    def run_element(self, active: Indices, name: str, counts: Array) -> None:
+        """Run an element to counts ``(m,)``, and bear in mind that it stands there."""
+        self.driver.set_element(active, name, counts)
+        self._leave(active, name, counts)
+
+    def exact_values(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
+        """Read where elements stand ``(m,)``, between two counts too where these hands have left them there."""
+        found = {}
+        for name, shown in self.elements(active, names).items():
+            left = self._left_at.get(name, np.full(self.operators.size, np.nan))[active]
+            near = np.abs(_difference(name, left, shown)) <= ROUNDED_AWAY * LEAST_COUNT
+            found[name] = np.where(near, left, shown)
+        return found
+
+    def turn_elements(self, active: Indices, settings: Mapping[str, Array]) -> None:
+        """Turn elements until they stand at values ``(m,)``, between two counts too, and enter what they show."""
+        for name, wanted in settings.items():
+            amounts = _difference(name, wanted, self.grab_drum(active, name))
+            self.spend_setting(active)
+            self.driver.turn_element(active, name, amounts)
+            self._turned(active, name, amounts)
+            self.give_up_on_errors(active, f"turning {name}")
+            self.operators.enter(active, "", f"set {name}", self.elements(active, [name])[name])
+        self.read_settings(self.operators.remaining(active))
+
+    def turn_if_changed(self, active: Indices, settings: Mapping[str, Array]) -> None:
+        """Turn those elements that do not yet stand at the values ``(m,)`` at which they have to."""
+        for name, wanted in settings.items():
+            if not active.size:
+                return
+            off = np.abs(_difference(name, wanted, self.exact_values(active, [name])[name]))
+            changed = self.operators.is_active(active) & (off >= 10.0**-TURNED_DECIMALS)
+            if changed.any():
+                self.turn_elements(active[changed], {name: wanted[changed]})
+
+    def grab_drum(self, active: Indices, name: str) -> Array:
+        """Take a drum in hand to turn it; return where it stands ``(m,)``."""
+        stands = self.exact_values(active, [name])[name]
+        self._leave(active, name, stands)
+        return stands
+
+    def held_position(self, active: Indices, name: str) -> Array:
+        """Return where a drum that these hands have turned stands ``(m,)``."""
+        return self._left_at[name][active]
+
+    def _leave(self, active: Indices, name: str, at: Array) -> None:
+        self._left_at.setdefault(name, np.full(self.operators.size, np.nan))[active] = at
+
+    def _turned(self, active: Indices, name: str, amounts: Array) -> None:
+        self._left_at[name][active] += amounts.round(TURNED_DECIMALS)
+
+    def read_settings(self, active: Indices) -> None:
+        """Read off what the places of images depend on."""
+        for name, counts in self.elements(active, [name for name in STEADY if name in self.manual.elements]).items():
+            self._settings[name][active] = counts
+
+    def projector(self, side: int) -> int:
+        """Return the projector of the left-hand (1) or the right-hand (2) photograph."""
+        return self.model.left_projector if side == 1 else self.model.right_projector
+
+    def bx(self, active: Indices) -> Array:
+        """Return the base as it is set ``(m,)``, mm."""
+        return take(self._settings["bx"], active)
+
+    # --- places ---------------------------------------------------------------------------------------
+
+    def counters(self, active: Indices) -> Array:
+        """Read X, Y and Z ``(3, m)``, and bear in mind how deep the mark stands."""
+        readings = self.driver.counters(active)
+        put((take(self._offset[2], active) - readings[2]) / self.units_per_mm, active, self.z)
+        return readings
+
+    def displayed_levels(self, active: Indices, levels: Sequence[float]) -> Array:
+        """Return Z readings ``(k, m)`` as the counters show them when they are driven there."""
+        shown = []
+        for level in levels:
+            self.drive(active, {"Z": np.full(active.size, level)})
+            self.give_up_on_errors(active, f"driving Z to {level:.2f}")
+            shown.append(self.counters(active)[2])
+        return np.array(shown)
+
+    def drive(self, active: Indices, readings: Mapping[str, Array]) -> BoolArray:
+        """Run carriages to readings ``(m,)``; return which instruments let them go there."""
+        self.operators.spend(active, self.operators.observer.seconds_to_drive, "driving")
+        return self.driver.drive(active, readings)
+
+    def drive_z_to(self, active: Indices, height: Array) -> BoolArray:
+        """Run the mark to heights ``(m,)`` above the base line, mm, hence negative."""
+        return self.drive(active, {"Z": self._offset[2, active] + height * self.units_per_mm})
+
+    def turn(self, active: Indices, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
+        """Turn the handwheels ``(2 or 3, m)`` in counter units and with them an element that is in hand."""
+        self.operators.spend(active, self.operators.observer.seconds_to_turn, "turning")
+        self.driver.turn(active, wheels, element, amounts)
+        if element is not None and amounts is not None:
+            self._turned(active, element, amounts)
+
+    def give_up_on_errors(self, active: Indices, doing: str) -> None:
+        """Give up where an instrument has refused anything since the last look."""
+        refused = self.driver.pop_errors(active)
+        if refused:
+            sessions = np.array(sorted(refused), dtype=np.intp)
+            self.operators.give_up(
+                sessions, lambda session: f"{doing}: the instrument refuses: {'; '.join(refused[session][:2])}"
+            )
+
+    def model_position(self, active: Indices, readings: Array) -> Array:
+        """Return readings ``(3, m)`` as x, y, z in mm: from the left-hand centre, the base line, downward."""
+        offset = take(self._offset, active)
+        x, y = self.to_mm(readings[:2] - offset[:2])
+        z = (offset[2] - readings[2]) / self.units_per_mm
+        return np.array([x - self._share(1) * self.bx(active), y, z])
+
+    def frame_positions(self, active: Indices, readings: Array, level: Array) -> Array:
+        """Return X, Y readings ``(2, n, m)`` at Z readings ``(m,)`` as places x, y, z ``(3, n, m)`` in mm."""
+        x, y = self.to_mm(readings - self._offset[:2, None, active])
+        x = x - self._share(1) * self.bx(active)
+        z = np.broadcast_to((self._offset[2, active] - level) / self.units_per_mm, x.shape)
+        return np.array([x, y, z])
+
+    def under_centre(self, active: Indices, side: int) -> Array:
+        """Return the X and Y readings ``(2, m)`` straight below a photograph's centre, as far as by and bx tell."""
+        below = np.array([self._share(side) * self.bx(active), -self._settings[f"by{self.projector(side)}"][active]])
+        return self.to_counter_units(below) + self._offset[:2, active]
+
+    def centre(self, active: Indices, side: int) -> Array:
+        """Return the readings ``(3, m)`` of a photograph's centre, as far as elements and scales tell (P 3.1, 3.2)."""
+        heights = self.elements_from_zero(active, [f"bz{self.projector(side)}"])[f"bz{self.projector(side)}"]
+        below = self.under_centre(active, side)
+        return np.array([*below, self._offset[2, active] + self.units_per_mm * heights])
+
+    def _share(self, side: int) -> float:
+        """Return where a centre stands along X from the frame's origin, as a share of bx."""
+        return self.manual.centres_on_base[side - 1]
+
+    def to_counter_units(self, shift: Array) -> Array:
+        """Return shifts ``(2, ...)`` in mm as so much of the X and Y counters."""
+        return np.asarray(self._plane[shift.ndim] * shift)
+
+    def to_mm(self, counted: Array) -> Array:
+        """Return differences ``(2, ...)`` of X and Y readings in mm."""
+        return np.asarray(counted / self._plane[counted.ndim])
+
+    @property
+    def counter_units_per_mm(self) -> Array:
+        """Units a mm ``(3,)`` of the X, Y and Z counters."""
+        return np.array([*self._plane[1], self.units_per_mm])
+
+    def rotate_by_swing(self, active: Indices, side: int, print_place: Array) -> Array:
+        """Return places of paper prints ``(2, m)`` as the swing of their photograph turns them."""
+        swing = wrap_gon(self._settings[f"kappa{self.projector(side)}"][active]) * GON
+        return mxv(plane_rotation(swing), print_place)
+
+
+def _by_dimensions(units: Array) -> Mapping[int, Array]:
+    """Return units a mm ``(2,)`` by how many dimensions what they go with has: points, sessions of each, or neither."""
+    return {1: units, 2: units[:, None], 3: units[:, None, None]}
+
+
+def wrap_gon(gon: Array) -> Array:
+    """Return angles within 200 gon of zero."""
+    return np.asarray((gon + 200.0) % 400.0 - 200.0)
+
+
+def counter_value(name: str, value: Array) -> Array:
+    """Return what the counter of an element must show, kappa brought to 0..400."""
+    return np.asarray(np.round(value % 400.0, 2) % 400.0 if name.startswith("kappa") else np.round(value, 2))
+
+
+def _difference(name: str, value: Array, other: Array) -> Array:
+    """Return one value of an element minus another, the shorter way round for kappa."""
+    return wrap_gon(value - other) if name.startswith("kappa") else np.asarray(value - other)
+
+
+def side_name(side: int) -> str:
+    """Return left or right for a hand."""
+    return "left" if side == 1 else "right"

@@ -1,0 +1,105 @@
+"""A level model to scale, as lines are drawn from it: its orientation to the ground by all control (thesis 3.5)."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.geometry import GON, Array
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.mapping.stereo_view import StereoView
+from a7sim.operator.procedures.levelling import Control, Levelling
+from a7sim.reduction import AbsoluteOrientation, Ground, Model, Undetermined, absolute_orientation
+
+Place = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class LevelModel:
+    """A level model to scale: its orientation to the ground, and what was measured in it by point, in readings."""
+
+    absolute: AbsoluteOrientation
+    points: Mapping[str, Place]
+    scale_number: float
+    """Of the model as ordered: 3750 for 1:3750."""
+    tilt_gon: float
+    """What is left of its tilt."""
+    units_per_mm: float
+    rounds: int
+
+    def on_ground(self, readings: Array) -> Array:
+        """Return readings ``(3, ...)`` of the counters as places on the ground ``(3, ...)`` in m."""
+        places = (readings.reshape(3, -1).T / self._units).T
+        return self.absolute.similarity.applied_to(places).reshape(readings.shape)
+
+    def readings_of(self, ground: Array) -> Array:
+        """Return the readings ``(3, ...)`` at which places on the ground ``(3, ...)`` in m stand in the model."""
+        places = self.absolute.similarity.inverted(ground.reshape(3, -1))
+        return np.asarray((places.T * self._units).T.reshape(ground.shape))
+
+    @property
+    def _units(self) -> Array:
+        return np.array([1.0, 1.0, self.units_per_mm])
+
+    @property
+    def metres_per_mm(self) -> float:
+        """Of the ground, a mm of the model as it came out."""
+        return float(self.absolute.similarity.scale)
+
+
+def level_model(
+    workstation: Workstation,
+    view: StereoView,
+    points: Mapping[str, Place],
+    control: Ground,
+    scale_number: float,
+    also: Sequence[str] = (),
+) -> LevelModel:
+    """Level a relatively oriented model of one person and bring it to scale; `points` are readings measured in it.
+
+    The control in the model, and the points of `also`, are measured anew in the end. Gives up where the control
+    does not determine the orientation.
+    """
+    operators, units = workstation.operators, workstation.controls.units_per_mm
+    wanted = [name for name in points if name in control.points or name in also]
+    rounds = 0
+    shown = Control.of(control, [name for name in wanted if name in control.points])
+    if shown.is_enough:
+        levelling = Levelling(workstation, workstation.controls.model, shown)
+        fit = levelling.compared(operators.active, levelling.measured(operators.active, 1))
+        rounds = len(levelling.level(operators.active, fit, scale_number)[0]) - 1
+        view.read_projectors()
+        points = _measured(workstation, wanted)
+    absolute = orient_model(workstation, points, control, units)
+    return LevelModel(absolute, points, scale_number, _tilt(absolute), units, rounds)
+
+
+def _measured(workstation: Workstation, names: Sequence[str]) -> dict[str, Place]:
+    readings = workstation.measure_points(workstation.operators.active, names)[:, :, 0].T
+    return {
+        name: (float(X), float(Y), float(Z))
+        for name, (X, Y, Z) in zip(names, readings, strict=True)
+        if not math.isnan(X)
+    }
+
+
+def orient_model(
+    workstation: Workstation, points: Mapping[str, Place], control: Ground, units: float
+) -> AbsoluteOrientation:
+    """Return the orientation to the ground of a model in which the control was measured, gives up where it has none."""
+    names = tuple(name for name in points if name in control.points)
+    coordinates = np.array([points[name] for name in names]).reshape(-1, 3).T / np.array([[1.0], [1.0], [units]])
+    try:
+        return absolute_orientation(Model(workstation.controls.model.name, names, coordinates), control)
+    except Undetermined as reason:
+        workstation.operators.give_up(
+            workstation.operators.active, f"{workstation.controls.model.name}: absolute orientation: {reason}"
+        )
+        raise
+
+
+def _tilt(absolute: AbsoluteOrientation) -> float:
+    """Return how far the ground's plumb line leans in the model, gon."""
+    x, y, _ = absolute.similarity.rotation[2]
+    return math.hypot(x, y) / GON

@@ -1,0 +1,284 @@
+"""Seeing the ground at the mark: the pictures of both eyepieces, brought together as a person fuses them.
+
+The eyepieces name no ground: they show texture. Two eyes that look at it see a surface that passes above or below
+the mark, and how it slopes. Here that is least-squares matching of the two pictures: the surface is a plane in the
+model, it is turned and raised until the left and the right picture of it agree. What a person's eyes add
+in error is added by the procedures.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from a7sim.geometry import GON, Array, image_of, plane_rotation, rotation
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.operator.people.person import Person
+
+SIDE = 48
+"""Columns and rows of a look."""
+
+FINE_MM, MIDDLING_MM, COARSE_MM = 0.03, 0.07, 0.2
+"""Size of a picture element at photo scale; the finest shows 1.44 mm of the photograph."""
+
+FUSED = 0.95
+"""Correlation from which two pictures are taken for the same ground: on bare ground 0.97 and more, elsewhere
+less (docs/compilation.md)."""
+
+_PATCH = 31
+"""Places each way at which the pictures are compared, one every picture element."""
+
+_MARK_RADIUS = 3.5
+"""Picture elements about the middle that the mark covers, with what interpolation spreads of it."""
+
+_MAX_STEPS = 12
+_AT_REST = 2e-4
+_STEEPEST = 1.0
+_NUDGE_MM = 0.05
+
+
+@dataclass(frozen=True)
+class PerceivedSurface:
+    """The ground as both eyes see it about the mark; lengths in mm at model scale."""
+
+    height: float
+    """Of the ground above the mark, straight over or under it."""
+    slope: Array
+    """How it rises along X and Y ``(2,)``."""
+    y_parallax: float
+    """mm at photo scale, left eye minus right eye."""
+    correlation: float
+
+    def above(self, plan: Array) -> float:
+        """Return how high the ground stands above the mark at a displacement in plan ``(2,)``."""
+        return float(self.height + self.slope @ plan)
+
+    @property
+    def fused(self) -> bool:
+        """Whether the two pictures came together."""
+        return self.correlation >= FUSED
+
+
+@dataclass(frozen=True)
+class StereoPatch:
+    """The pictures of both eyes ``(2, rows, columns)`` and how model displacements show in them."""
+
+    pictures: Array
+    pitch: float
+    """mm at photo scale."""
+    shown: Array
+    """From displacements in the model to those in the pictures ``(2 eyes, 2, 3)``."""
+    spacing: float
+    """mm in the model that a picture element shows."""
+
+    @property
+    def parallax_by_height(self) -> float:
+        """x-parallax at photo scale by a mm of height in the model."""
+        return float(abs(self.shown[0, 0, 2] - self.shown[1, 0, 2]))
+
+    @property
+    def enlargement(self) -> float:
+        """Size in the model by size in the photographs."""
+        return self.spacing / self.pitch
+
+    @cached_property
+    def comparison_points(self) -> Array:
+        """Displacements in plan ``(2, n)`` of the places at which the pictures are compared, mm in the model."""
+        return self.patch(_PATCH)
+
+    def patch(self, side: int) -> Array:
+        """Return displacements in plan ``(2, n)`` over so many picture elements each way, mm in the model."""
+        at = self.spacing * (np.arange(side) - (side - 1) / 2.0)
+        return np.array(np.meshgrid(at, at)).reshape(2, -1)
+
+    def elements_at(self, seen: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+        """Return columns and rows ``(..., n)`` of places ``(..., 2, n)``, and which are seen free of the mark."""
+        columns = seen[..., 0, :] / self.pitch + (SIDE - 1) / 2.0
+        rows = -seen[..., 1, :] / self.pitch + (SIDE - 1) / 2.0
+        inside = (columns >= 0) & (columns < SIDE - 1) & (rows >= 0) & (rows < SIDE - 1)
+        uncovered = np.hypot(seen[..., 0, :], seen[..., 1, :]) > _MARK_RADIUS * self.pitch
+        return columns, rows, inside & uncovered
+
+    def places(self, surface: Array) -> tuple[Array, Array]:
+        """Return displacements ``(2, n)`` over the patch and where either eye sees them on a surface ``(2, 2, n)``.
+
+        `surface` is height, slope in X, slope in Y in the model, and y-parallax at photo scale.
+        """
+        plan = self.comparison_points
+        raised = np.concatenate([plan, [surface[0] + surface[1:3] @ plan]])
+        seen = self.shown @ raised
+        seen[0, 1] += surface[3] / 2.0
+        seen[1, 1] -= surface[3] / 2.0
+        return plan, seen
+
+
+class StereoView:
+    """The eyes of one person at a line on the ground at the mark."""
+
+    def __init__(self, workstation: Workstation, person: Person) -> None:
+        self._workstation = workstation
+        self._person = person
+        self._active = np.zeros(1, dtype=np.intp)
+        self._elements: dict[str, float] = {}
+        self.read_projectors()
+
+    def read_projectors(self) -> None:
+        """Read off how the projectors stand."""
+        names = [f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz", "c") for n in (1, 2)]
+        counts = self._workstation.controls.elements(self._active, [*names, "bx"])
+        self._elements = {name: float(each[0]) for name, each in counts.items()}
+
+    def camera(self, side: int) -> tuple[Array, Array]:
+        """Return centre ``(3,)`` and rotation ``(3, 3)`` of the left-hand (1) or right-hand (2) photograph's camera."""
+        n = self._workstation.controls.projector(side)
+        turned = rotation(*(tilt * GON for tilt in self._workstation.controls.manual.tilts(self._elements, n)))
+        x = 0.0 if side == 1 else self._elements["bx"]
+        centre = np.array([x, -self._elements[f"by{n}"], self._elements[f"bz{n}"]])
+        return centre, turned
+
+    def displacements(self, mark: Array) -> Array:
+        """Return the derivatives ``(2 eyes, 2, 3)`` of what the eyes see by displacements from the mark ``(3,)``."""
+        steps = _NUDGE_MM * np.concatenate([np.eye(3), -np.eye(3)], axis=1)
+        seen = []
+        for side in (1, 2):
+            n = self._workstation.controls.projector(side)
+            centre, turned = self.camera(side)
+            images = image_of((mark[:, None] + steps), centre[:, None], turned, self._elements[f"c{n}"])
+            swing = plane_rotation(self._elements[f"kappa{n}"] * GON)
+            seen.append(swing @ (images[:, :3] - images[:, 3:]) / (2.0 * _NUDGE_MM))
+        return np.array(seen)
+
+    def look(self, pitch: float = FINE_MM) -> StereoPatch:
+        """Look with both eyes, a picture element being so many mm of the photographs; whoever looks spends the time."""
+        workstation = self._workstation
+        mark = workstation.controls.model_position(self._active, workstation.controls.counters(self._active))[:, 0] * (
+            1.0,
+            1.0,
+            -1.0,
+        )
+        magnification = 2.0 * workstation.controls.manual.field_radius_mm / (SIDE * pitch)
+        pictures = np.array([self._picture(eye, magnification) for eye in (1, 2)])
+        shown = self.displacements(mark)
+        return StereoPatch(pictures, pitch, shown, pitch / float(np.abs(np.linalg.det(shown[0, :, :2])) ** 0.5))
+
+    def _picture(self, eye: int, magnification: float) -> Array:
+        block = self._person.client.block(f"EYEP{eye}:PICT? {SIDE},{SIDE},{magnification:.6g}")
+        return np.frombuffer(block, dtype=np.uint8).reshape(SIDE, SIDE) / 255.0
+
+    def surface(
+        self, look: StereoPatch, expected: PerceivedSurface | None = None, reach: float = 0.0
+    ) -> PerceivedSurface:
+        """Return the ground that a look shows, beginning with an expected slope.
+
+        Heights within `reach` mm of the mark are tried; without it the ground is expected at the mark's height.
+        """
+        start = np.zeros(4)
+        if expected is not None:
+            start[1:3] = expected.slope
+            start[0] = expected.height
+        if reach:
+            per_element = look.pitch / look.parallax_by_height
+            heights = start[0] + np.arange(-reach, reach + per_element, 0.75 * per_element)
+            tried = [_correlation(look, np.array([h, *start[1:]])) for h in heights]
+            start[0] = heights[int(np.argmax(tried))]
+        return _matched(look, start)
+
+
+def _matched(look: StereoPatch, surface: Array) -> PerceivedSurface:
+    """Return the plane that makes both pictures agree best, by Gauss-Newton from a plane nearby."""
+    scale = np.array([1.0, 10.0, 10.0, 1.0])
+    for _ in range(_MAX_STEPS):
+        left, right, left_slopes, right_slopes, plan = _compared(look, surface)
+        if left.size < _PATCH:
+            return PerceivedSurface(0.0, np.zeros(2), 0.0, 0.0)
+        left_spread, right_spread = left.std(), right.std()
+        if not left_spread * right_spread:
+            return PerceivedSurface(0.0, np.zeros(2), 0.0, 0.0)
+        by_height = (left_slopes * look.shown[0, :, 2:]).sum(axis=0) / left_spread - (
+            right_slopes * look.shown[1, :, 2:]
+        ).sum(axis=0) / right_spread
+        by_parallax = (left_slopes[1] / left_spread + right_slopes[1] / right_spread) / 2.0
+        design = np.array([by_height, by_height * plan[0], by_height * plan[1], by_parallax, np.ones(left.size)]).T
+        misfit = (left - left.mean()) / left_spread - (right - right.mean()) / right_spread
+        step = np.linalg.lstsq(design, -misfit, rcond=None)[0][:4]
+        surface = surface + step
+        surface[1:3] = np.clip(surface[1:3], -_STEEPEST, _STEEPEST)
+        if np.abs(step * scale).max() < _AT_REST:
+            break
+    return PerceivedSurface(float(surface[0]), surface[1:3].copy(), float(surface[3]), _correlation(look, surface))
+
+
+def _compared(look: StereoPatch, surface: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Return the greys ``(n,)`` of a surface in both pictures, their slopes ``(2, n)`` a mm and the places ``(2, n)``.
+
+    Places that the mark covers or that lie outside either picture are left out.
+    """
+    between, plan = _seen_by_both(look, surface)
+    sense = np.array([[1.0], [-1.0]])
+    left_slopes, right_slopes = (each.slopes * sense / look.pitch for each in between)
+    return between[0].greys, between[1].greys, left_slopes, right_slopes, plan
+
+
+def _seen_by_both(look: StereoPatch, surface: Array) -> tuple[list["_Between"], Array]:
+    """Return where both pictures show a surface free of the mark, and the places ``(2, n)``."""
+    plan, seen = look.places(surface)
+    columns, rows, plain = look.elements_at(seen)
+    keep = plain.all(axis=0)
+    between = [_Between.of(look.pictures[eye], columns[eye, keep], rows[eye, keep]) for eye in (0, 1)]
+    return between, plan[:, keep]
+
+
+@dataclass(frozen=True)
+class _Between:
+    """Places ``(n,)`` between picture elements: how far to the right and down, and the changes of grey about them."""
+
+    to_right: Array
+    down: Array
+    upper: Array
+    upper_change: Array
+    lower: Array
+    lower_change: Array
+
+    @classmethod
+    def of(cls, picture: Array, columns: Array, rows: Array) -> "_Between":
+        j, i = columns.astype(np.intp), rows.astype(np.intp)
+        first, width, elements = i * picture.shape[1] + j, picture.shape[1], picture.ravel()
+        a, c = elements.take(first), elements.take(first + width)
+        return cls(columns - j, rows - i, a, elements.take(first + 1) - a, c, elements.take(first + (width + 1)) - c)
+
+    @cached_property
+    def _ends(self) -> tuple[Array, Array]:
+        upper = self.upper + self.upper_change * self.to_right
+        return upper, self.lower + self.lower_change * self.to_right - upper
+
+    @property
+    def greys(self) -> Array:
+        """Greys ``(n,)``."""
+        upper, difference = self._ends
+        return upper + difference * self.down
+
+    @property
+    def slopes(self) -> Array:
+        """How they change by column and row ``(2, n)``."""
+        return np.array([self.upper_change * (1.0 - self.down) + self.lower_change * self.down, self._ends[1]])
+
+
+def _correlation(look: StereoPatch, surface: Array) -> float:
+    """Return how the greys of a surface in both pictures are correlated."""
+    left, right = (each.greys for each in _seen_by_both(look, surface)[0])
+    spread = float(left.std() * right.std()) if left.size >= _PATCH else 0.0
+    return float(((left - left.mean()) * (right - right.mean())).mean()) / spread if spread > 0.0 else 0.0
+
+
+def rectify(look: StereoPatch, surface: PerceivedSurface, side: int) -> tuple[npt.NDArray[np.bool_], Array, Array]:
+    """Return what the left eye sees laid out on the ground: where it sees, greys, both ``(n,)``, and places ``(2, n)``.
+
+    The patch is `side` picture elements each way; places are displacements from the mark in plan, mm in the model.
+    """
+    plan = look.patch(side)
+    seen = look.shown[0] @ np.concatenate([plan, [surface.height + surface.slope @ plan]])
+    columns, rows, inside = look.elements_at(seen)
+    grey = np.zeros(inside.size)
+    grey[inside] = _Between.of(look.pictures[0], columns[inside], rows[inside]).greys
+    return inside, grey, plan

@@ -1,0 +1,1 @@
+"""The operator as a person: skill, random draws, fatigue, slips, time and observation book."""

@@ -1,0 +1,49 @@
+"""The person in the chair: a line, a book, a watch and patience."""
+
+from dataclasses import dataclass, field
+
+from a7sim.link.client.client import Client
+from a7sim.link.clock import Clock
+from a7sim.operator.people.observation_book import ObservationBook
+from a7sim.operator.people.random_draws import OperatorRandom
+from a7sim.operator.people.slips import Slip
+from a7sim.operator.people.timesheet import Timesheet
+from a7sim.scenario import Observer
+
+MAX_NOTE_LENGTH = 900
+
+
+class OperatorGaveUp(Exception):
+    """The operator gives up: what is seen cannot be what was ordered. The text is the remark in the book."""
+
+
+@dataclass
+class Person:
+    """An operator at a line to the instrument, with a book and a watch."""
+
+    client: Client
+    clock: Clock
+    observer: Observer
+    seed: int
+    book: ObservationBook = field(default_factory=ObservationBook)
+    timesheet: Timesheet = field(default_factory=lambda: Timesheet(1))
+    slips: list[Slip] = field(default_factory=list)
+    """The truth about every slip, which this person does not have."""
+
+    def __post_init__(self) -> None:
+        self.random = OperatorRandom(self.observer, self.seed)
+
+    def remark(self, text: str) -> None:
+        """Write a remark into the book and into the journal of the instrument."""
+        self.book.remark(self.clock.now, text)
+        self.note(text)
+
+    def note(self, text: str) -> None:
+        """Write a note into the journal of the instrument."""
+        printable = "".join(c if " " <= c <= "~" else "?" for c in text.replace('"', "'"))
+        self.client.send(f'NOTE "{printable[:MAX_NOTE_LENGTH]}"')
+
+    def give_up(self, text: str) -> OperatorGaveUp:
+        """Write what does not fit into the book and return it as an error to raise."""
+        self.remark(f"does not fit: {text}")
+        return OperatorGaveUp(text)

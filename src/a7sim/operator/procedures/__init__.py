@@ -1,0 +1,1 @@
+"""Procedures of orientation: interior, relative, absolute, perspective centres, bridging, grid test."""

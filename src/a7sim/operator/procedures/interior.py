@@ -1,0 +1,173 @@
+"""Interior orientation: fiducials to their collimating marks, principal distance to the counter (thesis 3.4.1)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from a7sim.batch import Indices
+from a7sim.geometry import GON, Array
+from a7sim.operator.driving.workstation import Workstation
+from a7sim.reduction import PicturePlacement, Undetermined, picture_placement
+from a7sim.scenario import Camera
+
+CENTRED_MM = 0.02
+"""How well pictures are centred where a tolerance is stated (history.md)."""
+
+MISPLACED_MM = 50.0
+"""Beyond this a fiducial is not off its collimating mark, it is somewhere else."""
+
+MAX_ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class InteriorOrientation:
+    """How a picture was centred: what was left at the fiducials, and the principal distance set."""
+
+    photograph: str
+    rounds: int
+    residual_mm: float
+    """Rms of the fiducials' displacements that no shift, turn or scale explains."""
+    film_scale: float
+    principal_distance: float
+
+
+@dataclass(frozen=True)
+class InteriorOrientationBatch:
+    """The interior orientations ``(sessions,)`` of a photograph in every session."""
+
+    photograph: str
+    rounds: npt.NDArray[np.intp]
+    residual_mm: Array
+    film_scale: Array
+    principal_distance: Array
+
+    def of(self, session: int) -> InteriorOrientation:
+        """Return one session's interior orientation."""
+        return InteriorOrientation(
+            self.photograph,
+            int(self.rounds[session]),
+            float(self.residual_mm[session]),
+            float(self.film_scale[session]),
+            float(self.principal_distance[session]),
+        )
+
+
+def interior_orientation(
+    workstation: Workstation, active: Indices, projector: int, photograph: str, certificate: Camera
+) -> InteriorOrientationBatch:
+    """Mount a photograph in a projector, centre it and set its principal distance.
+
+    Uniform film shrinkage, seen as a change of scale at the fiducials, goes into the principal distance. Those who
+    cannot centre the picture give up.
+    """
+    found = centre_picture(workstation, active, projector, photograph, certificate)
+    _set_principal_distance(
+        workstation, workstation.operators.remaining(active), projector, photograph, certificate, found
+    )
+    return found
+
+
+def centre_picture(
+    workstation: Workstation, active: Indices, projector: int, photograph: str, certificate: Camera
+) -> InteriorOrientationBatch:
+    """Mount a picture in a projector and centre it on the calibrated principal point; no element is touched.
+
+    The principal distances found are zero. Those who cannot centre the picture give up.
+    """
+    operators, driver = workstation.operators, workstation.driver
+    _mount(workstation, active, projector, photograph)
+    marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
+    wanted = -np.array(certificate.principal_point)[:, None]
+    found = InteriorOrientationBatch(
+        photograph, np.zeros(operators.size, dtype=np.intp), *np.zeros((3, operators.size))
+    )
+    centring = operators.remaining(active)
+    for round_ in range(1, MAX_ROUNDS + 1):
+        names, displacements = view_fiducials(workstation, centring, projector)
+        places = np.array([marks[name] for name in names]).T
+        right = _rightly_laid(workstation, centring, projector, photograph, displacements, places)
+        centring, displacements = centring[right], displacements[:, :, right]
+        try:
+            lie = picture_placement(displacements, places)
+        except Undetermined as undetermined:
+            operators.give_up(centring, f"the fiducials of {photograph} do not tell how it lies: {undetermined}")
+            return found
+        off = np.array([lie.dx, lie.dy]) - wanted
+        there = (np.abs(off).max(axis=0) <= CENTRED_MM) & (np.abs(lie.turn) * np.abs(places).max() <= CENTRED_MM)
+        centred = centring[there]
+        found.rounds[centred] = round_
+        found.film_scale[centred] = lie.scale[there]
+        found.residual_mm[centred] = _unexplained(displacements, places, lie)[there]
+        off, turn, centring = off[:, ~there], lie.turn[~there] / GON, centring[~there]
+        if not centring.size:
+            break
+        now = driver.centring(centring, projector)
+        workstation.controls.spend_setting(centring)
+        driver.centre(centring, projector, np.round(now - [*off, turn], 3))
+        workstation.controls.give_up_on_errors(centring, f"centring {photograph}")
+        centring = operators.remaining(centring)
+    operators.give_up(centring, f"picture {photograph} cannot be centred in projector {projector}")
+    return found
+
+
+def _mount(workstation: Workstation, active: Indices, projector: int, photograph: str) -> None:
+    operators = workstation.operators
+    operators.spend(active, operators.observer.seconds_to_mount, "mounting")
+    workstation.controls.spend_setting(active)
+    workstation.driver.load(active, projector, photograph)
+    workstation.controls.give_up_on_errors(active, f"mounting {photograph}")
+    lies_there = workstation.driver.loaded(active, projector)
+    if lies_there != photograph:
+        operators.give_up(
+            active, f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it"
+        )
+
+
+def view_fiducials(workstation: Workstation, active: Indices, projector: int) -> tuple[list[str], Array]:
+    """Return the names of a picture's fiducials and their displacements ``(2, n, m)`` as they are registered, mm."""
+    names, exact = workstation.driver.fiducials(active, projector)
+    operators = workstation.operators
+    operators.spend(active, len(names) * operators.observer.seconds_to_read, "reading")
+    return names, exact + 1e-3 * operators.draw_setting_errors(active, operators.observer.fiducial_um, exact.shape[:2])[
+        :, :, active
+    ]
+
+
+def _rightly_laid(
+    workstation: Workstation, active: Indices, projector: int, photograph: str, displacements: Array, places: Array
+) -> npt.NDArray[np.bool_]:
+    """Return whose fiducials stand near the collimating marks of their names ``(m,)``; the others give up."""
+    furthest = np.abs(displacements).max(axis=(0, 1))
+    upside_down = np.abs(displacements + 2.0 * places[:, :, None]).max(axis=(0, 1)) < MISPLACED_MM
+    misplaced = furthest > MISPLACED_MM
+    for session, distance, turned in zip(active[misplaced], furthest[misplaced], upside_down[misplaced], strict=True):
+        how = "upside down" if turned else "beside its marks"
+        workstation.operators.give_up(
+            np.array([session]),
+            f"picture {photograph} lies {how} in projector {projector}: its fiducials stand up to "
+            f"{distance:.0f} mm from the collimating marks of their names",
+        )
+    return np.asarray(~misplaced)
+
+
+def _unexplained(displacements: Array, places: Array, lie: PicturePlacement) -> Array:
+    x, y = places[:, :, None]
+    explained = np.array([lie.dx - lie.turn * y + lie.scale * x, lie.dy + lie.turn * x + lie.scale * y])
+    return np.asarray(np.sqrt(((displacements - explained) ** 2).mean(axis=(0, 1))))
+
+
+def _set_principal_distance(
+    workstation: Workstation,
+    active: Indices,
+    projector: int,
+    photograph: str,
+    certificate: Camera,
+    found: InteriorOrientationBatch,
+) -> None:
+    c = np.round(certificate.c * (1.0 + found.film_scale[active]), 2)
+    found.principal_distance[active] = c
+    workstation.controls.spend_setting(active)
+    workstation.driver.set_element(active, f"c{projector}", c)
+    workstation.controls.give_up_on_errors(active, f"setting c{projector}")
+    workstation.operators.enter(active, "", f"{photograph} centred, c{projector}", c)

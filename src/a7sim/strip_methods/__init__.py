@@ -1,0 +1,1 @@
+"""Methods of strip triangulation: independent models, comparator and A8."""

@@ -1,0 +1,188 @@
+"""A strip on the Wild A8, on arrays: what P's chain reads there (P 3.1, 3.2).
+
+Errors and their sources: docs/decisions/0005-a8-strip.md.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.geometry import Array, plane_rotation
+from a7sim.instrument.condition import INSTRUMENT_STREAM
+from a7sim.operator.people.random_draws import OPERATOR_STREAM
+from a7sim.reduction import Model, Undetermined, a8_centres, a8_model_coordinates, picture_placement
+from a7sim.scenario import ModelPlan, Observer, Scenario
+from a7sim.scene import Photograph, Scene
+from a7sim.standard_points import CASES
+from a7sim.strip_methods.a8_projector import Projector
+from a7sim.strip_methods.comparator import (
+    StripResult,
+    add_centres,
+    calibrated_fiducials,
+    common_points,
+    errors_for_model,
+    mark_coordinates,
+    measured_points,
+    orient_measured_strip,
+    pointing_errors,
+    round_to_count,
+)
+from a7sim.strip_methods.parallax_clearing import ClearedPair, clear_parallaxes
+
+POINTINGS = 2
+"""Of every model point (thesis 3.5)."""
+
+SCALE_STEP = 0.01
+"""Least count of the X and Y scales in their units of 2 mm, and of the glass scale of heights in mm."""
+
+COLUMN_MM = 300.0
+"""Zin, to which P ties the glass scale (P 3.2)."""
+
+REFERENCE_MM = 400.0
+"""What the glass scale shows there [assumption: an integer in its middle]."""
+
+C_STEP_MM = 0.01
+"""Least count of the principal distance."""
+
+
+@dataclass(frozen=True)
+class CentredPhoto:
+    """A photograph on its carrier: image points ``(2, n)`` about the principal point, and the c set for its film."""
+
+    image: Array
+    c: float
+
+
+def centre_photo(
+    photograph: Photograph, names: tuple[str, ...], observer: Observer, rng: np.random.Generator
+) -> CentredPhoto:
+    """Centre a photograph by its fiducials and set the principal distance for the size its film has."""
+    camera = photograph.camera
+    marks = calibrated_fiducials(photograph)
+    seen = photograph.fiducials.xy + 1e-3 * observer.fiducial_um * rng.standard_normal(marks.shape)
+    lie = picture_placement(seen - marks, marks)
+    shift = np.array([lie.dx, lie.dy]) + np.array(camera.principal_point)
+    centred = plane_rotation(-lie.turn) @ mark_coordinates(photograph.points, names) - shift[:, None]
+    return CentredPhoto(centred, float(round_to_count(np.array(camera.c * (1.0 + lie.scale)), C_STEP_MM)))
+
+
+@dataclass(frozen=True)
+class A8Setup:
+    """An A8 and the person in its chair, for one session."""
+
+    projectors: tuple[Projector, Projector]
+    observer: Observer
+    bx: float
+    readings_of_parallax: int
+    rng: np.random.Generator
+
+    def set_up(
+        self, model: ModelPlan, scene: Scene, wanted: frozenset[str], standard: frozenset[str]
+    ) -> "ProjectedPair":
+        """Lay the photographs of a model on their carriers; draw how they are shown, and all that is seen wrongly."""
+        photographs = scene.photographs[model.left], scene.photographs[model.right]
+        names = common_points(photographs[0].points, photographs[1].points, wanted)
+        pictures = tuple(centre_photo(each, names, self.observer, self.rng) for each in photographs)
+        left, right = (
+            projector.project(picture.image, self.rng)
+            for projector, picture in zip(self.projectors, pictures, strict=True)
+        )
+        c = tuple(
+            picture.c + projector.principal_distance_error
+            for projector, picture in zip(self.projectors, pictures, strict=True)
+        )
+        oriented_on = [i for i, name in enumerate(names) if name in standard]
+        sigma = 1e-3 * self.observer.parallax_um / np.sqrt(self.readings_of_parallax)
+        errors = sigma * self.rng.standard_normal(len(oriented_on))
+        pointing = pointing_errors((3, len(names)), self.observer.repeat_share, POINTINGS, self.rng)
+        return ProjectedPair(model, names, left, right, (c[0], c[1]), oriented_on, errors, pointing)
+
+    def cleared(self, models: Sequence["ProjectedPair"]) -> list[ClearedPair]:
+        """Clear the parallaxes of models, all at once where they have as many points to do it on."""
+        if len({len(each.oriented_on) for each in models}) == 1:
+            left, right = (np.stack([each.at_standard_points[side] for each in models], axis=-1) for side in range(2))
+            c1, c2 = np.array([each.c for each in models]).T
+            try:
+                stands = clear_parallaxes(
+                    left, right, (c1, c2), self.bx, np.stack([each.errors for each in models], axis=-1)
+                )
+            except Undetermined:
+                pass
+            else:
+                return [stands.of(i) for i in range(len(models))]
+        alone = []
+        for each in models:
+            with errors_for_model(each.model.name):
+                alone.append(clear_parallaxes(*each.at_standard_points, each.c, self.bx, each.errors))
+        return alone
+
+    def measured(self, shown: "ProjectedPair", stand: ClearedPair) -> Model:
+        """Return a model with all its points, mm at its scale."""
+        readings = self._read(stand.model_points(shown.left, shown.right)[0], stand, shown.pointing)
+        centres = np.array(a8_centres(self.bx, COLUMN_MM, REFERENCE_MM)).T
+        points, ends = (a8_model_coordinates(each, self.bx, COLUMN_MM, REFERENCE_MM) for each in (readings, centres))
+        return add_centres(shown.model, shown.names, points, ends)
+
+    def _read(self, points: Array, stand: ClearedPair, pointing: Array) -> Array:
+        """Return the scales' readings ``(3, n)`` for points ``(3, n)`` from the left centre, as pointed at."""
+        observer = self.observer
+        enlargement = -points[2] / stand.c[0]
+        plan = 1e-3 * observer.stereo_um * enlargement
+        height = 1e-3 * observer.height_um * enlargement * -points[2] / self.bx
+        x, y, z = points[..., None] + np.array([plan, plan, height])[..., None] * pointing
+        readings = np.array([x / 2.0 + 200.0 - self.bx / 4.0, y / 2.0 + 200.0, z + COLUMN_MM + REFERENCE_MM])
+        return np.asarray(round_to_count(readings, SCALE_STEP).mean(axis=-1))
+
+
+@dataclass(frozen=True)
+class ProjectedPair:
+    """A model's photographs as the projectors show them, and how wrongly they are going to be seen."""
+
+    model: ModelPlan
+    names: tuple[str, ...]
+    left: Array
+    right: Array
+    """Image points ``(2, n)`` about the principal points, mm."""
+    c: tuple[float, float]
+    oriented_on: list[int]
+    """The standard points among them."""
+    errors: Array
+    """With which their parallaxes are cleared, mm in the picture."""
+    pointing: Array
+    """Errors ``(3, n, pointings)`` in units of their standard deviations."""
+
+    @property
+    def at_standard_points(self) -> tuple[Array, Array]:
+        """Image points of both photographs on which the model is oriented."""
+        return self.left[:, self.oriented_on], self.right[:, self.oriented_on]
+
+
+def strip_on_a8(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
+    """Set up and measure all models of a scenario on an A8 and return the strip, on the ground.
+
+    The same ground control and checks, the same points and the same connection as `strip_by_comparator`; c is set for
+    the film's mean size, affine shrinkage and lens distortion stay in. Raises Mistake where the scenario has no plan,
+    Undetermined or Mistake for what does not make a strip.
+    """
+    plan = scenario.plan
+    faults, person = (
+        np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
+        for stream in (INSTRUMENT_STREAM, OPERATOR_STREAM)
+    )
+    test = scenario.instrument.grid_test
+    a8 = A8Setup(
+        (Projector.sample(test, faults), Projector.sample(test, faults)),
+        scenario.observer,
+        plan.bx,
+        plan.parallax_readings,
+        person,
+    )
+    wanted = measured_points(scenario, scene, plan.case)
+    shown = [
+        a8.set_up(model, scene, wanted, frozenset(positions[label] for label in CASES[plan.case] if label in positions))
+        for model in scenario.models
+        for positions in [scene.standard_points[model.name]]
+    ]
+    models = tuple(a8.measured(each, stand) for each, stand in zip(shown, a8.cleared(shown), strict=True))
+    return orient_measured_strip(models, scenario, scene)

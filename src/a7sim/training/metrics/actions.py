@@ -1,0 +1,216 @@
+"""Measures of what was done, by what is seen at the link: order, levers, what was left alone, time."""
+
+import msgspec
+from msgspec import field
+
+from a7sim.operator import ModelJob
+from a7sim.plotters import REQUIRED_FITTINGS
+from a7sim.scenario import Scenario
+from a7sim.training.action_log import AXES, PLAIN, Reading
+from a7sim.training.attempt_record import AttemptRecord
+from a7sim.training.metrics.base import (
+    HALF_A_COUNT,
+    Metric,
+    MetricResult,
+    describe_points,
+    handle_label,
+    join_words,
+    readings_with,
+    register_metric,
+)
+
+
+@register_metric("out-of-order")
+class ActionsOutOfOrder(Metric, frozen=True, kw_only=True):
+    """How many deeds of a procedure are missing or came too early: in each of some chains, its own order.
+
+    Deeds are written 'load 1', 'fiducials 1', 'centre 1', 'set c1', 'turn by1', 'record 3': what, and of what where it
+    matters; 'move X' is any way of moving it, 'adjust by1' setting or turning it. The last deed of a kind counts, or
+    the first where it ends in '!'.
+    """
+
+    unit = "deeds"
+    chains: list[list[str]]
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return their number."""
+        missing: list[str] = []
+        early: list[str] = []
+        for chain in self.chains:
+            last, before = -1, ""
+            for deed in chain:
+                place = self._place(record, deed)
+                if place is None:
+                    missing.append(_plainly(deed))
+                elif place < last:
+                    early.append(f"{_plainly(deed)} (before {_plainly(before)})")
+                elif place > last:
+                    last, before = place, deed
+        told = [f"not done: {join_words(dict.fromkeys(missing))}"] if missing else []
+        told += [f"done too early: {join_words(dict.fromkeys(early))}"] if early else []
+        return MetricResult(float(len(missing) + len(early)), "; ".join(told) or "everything was done, in its order")
+
+    def _place(self, record: AttemptRecord, deed: str) -> int | None:
+        what, _, name = deed.removesuffix("!").partition(" ")
+        kinds = {"move": PLAIN, "adjust": ("set", "turn")}.get(what, (what,))
+        places = [
+            each.index
+            for each in record.actions
+            if each.what in kinds and (not name or record.name_of(name) == each.name or name in (each.name, each.text))
+        ]
+        return (places[0] if deed.endswith("!") else places[-1]) if places else None
+
+
+def _plainly(deed: str) -> str:
+    what, _, name = deed.removesuffix("!").partition(" ")
+    return f"{what} {handle_label(name)}".strip()
+
+
+@register_metric("run-by-motor")
+class MotorDrivenReadings(Metric, frozen=True, kw_only=True):
+    """How many registrations were made with a carriage that was last run there, not turned there by hand."""
+
+    unit = "registrations"
+    handles: list[str]
+    points: list[str] = field(default_factory=list)
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return their number."""
+        readings = readings_with(record, "", self.points)
+        if not readings:
+            return MetricResult(None, "nothing was registered")
+        ran = [each for each in readings if any(self._ran(record, each, handle) for handle in self.handles)]
+        told = f"run there at {describe_points(ran, record)}" if ran else "turned there by hand every time"
+        return MetricResult(float(len(ran)), f"{join_words(map(handle_label, self.handles))}: {told}")
+
+    def _ran(self, record: AttemptRecord, reading: Reading, handle: str) -> bool:
+        before = [each for each in record.actions if each.name == handle and each.index < reading.place]
+        return bool(before) and before[-1].what in ("drive", "set")
+
+
+@register_metric("handles-moved")
+class MovedElements(Metric, frozen=True, kw_only=True):
+    """How many elements do not stand in the end where the opening left them."""
+
+    unit = "elements"
+    handles: list[str]
+    within: float = HALF_A_COUNT
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return their number."""
+        moved = [handle for handle in self.handles if self._by_how_much(record, handle) > self.within + 1e-9]
+        told = f"{join_words(map(handle_label, moved))} moved" if moved else "all of it stands where it stood"
+        return MetricResult(float(len(moved)), told)
+
+    def _by_how_much(self, record: AttemptRecord, handle: str) -> float:
+        actions = [each for each in record.actions if each.name == handle and each.what in PLAIN]
+        if not actions:
+            return 0.0
+        moved = abs(actions[-1].after - actions[0].before)
+        return min(moved, abs(400.0 - moved)) if handle.startswith("kappa") else moved
+
+
+@register_metric("not-looked")
+class UnviewedPoints(Metric, frozen=True, kw_only=True):
+    """How many points were registered without a look through an eyepiece since the last lever was put over."""
+
+    unit = "points"
+    points: list[str]
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return their number."""
+        blind = []
+        for point in self.points:
+            readings = readings_with(record, "", [point])
+            before = [each for each in record.actions if readings and each.index < readings[-1].place]
+            looks = [each.index for each in before if each.what == "look"]
+            levers = [each.index for each in before if each.what in ("fit", "base", "load")]
+            if not readings or max(looks, default=-1) < max(levers, default=0):
+                blind.append(point)
+        told = f"at {join_words(blind)} nobody looked after the last lever" if blind else "looked every time"
+        return MetricResult(float(len(blind)), told)
+
+
+@register_metric("minutes")
+class Minutes(Metric, frozen=True, kw_only=True):
+    """Minutes at the simulated clock since the student sat down."""
+
+    unit = "min"
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return them."""
+        minutes = record.seconds / 60.0
+        return MetricResult(
+            round(minutes, 2), f"{minutes:.1f} of {record.exercise.minutes:g} minutes at the instrument's clock"
+        )
+
+
+@register_metric("element-off")
+class ElementDeviation(Metric, frozen=True, kw_only=True):
+    """The largest difference of elements, or counters, from what they should show in the end."""
+
+    unit = "mm or gon"
+    wanted: dict[str, float]
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it."""
+        shown = {
+            name: record.autograph.counter(name) if name in AXES else record.autograph.element(name)
+            for name in self.wanted
+        }
+        name = max(self.wanted, key=lambda each: abs(shown[each] - self.wanted[each]))
+        return MetricResult(
+            round(abs(shown[name] - self.wanted[name]), 4),
+            f"{handle_label(name)} stands at {shown[name]:.2f} and belongs at {self.wanted[name]:.2f}",
+        )
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return half a count."""
+        return HALF_A_COUNT
+
+
+@register_metric("wrong-fittings")
+class WrongFittings(Metric, frozen=True, kw_only=True):
+    """How many fittings do not belong to the pictures and the base: in the end, or at the registrations of a point.
+
+    Base and picture as they are, unless they are named.
+    """
+
+    unit = "fittings"
+    point: str = ""
+    base: str = ""
+    polarity: str = ""
+    pictures: list[str] = field(default_factory=list)
+    """What must lie in the left and the right projector; what else lies there is counted too."""
+    by_job: bool = False
+    """Whether base and pictures must be those of the exercise's model on the job sheet."""
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return their number, the base counted where it is not as it should be."""
+        if self.by_job:
+            return self._as_ordered(record.model).evaluate(record)
+        autograph = record.autograph
+        fittings, base = autograph.fittings.as_words(), autograph.base_mode
+        lying = autograph.loaded(1), autograph.loaded(2)
+        if self.point:
+            readings = readings_with(record, "", [self.point])
+            if not readings:
+                return MetricResult(None, f"nothing was registered as {self.point}")
+            fittings, base, lying = dict(readings[-1].fittings), readings[-1].base, readings[-1].pictures
+        polarity = self.polarity or record.model.polarity
+        right = REQUIRED_FITTINGS[polarity, self.base or base].as_words()
+        wrong = [f"{name} stands {at} and belongs {right[name]}" for name, at in fittings.items() if at != right[name]]
+        if self.base and base != self.base:
+            wrong.append(f"the base is {base} and belongs {self.base}")
+        wrong += [
+            f"{there or 'no picture'} lies in projector {projector} and {wanted} belongs there"
+            for projector, (there, wanted) in enumerate(zip(lying, self.pictures, strict=False), start=1)
+            if there != wanted
+        ]
+        picture = f"{'at ' + self.point + ' ' if self.point else ''}for a {polarity} with base {self.base or base}"
+        return MetricResult(float(len(wrong)), f"{picture}: {join_words(wrong) if wrong else 'all is as it belongs'}")
+
+    def _as_ordered(self, model: ModelJob) -> "WrongFittings":
+        """Return the measure with what the job sheet orders of a model."""
+        pictures = [model.left, model.right] if model.left_projector == 1 else [model.right, model.left]
+        return msgspec.structs.replace(self, base=model.base, polarity=model.polarity, pictures=pictures, by_job=False)

@@ -1,0 +1,210 @@
+"""Measures of an empirical relative orientation: which point was cleared with what, and how far omega was turned."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from a7sim.geometry import GON, PARALLAX_ELEMENTS, Array
+from a7sim.operator.procedures.empirical import clearing_coefficients, over_correction_by_coefficients
+from a7sim.reduction import ProjectorPose
+from a7sim.scenario import Scenario
+from a7sim.standard_points import CASES
+from a7sim.training.action_log import Reading
+from a7sim.training.attempt_record import AttemptRecord
+from a7sim.training.metrics.base import (
+    HALF_A_COUNT,
+    Metric,
+    MetricResult,
+    describe_points,
+    handle_label,
+    join_words,
+    register_metric,
+)
+
+
+def projector_poses(record: AttemptRecord, reading: Reading) -> tuple[ProjectorPose, ProjectorPose]:
+    """Return how the projectors of the left-hand and the right-hand photograph stood by their counters."""
+    zero = {name: record.autograph.element_data(name).zero for name in record.autograph.variant.elements}
+
+    def stand(projector: int, x: float) -> ProjectorPose:
+        tilts = [reading.shown[f"{name}{projector}"] - zero[f"{name}{projector}"] for name in ("omega", "phi", "kappa")]
+        centre = [x, -reading.shown[f"by{projector}"], reading.shown[f"bz{projector}"]]
+        return ProjectorPose(np.array(centre)[:, None], GON * np.array(tilts)[:, None])
+
+    model = record.model
+    return stand(model.left_projector, 0.0), stand(model.right_projector, abs(reading.shown["bx"]))
+
+
+class _Clearing(Metric, frozen=True, kw_only=True):
+    """Steps by point and element, such as { "2" = "kappa1" }, in groups within which their order is free."""
+
+    steps: list[dict[str, str]]
+
+    def _step_of(self, record: AttemptRecord, reading: Reading) -> str | None:
+        """Return the point of the step that a registration belongs to, None where it belongs to none."""
+        for group in self.steps:
+            for point, element in group.items():
+                if element in reading.named and reading.point == record.name_of(point):
+                    return point
+        return None
+
+    def _elements(self) -> dict[str, str]:
+        return {point: element for group in self.steps for point, element in group.items()}
+
+
+@register_metric("steps-missing")
+class MissingSteps(_Clearing, frozen=True, kw_only=True):
+    """How many steps were not registered, were done before those they rest on, or with their element elsewhere."""
+
+    unit = "steps"
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return their number."""
+        first: dict[str, int] = {}
+        elsewhere: list[Reading] = []
+        elements = self._elements()
+        for reading in record.readings:
+            step = self._step_of(record, reading)
+            if step is not None:
+                first.setdefault(step, reading.place)
+            elif set(reading.named) & set(elements.values()):
+                elsewhere.append(reading)
+        missing = [point for point in elements if point not in first]
+        early, before = [], -1
+        for group in self.steps:
+            places = {point: first[point] for point in group if point in first}
+            early += [point for point, place in places.items() if place < before]
+            before = max([before, *places.values()])
+        told = [f"not registered: {self._told(missing)}"] if missing else []
+        told += [f"registered before those it rests on: {self._told(early)}"] if early else []
+        told += [f"registered where it does not belong: {self._strayed(elsewhere, record)}"] if elsewhere else []
+        strays = len({(each.point, each.named) for each in elsewhere})
+        return MetricResult(
+            float(len(missing) + len(early) + strays),
+            "; ".join(told) or f"cleared in their order: {self._told(list(elements))}",
+        )
+
+    def _told(self, points: list[str]) -> str:
+        elements = self._elements()
+        return join_words(f"{handle_label(elements[point])} at {point}" for point in points)
+
+    def _strayed(self, readings: list[Reading], record: AttemptRecord) -> str:
+        return join_words(
+            dict.fromkeys(
+                f"{join_words(map(handle_label, each.named))} at {describe_points([each], record)}" for each in readings
+            )
+        )
+
+
+@dataclass(frozen=True)
+class OmegaTurn:
+    """A turn of omega at the last point: where it stood, where the point was clear, and where it was left."""
+
+    reading: Reading
+    before: float
+    cleared: float
+    left: float
+    needed: float
+    """How many times the clearing turn it takes, by the places of the five points."""
+
+    @property
+    def times(self) -> float:
+        """Return how many times as far as cleared the point omega was turned."""
+        return (self.left - self.before) / (self.cleared - self.before)
+
+    @property
+    def remains(self) -> float:
+        """Return what share of the parallax the next round finds again."""
+        return abs(1.0 - self.times / self.needed)
+
+
+@register_metric("over-correction-off")
+class OverCorrectionDeviation(_Clearing, frozen=True, kw_only=True):
+    """What share of the last point's parallax is left after a round, since omega was turned too far or not enough.
+
+    The last step is omega's. It counts where the turn that cleared it was `least` or more, and the worst of these.
+    What cleared it is what was registered there first; where it was left, what it shows when another step is
+    registered, or in the end.
+    """
+
+    truth = True
+    least: float = 0.15
+    """Gon."""
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it."""
+        turns = self._turns(record)
+        last, omega = list(self._elements().items())[-1]
+        if not turns:
+            return MetricResult(
+                None, f"{handle_label(omega)} was never turned at {last} by {self.least:g} gon or more and registered"
+            )
+        worst = max(turns, key=lambda each: each.remains)
+        return MetricResult(
+            round(worst.remains, 3),
+            f"at point {last} {handle_label(omega)} was turned {worst.times:.2f} times as far as cleared it, "
+            "and it takes "
+            f"{worst.needed:.2f} times: {worst.remains:.0%} of the parallax is left after the next round",
+        )
+
+    def _turns(self, record: AttemptRecord) -> list[OmegaTurn]:
+        *_, (last, omega) = self._elements().items()
+        begun = [each.before for each in record.actions if each.name == omega and each.what in ("set", "turn")]
+        before = begun[0] if begun else record.autograph.element(omega)
+        readings = [each for each in record.readings if self._step_of(record, each) is not None]
+        latest: dict[str, Reading] = {}
+        cleared: Reading | None = None
+        turns = []
+        for reading in readings:
+            step = self._step_of(record, reading) or ""
+            if step != last:
+                if cleared is not None:
+                    turns.append(self._turn(record, latest, cleared, before, reading.shown[omega]))
+                    cleared = None
+                before = reading.shown[omega]
+            elif cleared is None:
+                cleared = reading
+            latest[step] = reading
+        if cleared is not None:
+            turns.append(self._turn(record, latest, cleared, before, record.autograph.element(omega)))
+        return [each for each in turns if each is not None]
+
+    def _turn(
+        self, record: AttemptRecord, latest: dict[str, Reading], cleared: Reading, before: float, left: float
+    ) -> OmegaTurn | None:
+        *_, (_, omega) = self._elements().items()
+        if abs(cleared.shown[omega] - before) < self.least or set(latest) != set(self._elements()):
+            return None
+        marks = np.array([latest[point].mark for point in self._elements()]).T[..., None]
+        needed = float(over_correction_by_coefficients(self._coefficients(record, marks, cleared))[0])
+        return OmegaTurn(cleared, before, cleared.shown[omega], left, needed)
+
+    def _coefficients(self, record: AttemptRecord, marks: Array, reading: Reading) -> Array:
+        hands = [f"{name[:-1]}{record.model.side_of(int(name[-1]))}" for name in self._elements().values()]
+        rows = [PARALLAX_ELEMENTS.index(name) for name in hands]
+        return clearing_coefficients(marks, *projector_poses(record, reading))[rows]
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what half a count at either end of the shortest turn makes of it."""
+        return 2.0 * HALF_A_COUNT / self.least
+
+
+@register_metric("missing-point-wrong")
+class WrongMissingPoints(Metric, frozen=True, kw_only=True):
+    """How many of the positions 1 to 6 were wrongly answered to be missing, or not answered though they are."""
+
+    unit = "points"
+    truth = True
+    key: str
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return their number."""
+        answered = record.answers.get(self.key, "")
+        if not answered:
+            return MetricResult(None, f"{self.key}: not answered")
+        said = set(answered.replace(",", " ").replace("+", " ").split())
+        gone = set(CASES["A"]) - set(record.model.standard_points)
+        wrong = sorted(said ^ gone)
+        if not wrong:
+            return MetricResult(0.0, f"{self.key} was answered {answered}: right")
+        return MetricResult(float(len(wrong)), f"{self.key} was answered {answered}: {join_words(wrong)} is not so")

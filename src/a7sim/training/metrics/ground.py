@@ -1,0 +1,289 @@
+"""Measures of models beside the ground and beside each other: heights, distances, scale carried on, what was kept."""
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
+from itertools import combinations
+
+import numpy as np
+from msgspec import field
+
+from a7sim.geometry import Array, length_of
+from a7sim.scenario import ModelPlan, Scenario
+from a7sim.text import pluralize
+from a7sim.training.action_log import AXES, PLAIN, Reading, StudentAction
+from a7sim.training.attempt_record import AttemptRecord
+from a7sim.training.metrics.base import (
+    BEST_HEIGHT_UM,
+    BEST_PARALLAX_UM,
+    BEST_POINTING_UM,
+    HALF_A_COUNT,
+    Metric,
+    MetricResult,
+    handle_label,
+    join_words,
+    register_metric,
+)
+
+PLAN_AXES = ("X", "Y")
+
+ARRIVAL = 2.0
+"""Units of its counter by which a carriage moves when the mark is brought to a point, and not when it is set on it."""
+
+LAST = 2
+"""So many registrations of a point are its reading: a point is pointed at twice."""
+
+
+def last_readings(record: AttemptRecord, points: Iterable[str], base: str = "") -> dict[str, list[Reading]]:
+    """Return the last two pointings at points, with a base where it is named; points without any are left out."""
+    found = {}
+    for point in points:
+        name = record.name_of(point)
+        readings = pointings(record, name, base)
+        if readings:
+            found[name] = readings[-LAST:]
+    return found
+
+
+def pointings(record: AttemptRecord, name: str, base: str = "") -> list[Reading]:
+    """Return the registrations of a point's coordinates: those that are no readings of an element just turned there."""
+    actions = [each for each in record.actions if each.what in PLAIN]
+    there = [each for each in record.readings if each.point == name and base in ("", each.base)]
+    return [each for each in there if not _turned_there(actions, each)]
+
+
+def _turned_there(actions: Sequence[StudentAction], reading: Reading) -> bool:
+    """Whether an element that was registered had been turned after the mark came to the point.
+
+    At the console whatever is in hand is registered, so that it is named says nothing.
+    """
+    for action in reversed(actions[: bisect_left(actions, reading.place, key=lambda each: each.index)]):
+        if action.name in reading.named:
+            return True
+        if action.name in PLAN_AXES and abs(action.after - action.before) >= ARRIVAL:
+            return False
+    return False
+
+
+def mean_display(readings: Sequence[Reading]) -> Array:
+    """Return what the X, Y and Z counters showed in the mean ``(3,)``."""
+    return np.asarray(np.mean([[each.shown[axis] for axis in AXES] for each in readings], axis=0))
+
+
+def height_floor_um(scenario: Scenario) -> float:
+    """Return what the best eye leaves in an x-parallax, the film's irregular deformation in both pictures with it."""
+    film = math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
+    return math.hypot(BEST_HEIGHT_UM, math.sqrt(2.0) * film)
+
+
+def metres_per_um(scenario: Scenario, scale_number: float) -> float:
+    """Return by how much a height changes with a micrometre of x-parallax at photo scale, m on the ground."""
+    plan, c = scenario.plan, scenario.camera.c
+    return 1e-6 * scale_number * plan.projection_height / c * plan.projection_height / plan.bx
+
+
+@register_metric("missing-pointings")
+class MissingPointings(Metric, frozen=True, kw_only=True):
+    """How many pointings are missing: at every point so many, with each of some bases."""
+
+    unit = "registrations"
+    points: list[str]
+    each: int = 1
+    bases: list[str] = field(default_factory=lambda: [""])
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return their number."""
+        lacking = {
+            f"{point}{f' with base {base}' if base else ''}": self.each
+            - len(pointings(record, record.name_of(point), base))
+            for base in self.bases
+            for point in self.points
+        }
+        lacking = {where: lacks for where, lacks in lacking.items() if lacks > 0}
+        missing, wanted = sum(lacking.values()), len(self.points) * self.each * len(self.bases)
+        if not missing:
+            return MetricResult(0.0, "no registration is missing")
+        return MetricResult(
+            float(missing), f"{missing} of {pluralize(wanted, 'registration')} missing: {join_words(lacking)}"
+        )
+
+
+@register_metric("heights-off")
+class HeightDeviation(Metric, frozen=True, kw_only=True):
+    """By how much heights that the Z counter showed differ from the ground: rms or the largest, m."""
+
+    unit = "m"
+    truth = True
+    points: list[str]
+    scale_number: float
+    """Of the model, by which the counter reads metres."""
+    largest: bool = False
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it, by the last two registrations of each point."""
+        readings = last_readings(record, self.points)
+        missing = [point for point in self.points if record.name_of(point) not in readings]
+        if missing:
+            return MetricResult(None, f"nothing was registered at {join_words(missing)}")
+        truth = record.scene.ground_points
+        off = {name: float(mean_display(some)[2] - truth[name][2]) for name, some in readings.items()}
+        worst = max(off, key=lambda name: abs(off[name]))
+        rms = math.sqrt(sum(each**2 for each in off.values()) / len(off))
+        told = f"heights are off by {rms:.2f} m (rms), the largest {off[worst]:+.2f} m at {worst}"
+        return MetricResult(round(abs(off[worst]) if self.largest else rms, 4), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what the best eye and the film allow, and half a count."""
+        return height_floor_um(scenario) * metres_per_um(scenario, self.scale_number)
+
+
+@register_metric("distances-off")
+class DistanceDeviation(Metric, frozen=True, kw_only=True):
+    """The largest share by which distances in plan that the counters showed differ from the ground, in a thousand."""
+
+    unit = "per mille"
+    truth = True
+    points: list[str]
+    scale_number: float
+    shortest_m: float = 500.0
+    """Distances shorter than that tell little of the scale."""
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return the share in the mean of all pairs, by the last two registrations of each point."""
+        readings = last_readings(record, self.points)
+        truth = record.scene.ground_points
+        metres = 1e-3 * self.scale_number / record.autograph.variant.scales["X"].units_per_mm
+        shares = []
+        for one, other in combinations(readings, 2):
+            true = float(length_of((truth[other] - truth[one])[:2]))
+            if true >= self.shortest_m:
+                shown = mean_display(readings[other]) - mean_display(readings[one])
+                shares.append(metres * float(length_of(shown[:2])) / true - 1.0)
+        if not shares:
+            return MetricResult(None, f"no two of {join_words(self.points)} were registered")
+        share = 1e3 * sum(shares) / len(shares)
+        told = f"the model is {abs(share):.2f} per mille too {'large' if share > 0 else 'small'}"
+        return MetricResult(round(abs(share), 4), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what two pointings allow over the width of the model."""
+        film = math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
+        um = math.sqrt(2.0) * math.hypot(BEST_POINTING_UM, film)
+        return um / (1.5 * scenario.plan.half_width)
+
+
+def element_at(record: AttemptRecord, name: str, place: int) -> float:
+    """Return where an element stood before a deed."""
+    moved = [each for each in record.action_log.actions if each.what in ("set", "turn") and each.name == name]
+    before = [each.after for each in moved if each.index < place]
+    later = [each.before for each in moved if each.index >= place]
+    return before[-1] if before else later[0] if later else record.autograph.element(name)
+
+
+def change_of_base(record: AttemptRecord, mode: str) -> StudentAction | None:
+    """Return the student's deed by which the base was last changed over to a mode, None where it never was."""
+    changes = [each for each in record.actions if each.what == "base" and each.text == mode]
+    return changes[-1] if changes else None
+
+
+@register_metric("moved-since")
+class ElementChange(Metric, frozen=True, kw_only=True):
+    """The largest difference of elements from how they stood when the base was changed over, mm or gon."""
+
+    unit = "mm or gon"
+    elements: list[str]
+    base: str = "outside"
+    """To which it was changed."""
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it."""
+        change = change_of_base(record, self.base)
+        if change is None:
+            return MetricResult(None, f"the base was never set {self.base}")
+        moved = {}
+        for name in self.elements:
+            off = record.autograph.element(name) - element_at(record, name, change.index)
+            moved[name] = abs((off + 200.0) % 400.0 - 200.0) if name.startswith("kappa") else abs(off)
+        worst = max(moved, key=lambda name: moved[name])
+        told = [f"{handle_label(name)} by {amount:.2f}" for name, amount in moved.items() if amount > HALF_A_COUNT]
+        return MetricResult(round(moved[worst], 4), f"moved since: {join_words(told)}")
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return half a count."""
+        return HALF_A_COUNT
+
+
+@register_metric("ties-apart")
+class TiePointDisagreement(Metric, frozen=True, kw_only=True):
+    """The largest difference of a counter between the readings of common points in two models, mm.
+
+    The two are the one with base in and the one with base out.
+    """
+
+    unit = "mm"
+    points: list[str]
+    axes: list[str] = field(default_factory=lambda: list(AXES))
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it, by the last two registrations of each point in either model."""
+        inside, outside = (last_readings(record, self.points, base) for base in ("inside", "outside"))
+        missing = [point for point in self.points if record.name_of(point) not in inside.keys() & outside.keys()]
+        if missing:
+            return MetricResult(None, f"not registered both with base in and with base out: {join_words(missing)}")
+        units = {"Z": record.autograph.z_units_per_mm}
+        apart = []
+        for name, some in inside.items():
+            difference = mean_display(outside[name]) - mean_display(some)
+            for axis, by in zip(AXES, difference.tolist(), strict=True):
+                if axis in self.axes:
+                    mm = by / units.get(axis, 1.0)
+                    apart.append((abs(mm), f"{axis} at {name} reads {mm:+.3f} mm more than in the model before"))
+        worst, told = max(apart)
+        return MetricResult(round(worst, 4), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what the best eye allows of heights in two models."""
+        plan = scenario.plan
+        um = math.sqrt(2.0) * height_floor_um(scenario)
+        return 1e-3 * um * plan.projection_height / scenario.camera.c * plan.projection_height / plan.bx
+
+
+@register_metric("scale-not-carried")
+class ScaleTransferDeviation(Metric, frozen=True, kw_only=True):
+    """By how much the second model's scale differs from the first's, per mille: by the bases, beside the flight."""
+
+    unit = "per mille"
+    truth = True
+    first: str = "1"
+    base: str = "outside"
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it."""
+        change = change_of_base(record, self.base)
+        if change is None:
+            return MetricResult(None, f"the base was never set {self.base}")
+        models = {each.name: each for each in record.scenario.models}
+        before = self._scale(record, models[self.first], change.index)
+        after = self._scale(record, models[record.model.name], record.action_log.actions[-1].index + 1)
+        share = 1e3 * (after / before - 1.0)
+        told = f"the second model is {abs(share):.2f} per mille {'larger' if share > 0 else 'smaller'} than the first"
+        return MetricResult(round(abs(share), 4), told)
+
+    def _scale(self, record: AttemptRecord, model: ModelPlan, place: int) -> float:
+        at = {
+            name: element_at(record, name, place)
+            for name in ("bx", "by1", "by2", "bz1", "bz2")
+            if name in record.autograph.variant.elements
+        }
+        base = np.array([at["bx"], at.get("by1", 0.0) - at.get("by2", 0.0), at.get("bz1", 0.0) - at.get("bz2", 0.0)])
+        stations = record.scene.stations
+        return float(length_of(base) / length_of(stations[model.right].centre - stations[model.left].centre))
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what y-parallaxes in the outer rows allow of phi of both photographs in both models (T 2.32)."""
+        plan, c = scenario.plan, scenario.camera.c
+        film = math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
+        parallax = math.hypot(BEST_PARALLAX_UM, math.sqrt(2.0) * film)
+        base = plan.bx * c / plan.projection_height
+        tilt = parallax / (base * plan.half_width / c) / math.sqrt(2.0)
+        return 2.0 * c * tilt / base

@@ -1,0 +1,257 @@
+"""Measures of what was reached, by the truth that never crosses the link."""
+
+import math
+
+import numpy as np
+from msgspec import field
+
+from a7sim.geometry import GON, Array, plane_rotation
+from a7sim.scenario import Scenario
+from a7sim.standard_points import CASES
+from a7sim.training.action_log import LoggedAutograph, Reading
+from a7sim.training.attempt_record import AttemptRecord
+from a7sim.training.metrics.base import (
+    BEST_FIDUCIAL_UM,
+    BEST_HEIGHT_UM,
+    BEST_PARALLAX_UM,
+    BEST_POINTING_UM,
+    HALF_A_COUNT,
+    MAX_OF_SEVERAL,
+    Metric,
+    MetricResult,
+    describe_points,
+    handle_label,
+    join_words,
+    register_metric,
+)
+
+MAX_STEPS = 20
+
+
+def half_a_count_um(scenario: Scenario) -> float:
+    """Return half a count of by at photo scale."""
+    plan = scenario.plan
+    return 1e3 * HALF_A_COUNT * scenario.camera.c / plan.projection_height
+
+
+class MaxAtReadings(Metric, frozen=True, kw_only=True):
+    """The largest of something at the registrations, in um at photo scale."""
+
+    unit = "um"
+    truth = True
+    elements: list[str] = field(default_factory=list)
+    """Only where one of these was registered."""
+    points: list[str] = field(default_factory=list)
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it."""
+        names = [record.name_of(point) for point in self.points]
+        readings = [
+            each
+            for each in record.readings
+            if (not self.elements or set(self.elements) & set(each.named)) and (not names or each.point in names)
+        ]
+        if not readings:
+            return MetricResult(None, "nothing was registered")
+        lost = [each for each in readings if self._um(each) is None]
+        if lost:
+            return MetricResult(None, f"at {describe_points(lost, record)} the point was not in view")
+        worst = max(readings, key=lambda each: self._um(each) or 0.0)
+        value = self._um(worst) or 0.0
+        named = join_words(map(handle_label, worst.named)) if worst.named else "the mark"
+        return MetricResult(
+            round(value, 1), f"{self._called(value)} at {describe_points([worst], record)} with {named}"
+        )
+
+    def _um(self, reading: Reading) -> float | None:
+        raise NotImplementedError
+
+    def _called(self, value: float) -> str:
+        raise NotImplementedError
+
+
+@register_metric("parallax-left")
+class RemainingParallax(MaxAtReadings, frozen=True, kw_only=True):
+    """The largest y-parallax that was left where a reading was registered, um at photo scale."""
+
+    def _um(self, reading: Reading) -> float | None:
+        return None if reading.stereo is None else abs(reading.stereo[1])
+
+    def _called(self, value: float) -> str:
+        return f"the largest y-parallax left was {value:.0f} um at photo scale,"
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what the best eye leaves, and half a count."""
+        return math.hypot(MAX_OF_SEVERAL * BEST_PARALLAX_UM, half_a_count_um(scenario))
+
+
+@register_metric("off-the-ground")
+class HeightParallax(MaxAtReadings, frozen=True, kw_only=True):
+    """The largest x-parallax where a reading was registered: the mark was above or below the ground, um."""
+
+    def _um(self, reading: Reading) -> float | None:
+        return None if reading.stereo is None else abs(reading.stereo[0])
+
+    def _called(self, value: float) -> str:
+        return f"the mark stood off the ground by an x-parallax of {value:.0f} um"
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what the best eye leaves."""
+        return MAX_OF_SEVERAL * BEST_HEIGHT_UM
+
+
+@register_metric("beside-the-point")
+class PlanDeviation(MaxAtReadings, frozen=True, kw_only=True):
+    """The largest distance of the mark from the point in plan where a reading was registered, um at photo scale."""
+
+    eye: int = 0
+    """Of one eye; 0 for the mean of both."""
+
+    def _um(self, reading: Reading) -> float | None:
+        eyes = [reading.eyes[self.eye - 1]] if self.eye else list(reading.eyes)
+        seen = [each for each in eyes if each is not None]
+        if len(seen) < len(eyes):
+            return None
+        return math.hypot(sum(x for x, _ in seen) / len(seen), sum(y for _, y in seen) / len(seen))
+
+    def _called(self, value: float) -> str:
+        return f"the mark stood {value:.0f} um beside the point"
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what the best eye leaves, and the least count of both wheels."""
+        return MAX_OF_SEVERAL * BEST_POINTING_UM
+
+
+def y_parallax_at(record: AttemptRecord, point: str) -> float | None:
+    """Return the y-parallax in um at photo scale of a point as the projectors stand, None where it is on no picture.
+
+    It is what both eyes would see with the mark on the ground there.
+    """
+    autograph, model = record.autograph, record.model
+    images = []
+    for projector in (model.left_projector, model.right_projector):
+        if autograph.loaded(projector) is None:
+            return None
+        place = autograph.carrier(projector).point(point)
+        if place is None:
+            return None
+        images.append((projector, place))
+    mark = np.array([record.scenario.plan.bx / 2.0, 0.0, -record.scenario.plan.projection_height])
+    for _ in range(MAX_STEPS):
+        off = _misses(autograph, images, mark)
+        slopes = np.array([_misses(autograph, images, mark + step) - off for step in np.eye(3)]).T
+        change = np.linalg.solve(slopes[:3], -off[:3])
+        mark = mark + change
+        if np.abs(change).max() < 1e-6:
+            break
+    return float(1e3 * _misses(autograph, images, mark)[3])
+
+
+def _misses(autograph: LoggedAutograph, images: list[tuple[int, Array]], mark: Array) -> Array:
+    """Return how images stand to a mark ``(4,)`` in mm at photo scale: x and y in the mean, px, py."""
+    seen = []
+    for projector, place in images:
+        swing = plane_rotation(autograph.element(f"kappa{projector}") * GON)
+        seen.append(swing @ (place - autograph.on_carrier(projector, mark)))
+    (x1, y1), (x2, y2) = seen
+    return np.array([(x1 + x2) / 2.0, (y1 + y2) / 2.0, x1 - x2, y1 - y2])
+
+
+@register_metric("residual-parallax")
+class ResidualParallax(Metric, frozen=True, kw_only=True):
+    """The y-parallax that is left at the standard points in the end: rms, or the largest, um at photo scale."""
+
+    unit = "um"
+    truth = True
+    points: list[str] = field(default_factory=lambda: list(CASES["A"]))
+    largest: bool = False
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it."""
+        names = {point: record.name_of(point) for point in self.points if point in record.model.standard_points}
+        found = {point: y_parallax_at(record, name) for point, name in names.items()}
+        seen = {point: value for point, value in found.items() if value is not None}
+        if len(seen) < len(found) or not seen:
+            return MetricResult(None, "the pictures of the model do not lie in their projectors")
+        worst = max(seen, key=lambda point: abs(seen[point]))
+        rms = math.sqrt(sum(each**2 for each in seen.values()) / len(seen))
+        told = f"y-parallaxes of {rms:.0f} um (rms) are left, the largest {seen[worst]:+.0f} um at point {worst}"
+        return MetricResult(round(abs(seen[worst]) if self.largest else rms, 1), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what the best eye leaves, the film's irregular deformation, and half a count."""
+        film = math.sqrt(2.0) * math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
+        rms = math.hypot(BEST_PARALLAX_UM, half_a_count_um(scenario), film)
+        return MAX_OF_SEVERAL * rms if self.largest else rms
+
+
+@register_metric("picture-off-centre")
+class CentringDeviation(Metric, frozen=True, kw_only=True):
+    """How far pictures lie from centred: the largest shift or, at the fiducials, turn that is left, mm."""
+
+    unit = "mm"
+    truth = True
+    projectors: list[int] = field(default_factory=lambda: [1, 2])
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it."""
+        left: list[tuple[float, str]] = []
+        for projector in self.projectors:
+            name = record.autograph.loaded(projector)
+            if name is None or name not in record.scene.photographs:
+                return MetricResult(None, f"no photograph lies in projector {projector}")
+            shift, turned, _ = _lie(record, projector)
+            left.append((shift, f"{name} lies {shift:.3f} mm beside the principal point"))
+            left.append((turned, f"{name} is turned by {turned:.3f} mm at its fiducials"))
+        value, told = max(left)
+        return MetricResult(round(value, 4), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return what the mean of four fiducials allows."""
+        return 1e-3 * MAX_OF_SEVERAL * BEST_FIDUCIAL_UM / 2.0
+
+
+def _lie(record: AttemptRecord, projector: int) -> tuple[float, float, float]:
+    """Return shift and turn in mm by which a picture lies off, and by how much its film is larger than it was."""
+    camera = record.scenario.camera
+    displaced = record.autograph.carrier(projector).fiducial_displacements()
+    places = {each.name: (each.x, each.y) for each in camera.fiducials}
+    xy = np.array([places[name] for name, _, _ in displaced]).T
+    d = np.array([(dx, dy) for _, dx, dy in displaced]).T
+    about = xy - xy.mean(axis=1, keepdims=True)
+    squares = float((about**2).sum())
+    turn = float((about[0] * d[1] - about[1] * d[0]).sum()) / squares
+    scale = float((about * d).sum()) / squares
+    shift = d.mean(axis=1) + np.array(camera.principal_point)
+    return float(np.hypot(*shift)), abs(turn) * float(np.abs(xy).max()), scale
+
+
+@register_metric("principal-distance-off")
+class PrincipalDistanceDeviation(Metric, frozen=True, kw_only=True):
+    """The largest difference of a principal distance from that of the camera with the film as it has shrunk, mm."""
+
+    unit = "mm"
+    truth = True
+    projectors: list[int] = field(default_factory=lambda: [1, 2])
+
+    def evaluate(self, record: AttemptRecord) -> MetricResult:
+        """Return it."""
+        off: list[tuple[float, str]] = []
+        for projector in self.projectors:
+            if record.autograph.loaded(projector) is None:
+                return MetricResult(None, f"no photograph lies in projector {projector}")
+            wanted = record.scenario.camera.c * (1.0 + _lie(record, projector)[2])
+            shown = record.autograph.element(f"c{projector}")
+            side = "long" if shown > wanted else "short"
+            told = (
+                f"{handle_label(f'c{projector}')} stands at {shown:.2f}: {abs(shown - wanted):.3f} mm too {side} "
+                "for the film"
+            )
+            off.append((abs(shown - wanted), told))
+        value, told = max(off)
+        return MetricResult(round(value, 4), told)
+
+    def floor(self, scenario: Scenario) -> float:
+        """Return half a count, and what four fiducials say of a scale."""
+        reach = max(abs(each.x) for each in scenario.camera.fiducials)
+        return HALF_A_COUNT + 1e-3 * BEST_FIDUCIAL_UM / math.sqrt(8.0) * scenario.camera.c / reach
