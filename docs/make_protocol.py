@@ -333,8 +333,8 @@ def _code(text):
 
 
 def _about(command):
-    if command.about:
-        return command.about
+    if command.help:
+        return command.help
     setter = next((each.help for each in COMMANDS.commands if f"{each.header}?" == command.header), "")
     return f"asks for it: {setter}" if setter else ""
 

@@ -83,7 +83,7 @@ def test_three_models_close_within_what_is_asked_of_ten(three):
 
 def test_the_scale_is_carried_by_the_heights_of_common_points(monkeypatch):
     """The comparison can fail: without the carrying of scale the flying height's changes break the strip."""
-    monkeypatch.setattr(bridging, "carry_scale_on", lambda bench, active, model, before: np.ones(bench.operators.size))
+    monkeypatch.setattr(bridging, "transfer_scale", lambda bench, active, model, before: np.ones(bench.operators.size))
     crowd, models = worked(scenario_of(2))
     assert len(models) == 2
     assert np.abs(misclosures(crowd, models)).max() > 10.0 * CLOSES_MM
@@ -128,7 +128,7 @@ def test_a_scenario_that_asks_for_a_bridge_gets_it_over_the_link_and_in_a_crowd(
 @pytest.mark.slow
 def test_a_bridge_that_does_not_close_says_why_in_both(monkeypatch):
     """Whoever gives up has no strip, and the document says so."""
-    monkeypatch.setattr(bridging, "carry_scale_on", _gives_up)
+    monkeypatch.setattr(bridging, "transfer_scale", _gives_up)
     scenario = msgspec.structs.replace(scenario_of(2), work=["bridge"])
     for document in (run_all_methods(scenario, 1), *run_all_methods_batch(scenario, [1])):
         assert (document["status"], document["message"]) == ("does not fit", "no scale")
@@ -166,7 +166,7 @@ def test_what_cannot_be_looked_at_again_stays_as_it_was_oriented(monkeypatch):
         apart = np.full(bench.operators.size, points[0], dtype=object)
         return Parallaxes(nothing, np.zeros((3, *nothing.shape)), apart)
 
-    monkeypatch.setattr(Workstation, "parallaxes_seen", all_apart)
+    monkeypatch.setattr(Workstation, "look_at_parallaxes", all_apart)
     _, models = worked(scenario_of(1))
     assert abs(models[0].orientation.elements["omega2"][0] - 100.0) < 5.0
     assert abs(models[0].orientation.elements["phi2"][0] - 100.0) < 5.0
@@ -228,7 +228,7 @@ def with_control():
 @pytest.mark.slow
 def test_the_command_bridges_to_its_end_and_shows_what_polynomials_do_beside_the_similarity(monkeypatch, with_control):
     """In both ways, and with more unknowns the control never fits worse; where nothing is to be kept, nothing is."""
-    monkeypatch.setattr("a7sim.cli.run_options.chosen", lambda *_: (with_control, 1))
+    monkeypatch.setattr("a7sim.cli.run_options.resolve_scenario", lambda *_: (with_control, 1))
     said = a7sim_here("bridge", "bridge")
     assert (said.returncode, said.stderr) == (0, "")
     rows = {

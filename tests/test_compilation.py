@@ -139,7 +139,7 @@ def test_a_road_is_followed_by_its_middle(worker):
     work = worker.at_work(0.0)
     east, north = worker.session.scene.lines["road1"].middle
     readings = worker.model.readings_of(np.array([east, north, np.full(east.size, 455.0)]))
-    within = [i for i in range(east.size) if worker.area.holds(readings[:2, i])]
+    within = [i for i in range(east.size) if worker.area.contains(readings[:2, i])]
     start, towards, end = ((east[i], north[i]) for i in (within[2], within[4], within[-1]))
     line = work.line(LineTarget("road1", "road", start, towards, end), worker.spots)
     at = worker.model.on_ground(line.readings)

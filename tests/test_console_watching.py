@@ -50,7 +50,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("session")
     scenario = load_scenario("akwanga")
     with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr(journal_module, "EVERY", 10)
+        monkeypatch.setattr(journal_module, "LINES_PER_CHECKPOINT", 10)
         journal = Journal()
         instrument = SharedInstrument(
             build_autograph(scenario.instrument, build_scene(scenario, 7).mountable, 7), journal.on_link_event
@@ -106,7 +106,7 @@ def test_a_film_stands_the_same_whichever_way_it_came_there(session: Path, monke
         there.append((frame, dials_of(straight)))
     assert straight.journalled.header["command"] == "serve" and frame.error == ""
     jumping = film(session)
-    monkeypatch.setattr(recording_module, "LEAP", 5)
+    monkeypatch.setattr(recording_module, "MAX_REPLAYED_LINES", 5)
     for step in (17, 3, 9, 8, 0, 15, 1, 17):
         assert (jumping.seek(step), dials_of(jumping)) == there[step]
     assert there[11][1].struck == 0 and there[12][1].struck == 1
@@ -114,13 +114,13 @@ def test_a_film_stands_the_same_whichever_way_it_came_there(session: Path, monke
 
 
 def test_checkpoints_make_a_jump_say_few_lines_again(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recording_module, "LEAP", 5)
+    monkeypatch.setattr(recording_module, "MAX_REPLAYED_LINES", 5)
     jumping = film(session)
     said: list[int] = []
     say = jumping._replay.__class__.apply
     monkeypatch.setattr(
         jumping._replay.__class__,
-        "say",
+        "apply",
         lambda replay, number, event: said.append(number) or say(replay, number, event),
     )
     jumping.seek(jumping.steps)

@@ -23,10 +23,11 @@ from a7sim.geometry import (
     transposed,
     turn_of,
 )
-from a7sim.operator import OperatorGaveUp, empirical
+from a7sim.operator import OperatorGaveUp
 from a7sim.operator.driving.scpi_driver import ScpiDriver
 from a7sim.operator.driving.workstation import Workstation
 from a7sim.operator.people.operator_batch import OperatorBatch
+from a7sim.operator.procedures import empirical
 from a7sim.operator.procedures.empirical import (
     clearing_steps,
     over_correction,
@@ -128,7 +129,7 @@ def test_an_over_correction_is_not_a_number_where_the_four_points_cannot_be_clea
 @METHODS
 def test_the_parallax_at_the_last_point_shrinks_as_the_parallax_equation_says(monkeypatch, method, n):
     """By 1 - n/n0 a round, n0 = (1 + z^2/d^2)/2; the rounds that count are those with parallaxes well above a count."""
-    monkeypatch.setattr(empirical, "MOST_ROUNDS", 6)
+    monkeypatch.setattr(empirical, "MAX_ROUNDS", 6)
     rough = {"plan.tolerated_parallax_um": "1000"}
     off = TWO_GON_OFF | rough | {"plan.over_correction": n, "terrain.relief": "0", "plan.method": f'"{method}"'}
     found, _ = orient(without_errors(load_scenario("akwanga", off)), 1)
@@ -256,7 +257,7 @@ def test_setting_off_reaches_two_gon_on_both_sides_and_never_beyond(monkeypatch)
         perturb_elements(*given)
         raise _IsReady
 
-    monkeypatch.setattr(import_module("a7sim.operator.procedures.models"), "set_off", only_set_off)
+    monkeypatch.setattr(import_module("a7sim.operator.procedures.models"), "perturb_elements", only_set_off)
     off = []
     for seed in range(6):
         session, bench = ready(without_errors(load_scenario("akwanga", TWO_GON_OFF)), seed)

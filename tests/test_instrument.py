@@ -183,7 +183,7 @@ def test_a_point_beyond_the_field_of_view_is_not_seen():
     a7.drive("X", 60.0 + 2.0 * 9.9)
     a7.drive("Y", 40.0)
     assert a7.eyepiece(1, "P") is not None
-    a7.wheel("X", 0.5)
+    a7.turn_handwheel("X", 0.5)
     assert a7.eyepiece(1, "P") is None
     assert a7.stereo("P") is None
     assert a7.eyepiece(1, "nobody") is None
@@ -229,11 +229,11 @@ def test_the_triangulation_lever_exchanges_the_eyes_and_turns_the_relief_inside_
 @pytest.mark.parametrize("axis", ["X", "Y"])
 def test_a_collar_that_does_not_belong_to_the_picture_reverses_its_wheel(polarity, axis):
     a7 = plotter(polarity=polarity)
-    a7.wheel(axis, 1.0)
+    a7.turn_handwheel(axis, 1.0)
     assert a7.counter(axis) == 1.0
     now = a7.fittings.as_words()[f"{axis.lower()}collar"]
     a7.set_fitting(f"{axis.lower()}collar", "out" if now == "in" else "in")
-    a7.wheel(axis, 1.0)
+    a7.turn_handwheel(axis, 1.0)
     assert a7.counter(axis) == 0.0
 
 
@@ -370,7 +370,7 @@ def test_both_photographs_show_the_same_ground():
 
 
 def test_a_picture_upside_down_has_its_fiducials_far_from_their_marks():
-    a7 = Autograph(A7, photographs={"L": photograph("L", {"P": (30.0, 20.0)}, laid="upside down")})
+    a7 = Autograph(A7, photographs={"L": photograph("L", {"P": (30.0, 20.0)}, placement="upside down")})
     a7.load(1, "L")
     assert min(np.hypot(dx, dy) for _, dx, dy in a7.carrier(1).fiducial_displacements()) > 200.0
 

@@ -80,11 +80,11 @@ def test_the_relative_orientation_is_untouched_but_for_rounding(without_any_erro
 def test_afterwards_everything_stands_as_it_did(without_any_error):
     """Elements, gear and counters: the instrument reads a point as it read it before."""
     crowd, record = without_any_error
-    bench, active = crowd.bench, crowd.workstation.operators.active
+    bench, active = crowd.workstation, crowd.workstation.operators.active
     shown = bench.controls.elements(active, list(record.on_ground.before))
     assert {name: each[0] for name, each in shown.items()} == record.on_ground.before
     assert bench.controls.units_per_mm == record.z_units_per_mm == 8.0
-    again = bench.measure(active, ["K1"])[:, 0, 0]
+    again = bench.measure_points(active, ["K1"])[:, 0, 0]
     assert again == pytest.approx(record.points["K1"], abs=0.015)
 
 

@@ -154,7 +154,7 @@ def test_pictures_of_before_have_sharp_edges_and_nothing_but_ground_and_roads(sc
     seen = on_film(scenario, scene, "101", plan.reshape(2, -1))
     np.testing.assert_array_equal(before(seen, FINE), before(seen, 1.0))
     station, offset = scene.stations["101"], np.array(scenario.camera.principal_point)[:, None]
-    met = scene.ground.met_by(station.centre, ray_of(seen - offset, station.rotation, scenario.camera.c))[:2]
+    met = scene.ground.intersect(station.centre, ray_of(seen - offset, station.rotation, scenario.camera.c))[:2]
     bare = with_lines(tuple(scene.lines.values()), met, ground_texture(*met), 0.0)
     np.testing.assert_allclose(before(seen, FINE), bare, atol=1e-9)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import a7sim
-from a7sim import Client, InstrumentError, Mistake, Operator, Scenario, Study, connect
+from a7sim import A7SimError, Client, InstrumentError, Operator, Scenario, Study, connect
 
 ROOT = Path(__file__).parents[1]
 TOLD = ("a7sim.api", "a7sim.link.client.client", "a7sim.scenario.schema", "a7sim.instrument.autograph", "a7sim.text")
@@ -30,7 +30,7 @@ def test_importing_it_imports_nothing_of_it():
 
 
 def test_one_name_imports_its_own_part_and_none_that_is_heavy():
-    assert not {"numpy", "click", "rich"} & imported_by("from a7sim import Mistake")
+    assert not {"numpy", "click", "rich"} & imported_by("from a7sim import A7SimError")
     assert not {"scipy", "textual", "matplotlib", "click"} & imported_by("from a7sim import connect")
 
 
@@ -98,11 +98,11 @@ def test_connect_makes_an_instrument_of_a_scenario_as_the_url_does():
         (lambda: Operator("nowhere"), "expected a scenario file or one of"),
         (lambda: Scenario.load("akwanga", {"plan.case": "F"}), "plan.case: expected"),
         (lambda: Study.load("nothing"), "expected the file of a study"),
-        (lambda: Operator("schut-1956").work("tcp://127.0.0.1:5025"), "expected work at the plotter"),
+        (lambda: Operator("schut-1956").run("tcp://127.0.0.1:5025"), "expected work at the plotter"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(asked, sentence):
-    with pytest.raises(Mistake, match=sentence):
+    with pytest.raises(A7SimError, match=sentence):
         asked()
 
 
@@ -120,7 +120,7 @@ def test_a_study_is_worked_to_the_document_of_the_command(tmp_path, typed):
         'responses = ["strip_plan_at_checks_m"]\nsettings = { work = ["comparator"] }\n',
         encoding="utf-8",
     )
-    found = Study.load(study).work(tmp_path / "out")
+    found = Study.load(study).run(tmp_path / "out")
     code, _, err = typed("study", study, "--executor", "process", "--quiet", "--out", tmp_path / "command")
     assert code == 0, err
     left, of_command = (tmp_path / name / "results.json" for name in ("out", "command"))

@@ -54,7 +54,7 @@ def test_lines_waits_and_comments_are_what_they_say(tmp_path):
     failed, said, player = played(tmp_path, text)
     assert failed is None
     assert said == ["DRIV:X 10", "NOTE \"a # in quotes, and 'more'\"", "COUN:X?", "COUN?", "PHOT:CAT?"]
-    assert player.instrument.opened == 1
+    assert player.instrument.client_count == 1
 
 
 @pytest.mark.parametrize(

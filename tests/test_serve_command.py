@@ -94,14 +94,14 @@ import sys
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.instrument import build_autograph
-from a7sim.instrument.language import Desk
+from a7sim.instrument.language import SharedInstrument
 from a7sim.link.clock import Clock
-from a7sim.link.simulated_wait import obeyed
+from a7sim.link.simulated_wait import feed_until_idle
 scenario = load_scenario("akwanga")
-engine = Desk(build_autograph(scenario.instrument, build_scene(scenario, 7).drawer, 7)).open()
+engine = SharedInstrument(build_autograph(scenario.instrument, build_scene(scenario, 7).mountable, 7)).open()
 clock = Clock()
 def say(line):
-    return obeyed(engine, line.encode() + b"\\n", clock).decode("latin-1")
+    return feed_until_idle(engine, line.encode() + b"\\n", clock).decode("latin-1")
 headers = say("SYST:HELP:HEAD?").replace("<n>", "1").replace("[", "").replace("]", "").strip().split(",")
 lines = [header.strip('"') for header in headers]
 mount = ['PHOT1:LOAD "101"', 'PHOT2:LOAD "102"']

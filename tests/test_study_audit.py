@@ -31,7 +31,7 @@ def worked(tmp_path_factory):
     run_study(loaded, tally, InProcess())
     linked = loaded.tasks[0].link_document(0, replicate_seed(loaded.study.seed, 0))
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Task, "linked", lambda task, cell, seed: linked)
+        patched.setattr(Task, "link_document", lambda task, cell, seed: linked)
         yield loaded, tally
 
 
@@ -75,7 +75,7 @@ PERTURBED = {
     "X of model and centres": ("counter", _reads("X", 0.01)),
     "Y of model and centres": ("counter", _reads("Y", 0.01)),
     "Z of model and centres": ("counter", _reads("Z", 0.01)),
-    "the picture in the eyepiece": ("seen", _gives(0.01)),
+    "the picture in the eyepiece": ("view_point", _gives(0.01)),
 }
 
 
@@ -96,7 +96,7 @@ def test_a_strip_that_is_off_by_a_millimetre_on_the_bench_is_found_out(worked, m
         residuals = document["residuals_m"] | {"C1": document["residuals_m"]["C1"] | {"X": x}}
         return document | {"residuals_m": residuals}, strip
 
-    monkeypatch.setattr(session_batch, "strip_of", a_millimetre_off)
+    monkeypatch.setattr(session_batch, "strip_document", a_millimetre_off)
     (found,) = audit_study(*worked, 1)
     assert (found.place, found.others) == ("strip.residuals_m.C1.X", 0)
 

@@ -134,7 +134,7 @@ def test_a_folder_of_something_else_is_left_alone(study, tmp_path, capsys):
 def test_a_failed_audit_is_one_sentence_and_exit_code_3(study, capsys, monkeypatch):
     path, out, _ = study
     differences = [AuditDifference(2, each, 99, "strip.rms", 0.25, 0.5, 7) for each in (3, 4)]
-    monkeypatch.setattr("a7sim.cli.study.audited", lambda laid, tally, picks: differences)
+    monkeypatch.setattr("a7sim.cli.study.audit_study", lambda laid, tally, picks: differences)
     told = said_here(capsys, "study", path, "--executor", "process", "--out", out, "--audit", 5, "--quiet")
     assert (told.returncode, told.stdout) == (3, "")
     assert told.stderr == (

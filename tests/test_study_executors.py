@@ -153,7 +153,7 @@ def test_a_wrong_executor_is_one_sentence_and_exit_code_2(capsys, name):
 
 
 def test_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch, capsys, nobody):
-    monkeypatch.setattr("a7sim.study.dask_executor.PATIENCE_S", 0.5)
+    monkeypatch.setattr("a7sim.study.dask_executor.WORKER_TIMEOUT_S", 0.5)
     told = said_here(capsys, "study", "levels", "--executor", "dask", "--scheduler", nobody)
     assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
     assert f"--scheduler: expected one that answers at {nobody}" in told.stderr

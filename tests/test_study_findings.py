@@ -196,7 +196,7 @@ def test_levels_far_apart_are_drawn_on_a_logarithmic_axis_and_too_many_cells_not
     document["densities"] = []
     drawn = {}
     for most in (2, 1):
-        monkeypatch.setattr("a7sim.study.figures.MOST_CELLS_DRAWN", most)
+        monkeypatch.setattr("a7sim.study.figures.MAX_CELLS_DRAWN", most)
         drawn[most] = [each.caption for each in response_figures(document, document["responses"][0])]
     assert len(drawn[2]) == 2
     assert drawn[1] == drawn[2][:1]

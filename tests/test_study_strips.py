@@ -76,7 +76,7 @@ def asked(tmp_path_factory):
         return by_case[scenario.plan.case]
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("a7sim.study.simulating.documents_of_all_ways", kept)
+        patched.setattr("a7sim.study.simulating.run_all_methods_batch", kept)
         return task.run_batch(SEEDS), by_case
 
 
@@ -150,7 +150,7 @@ def test_cells_are_the_strips_and_a_model_does_not_know_with_which_it_is_combine
     (task,) = study.tasks
     by_case = {case: [each[case] for each in replicates] for case in CASES}
     monkeypatch.setattr(
-        "a7sim.study.simulating.documents_of_all_ways", lambda scenario, *_, **__: by_case[scenario.plan.case]
+        "a7sim.study.simulating.run_all_methods_batch", lambda scenario, *_, **__: by_case[scenario.plan.case]
     )
     values = task.run_batch([1, 2, 3])
     assert [cell.label for cell in study.cells][:2] == ["model 1 A, model 2 A", "model 1 A, model 2 B"]
@@ -170,7 +170,7 @@ def test_one_cell_needs_no_session_but_those_of_its_own_cases(tmp_path, monkeypa
         worked_cases.append(scenario.plan.case)
         return [replicates[0][scenario.plan.case], replicates[2][scenario.plan.case]]
 
-    monkeypatch.setattr("a7sim.study.simulating.documents_of_all_ways", worked_already)
+    monkeypatch.setattr("a7sim.study.simulating.run_all_methods_batch", worked_already)
     whole = list(combine_strips([replicates[0], replicates[2]], 2, ground, scenario.strip))
     for cell, cases in ((8, ["B", "D"]), (15, ["D", "A"]), (12, ["C"])):
         assert task.batch_documents(cell, SEEDS[::2]) == [each[cell] for each in whole]
@@ -184,7 +184,7 @@ def test_a_task_cut_off_between_its_cells_goes_on_to_the_same_numbers(tmp_path, 
     def numbers(_, seeds):
         return np.sin(np.arange(25.0)[:, None, None] + np.arange(4.0)[None, :, None] + np.array(seeds, dtype=float))
 
-    monkeypatch.setattr(Task, "together", numbers)
+    monkeypatch.setattr(Task, "run_batch", numbers)
     study = laid(tmp_path, replicates=9)
     whole = _numbers(study, 9)
     begun = Tally.empty(25, 4)
@@ -208,7 +208,7 @@ def test_a_strip_over_the_link_gives_the_same_digits(tmp_path, asked):
     """A picked strip is that of the sessions of its two cases over the link, to the last digit kept."""
     task, cell = laid(tmp_path).task_of(8)
     numbers, _ = asked
-    assert task.alone(cell, SEEDS[1]).tolist() == numbers[cell, :, 1].tolist()
+    assert task.run_single(cell, SEEDS[1]).tolist() == numbers[cell, :, 1].tolist()
 
 
 @pytest.fixture(scope="module")

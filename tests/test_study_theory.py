@@ -48,7 +48,7 @@ def test_without_counters_theory_is_hallerts(monkeypatch):
     """Six points, dependent: variances of by 2/3 + h^2/d^2 + 3 h^4/(4 d^4), kappa 2/(3 b^2),
     phi h^2/(b^2 d^2), omega 3 h^2/(4 d^4), bz h^2/(2 d^2)."""
     monkeypatch.setattr(theory, "ROUNDING", 0.0)
-    monkeypatch.setattr(theory, "settled", lambda fraction, sd: (1.0, 0.0))
+    monkeypatch.setattr(theory, "quantised_error", lambda fraction, sd: (1.0, 0.0))
     scenario = load_scenario("akwanga", settings=QUIET | PERFECT_BUT_FOR_PARALLAX | {"plan.method": "dependent"})
     plan = scenario.plan
     b, h = plan.bx, plan.projection_height

@@ -76,7 +76,7 @@ class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackAc
         console.say(f"driving to point {point} ...")
         console.ask(partial(reach.drive_near, point=point), arrived)
 
-    def action_send_line(self) -> None:
+    def do_say(self) -> None:
         """Say a line of the command language."""
         self._console.push_screen(Ask("say", note="a line of the command language"), self._said)
 

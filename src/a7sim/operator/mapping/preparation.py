@@ -170,7 +170,7 @@ def _scale(flight: FlightPlan, variant: Variant, gear: str, map_scale: float | N
         _base(flight, number),
         flight.photo_scale / number * FORMAT_MM / 2.0,
     )
-    return ModelScale(**{**vars(scale), "against": tuple(_against(scale, variant, map_scale))})
+    return ModelScale(**{**vars(scale), "reason_rejected": tuple(_against(scale, variant, map_scale))})
 
 
 def _plan_gear(number: float, map_scale: float | None) -> str:
