@@ -11,10 +11,9 @@ import asyncio
 import statistics
 import time
 
+import processes
 from figures import Figure, Target, tell
 from round_trips import QUERY
-
-import processes
 
 LEAST_SHARE = Target("at least", 0.2, "ratio")
 NONE = Target("at most", 0)

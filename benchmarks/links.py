@@ -25,10 +25,9 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+import processes
 from figures import Figure, Target, tell
 from round_trips import by_pyserial, by_socket, timed
-
-import processes
 
 HERE = Path(__file__).parent
 PEERS = HERE / "peers"

@@ -8,7 +8,7 @@ import re
 import tempfile
 from pathlib import Path
 
-from tests.sitting_down import Person
+from tests.support.interactive import Person
 
 from a7sim.console.app import Console
 from a7sim.console.config import ConsoleConfig

@@ -9,8 +9,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from docs.make_guide_pictures import FIGURES, SIZE, Student, bare
-from tests.door import with_photographs
-from tests.sitting_down import Person, at
+from tests.support.engine_client import with_photographs
+from tests.support.interactive import Person, at
 
 from a7sim.scenario import load_scenario
 

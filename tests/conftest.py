@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 
 from a7sim.cli import main
-from tests.examples import PROFILE
+from tests.support.hypothesis_profile import PROFILE
 
 settings.load_profile(PROFILE)
 

@@ -14,7 +14,7 @@ from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
 from a7sim.plotters import A7, A8
 from a7sim.reduction.modelling import a8_model_coordinates
-from tests.door import Door
+from tests.support.engine_client import EngineClient
 from tests.test_instrument import photograph
 
 GROUND = np.array(
@@ -25,12 +25,12 @@ GROUND = np.array(
 BASE, C = 184.0, 152.0
 
 
-def an_a8(**photographs) -> Door:
-    return Door(SharedInstrument(Autograph(A8, photographs=photographs)))
+def an_a8(**photographs) -> EngineClient:
+    return EngineClient(SharedInstrument(Autograph(A8, photographs=photographs)))
 
 
 def test_it_says_that_it_is_an_a8():
-    assert an_a8().say("*IDN?") == f"WILD HEERBRUGG,A8,0,{a7sim.__version__}"
+    assert an_a8().query("*IDN?") == f"WILD HEERBRUGG,A8,0,{a7sim.__version__}"
 
 
 @pytest.mark.parametrize(
@@ -50,20 +50,20 @@ def test_it_says_that_it_is_an_a8():
     ],
 )
 def test_what_it_has_not_is_a_settings_conflict(line):
-    door = an_a8()
-    assert door.say(line) == ""
-    assert door.errors() == [-221]
+    client = an_a8()
+    assert client.query(line) == ""
+    assert client.errors() == [-221]
 
 
 def test_what_it_has_not_is_what_its_data_do_not_list():
     """An A7 whose table had no by is refused it, an A8 whose table had one sets it: no name decides anything."""
     with_by = replace(A8, elements={**A8.elements, "by1": A7.elements["by1"]}, fittings=A7.fittings)
-    door = Door(SharedInstrument(Autograph(with_by)))
-    assert door.say("PROJ1:BY 1.5;:PROJ1:BY?;:FITT:DOVE?") == "1.50;OUT"
+    client = EngineClient(SharedInstrument(Autograph(with_by)))
+    assert client.query("PROJ1:BY 1.5;:PROJ1:BY?;:FITT:DOVE?") == "1.50;OUT"
     without = replace(A7, elements={name: each for name, each in A7.elements.items() if name != "by1"})
-    door = Door(SharedInstrument(Autograph(without)))
-    door.say("PROJ1:BY 1;:PROJ2:BY 1;:COMM:PHI 101")
-    assert door.errors() == [-221, -221]
+    client = EngineClient(SharedInstrument(Autograph(without)))
+    client.query("PROJ1:BY 1;:PROJ2:BY 1;:COMM:PHI 101")
+    assert client.errors() == [-221, -221]
 
 
 @pytest.mark.parametrize(
@@ -82,14 +82,14 @@ def test_what_it_has_not_is_what_its_data_do_not_list():
     ],
 )
 def test_its_scales_and_elements_answer_at_the_door(line, reply):
-    assert an_a8().say(line) == reply
+    assert an_a8().query(line) == reply
 
 
 def test_a_reading_of_its_scales_is_no_length():
-    door = an_a8()
-    door.say("DRIV:X 180 MM")
-    assert door.errors() == [-138]
-    assert Door().say("DRIV:X 180 MM;:COUN:X?") == "180.00"
+    client = an_a8()
+    client.query("DRIV:X 180 MM")
+    assert client.errors() == [-138]
+    assert EngineClient().query("DRIV:X 180 MM;:COUN:X?") == "180.00"
 
 
 @given(st.sampled_from("XY"), st.floats(-50.0, 50.0))
@@ -186,21 +186,21 @@ def test_readings_of_a_model_become_its_coordinates_by_the_rules_of_p():
     """P 3.1 and 3.2 from the door: the mark set on every point, the scales read, the left centre at the origin."""
     points = {str(i): place for i, place in enumerate(GROUND.T)}
     tilts = (0.6, -0.4, 1.0), (-0.5, 0.7, -2.0)
-    door = Door(SharedInstrument(_set_up(_pictures_of(points, *tilts), *tilts)))
-    door.say('GEAR:HEIG "1:10000"')
-    door.say("DRIV:Z -300;:COUN:Z:PRES 400")
+    client = EngineClient(SharedInstrument(_set_up(_pictures_of(points, *tilts), *tilts)))
+    client.query('GEAR:HEIG "1:10000"')
+    client.query("DRIV:Z -300;:COUN:Z:PRES 400")
     readings = []
     for name, (x, y, z) in points.items():
-        door.say(f"DRIV:X {200 + x / 2:.2f};Y {200 + y / 2:.2f};Z {z + 700:.2f}")
-        px, py = door.numbers(f'EYEP:STER? "{name}"')
-        dx, dy = door.numbers(f'EYEP1? "{name}"')
+        client.query(f"DRIV:X {200 + x / 2:.2f};Y {200 + y / 2:.2f};Z {z + 700:.2f}")
+        px, py = client.numbers(f'EYEP:STER? "{name}"')
+        dx, dy = client.numbers(f'EYEP1? "{name}"')
         assert abs(py) < 0.01
         assert abs(px) < 10.0
         assert np.hypot(dx, dy) < 10.0
-        readings.append(door.numbers("COUN?"))
+        readings.append(client.numbers("COUN?"))
     found = a8_model_coordinates(np.array(readings).T, BASE, 300.0, 400.0)
     np.testing.assert_allclose(found, GROUND + np.array([[BASE / 2.0], [0.0], [0.0]]), atol=0.011)
-    assert door.errors() == []
+    assert client.errors() == []
 
 
 def test_a_negative_is_seen_as_it_is_with_the_fittings_that_it_has():
@@ -226,7 +226,7 @@ def test_an_a8_opens_on_the_serial_line_with_its_pictures():
 
 
 def test_with_common_phi_the_rods_keep_their_reach():
-    door = an_a8()
-    door.say("BASE:BX 200;:DRIV:Z -175;:DRIV:X 320")
-    assert door.errors() == [-222]
-    assert door.say("COUN:X?") == "200.00"
+    client = an_a8()
+    client.query("BASE:BX 200;:DRIV:Z -175;:DRIV:X 320")
+    assert client.errors() == [-222]
+    assert client.query("COUN:X?") == "200.00"

@@ -6,8 +6,8 @@ import pytest
 from a7sim.operator import OperatorGaveUp, measure_models
 from a7sim.scenario import ScenarioError, load_scenario
 from a7sim.session import open_session, run
-from tests.sessions import without_errors
-from tests.test_crowd import SEEDS, same_to_the_digit
+from tests.support.sessions import without_errors
+from tests.test_session_batch import SEEDS, same_to_the_digit
 
 
 def a8(**settings):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.benches import BENCHMARKS, benchmark
+from tests.support.benchmark_programs import BENCHMARKS, benchmark
 
 figures, bench, bench_page = (benchmark(name) for name in ("figures", "bench", "bench_page"))
 Figure, Target = figures.Figure, figures.Target

@@ -19,8 +19,8 @@ from a7sim.session.all_methods import run_all_methods, run_all_methods_batch
 from a7sim.session.bridge import run_bridge, strip_points
 from a7sim.session.session_batch import open_batch
 from a7sim.study.loading import load_study
-from tests.processes import a7sim_here
-from tests.sessions import without_errors
+from tests.support.processes import a7sim_in_process
+from tests.support.sessions import without_errors
 
 CLOSES_MM = 0.05
 
@@ -195,7 +195,7 @@ def test_of_two_readings_that_contradict_each_other_either_may_be_the_wrong_one(
 @pytest.mark.parametrize(("photo", "picture", "bridged"), [(1, "202", 0), (2, "203", 1)])
 def test_who_gives_up_a_bridge_says_why_and_leaves_the_models_that_stand(tmp_path, photo, picture, bridged):
     """Exit code 1, the reason in results, table and complaint; nothing is worked independently."""
-    said = a7sim_here(
+    said = a7sim_in_process(
         "bridge", "bridge", "--set", f"photos.{photo}.laid=upside down", "--set", "plan.parallax_readings=1",
         "--out", tmp_path / "out",
     )  # fmt: skip
@@ -229,7 +229,7 @@ def with_control():
 def test_the_command_bridges_to_its_end_and_shows_what_polynomials_do_beside_the_similarity(monkeypatch, with_control):
     """In both ways, and with more unknowns the control never fits worse; where nothing is to be kept, nothing is."""
     monkeypatch.setattr("a7sim.cli.run_options.resolve_scenario", lambda *_: (with_control, 1))
-    said = a7sim_here("bridge", "bridge")
+    said = a7sim_in_process("bridge", "bridge")
     assert (said.returncode, said.stderr) == (0, "")
     rows = {
         tuple(line.split(" 9 control ")[0].split()): line.split()

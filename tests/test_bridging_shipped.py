@@ -11,7 +11,7 @@ from a7sim.report.session_folder import read_session
 from a7sim.scenario import load_scenario
 from a7sim.session.bridge import bridge_tables, run_bridge
 from a7sim.session.session_batch import open_batch
-from tests.pages import Page
+from tests.support.html_pages import Page
 
 
 @pytest.fixture(scope="module")

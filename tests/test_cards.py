@@ -9,7 +9,7 @@ from a7sim.errors import A7SimError
 from a7sim.reduction.absolute import Ground, absolute_orientation
 from a7sim.reduction.cards import deck_lines, free_format_lines, is_deck, output_lines, read_cards, write_cards
 from a7sim.reduction.strips import Model, formed_strip, is_centre
-from tests.examples import examples
+from tests.support.hypothesis_profile import examples
 
 DECK = """\
       101 1000.000 2000.000  100.000

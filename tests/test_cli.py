@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import a7sim as in_a_process
-from tests.processes import a7sim_here
+from tests.support.processes import a7sim as in_a_process
+from tests.support.processes import a7sim_in_process
 
 ROOT = Path(__file__).parents[1]
 WORK_FILES = {
@@ -38,7 +38,7 @@ runpy.run_module("a7sim", run_name="__main__")
 
 
 def a7sim(*arguments, cwd=ROOT):
-    return a7sim_here(*arguments, cwd=cwd)
+    return a7sim_in_process(*arguments, cwd=cwd)
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,9 @@ from a7sim.link.client.completion import completions
 from a7sim.link.client.exchange import send_line
 from a7sim.link.client.ports import open_port, port_errors
 from a7sim.link.client.replies import MalformedReplyError, parse_reply
-from tests.door import MODEL_1
+from tests.support.engine_client import MODEL_1
+from tests.support.links import new_instrument, serve_on
 from tests.test_language import EXAMPLES
-from tests.wires import new_desk, served
 
 WIRES = ("tcp", "socket", "rfc2217", "pty")
 SHORT = 0.1
@@ -24,12 +24,12 @@ SHORT = 0.1
 
 @pytest.fixture(scope="module")
 def instrument():
-    return new_desk()
+    return new_instrument()
 
 
 @pytest.fixture
 def client(instrument):
-    with served("tcp", instrument) as url, Client.open(url, timeout=0.5) as opened:
+    with serve_on("tcp", instrument) as url, Client.open(url, timeout=0.5) as opened:
         opened.send("*RST")
         yield opened
 
@@ -39,7 +39,7 @@ def client(instrument):
 
 @pytest.mark.parametrize("kind", WIRES)
 def test_any_url_opens_as_a_pyserial_port(instrument, kind):
-    with served(kind, instrument) as url, open_port(url, timeout=1.0) as port:
+    with serve_on(kind, instrument) as url, open_port(url, timeout=1.0) as port:
         assert isinstance(port, serial.SerialBase)
         port.write(b"*OPC?;*TST?\n*OPC?\n")
         assert (port.readline(), port.read(1), port.read_until(b"\n")) == (b"1;0\n", b"1", b"\n")
@@ -318,7 +318,7 @@ def test_whatever_is_completed_is_a_header_of_the_instrument(client):
 def test_who_has_not_logged_in_is_told_of_the_token(instrument):
     guarded = SharedInstrument(instrument.autograph)
     guarded.token = "secret"
-    with served("tcp", guarded) as url:
+    with serve_on("tcp", guarded) as url:
         with Client.open(url, timeout=SHORT) as stranger, pytest.raises(A7SimError, match="asks for a token"):
             send_line(stranger, "BASE:BX?")
         with Client.open(url, timeout=SHORT, token="secret") as friend:

@@ -19,7 +19,7 @@ from a7sim.cli.lazy_group import LazyGroup
 from a7sim.cli.options import PLOTTERS
 from a7sim.cli.prompt import data_folder
 from a7sim.plotters import VARIANTS
-from tests.processes import a7sim_here
+from tests.support.processes import a7sim_in_process
 
 ROOT = Path(__file__).parents[1]
 BIN = Path(sys.executable).parent
@@ -493,7 +493,7 @@ def test_whatever_ends_a_command_is_said_in_a_sentence_and_raised_where_it_is_de
         raise error
 
     monkeypatch.setattr(cli, "main", ends)
-    ended = a7sim_here("doctor")
+    ended = a7sim_in_process("doctor")
     assert (ended.returncode, ended.stdout) == (code, "")
     assert ended.stderr.startswith(said) and ended.stderr.count("\n") == bool(said)
     monkeypatch.setattr(sys, "argv", ["a7sim", "doctor", "--debug"])

@@ -23,7 +23,7 @@ from a7sim.session import open_session
 from a7sim.session.compiling import CompilationRequest, compile_model
 from a7sim.session.map_svg import index_contours, to_geojson, to_svg
 from a7sim.strip_methods.strip import given_control, ground_control
-from tests.sessions import without_errors
+from tests.support.sessions import without_errors
 from tests.test_cli import a7sim
 
 SCALE = 3750.0

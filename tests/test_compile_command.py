@@ -10,7 +10,7 @@ import pytest
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 from a7sim.session.compiling import WITHIN_HALF
-from tests.processes import a7sim_here
+from tests.support.processes import a7sim_in_process
 
 SEED = 1985
 HEIGHT = 471.0
@@ -25,7 +25,7 @@ def compiled(tmp_path_factory):
     """What the command ended with and said, and the folder it left."""
     out = tmp_path_factory.mktemp("compiled") / "sheet"
     hurried = ("--set", "plan.parallax_readings=1")
-    return a7sim_here("compile", "akwanga", *WORDS, *hurried, "--out", out), out
+    return a7sim_in_process("compile", "akwanga", *WORDS, *hurried, "--out", out), out
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +132,7 @@ def test_the_printed_table_says_the_numbers_of_the_results(compiled, results):
 
 @pytest.mark.slow
 def test_an_operator_who_gives_up_leaves_results_without_a_map_and_exit_code_1(tmp_path):
-    said = a7sim_here(
+    said = a7sim_in_process(
         "compile", "akwanga", *WORDS, "--set", "photos.1.laid=upside down", "--out", tmp_path / "out"
     )  # fmt: skip
     document = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))

@@ -26,7 +26,7 @@ from a7sim.scenario import (
     find_scenario,
     load_scenario,
 )
-from tests.door import Door
+from tests.support.engine_client import EngineClient
 from tests.test_instrument import photograph
 
 CLASSES = ("new", "serviced", "worn")
@@ -50,13 +50,13 @@ def grid_test(stated: Instrument, seed: int, projector: int) -> float:
     Every cross is brought under the mark from the lower left, the scales are read, and shift, principal distance, swing
     and both tilts are taken off.
     """
-    door = Door(SharedInstrument(build_autograph(stated, {"grid": photograph("grid", CROSSES)}, seed)))
-    door.say(f'PHOT{projector}:LOAD "grid";:PROJ{projector}:PDIS 150;:DRIV:Z -300')
+    client = EngineClient(SharedInstrument(build_autograph(stated, {"grid": photograph("grid", CROSSES)}, seed)))
+    client.query(f'PHOT{projector}:LOAD "grid";:PROJ{projector}:PDIS 150;:DRIV:Z -300')
     scales = VARIANTS[stated.variant].scales
     units = np.array([scales[axis].units_per_mm for axis in "XY"])
     origin = np.array([scales[axis].at_origin for axis in "XY"])
-    read = np.array([_cross_read(door, projector, name, place, units, origin) for name, place in CROSSES.items()]).T
-    assert door.errors() == []
+    read = np.array([_cross_read(client, projector, name, place, units, origin) for name, place in CROSSES.items()]).T
+    assert client.errors() == []
     x, y = grid = np.array(list(CROSSES.values())).T
     found = (read - origin[:, None]) / units[:, None] / MAGNIFICATION - grid
     one, none = np.ones_like(x), np.zeros_like(x)
@@ -66,15 +66,15 @@ def grid_test(stated: Instrument, seed: int, projector: int) -> float:
     return float(1e3 * np.sqrt((left**2).sum() / (left.size - len(regular))))
 
 
-def _cross_read(door, projector, name, place, units, origin):
+def _cross_read(client, projector, name, place, units, origin):
     reading = origin + units * MAGNIFICATION * np.array(place)
     for _ in range(3):
         for start in (0.5, 0.0):
             x, y = reading - start
-            door.say(f"DRIV:X {x:.2f};Y {y:.2f}")
-        seen = np.array(door.numbers(f'EYEP{projector}? "{name}"'))
+            client.query(f"DRIV:X {x:.2f};Y {y:.2f}")
+        seen = np.array(client.numbers(f'EYEP{projector}? "{name}"'))
         reading = reading + units * MAGNIFICATION * 1e-3 * seen
-    return np.array(door.numbers("COUN:X?;Y?"))
+    return np.array(client.numbers("COUN:X?;Y?"))
 
 
 def test_a_serviced_plotters_grid_test_comes_out_at_4_to_7_um():
@@ -211,12 +211,12 @@ PLAY = 0.05
 def _parallaxes(approach):
     """Return the y-parallax in um at photo scale each time by' was set to zero after `approach` of its turns."""
     pictures = {"L": photograph("L", {"P": (0.0, 0.0)}), "R": photograph("R", {"P": (-90.0, 0.0)})}
-    door = Door(SharedInstrument(Autograph(A7, Condition(backlash_mm=PLAY), pictures)))
-    door.say('PHOT1:LOAD "L";:PHOT2:LOAD "R";:BASE:BX 180;:DRIV:Z -300')
+    client = EngineClient(SharedInstrument(Autograph(A7, Condition(backlash_mm=PLAY), pictures)))
+    client.query('PHOT1:LOAD "L";:PHOT2:LOAD "R";:BASE:BX 180;:DRIV:Z -300')
     seen = []
     for start in approach:
-        door.say(f"PROJ1:BY {start};:PROJ1:BY 0")
-        seen.append(door.numbers('EYEP:STER? "P"')[1])
+        client.query(f"PROJ1:BY {start};:PROJ1:BY 0")
+        seen.append(client.numbers('EYEP:STER? "P"')[1])
     return np.array(seen)
 
 
@@ -260,12 +260,12 @@ def test_the_truth_about_a_place_undoes_the_screws(place, amplitude, phase):
 
 
 def test_a_counter_that_never_carries_loses_every_unit_until_it_is_preset():
-    door = Door(SharedInstrument(Autograph(A7, Condition(counter_slip_share=1.0))))
-    assert door.say("WHE:X 0.6;:COUN:X?") == "0.60"
-    assert door.say("WHE:X 0.6;:COUN:X?") == "0.20"
-    assert door.say("WHE:X -0.6;:COUN:X?") == "0.60"
-    assert door.say("COUN:X:PRES 7.5;:WHE:X 0.25;:COUN:X?") == "7.75"
-    assert door.say("WHE:X 1;:COUN:X?;*RST;:COUN:X?") == "7.75;1.85"
+    client = EngineClient(SharedInstrument(Autograph(A7, Condition(counter_slip_share=1.0))))
+    assert client.query("WHE:X 0.6;:COUN:X?") == "0.60"
+    assert client.query("WHE:X 0.6;:COUN:X?") == "0.20"
+    assert client.query("WHE:X -0.6;:COUN:X?") == "0.60"
+    assert client.query("COUN:X:PRES 7.5;:WHE:X 0.25;:COUN:X?") == "7.75"
+    assert client.query("WHE:X 1;:COUN:X?;*RST;:COUN:X?") == "7.75;1.85"
 
 
 @given(st.lists(st.floats(-200.0, 200.0), min_size=1, max_size=10), st.floats(0.0, 0.2), st.integers(0, 99))
@@ -356,14 +356,16 @@ def test_nothing_but_the_view_differs_between_a_faulty_instrument_and_a_faultles
         "DRIV:X? ;:COMM:PHI 101;:COMM:PHI?;:SYST:ERR?;:SYST:ERR?",
     ]
     faulty, faultless = (
-        Door(SharedInstrument(build_autograph(instrument(each, variant), {"L": photograph("L", {"P": (1.0, 2.0)})}, 6)))
+        EngineClient(
+            SharedInstrument(build_autograph(instrument(each, variant), {"L": photograph("L", {"P": (1.0, 2.0)})}, 6))
+        )
         for each in (upkeep, Condition())
     )
     for line in lines:
-        assert faulty.say(line) == faultless.say(line)
+        assert faulty.query(line) == faultless.query(line)
     to_the_point = {"A7": "DRIV:X -2;Y 5", "A8": "DRIV:X 150;Y 202"}[variant]
-    for door in (faulty, faultless):
-        door.say(to_the_point)
-    seen = [door.say('EYEP1? "P"') for door in (faulty, faultless)]
+    for client in (faulty, faultless):
+        client.query(to_the_point)
+    seen = [client.query('EYEP1? "P"') for client in (faulty, faultless)]
     assert "9.91E37" not in seen[0] + seen[1]
     assert seen[0] != seen[1]

@@ -23,9 +23,9 @@ from a7sim.link.inprocess import InProcessSerial
 from a7sim.link.server.addresses import Address
 from a7sim.link.server.serving import Endpoints
 from a7sim.scenario import load_scenario
-from tests.door import Door, with_model, with_photographs
-from tests.served import Served
-from tests.sitting_down import Person, at, at_akwanga
+from tests.support.engine_client import EngineClient, with_model, with_photographs
+from tests.support.interactive import Person, at, at_akwanga
+from tests.support.server_thread import ServerThread
 
 POINTS = ("1021", "1011", "1023", "1013", "1025", "1015")
 
@@ -94,7 +94,7 @@ def _same_over_a_link(heard: list[LinkEvent]) -> None:
     pictures = sum(event.direction == ">" and "PICT" in event.text for event in heard)
     assert pictures > 20
     replayed = 0
-    with Served(with_photographs().instrument) as served:
+    with ServerThread(with_photographs().instrument) as served:
         line = served.line()
         replies = iter([event.text for event in said if event.direction == "<" and not event.text.startswith("#")])
         for event in said:
@@ -298,13 +298,13 @@ def test_the_book_strikes_out_and_never_erases() -> None:
             assert str(console.query_one(BookPanel).render()).startswith("x  1 P1")
 
     played(sit_down())
-    assert door.say("REC:COUN?;:REC:LAST?").endswith('"struck: struck out at the console"')
+    assert door.query("REC:COUN?;:REC:LAST?").endswith('"struck: struck out at the console"')
 
 
 def test_a8_has_the_same_hands_and_says_what_it_lacks() -> None:
     akwanga = load_scenario("akwanga-a8")
     instrument = SharedInstrument(build_autograph(akwanga.instrument, {}, 7))
-    console = at(Door(instrument))
+    console = at(EngineClient(instrument))
 
     async def sit_down() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
@@ -393,9 +393,9 @@ def test_plain_says_in_words_what_the_eyes_see() -> None:
 
 
 def test_a_dead_link_is_a_banner_and_a_new_one_is_taken_up() -> None:
-    first = Served(with_photographs().instrument)
+    first = ServerThread(with_photographs().instrument)
     first.__enter__()
-    second = Served(with_photographs().instrument, doors=Endpoints(tcp=[Address("127.0.0.1", first.port)]))
+    second = ServerThread(with_photographs().instrument, endpoints=Endpoints(tcp=[Address("127.0.0.1", first.port)]))
     url = f"tcp://127.0.0.1:{first.port}"
     console = Console(ConsoleConfig(lambda: Client.open(url, timeout=1.0), lambda: 0.0, alone=False))
 

@@ -18,10 +18,10 @@ import aiohttp
 import pytest
 
 from tests.conftest import Typed
-from tests.processes import COMMAND
-from tests.served import PATIENCE
+from tests.support.processes import COMMAND
+from tests.support.server_thread import TIMEOUT_S
 
-LONG_S = 3.0 * PATIENCE
+LONG_S = 3.0 * TIMEOUT_S
 """A console is a process of its own, which begins and ends slowly where others work too."""
 
 FETCHED = re.compile(r"""(?:src|href)=["']?([^"'> ]+)|url\(["']?([^"')]+)|@import ["']?([^"';]+)""")
@@ -64,7 +64,7 @@ def address() -> Iterator[str]:
 
 def fetched(url: str, **headers: str) -> tuple[str, str]:
     """Return what is at an address, and the policy that a browser holds it to."""
-    with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=PATIENCE) as answer:
+    with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=TIMEOUT_S) as answer:
         return answer.read().decode("utf-8", "replace"), answer.headers["Content-Security-Policy"]
 
 

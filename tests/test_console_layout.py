@@ -19,8 +19,8 @@ from a7sim.console.widgets.drum_panels import CounterPanel
 from a7sim.instrument import build_autograph
 from a7sim.instrument.language import SharedInstrument
 from a7sim.scenario import load_scenario
-from tests.door import Door, with_model
-from tests.sitting_down import Person, at
+from tests.support.engine_client import EngineClient, with_model
+from tests.support.interactive import Person, at
 
 Compared = Callable[..., bool]
 Played = Callable[[Person], Awaitable[None]]
@@ -78,7 +78,7 @@ def test_in_every_theme(snap_compare: Compared, theme: str) -> None:
 
 
 def test_an_a8(snap_compare: Compared) -> None:
-    console = at(Door(SharedInstrument(build_autograph(load_scenario("akwanga-a8").instrument, {}, 7))))
+    console = at(EngineClient(SharedInstrument(build_autograph(load_scenario("akwanga-a8").instrument, {}, 7))))
     assert shown_as_before(snap_compare, console, USUAL)
 
 

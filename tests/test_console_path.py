@@ -9,9 +9,9 @@ import pytest
 
 from a7sim.console.state.selection import STEP_SIZES
 from a7sim.instrument.language import LinkEvent
-from tests.door import with_photographs
-from tests.served import Served
-from tests.tmux import Terminal, needs_tmux
+from tests.support.engine_client import with_photographs
+from tests.support.server_thread import ServerThread
+from tests.support.tmux import Terminal, needs_tmux
 
 POINTS = ("1021", "1011", "1023", "1013", "1025", "1015")
 
@@ -123,7 +123,7 @@ class Observer:
 @pytest.mark.slow
 def test_a_person_clears_six_points_with_real_keys_and_the_book_is_what_the_same_lines_give(tmp_path: Path) -> None:
     heard: list[LinkEvent] = []
-    with Served(with_photographs(heard.append).instrument) as served:
+    with ServerThread(with_photographs(heard.append).instrument) as served:
         url = f"tcp://127.0.0.1:{served.port}"
         with Terminal(tmp_path, "console", "akwanga", "--connect", url, "--plain") as terminal:
             book = oriented_by_eye(terminal)
@@ -174,7 +174,7 @@ def recorded_by_the_same_lines(heard: list[LinkEvent]) -> list[tuple[str, ...]]:
     """Say what a console said to another instrument over TCP; every reply is the same. Return its registrations."""
     said = [event for event in heard if event.direction in "<>" and "PICT" not in event.text]
     recorded = []
-    with Served(with_photographs().instrument) as served:
+    with ServerThread(with_photographs().instrument) as served:
         line = served.line()
         replies = iter([event.text for event in said if event.direction == "<"])
         for event in said:

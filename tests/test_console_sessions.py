@@ -28,7 +28,7 @@ from a7sim.journal.format import read_journal
 from a7sim.journal.replay import Replay, replay_lines
 from a7sim.journal.session_files import JOURNAL
 from a7sim.scenario import load_scenario
-from tests.sitting_down import PATIENCE_S, Person
+from tests.support.interactive import TIMEOUT_S, Person
 
 SEED = 7
 
@@ -218,7 +218,7 @@ class Terminal:
         os.close(far)
 
     def until(self, holds: Callable[[], object]) -> None:
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + TIMEOUT_S
         while not holds():
             assert time.monotonic() < end and self.process.poll() is None
             if select.select([self._end], [], [], 0.02)[0]:

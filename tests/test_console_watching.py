@@ -29,9 +29,9 @@ from a7sim.link.inprocess import InProcessSerial
 from a7sim.plotters import VARIANTS
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from tests.door import with_model
-from tests.served import Served
-from tests.sitting_down import Person
+from tests.support.engine_client import with_model
+from tests.support.interactive import Person
+from tests.support.server_thread import ServerThread
 
 WORK = [
     'PHOT1:LOAD "101";:PHOT2:LOAD "102"',
@@ -256,7 +256,7 @@ def test_a_script_is_watched_too_and_in_words(session: Path) -> None:
 
 
 def test_who_watches_a_served_instrument_sees_what_another_does_and_turns_nothing() -> None:
-    with Served(with_model().instrument) as served:
+    with ServerThread(with_model().instrument) as served:
         url = f"tcp://127.0.0.1:{served.port}"
         console = Console(
             replace(remote_console(url, JobSheet("Akwanga"), None, watching=True), drawing=DrawingMode.HALVES)

@@ -10,7 +10,7 @@ import click
 import pytest
 
 from a7sim.cli import cli
-from tests.guides import DOCS, ROOT
+from tests.support.guide_pages import DOCS, ROOT
 
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 NAV = re.findall(r"^ +- .*: (\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8").split("\nnav:\n")[1], re.M)

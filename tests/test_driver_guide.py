@@ -6,9 +6,9 @@ import subprocess
 
 import pytest
 
-from tests.guides import not_shown, page, steps
-from tests.processes import COMMAND, Running, a7sim
-from tests.served import PATIENCE
+from tests.support.guide_pages import not_shown, page, steps
+from tests.support.processes import COMMAND, RunningServer, a7sim
+from tests.support.server_thread import TIMEOUT_S
 
 
 class Room:
@@ -27,9 +27,9 @@ class Room:
         self.close()
         ports = {"--tcp": "127.0.0.1:5025", "--rfc2217": "127.0.0.1:2217"}
         anywhere = [word.replace(":5025", ":0").replace(":2217", ":0") for word in words]
-        server = Running(*anywhere[2:], of=anywhere[1:2])
+        server = RunningServer(*anywhere[2:], of=anywhere[1:2])
         self.running = [server.process]
-        for door in server.doors:
+        for door in server.listening:
             if door["kind"] != "pty":
                 self.places[ports[f"--{door['kind']}"]] = f"127.0.0.1:{door['port']}"
 
@@ -50,7 +50,7 @@ class Room:
         while self.running:
             process = self.running.pop()
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=PATIENCE)
+            process.communicate(timeout=TIMEOUT_S)
             assert process.returncode == 0
 
 

@@ -42,7 +42,7 @@ from a7sim.scenario import load_scenario
 from a7sim.session import open_session, run
 from a7sim.session.session_batch import open_batch
 from a7sim.standard_points import CASES, PLACES
-from tests.sessions import tilted_flight, without_errors
+from tests.support.sessions import tilted_flight, without_errors
 
 METHODS = pytest.mark.parametrize("method", ["independent", "dependent"])
 EMPIRICAL = {"plan.procedure": '"empirical"'}

@@ -3,7 +3,7 @@
 import pytest
 
 from a7sim.instrument.language import ErrorNumber, SharedInstrument
-from tests.benches import benchmark
+from tests.support.benchmark_programs import benchmark
 
 
 @pytest.fixture(scope="module")

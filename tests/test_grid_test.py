@@ -25,10 +25,10 @@ from a7sim.scene import build_scene
 from a7sim.session import open_session, run
 from a7sim.session.grid_test import run_grid_test
 from a7sim.session.session_batch import open_batch
-from tests.door import Door
-from tests.examples import examples
-from tests.processes import a7sim_here
-from tests.sessions import read_once, without_errors
+from tests.support.engine_client import EngineClient
+from tests.support.hypothesis_profile import examples
+from tests.support.processes import a7sim_in_process
+from tests.support.sessions import read_once, without_errors
 
 ROOT = Path(__file__).parents[1]
 CROSSES = np.array(list(GridPlate().some_crosses(25).values())).T
@@ -199,13 +199,13 @@ def test_a_plate_is_ruled_to_its_accuracy_and_is_the_same_whatever_is_flown():
 
 def test_a_plate_is_loaded_over_the_link_like_a_picture():
     scenario = load_scenario("akwanga")
-    door = Door(SharedInstrument(build_autograph(scenario.instrument, build_scene(scenario, 1).mountable, 1)))
-    assert door.say("PHOT:CAT?") == '"101","102","103","grid"'
-    assert door.say('PHOT1:LOAD "grid";:PROJ1:PDIS 152.68;:DRIV:X 0;Y 0;:PHOT1?') == '"grid"'
-    assert all(abs(each) < 2000.0 for each in door.numbers('EYEP1? "G55"'))
-    assert door.say("PHOT1:FID?").count('"') == 8
-    assert door.say('PHOT2:LOAD "grid";:PHOT2?') == '""'
-    assert door.errors() == [-221]
+    client = EngineClient(SharedInstrument(build_autograph(scenario.instrument, build_scene(scenario, 1).mountable, 1)))
+    assert client.query("PHOT:CAT?") == '"101","102","103","grid"'
+    assert client.query('PHOT1:LOAD "grid";:PROJ1:PDIS 152.68;:DRIV:X 0;Y 0;:PHOT1?') == '"grid"'
+    assert all(abs(each) < 2000.0 for each in client.numbers('EYEP1? "G55"'))
+    assert client.query("PHOT1:FID?").count('"') == 8
+    assert client.query('PHOT2:LOAD "grid";:PHOT2?') == '""'
+    assert client.errors() == [-221]
 
 
 @pytest.mark.parametrize(
@@ -474,7 +474,7 @@ def test_a_plate_with_too_few_crosses_in_the_model_does_not_pass():
 
 
 def a7sim(*arguments):
-    return a7sim_here(*arguments, cwd=ROOT)
+    return a7sim_in_process(*arguments, cwd=ROOT)
 
 
 def test_calibrate_files_a_sheet(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 
 from a7sim.training.attempts import run_attempt, seed_for
 from a7sim.training.catalogue import all_exercises, find_exercise
-from tests.guides import ROOT, blocks, commands, not_shown, page, steps, type_in
+from tests.support.guide_pages import ROOT, blocks, commands, not_shown, page, steps, type_in
 
 GUIDES = {name: page(f"{name}-guide") for name in ("student", "teacher")}
 TOLD_IN_STEPS = ("tutorial", "running", "sessions", "researcher-guide")

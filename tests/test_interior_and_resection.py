@@ -22,7 +22,7 @@ from a7sim.reduction.least_squares import solve_least_squares
 from a7sim.reduction.resection import MAX_CONDITION, _coefficients, resection
 from a7sim.scenario.schema import Camera, Fiducial
 from a7sim.scene.camera import distorted, lowered_by_curvature, refracted
-from tests.examples import examples
+from tests.support.hypothesis_profile import examples
 
 KINDS = tuple(UNKNOWNS)
 EIGHT = np.array(

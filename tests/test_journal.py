@@ -31,8 +31,8 @@ from a7sim.scenario import find_scenario, from_data, hash_scenario, load_scenari
 from a7sim.scene import PICTURES
 from a7sim.session import run, strip_combinations
 from a7sim.session.running import ProgressCallbacks
-from tests.processes import ANYWHERE, COMMAND, Running, a7sim, said_here
-from tests.served import Line
+from tests.support.processes import ANY_TCP_PORT, COMMAND, RunningServer, a7sim, a7sim_captured
+from tests.support.server_thread import SocketClient
 
 ROOT = Path(__file__).parents[1]
 LIGHT = {"plan.parallax_readings": "1"}
@@ -175,7 +175,7 @@ def test_a_flipped_last_line_end_is_no_torn_line(whole, tmp_path, flipped):
 def test_what_is_no_journal_gets_one_sentence(tmp_path, content, sentence, capsys):
     (tmp_path / "session.jsonl").write_bytes(content)
     for arguments in (("run", "--resume", tmp_path), ("replay", tmp_path)):
-        done = said_here(capsys, *arguments)
+        done = a7sim_captured(capsys, *arguments)
         assert (done.returncode, done.stdout) == (2, "")
         assert sentence in done.stderr
         assert done.stderr.count("\n") == 1
@@ -209,7 +209,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_bytes(whole, tmp_path, capsys)
         running.kill()
         assert running.wait() == -signal.SIGKILL
         command = ["run", "--resume", str(tmp_path / "out"), "--quiet"]
-    assert said_here(capsys, *command).returncode == 0
+    assert a7sim_captured(capsys, *command).returncode == 0
     left = files_of(tmp_path / "out")
     left.pop("session.jsonl.torn", None)
     assert {name: left[name] for name in files_of(whole)} == files_of(whole)
@@ -251,21 +251,21 @@ def test_a_journal_of_something_else_is_refused_at_line_1(copied, key, value, se
 def test_a_scenario_that_is_none_is_said_and_another_may_be_named(copied, content, sentence, capsys):
     file = copied / "session.scenario.json"
     file.unlink() if content is None else file.write_text(content)
-    done = said_here(capsys, "replay", copied, "--quiet")
+    done = a7sim_captured(capsys, "replay", copied, "--quiet")
     assert done.returncode == 2
     assert f"{file}: {sentence}" in done.stderr
     named = ["replay", copied, "--verify", "--quiet", "--scenario"]
-    assert "expected the scenario and the measurements that" in said_here(capsys, *named, "akwanga").stderr
+    assert "expected the scenario and the measurements that" in a7sim_captured(capsys, *named, "akwanga").stderr
 
 
 def test_a_journal_without_its_scenario_replays_with_one_that_is_named(tmp_path, capsys):
-    assert said_here(capsys, "replay", "interior", "--out", tmp_path / "out", "--quiet").returncode == 0
+    assert a7sim_captured(capsys, "replay", "interior", "--out", tmp_path / "out", "--quiet").returncode == 0
     script = read_script(find_script("interior"))
     (tmp_path / "out" / "session.scenario.json").unlink()
     name = next(
         path.stem for path in (ROOT / "scenarios").glob("*.toml") if load_scenario(path.stem) == script.scenario
     )
-    done = said_here(capsys, "replay", tmp_path / "out", "--verify", "--quiet", "--scenario", name)
+    done = a7sim_captured(capsys, "replay", tmp_path / "out", "--verify", "--quiet", "--scenario", name)
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -320,7 +320,7 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
 
 def test_resume_takes_nothing_beside_it(whole, capsys):
     for extra in (["akwanga"], ["--seed", "7"], ["--out", "x"]):
-        done = said_here(capsys, "run", "--resume", whole, *extra)
+        done = a7sim_captured(capsys, "run", "--resume", whole, *extra)
         assert done.returncode == 2
         assert "since the journal says what was asked for" in done.stderr
 
@@ -335,39 +335,39 @@ def journalled_events(out):
 
 def test_a_server_that_is_killed_goes_on_with_all_that_two_clients_registered(tmp_path, capsys):
     out = tmp_path / "out"
-    with Running(*ANYWHERE, "--out", str(out)) as first:
+    with RunningServer(*ANY_TCP_PORT, "--out", str(out)) as first:
         one, other = first.line(), first.line()
         assert one.ask("SYST:LOCK:REQ?;:PROJ1:BY 1;*OPC?") == "1;1"
         assert one.ask('DRIV:X 100;*WAI;:DRIV:X 20;:REC "a",BY1;:REC:LAST?') == '1,"a",20.00,0.00,-300.00,BY1,1.00'
         other.send(b'PROJ2:BY 1\nREC "b"\n' + b"x" * 5000 + b"\n")
         assert other.ask("REC:COUN?;:SYST:ERR:COUN?") == "2;2"
-    with Running.resuming(out) as again:
+    with RunningServer.resuming(out) as again:
         line = again.line()
         assert line.ask("REC:COUN?;:PROJ1:BY?;:COUN:X?;:SYST:LOCK:REQ?") == "2;1.00;20.00;1"
         line.send(b'REC "c"\n')
         assert line.ask("REC:LAST?").startswith('3,"c",20.00')
-        assert again.stopped_by(signal.SIGTERM)[0] == 0
+        assert again.stop(signal.SIGTERM)[0] == 0
     events = journalled_events(out)
     assert [(event.dir, event.client) for event in events if event.dir in ("+", "-")] == [
         *[("+", "client1"), ("+", "client2"), ("-", "client1"), ("-", "client2"), ("+", "client3"), ("-", "client3")]
     ]
     assert [before.t <= after.t for before, after in pairwise(events)] == [True] * (len(events) - 1)
-    assert said_here(capsys, "replay", out, "--verify", "--quiet").returncode == 0
+    assert a7sim_captured(capsys, "replay", out, "--verify", "--quiet").returncode == 0
 
 
 def test_a_server_that_asked_for_a_token_goes_on_with_one(tmp_path, capsys):
     out = tmp_path / "out"
-    with Running(*ANYWHERE, "--out", str(out), A7SIM_TOKEN="sesame") as first:
+    with RunningServer(*ANY_TCP_PORT, "--out", str(out), A7SIM_TOKEN="sesame") as first:
         line = first.line()
         assert line.ask('COUN?;:SYST:LOG "sesame";:DRIV:X 5;:COUN:X?') == "5.00"
     assert "sesame" not in (out / "session.jsonl").read_text()
-    done = said_here(capsys, "serve", "--resume", out, *ANYWHERE)
+    done = a7sim_captured(capsys, "serve", "--resume", out, *ANY_TCP_PORT)
     assert (done.returncode, done.stdout) == (2, "")
     assert "line 1: expected a token, as the session was begun with, got none" in done.stderr
-    with Running.resuming(out, A7SIM_TOKEN="open") as again:
+    with RunningServer.resuming(out, A7SIM_TOKEN="open") as again:
         assert again.line().ask('SYST:LOG "open";:COUN:X?') == "5.00"
-        again.stopped_by(signal.SIGTERM)
-    assert said_here(capsys, "replay", out, "--verify", "--quiet").returncode == 0
+        again.stop(signal.SIGTERM)
+    assert a7sim_captured(capsys, "replay", out, "--verify", "--quiet").returncode == 0
 
 
 # --- what cannot be written -------------------------------------------------------------------------------
@@ -399,17 +399,17 @@ def test_a_run_on_a_full_disk_stops_in_a_sentence_and_goes_on_when_there_is_room
 
 def test_a_server_on_a_full_disk_says_so_and_acknowledges_nothing_that_is_not_written(tmp_path):
     out = tmp_path / "out"
-    with Running(*ANYWHERE, "--out", str(out), preexec_fn=with_files_of_at_most(20_000)) as running:
+    with RunningServer(*ANY_TCP_PORT, "--out", str(out), preexec_fn=with_files_of_at_most(20_000)) as running:
         one, other = running.line(), running.line()
         acknowledged = 0
         while one.ask(f'REC "{acknowledged + 1}";:REC:COUN?') == str(acknowledged + 1):
             acknowledged += 1
-        assert other.hung_up()
+        assert other.wait_closed()
         _, errors = running.process.communicate(timeout=30)
         assert running.process.returncode == 2
         assert errors.endswith("so the session stops here: File too large\n")
         assert errors.count("\n") == 1
-    with Running.resuming(out) as again:
+    with RunningServer.resuming(out) as again:
         assert again.line().ask("REC:COUN?") in (str(acknowledged), str(acknowledged + 1))
     assert acknowledged > 50
 
@@ -442,8 +442,8 @@ def test_a_line_half_written_is_taken_back(tmp_path, monkeypatch):
 @pytest.mark.parametrize("command", ["run", "serve"])
 def test_a_folder_that_cannot_be_written_is_said_before_anything_starts(tmp_path, command, capsys):
     (tmp_path / "file").write_text("")
-    done = said_here(
-        capsys, command, "akwanga", "--out", tmp_path / "file" / "out", *(ANYWHERE if command == "serve" else ())
+    done = a7sim_captured(
+        capsys, command, "akwanga", "--out", tmp_path / "file" / "out", *(ANY_TCP_PORT if command == "serve" else ())
     )
     assert (done.returncode, done.stdout) == (2, "")
     assert "expected a folder that can be written" in done.stderr
@@ -532,7 +532,7 @@ def test_a_changed_reply_stops_the_replay_with_both_lines_and_the_state(copied, 
         return data | {"text": "1" + data["text"]} if n == number else data
 
     (copied / "session.jsonl").write_bytes(forged(journalled, change=change))
-    done = said_here(capsys, "replay", copied, "--verify", "--quiet")
+    done = a7sim_captured(capsys, "replay", copied, "--verify", "--quiet")
     said = journalled.event(number).text
     assert done.returncode == 3
     assert done.stderr.splitlines() == [
@@ -550,7 +550,7 @@ def test_a_replay_that_only_tells_goes_on_beyond_a_difference_and_counts_it(copi
         return data | {"text": "1" + data["text"]} if n == number else data
 
     (copied / "session.jsonl").write_bytes(forged(journalled, change=change))
-    done = said_here(capsys, "replay", copied)
+    done = a7sim_captured(capsys, "replay", copied)
     told = done.stdout.splitlines()
     assert not done.returncode
     assert [line.split(None, 1)[1] for line in told if line.startswith("   differs ")] == [
@@ -592,7 +592,7 @@ def test_a_changed_command_shows_in_what_the_state_differs(copied, capsys):
         return data | {"text": "PROJ1:PDIS 151.5"} if n == number else data
 
     (copied / "session.jsonl").write_bytes(forged(journalled, change=change))
-    done = said_here(capsys, "replay", copied, "--verify", "--json")
+    done = a7sim_captured(capsys, "replay", copied, "--verify", "--json")
     document = json.loads(done.stdout)
     assert (done.returncode, document["status"]) == (3, "differs")
     assert number < document["difference"]["line"] < number + 200
@@ -611,7 +611,7 @@ def test_lines_left_over_fail(copied, capsys):
         ([*journalled.lines[:last], unasked], last + 1, "client1 < 5", "nothing"),
     ):
         (copied / "session.jsonl").write_bytes(b"\n".join(lines) + b"\n")
-        done = said_here(capsys, "replay", copied, "--verify", "--quiet")
+        done = a7sim_captured(capsys, "replay", copied, "--verify", "--quiet")
         assert done.returncode == 3
         assert done.stderr.splitlines()[:3] == [
             f"a7sim: {copied}/session.jsonl, line {number}: the first difference",
@@ -627,17 +627,17 @@ def test_lines_left_over_fail(copied, capsys):
 def test_a_replay_tells_from_a_line_or_a_time_on(whole, begin, first, capsys):
     journalled = read_journal(whole / "session.jsonl")
     number = next(n for n in range(2, len(journalled)) if first(n, journalled.event(n)))
-    done = said_here(capsys, "replay", whole, "--from", begin, "--verify")
+    done = a7sim_captured(capsys, "replay", whole, "--from", begin, "--verify")
     assert done.returncode == 0
     assert len(done.stdout.splitlines()) == len(journalled) - number + 2
     assert done.stdout.split()[0] == f"{journalled.event(number).t:.2f}"
 
 
 def test_a_replay_tells_from_a_note_on(whole, capsys):
-    done = said_here(capsys, "replay", whole, "--from", "left perspective centre")
+    done = a7sim_captured(capsys, "replay", whole, "--from", "left perspective centre")
     assert done.stdout.splitlines()[0].endswith('client1   > NOTE "1: left perspective centre"')
     assert done.returncode == 0
-    done = said_here(capsys, "replay", whole, "--from", "coffee")
+    done = a7sim_captured(capsys, "replay", whole, "--from", "coffee")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "--from coffee: expected a time, @LINE or the text of a note" in done.stderr
 
@@ -656,7 +656,7 @@ def test_a_replay_goes_at_the_speed_that_is_asked_for(monkeypatch):
 @pytest.mark.parametrize("path", sorted((ROOT / "tests" / "journals").glob("*.jsonl")), ids=lambda path: path.stem)
 def test_a_journal_of_every_version_replays_for_ever(path, capsys):
     assert path.stat().st_size < 150_000
-    done = said_here(capsys, "replay", path, "--verify", "--quiet")
+    done = a7sim_captured(capsys, "replay", path, "--verify", "--quiet")
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -665,8 +665,8 @@ def test_a_journal_of_every_version_replays_for_ever(path, capsys):
 
 def test_what_a_client_and_an_instrument_say_is_recorded_and_replays(tmp_path, capsys):
     out = tmp_path / "recorded"
-    with Running(*ANYWHERE) as served:
-        command = ["record", served.doors[0]["url"], "--scenario", "akwanga", "--out", str(out), "--json"]
+    with RunningServer(*ANY_TCP_PORT) as served:
+        command = ["record", served.listening[0]["url"], "--scenario", "akwanga", "--out", str(out), "--json"]
         recorder = subprocess.Popen([*COMMAND, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         text = ""
         while not text.endswith("\n}\n"):
@@ -674,12 +674,12 @@ def test_what_a_client_and_an_instrument_say_is_recorded_and_replays(tmp_path, c
         scheme, _, port = json.loads(text)["url"].split(":")
         assert scheme == "tcp"
         port = int(port)
-        with Line(port) as line:
+        with SocketClient(port) as line:
             assert line.ask("DRIV:X 30;*OPC?;:COUN:X?") == "1;30.00"
             line.send(b"EYEP1:PICT? 4,4,1\n" + b"x" * 5000 + b"\n")
             assert line.read().startswith("#216")
             assert line.ask("SYST:ERR?").endswith('-363,"Input buffer overrun;expected at most 4096 bytes a line"')
-        with Line(port) as line:
+        with SocketClient(port) as line:
             assert line.ask("COUN:X?") == "30.00"
         recorder.send_signal(signal.SIGTERM)
         _, errors = recorder.communicate(timeout=30)
@@ -687,15 +687,15 @@ def test_what_a_client_and_an_instrument_say_is_recorded_and_replays(tmp_path, c
     events = journalled_events(out)
     assert [event.dir for event in events if event.dir != "<"] == [*"+>>!>-", *"+>-"]
     assert [event.text[:10] for event in events if event.dir == "<"] == ["1;30.00", "#block of ", '-363,"Inpu', "30.00"]
-    assert said_here(capsys, "replay", out, "--verify", "--quiet").returncode == 0
+    assert a7sim_captured(capsys, "replay", out, "--verify", "--quiet").returncode == 0
 
 
 def test_a_record_of_an_unknown_instrument_is_told_and_not_verified(tmp_path, capsys):
     with Journal().recording(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
         journal.on_link_event(LinkEvent(1.0, "client1", ">", "*IDN?"))
-    done = said_here(capsys, "replay", tmp_path)
+    done = a7sim_captured(capsys, "replay", tmp_path)
     assert done.stdout.splitlines()[0] == "      1.00 client1   > *IDN?"
-    done = said_here(capsys, "replay", tmp_path, "--verify")
+    done = a7sim_captured(capsys, "replay", tmp_path, "--verify")
     assert done.returncode == 2
     assert "expected a session whose scenario is known" in done.stderr
 
@@ -716,5 +716,5 @@ def test_a_client_that_goes_needs_no_journal_that_can_be_written_and_any_other_w
 def test_what_a_replay_only_tells_is_not_told_where_it_is_to_be_quiet(tmp_path, capsys):
     with Journal().recording(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
         journal.on_link_event(LinkEvent(1.0, "client1", ">", "*IDN?"))
-    told = said_here(capsys, "replay", tmp_path, "--quiet")
+    told = a7sim_captured(capsys, "replay", tmp_path, "--quiet")
     assert (told.returncode, told.stdout) == (0, "")

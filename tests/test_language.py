@@ -10,7 +10,7 @@ from a7sim.instrument import Autograph
 from a7sim.instrument.language import LinkEvent, SharedInstrument
 from a7sim.plotters import VARIANTS
 from a7sim.scenario.schema import Condition, ProjectorCondition
-from tests.door import Door, with_model, with_photographs
+from tests.support.engine_client import EngineClient, with_model, with_photographs
 
 EXAMPLES = {
     "*CLS": "",
@@ -156,21 +156,21 @@ def in_short(header: str) -> str:
 
 
 def test_help_lists_every_header_of_the_protocol_and_no_other():
-    listed = Door().say("SYST:HELP:HEAD?").split(",")
+    listed = EngineClient().query("SYST:HELP:HEAD?").split(",")
     assert sorted(listed) == sorted(f'"{header}"' for header in EXAMPLES)
 
 
 @pytest.mark.parametrize("form", [in_short, in_full])
 @pytest.mark.parametrize("header", EXAMPLES)
 def test_every_header_answers_or_obeys_in_both_forms(header, form):
-    door = with_model()
-    door.say('REC "1021"')
-    reply = door.feed(f"{form(header)} {EXAMPLES[header]}\n".encode())
+    client = with_model()
+    client.query('REC "1021"')
+    reply = client.feed(f"{form(header)} {EXAMPLES[header]}\n".encode())
     if header in NOT_ON_AN_A7:
-        assert (reply, door.errors()) == (b"", [-221])
+        assert (reply, client.errors()) == (b"", [-221])
     else:
         assert reply.endswith(b"\n") == header.endswith("?")
-        assert door.errors() == []
+        assert client.errors() == []
 
 
 @pytest.mark.parametrize(
@@ -186,9 +186,9 @@ def test_every_header_answers_or_obeys_in_both_forms(header, form):
     ],
 )
 def test_forms_mix_in_any_case_and_no_suffix_means_1(line):
-    door = Door()
-    door.say("PROJ1:OMEG 98.5")
-    assert door.say(line) == "98.50"
+    client = EngineClient()
+    client.query("PROJ1:OMEG 98.5")
+    assert client.query(line) == "98.50"
 
 
 @pytest.mark.parametrize(
@@ -220,90 +220,90 @@ def test_forms_mix_in_any_case_and_no_suffix_means_1(line):
     ],
 )  # fmt: skip
 def test_anything_else_is_an_undefined_header(line):
-    door = Door()
-    assert door.say(line) == ""
-    assert door.errors() == [-113]
+    client = EngineClient()
+    assert client.query(line) == ""
+    assert client.errors() == [-113]
 
 
 def test_semicolon_stays_at_the_level_and_a_colon_goes_to_the_root():
-    door = Door()
-    door.say("PROJ2:KAPP 5;PHI 99;OMEG 98;:BASE:BX 20;MODE OUT")
-    assert door.say("PROJ2:KAPP?;PHI?;OMEG?;:BASE:BX?;MODE?") == "5.00;99.00;98.00;20.00;OUT"
-    assert door.say("COUN:X:PRES 7;:COUN:X?;Y?") == "7.00;0.00"
-    assert door.say("SYST:ERR:COUN?;NEXT?") == '0;0,"No error"'
-    assert door.errors() == []
+    client = EngineClient()
+    client.query("PROJ2:KAPP 5;PHI 99;OMEG 98;:BASE:BX 20;MODE OUT")
+    assert client.query("PROJ2:KAPP?;PHI?;OMEG?;:BASE:BX?;MODE?") == "5.00;99.00;98.00;20.00;OUT"
+    assert client.query("COUN:X:PRES 7;:COUN:X?;Y?") == "7.00;0.00"
+    assert client.query("SYST:ERR:COUN?;NEXT?") == '0;0,"No error"'
+    assert client.errors() == []
 
 
 def test_without_the_colon_the_root_is_not_seen():
-    door = Door()
-    assert door.say("PROJ1:KAPP?;PROJ2:KAPP?") == "0.00"
-    assert door.errors() == [-113]
+    client = EngineClient()
+    assert client.query("PROJ1:KAPP?;PROJ2:KAPP?") == "0.00"
+    assert client.errors() == [-113]
 
 
 def test_common_commands_leave_the_level_alone():
-    door = Door()
-    assert door.say("PROJ1:KAPP 5;*ESE 1;PHI 99;*ESE?;PHI?") == "1;99.00"
+    client = EngineClient()
+    assert client.query("PROJ1:KAPP 5;*ESE 1;PHI 99;*ESE?;PHI?") == "1;99.00"
 
 
 @pytest.mark.parametrize("between", ["FOO", "KAPP FOO", "KAPP 1,2", "KAPP 999", "KAPP 5 MM", "KAPP 1..2", "FOO \xe9"])
 def test_a_bad_unit_leaves_the_level_alone(between):
-    door = Door()
-    assert door.say(f"PROJ2:PHI 99;{between};PHI?") == "99.00"
-    assert len(door.errors()) == 1
+    client = EngineClient()
+    assert client.query(f"PROJ2:PHI 99;{between};PHI?") == "99.00"
+    assert len(client.errors()) == 1
 
 
 def test_every_line_begins_at_the_root():
-    door = Door()
-    door.say("PROJ1:KAPP?")
-    assert door.say("PHI?") == ""
-    assert door.errors() == [-113]
+    client = EngineClient()
+    client.query("PROJ1:KAPP?")
+    assert client.query("PHI?") == ""
+    assert client.errors() == [-113]
 
 
 @pytest.mark.parametrize("line", ["", " ", "\t", ";", ";;", " ; ; ", "\r"])
 def test_nothing_between_semicolons_is_nothing(line):
-    door = Door()
-    assert door.say(line) == ""
-    assert door.errors() == []
+    client = EngineClient()
+    assert client.query(line) == ""
+    assert client.errors() == []
 
 
 def test_empty_units_do_not_disturb_their_neighbours():
-    assert Door().say(";;PROJ1:KAPP?; ;PHI?;;*OPC?;") == "0.00;100.00;1"
+    assert EngineClient().query(";;PROJ1:KAPP?; ;PHI?;;*OPC?;") == "0.00;100.00;1"
 
 
 def test_there_is_no_banner_and_no_echo():
-    door = Door()
-    assert door.feed(b"") == b""
-    assert door.feed(b"*OPC?\n") == b"1\n"
+    client = EngineClient()
+    assert client.feed(b"") == b""
+    assert client.feed(b"*OPC?\n") == b"1\n"
 
 
 def test_a_command_never_answers():
-    assert Door().say("*CLS;*ESE 1;:PROJ1:KAPP 5;:NOTE 'x';*OPC;*WAI") == ""
+    assert EngineClient().query("*CLS;*ESE 1;:PROJ1:KAPP 5;:NOTE 'x';*OPC;*WAI") == ""
 
 
 def test_one_bad_query_among_good_ones_answers_nothing_and_queues_an_error():
-    door = Door()
-    assert door.say("PROJ1:KAPP?;:FOO?;:PROJ1:PHI?;OMEG? 7;BY?") == "0.00;100.00;0.00"
-    assert door.errors() == [-113, -104]
+    client = EngineClient()
+    assert client.query("PROJ1:KAPP?;:FOO?;:PROJ1:PHI?;OMEG? 7;BY?") == "0.00;100.00;0.00"
+    assert client.errors() == [-113, -104]
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r"])
 def test_lines_end_in_lf_crlf_or_cr(end):
-    door = Door()
-    assert door.feed(b"*OPC?" + end) + door.feed(b"*TST?" + end) == b"1\n0\n"
-    assert door.errors() == []
+    client = EngineClient()
+    assert client.feed(b"*OPC?" + end) + client.feed(b"*TST?" + end) == b"1\n0\n"
+    assert client.errors() == []
 
 
 def test_off_the_serial_line_a_cr_alone_ends_nothing():
-    door = Door(cr_ends_line=False)
-    assert door.feed(b"*OPC?\r\n") == b"1\n"
-    assert door.feed(b"*OPC?\r*TST?") == b""
-    assert door.feed(b"\n") == b""
-    assert door.errors() == [-101]
+    client = EngineClient(cr_ends_line=False)
+    assert client.feed(b"*OPC?\r\n") == b"1\n"
+    assert client.feed(b"*OPC?\r*TST?") == b""
+    assert client.feed(b"\n") == b""
+    assert client.errors() == [-101]
 
 
 def test_a_line_may_come_in_pieces():
-    door = Door()
-    assert [door.feed(piece) for piece in (b"*O", b"PC?", b";*TST", b"?\n*OP", b"C?\n")] == [
+    client = EngineClient()
+    assert [client.feed(piece) for piece in (b"*O", b"PC?", b";*TST", b"?\n*OP", b"C?\n")] == [
         b"", b"", b"", b"1;0\n", b"1\n",
     ]  # fmt: skip
 
@@ -311,28 +311,28 @@ def test_a_line_may_come_in_pieces():
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 @pytest.mark.parametrize("cr_ends_line", [True, False])
 def test_a_line_of_4096_bytes_is_obeyed_and_one_more_is_dropped_whole(end, cr_ends_line):
-    door = Door(cr_ends_line=cr_ends_line)
+    client = EngineClient(cr_ends_line=cr_ends_line)
     longest = b"*OPC?".ljust(4096)
-    assert door.feed(longest + end) == b"1\n"
-    assert door.errors() == []
-    assert door.feed(longest + b" " + end) == b""
-    assert door.errors() == [-363]
+    assert client.feed(longest + end) == b"1\n"
+    assert client.errors() == []
+    assert client.feed(longest + b" " + end) == b""
+    assert client.errors() == [-363]
 
 
 def test_a_cr_that_ends_nothing_counts_among_the_bytes_of_its_line():
-    door = Door(cr_ends_line=False)
-    assert door.feed(b"*OPC?".ljust(4096) + b"\r;*OPC?\n") == b""
-    assert door.errors() == [-363]
+    client = EngineClient(cr_ends_line=False)
+    assert client.feed(b"*OPC?".ljust(4096) + b"\r;*OPC?\n") == b""
+    assert client.errors() == [-363]
 
 
 @pytest.mark.parametrize("piece", [1, 1000, 4096, 100_000])
 def test_a_line_too_long_does_nothing_in_whatever_pieces_and_the_next_line_works(piece):
-    door = Door()
+    client = EngineClient()
     flood = b"BASE:BX 5;" * 2000 + b"*OPC?\n"
     for start in range(0, len(flood), piece):
-        assert door.feed(flood[start : start + piece]) == b""
-    assert door.say("BASE:BX?") == "0.00"
-    assert door.errors() == [-363]
+        assert client.feed(flood[start : start + piece]) == b""
+    assert client.query("BASE:BX?") == "0.00"
+    assert client.errors() == [-363]
 
 
 # --- parameters ----------------------------------------------------------------------------------------
@@ -350,9 +350,9 @@ def test_a_line_too_long_does_nothing_in_whatever_pieces_and_the_next_line_works
     ],
 )
 def test_quotes_protect_and_double_themselves(written, name):
-    door = Door()
-    assert door.say(f"REC {written},BX;:REC:LAST?") == f"1,{name},0.00,0.00,-300.00,BX,0.00"
-    assert door.errors() == []
+    client = EngineClient()
+    assert client.query(f"REC {written},BX;:REC:LAST?") == f"1,{name},0.00,0.00,-300.00,BX,0.00"
+    assert client.errors() == []
 
 
 @pytest.mark.parametrize(
@@ -360,9 +360,9 @@ def test_quotes_protect_and_double_themselves(written, name):
     ["12", "+12", "12.", "12.000", "1.2E1", "1.2e+1", ".12E2", "1200e-2", "12MM", "12 mm", "12000 UM", "1.2E4um"],
 )
 def test_numbers_come_in_any_form_with_or_without_a_unit(number):
-    door = Door()
-    assert door.say(f"PROJ1:BY {number};BY?") == "12.00"
-    assert door.errors() == []
+    client = EngineClient()
+    assert client.query(f"PROJ1:BY {number};BY?") == "12.00"
+    assert client.errors() == []
 
 
 @pytest.mark.parametrize(
@@ -383,28 +383,28 @@ def test_numbers_come_in_any_form_with_or_without_a_unit(number):
     ],
 )
 def test_replies_come_as_the_counter_shows_them_without_a_unit(line, reply):
-    assert Door().say(line) == reply
+    assert EngineClient().query(line) == reply
 
 
 @pytest.mark.parametrize(("header", "name"), ELEMENTS.items())
 def test_min_max_and_def_name_an_elements_range_and_zero(header, name):
     element = VARIANTS["A7"].elements[name]
-    door = Door()
+    client = EngineClient()
     for words, value in (("MIN", element.low), ("MAXIMUM", element.high), ("default", element.zero)):
-        assert door.numbers(f"{header}? {words}") == [value]
+        assert client.numbers(f"{header}? {words}") == [value]
         shown = 0.0 if element.endless else value
-        assert door.numbers(f"{header} {words};:{header}?") == [shown]
-    assert door.errors() == []
+        assert client.numbers(f"{header} {words};:{header}?") == [shown]
+    assert client.errors() == []
 
 
 @pytest.mark.parametrize(
     ("axis", "low", "high", "rest"), [("X", -280, 280, 0), ("Y", -420, 350, 0), ("Z", -490, -140, -300)]
 )
 def test_min_max_and_def_name_a_carriages_ends_and_rest(axis, low, high, rest):
-    door = Door()
+    client = EngineClient()
     for word, value in (("MIN", low), ("MAX", high), ("DEF", rest)):
-        assert door.numbers(f"DRIV:{axis} {word};:COUN:{axis}?") == [value]
-    assert door.errors() == []
+        assert client.numbers(f"DRIV:{axis} {word};:COUN:{axis}?") == [value]
+    assert client.errors() == []
 
 
 REFUSED = {
@@ -550,41 +550,41 @@ REFUSED = {
 
 @pytest.mark.parametrize(("number", "line"), [(number, line) for number, lines in REFUSED.items() for line in lines])
 def test_what_is_refused_answers_nothing_moves_nothing_and_queues_its_number(number, line):
-    door = Door()
-    before = door.say(POSITIONS)
-    assert door.say(line) == ""
-    assert door.errors() == [number]
-    assert door.say(POSITIONS) == before
+    client = EngineClient()
+    before = client.query(POSITIONS)
+    assert client.query(line) == ""
+    assert client.errors() == [number]
+    assert client.query(POSITIONS) == before
 
 
 def test_an_error_says_its_number_its_message_and_what_was_expected():
-    door = Door()
-    door.say('PROJ1:PHI 200;:PROJ1:KAPP "5"')
-    assert re.fullmatch(r'-222,"Data out of range;[^"]*expected 70\.00 to 106\.00, got 200"', door.say("SYST:ERR?"))
-    assert re.fullmatch(r'-104,"Data type error;[^"]*expected a number[^"]*"', door.say("SYST:ERR:NEXT?"))
-    assert door.say("SYST:ERR?") == '0,"No error"'
+    client = EngineClient()
+    client.query('PROJ1:PHI 200;:PROJ1:KAPP "5"')
+    assert re.fullmatch(r'-222,"Data out of range;[^"]*expected 70\.00 to 106\.00, got 200"', client.query("SYST:ERR?"))
+    assert re.fullmatch(r'-104,"Data type error;[^"]*expected a number[^"]*"', client.query("SYST:ERR:NEXT?"))
+    assert client.query("SYST:ERR?") == '0,"No error"'
 
 
 # --- several clients -----------------------------------------------------------------------------------
 
 
 def two_clients():
-    first = Door()
-    return first, Door(first.instrument)
+    first = EngineClient()
+    return first, EngineClient(first.instrument)
 
 
 def test_clients_share_the_instrument():
     first, second = two_clients()
-    first.say("BASE:BX 20")
-    assert second.say("BASE:BX?") == "20.00"
+    first.query("BASE:BX 20")
+    assert second.query("BASE:BX?") == "20.00"
 
 
 def test_whoever_holds_the_lock_turns_alone_and_the_others_may_look():
     first, second = two_clients()
-    assert (first.say("SYST:LOCK:REQ?"), second.say("SYST:LOCK:REQ?")) == ("1", "0")
-    assert first.say("SYST:LOCK:REQ?") == "1"
-    first.say("PROJ1:KAPP 5")
-    assert second.say("PROJ1:KAPP 6;KAPP?;:NOTE 'may I?'") == "5.00"
+    assert (first.query("SYST:LOCK:REQ?"), second.query("SYST:LOCK:REQ?")) == ("1", "0")
+    assert first.query("SYST:LOCK:REQ?") == "1"
+    first.query("PROJ1:KAPP 5")
+    assert second.query("PROJ1:KAPP 6;KAPP?;:NOTE 'may I?'") == "5.00"
     assert (first.errors(), second.errors()) == ([], [-203])
 
 
@@ -598,62 +598,62 @@ def test_whoever_holds_the_lock_turns_alone_and_the_others_may_look():
 )
 def test_the_lock_protects_all_that_moves(header):
     holder = with_model()
-    other = Door(holder.instrument)
-    holder.say("SYST:LOCK:REQ?")
-    before = other.say(POSITIONS)
-    other.say(f"{in_short(header)} {EXAMPLES[header]}")
+    other = EngineClient(holder.instrument)
+    holder.query("SYST:LOCK:REQ?")
+    before = other.query(POSITIONS)
+    other.query(f"{in_short(header)} {EXAMPLES[header]}")
     assert other.errors() == [-203]
-    assert other.say(POSITIONS) == before
+    assert other.query(POSITIONS) == before
 
 
 def test_a_lock_is_released_by_its_holder_only():
     first, second = two_clients()
-    first.say("SYST:LOCK:REQ?")
-    second.say("SYST:LOCK:REL")
-    assert second.say("SYST:LOCK:REQ?") == "0"
-    first.say("SYST:LOCK:REL")
-    assert second.say("SYST:LOCK:REQ?") == "1"
+    first.query("SYST:LOCK:REQ?")
+    second.query("SYST:LOCK:REL")
+    assert second.query("SYST:LOCK:REQ?") == "0"
+    first.query("SYST:LOCK:REL")
+    assert second.query("SYST:LOCK:REQ?") == "1"
     assert first.errors() + second.errors() == []
 
 
 def test_a_client_that_leaves_frees_its_lock_and_no_others():
     first, second = two_clients()
-    first.say("SYST:LOCK:REQ?")
+    first.query("SYST:LOCK:REQ?")
     second.instrument.close(second.engine.client)
-    third = Door(first.instrument)
-    assert third.say("SYST:LOCK:REQ?") == "0"
+    third = EngineClient(first.instrument)
+    assert third.query("SYST:LOCK:REQ?") == "0"
     first.instrument.close(first.engine.client)
-    assert third.say("SYST:LOCK:REQ?;:BASE:BX 20;BX?") == "1;20.00"
+    assert third.query("SYST:LOCK:REQ?;:BASE:BX 20;BX?") == "1;20.00"
 
 
 def test_the_queue_and_the_registers_are_each_clients_own():
     first, second = two_clients()
-    first.say("FOO;*ESE 7")
-    assert second.say("SYST:ERR:COUN?;*ESE?") == "0;0"
+    first.query("FOO;*ESE 7")
+    assert second.query("SYST:ERR:COUN?;*ESE?") == "0;0"
     assert first.errors() == [-113]
 
 
 def test_the_queue_holds_32_and_overflows_into_its_last_entry():
-    door = Door()
-    door.say(";".join(["FOO"] * 32))
-    assert door.say("SYST:ERR:COUN?") == "32"
-    door.say("BAR;BAZ")
-    assert door.errors() == [-113] * 31 + [-350]
-    door.say("FOO")
-    assert door.errors() == [-113]
+    client = EngineClient()
+    client.query(";".join(["FOO"] * 32))
+    assert client.query("SYST:ERR:COUN?") == "32"
+    client.query("BAR;BAZ")
+    assert client.errors() == [-113] * 31 + [-350]
+    client.query("FOO")
+    assert client.errors() == [-113]
 
 
 # --- common commands and the status model --------------------------------------------------------------
 
 
 def test_the_instrument_says_who_it_is():
-    assert Door().say("*IDN?") == f"WILD HEERBRUGG,A7,0,{a7sim.__version__}"
-    assert with_photographs().say("*IDN?") == f"WILD HEERBRUGG,A7,3268,{a7sim.__version__}"
-    assert Door().say("SYST:VERS?;*OPC?;*TST?;*WAI") == "1999.0;1;0"
+    assert EngineClient().query("*IDN?") == f"WILD HEERBRUGG,A7,0,{a7sim.__version__}"
+    assert with_photographs().query("*IDN?") == f"WILD HEERBRUGG,A7,3268,{a7sim.__version__}"
+    assert EngineClient().query("SYST:VERS?;*OPC?;*TST?;*WAI") == "1999.0;1;0"
 
 
 def test_the_power_on_bit_is_set_once():
-    assert Door().say("*ESR?;*ESR?") == "128;0"
+    assert EngineClient().query("*ESR?;*ESR?") == "128;0"
 
 
 @pytest.mark.parametrize(
@@ -662,81 +662,84 @@ def test_the_power_on_bit_is_set_once():
      (" " * 4097, 8), (";".join(["FOO"] * 33), 32 + 8)],
 )  # fmt: skip
 def test_events_raise_their_bits(line, bit):
-    door = Door()
-    door.say("*CLS")
-    door.say(line)
-    assert door.say("*ESR?;*ESR?") == f"{bit};0"
+    client = EngineClient()
+    client.query("*CLS")
+    client.query(line)
+    assert client.query("*ESR?;*ESR?") == f"{bit};0"
 
 
 def test_the_status_byte_sums_up_what_is_enabled():
-    door = Door()
-    assert door.say("*CLS;*STB?;FOO;*STB?") == "0;4"
-    assert door.say("*ESE 32;*STB?") == str(4 + 32)
-    assert door.say("*SRE 32;*STB?;*STB?") == f"{4 + 32 + 64};{4 + 32 + 64}"
-    assert door.say("*ESR?;*STB?") == "32;4"
+    client = EngineClient()
+    assert client.query("*CLS;*STB?;FOO;*STB?") == "0;4"
+    assert client.query("*ESE 32;*STB?") == str(4 + 32)
+    assert client.query("*SRE 32;*STB?;*STB?") == f"{4 + 32 + 64};{4 + 32 + 64}"
+    assert client.query("*ESR?;*STB?") == "32;4"
 
 
 def test_enable_masks_read_back_and_bit_6_cannot_ask_for_service():
-    assert Door().say("*ESE 255;*ESE?;*SRE 255;*SRE?;*ESE 1.6;*ESE?") == "255;191;2"
+    assert EngineClient().query("*ESE 255;*ESE?;*SRE 255;*SRE?;*ESE 1.6;*ESE?") == "255;191;2"
 
 
 @pytest.mark.parametrize(("node", "register", "summary"), [("OPER", "operation", 128), ("QUES", "questionable", 8)])
 def test_a_register_keeps_what_rose_until_it_is_read(node, register, summary):
-    door = Door()
-    status = getattr(door.engine.status, register)
+    client = EngineClient()
+    status = getattr(client.engine.status, register)
     status.set_condition(16)
     status.set_condition(1)
-    assert door.say(f"STAT:{node}:COND?;ENAB?;*STB?") == "1;0;0"
-    assert door.say(f"STAT:{node}:ENAB 16;ENAB?;*STB?") == f"16;{summary}"
-    assert door.say(f"STAT:{node}:EVEN?;EVEN?;COND?;*STB?") == "17;0;1;0"
+    assert client.query(f"STAT:{node}:COND?;ENAB?;*STB?") == "1;0;0"
+    assert client.query(f"STAT:{node}:ENAB 16;ENAB?;*STB?") == f"16;{summary}"
+    assert client.query(f"STAT:{node}:EVEN?;EVEN?;COND?;*STB?") == "17;0;1;0"
     status.set_condition(1 + 4)
-    assert door.say(f"STAT:{node}?") == "4"
+    assert client.query(f"STAT:{node}?") == "4"
 
 
 def test_the_top_bit_of_a_register_is_not_used():
-    assert Door().say("STAT:OPER:ENAB 65535;ENAB?") == "32767"
+    assert EngineClient().query("STAT:OPER:ENAB 65535;ENAB?") == "32767"
 
 
 def test_preset_reports_nothing_of_the_two_registers_and_leaves_the_rest():
-    door = Door()
+    client = EngineClient()
     assert (
-        door.say("*ESE 5;:STAT:OPER:ENAB 3;:STAT:QUES:ENAB 3;:STAT:PRES;OPER:ENAB?;:STAT:QUES:ENAB?;*ESE?") == "0;0;5"
+        client.query("*ESE 5;:STAT:OPER:ENAB 3;:STAT:QUES:ENAB 3;:STAT:PRES;OPER:ENAB?;:STAT:QUES:ENAB?;*ESE?")
+        == "0;0;5"
     )
 
 
 def test_cls_clears_events_and_errors_and_leaves_the_enables():
-    door = Door()
-    door.engine.status.operation.set_condition(1)
-    door.engine.status.questionable.set_condition(1)
-    door.say("*ESE 60;*SRE 32;:STAT:OPER:ENAB 1;:FOO")
-    assert door.say("*CLS;*ESR?;:STAT:OPER?;:STAT:QUES?;:SYST:ERR:COUN?;*STB?") == "0;0;0;0;0"
-    assert door.say("*ESE?;*SRE?;:STAT:OPER:ENAB?;COND?") == "60;32;1;1"
+    client = EngineClient()
+    client.engine.status.operation.set_condition(1)
+    client.engine.status.questionable.set_condition(1)
+    client.query("*ESE 60;*SRE 32;:STAT:OPER:ENAB 1;:FOO")
+    assert client.query("*CLS;*ESR?;:STAT:OPER?;:STAT:QUES?;:SYST:ERR:COUN?;*STB?") == "0;0;0;0;0"
+    assert client.query("*ESE?;*SRE?;:STAT:OPER:ENAB?;COND?") == "60;32;1;1"
 
 
 def test_rst_runs_all_to_zero_and_presets_and_fittings_to_rest():
-    door = Door()
-    at_rest = door.say(POSITIONS)
-    door.say("PROJ1:KAPP 390;PHI 90;OMEG 90;BY 9;BZ 8;:PROJ2:KAPP 5;PHI 110;OMEG 90;BY 9;BZ 8;:BASE:BX -20;MODE OUT")
-    door.say("FITT:DOVE IN;TRI FRON;DIAP RIGH;XCOL OUT;YCOL IN;:COUN:X:PRES 5;:COUN:Y:PRES 6;:COUN:Z:PRES 7")
-    door.say("*RST")
-    assert door.say(POSITIONS) == at_rest
-    assert door.errors() == []
+    client = EngineClient()
+    at_rest = client.query(POSITIONS)
+    client.query(
+        "PROJ1:KAPP 390;PHI 90;OMEG 90;BY 9;BZ 8;:PROJ2:KAPP 5;PHI 110;OMEG 90;BY 9;BZ 8;:BASE:BX -20;MODE OUT"
+    )
+    client.query("FITT:DOVE IN;TRI FRON;DIAP RIGH;XCOL OUT;YCOL IN;:COUN:X:PRES 5;:COUN:Y:PRES 6;:COUN:Z:PRES 7")
+    client.query("*RST")
+    assert client.query(POSITIONS) == at_rest
+    assert client.errors() == []
 
 
 def test_rst_puts_on_the_fittings_for_a_positive_with_base_in():
-    door = Door()
-    door.say("*RST")
-    assert door.say("FITT:DOVE?;TRI?;DIAP?;XCOL?;YCOL?;:BASE:MODE?") == "OUT;BACK;LEFT;IN;OUT;IN"
+    client = EngineClient()
+    client.query("*RST")
+    assert client.query("FITT:DOVE?;TRI?;DIAP?;XCOL?;YCOL?;:BASE:MODE?") == "OUT;BACK;LEFT;IN;OUT;IN"
 
 
 def test_rst_leaves_photographs_principal_distance_carriages_queue_and_registers():
-    door = with_model()
-    door.say("PROJ1:PDIS 153;:PHOT1:CENT 0.1,0.2,0.3;:DRIV:X 10;:REC '1011';*ESE 60;*SRE 4;FOO")
-    door.say("*RST")
-    assert door.say("PHOT1?;:PHOT2?;:PHOT1:CENT?") == '"101";"102";0.100,0.200,0.300'
-    assert door.say("PROJ1:PDIS?;:PROJ2:PDIS?;:COUN:X?;Z?") == "153.00;152.68;10.00;-325.71"
-    assert door.say("*ESE?;*SRE?;:REC:COUN?") == "60;4;1"
-    assert door.errors() == [-113]
+    client = with_model()
+    client.query("PROJ1:PDIS 153;:PHOT1:CENT 0.1,0.2,0.3;:DRIV:X 10;:REC '1011';*ESE 60;*SRE 4;FOO")
+    client.query("*RST")
+    assert client.query("PHOT1?;:PHOT2?;:PHOT1:CENT?") == '"101";"102";0.100,0.200,0.300'
+    assert client.query("PROJ1:PDIS?;:PROJ2:PDIS?;:COUN:X?;Z?") == "153.00;152.68;10.00;-325.71"
+    assert client.query("*ESE?;*SRE?;:REC:COUN?") == "60;4;1"
+    assert client.errors() == [-113]
 
 
 # --- fittings, gears, counters, carriages --------------------------------------------------------------
@@ -753,32 +756,32 @@ def test_rst_leaves_photographs_principal_distance_carriages_queue_and_registers
     ],
 )
 def test_fittings_take_both_forms_and_answer_the_short_one(node, words):
-    door = Door()
+    client = EngineClient()
     for word in words:
         for written in (word.upper(), in_short(word), word.lower()):
-            assert door.say(f"FITT:{node} {written};{node}?") == in_short(word)
-    assert door.errors() == []
+            assert client.query(f"FITT:{node} {written};{node}?") == in_short(word)
+    assert client.errors() == []
 
 
 def test_counters_show_where_the_carriages_stand():
-    door = Door()
-    assert door.say("COUN?") == "0.00,0.00,-300.00"
-    door.say("DRIV:X 10.5;Y -20.25;Z -310")
-    assert door.say("COUN?;:COUN:X?;Y?;Z?") == "10.50,-20.25,-310.00;10.50;-20.25;-310.00"
+    client = EngineClient()
+    assert client.query("COUN?") == "0.00,0.00,-300.00"
+    client.query("DRIV:X 10.5;Y -20.25;Z -310")
+    assert client.query("COUN?;:COUN:X?;Y?;Z?") == "10.50,-20.25,-310.00;10.50;-20.25;-310.00"
 
 
 def test_a_preset_is_what_the_counter_shows_here_and_moves_nothing():
-    door = Door()
-    door.say("DRIV:X 10;:COUN:X:PRES 5000;:COUN:Z:PRES 459.08;:DRIV:X 5001.5")
-    assert door.say("COUN?") == "5001.50,0.00,459.08"
-    assert door.say("*RST;:COUN?") == "11.50,0.00,-300.00"
+    client = EngineClient()
+    client.query("DRIV:X 10;:COUN:X:PRES 5000;:COUN:Z:PRES 459.08;:DRIV:X 5001.5")
+    assert client.query("COUN?") == "5001.50,0.00,459.08"
+    assert client.query("*RST;:COUN?") == "11.50,0.00,-300.00"
 
 
 def test_limits_hold_behind_a_preset():
-    door = Door()
-    door.say("COUN:X:PRES 5000;:DRIV:X 5280")
-    assert door.say("COUN:X?;:DRIV:X 5280.01;:COUN:X?") == "5280.00;5280.00"
-    assert door.errors() == [-222]
+    client = EngineClient()
+    client.query("COUN:X:PRES 5000;:DRIV:X 5280")
+    assert client.query("COUN:X?;:DRIV:X 5280.01;:COUN:X?") == "5280.00;5280.00"
+    assert client.errors() == [-222]
 
 
 @pytest.mark.parametrize(
@@ -792,36 +795,36 @@ def test_limits_hold_behind_a_preset():
     ],
 )
 def test_a_height_gear_goes_on_from_what_the_counter_shows_with_decimals_of_its_own(gear, shown, turned, carriage):
-    door = Door()
-    assert door.say(f"GEAR:HEIG {gear};:COUN:Z?;:WHE:Z 30;:COUN:Z?") == f"{shown};{turned}"
-    assert door.say("GEAR:HEIG?") == gear.replace("'", '"')
-    assert door.say("GEAR:HEIG 1;*RST;:COUN:Z?") == carriage
-    assert door.errors() == []
+    client = EngineClient()
+    assert client.query(f"GEAR:HEIG {gear};:COUN:Z?;:WHE:Z 30;:COUN:Z?") == f"{shown};{turned}"
+    assert client.query("GEAR:HEIG?") == gear.replace("'", '"')
+    assert client.query("GEAR:HEIG 1;*RST;:COUN:Z?") == carriage
+    assert client.errors() == []
 
 
 def test_the_last_decimal_of_dc_is_a_tenth():
-    door = Door()
-    assert door.say('GEAR:HEIG "Dc";:COUN:Z:PRES 459.08;:COUN?') == "0.00,0.00,459.1"
-    assert door.say("DRIV:Z 470.44;:COUN:Z?") == "470.4"
+    client = EngineClient()
+    assert client.query('GEAR:HEIG "Dc";:COUN:Z:PRES 459.08;:COUN?') == "0.00,0.00,459.1"
+    assert client.query("DRIV:Z 470.44;:COUN:Z?") == "470.4"
 
 
 @pytest.mark.parametrize(
     ("gear", "answer"), [('"1-2-1"', '"1-2-1"'), ("1.5", "1.5"), ("'a ''quote'''", "\"a 'quote'\""), ("'.'", '"."')]
 )
 def test_the_plan_gear_is_a_combination_or_a_number(gear, answer):
-    assert Door().say(f"GEAR:PLAN {gear};PLAN?") == answer
+    assert EngineClient().query(f"GEAR:PLAN {gear};PLAN?") == answer
 
 
 def test_handwheels_turn_by_so_much_counter():
-    door = Door()
-    assert door.say("WHE:X 5;Y 6;Z 7;X -2;:COUN?") == "3.00,6.00,-293.00"
+    client = EngineClient()
+    assert client.query("WHE:X 5;Y 6;Z 7;X -2;:COUN?") == "3.00,6.00,-293.00"
 
 
 @pytest.mark.parametrize(
     ("collar", "counters"), [("XCOL OUT", "-5.00,6.00,-293.00"), ("YCOL IN", "5.00,-6.00,-293.00")]
 )
 def test_a_collar_that_does_not_belong_to_the_picture_reverses_its_handwheel(collar, counters):
-    assert Door().say(f"FITT:{collar};:WHE:X 5;Y 6;Z 7;:COUN?") == counters
+    assert EngineClient().query(f"FITT:{collar};:WHE:X 5;Y 6;Z 7;:COUN?") == counters
 
 
 @pytest.mark.parametrize(
@@ -836,40 +839,40 @@ def test_a_collar_that_does_not_belong_to_the_picture_reverses_its_handwheel(col
     ],
 )
 def test_where_the_rods_cannot_go_nothing_moves(before, line):
-    door = Door()
-    door.say(before)
-    assert door.errors() == []
-    positions = door.say(POSITIONS)
-    door.say(line)
-    assert door.errors() == [-222]
-    assert door.say(POSITIONS) == positions
+    client = EngineClient()
+    client.query(before)
+    assert client.errors() == []
+    positions = client.query(POSITIONS)
+    client.query(line)
+    assert client.errors() == [-222]
+    assert client.query(POSITIONS) == positions
 
 
 def test_the_rods_reach_62_gon_from_the_plumb_line():
-    door = Door()
-    assert door.say("DRIV:Z -140;X 205;:COUN?") == "205.00,0.00,-140.00"
-    assert door.errors() == []
+    client = EngineClient()
+    assert client.query("DRIV:Z -140;X 205;:COUN?") == "205.00,0.00,-140.00"
+    assert client.errors() == []
 
 
 # --- pictures and eyepieces ----------------------------------------------------------------------------
 
 
 def test_pictures_are_taken_from_the_drawer_and_laid_on_a_carrier():
-    door = with_photographs()
-    assert door.say("PHOT:CAT?;:PHOT1?;:PHOT2?") == '"101","102","103";"";""'
-    assert door.say('PHOT1:LOAD "101";:PHOT2:LOAD "102";:PHOT1?;:PHOT2?') == '"101";"102"'
-    assert door.say("PHOT1:LOAD '103';:PHOT1?;:PHOT1:UNL;:PHOT1?;:PHOT:CAT?") == '"103";"";"101","102","103"'
-    assert door.errors() == []
+    client = with_photographs()
+    assert client.query("PHOT:CAT?;:PHOT1?;:PHOT2?") == '"101","102","103";"";""'
+    assert client.query('PHOT1:LOAD "101";:PHOT2:LOAD "102";:PHOT1?;:PHOT2?') == '"101";"102"'
+    assert client.query("PHOT1:LOAD '103';:PHOT1?;:PHOT1:UNL;:PHOT1?;:PHOT:CAT?") == '"103";"";"101","102","103"'
+    assert client.errors() == []
 
 
 def test_an_empty_drawer_has_an_empty_catalogue():
-    assert Door().say("PHOT:CAT?") == '""'
+    assert EngineClient().query("PHOT:CAT?") == '""'
 
 
 def test_a_picture_lies_on_one_carrier_at_a_time():
-    door = with_model()
-    assert door.say('PHOT2:LOAD "101";:PHOT2?') == '"102"'
-    assert door.errors() == [-221]
+    client = with_model()
+    assert client.query('PHOT2:LOAD "101";:PHOT2?') == '"102"'
+    assert client.errors() == [-221]
 
 
 def listed(reply):
@@ -879,55 +882,55 @@ def listed(reply):
 
 
 def test_centring_shifts_the_fiducials_on_their_carrier():
-    door = with_model()
-    assert door.say("PHOT1:CENT?") == "0.000,0.000,0.000"
-    before = listed(door.say("PHOT1:FID?"))
-    assert door.say("PHOT1:CENT 0.3 MM,-200 UM,0;CENT?") == "0.300,-0.200,0.000"
-    after = listed(door.say("PHOT1:FID?"))
+    client = with_model()
+    assert client.query("PHOT1:CENT?") == "0.000,0.000,0.000"
+    before = listed(client.query("PHOT1:FID?"))
+    assert client.query("PHOT1:CENT 0.3 MM,-200 UM,0;CENT?") == "0.300,-0.200,0.000"
+    after = listed(client.query("PHOT1:FID?"))
     assert list(before) == ["1", "2", "3", "4"]
     for name, (dx, dy) in before.items():
         assert after[name] == pytest.approx((dx + 0.3, dy - 0.2), abs=0.0011)
 
 
 def test_the_sketch_is_good_to_half_a_millimetre():
-    door = with_model()
-    sketch = listed(door.say("PHOT1:SKET?"))
-    true = door.instrument.autograph.carrier(1).photograph.points
+    client = with_model()
+    sketch = listed(client.query("PHOT1:SKET?"))
+    true = client.instrument.autograph.carrier(1).photograph.points
     errors = [each - place for name in sketch for each, place in zip(sketch[name], true.get(name), strict=True)]
     assert set(sketch) == set(true.names)
     assert 0.1 < (sum(error**2 for error in errors) / len(errors)) ** 0.5 < 0.5
 
 
 def test_an_eyepiece_shows_the_image_from_the_mark_and_stereo_their_difference():
-    door = with_model()
-    left, right = door.numbers('EYEP1? "1011"'), door.numbers('EYEP2? "1011"')
-    seen = door.numbers('EYEP:STER? "1011"')
+    client = with_model()
+    left, right = client.numbers('EYEP1? "1011"'), client.numbers('EYEP2? "1011"')
+    seen = client.numbers('EYEP:STER? "1011"')
     assert all(0.0 < abs(each) < 10_000.0 for each in left + right)
     assert seen == pytest.approx([left[0] - right[0], left[1] - right[1]], abs=0.011)
 
 
 def test_a_mark_driven_to_the_right_leaves_the_image_to_the_left():
-    door = with_model()
-    before = door.numbers('EYEP1? "1011"')
-    after = door.numbers('DRIV:X 1;:EYEP1? "1011"')
+    client = with_model()
+    before = client.numbers('EYEP1? "1011"')
+    after = client.numbers('DRIV:X 1;:EYEP1? "1011"')
     assert after[0] - before[0] == pytest.approx(-1000.0 * 152.68 / 325.71, abs=0.02)
     assert after[1] == pytest.approx(before[1], abs=0.02)
 
 
 def test_the_triangulation_lever_exchanges_the_eyepieces():
-    door = with_model()
-    straight = door.say('EYEP1? "1011";:EYEP2? "1011"').split(";")
-    assert door.say('FITT:TRI FRON;:EYEP1? "1011";:EYEP2? "1011"').split(";") == straight[::-1]
+    client = with_model()
+    straight = client.query('EYEP1? "1011";:EYEP2? "1011"').split(";")
+    assert client.query('FITT:TRI FRON;:EYEP1? "1011";:EYEP2? "1011"').split(";") == straight[::-1]
 
 
 @pytest.mark.parametrize("query", ["EYEP1?", "EYEP2?", "EYEP:STER?"])
 def test_what_is_outside_the_field_or_not_there_is_not_visible(query):
     nothing = "9.91E37,9.91E37"
-    door = with_model()
-    assert door.say(f'{query} "C2"') == nothing
-    assert door.say(f'{query} "no such point"') == nothing
-    assert door.say(f'PHOT1:UNL;:PHOT2:UNL;:{query} "1011"') == nothing
-    assert door.errors() == []
+    client = with_model()
+    assert client.query(f'{query} "C2"') == nothing
+    assert client.query(f'{query} "no such point"') == nothing
+    assert client.query(f'PHOT1:UNL;:PHOT2:UNL;:{query} "1011"') == nothing
+    assert client.errors() == []
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(1, 1), (8, 3), (64, 48), (1024, 1)])
@@ -948,9 +951,9 @@ def test_a_picture_has_the_mark_in_its_middle_and_is_dark_outside_the_field():
 
 def test_the_journal_keeps_size_and_checksum_of_a_picture_only():
     heard: list[LinkEvent] = []
-    door = with_model(heard.append)
+    client = with_model(heard.append)
     heard.clear()
-    reply = door.feed(b"*OPC?;:EYEP1:PICT? 16,16,1\n")
+    reply = client.feed(b"*OPC?;:EYEP1:PICT? 16,16,1\n")
     block = reply.removeprefix(b"1;").removesuffix(b"\n")
     assert [event.direction for event in heard] == [">", "~", "<"]
     assert heard[2].text == f"1;#block of {len(block)} bytes, crc32 {zlib.crc32(block):08x}"
@@ -960,32 +963,36 @@ def test_no_query_gives_away_a_fault_of_the_instrument():
     faulty = ProjectorCondition(phi_zero_gon=0.5, kappa_zero_gon=0.3, by_zero_mm=0.2, principal_distance_mm=0.1)
     condition = Condition(left=faulty, right=faulty, bx_zero_mm=0.4, setting_sigma_mm=0.1, backlash_mm=0.1)
     line = f"PROJ1:PHI 99;KAPP 5;BY 3;:BASE:BX 20;:DRIV:X 10;:{POSITIONS}"
-    assert Door(SharedInstrument(Autograph(VARIANTS["A7"], condition))).say(line) == Door().say(line)
+    assert EngineClient(SharedInstrument(Autograph(VARIANTS["A7"], condition))).query(line) == EngineClient().query(
+        line
+    )
 
 
 # --- recording -----------------------------------------------------------------------------------------
 
 
 def test_a_registration_holds_the_counters_and_the_named_elements():
-    door = Door()
-    door.say("PROJ1:BY 1.5;:PROJ2:KAPP 5;:DRIV:X 10;:REC 'P1';:REC 'P2',BY1,kappa2,BX,PDISTANCE1")
-    assert door.say("REC:LAST?;COUN?") == '2,"P2",10.00,0.00,-300.00,BY1,1.50,KAPPA2,5.00,BX,0.00,PDISTANCE1,150.00;2'
-    assert door.errors() == []
+    client = EngineClient()
+    client.query("PROJ1:BY 1.5;:PROJ2:KAPP 5;:DRIV:X 10;:REC 'P1';:REC 'P2',BY1,kappa2,BX,PDISTANCE1")
+    assert (
+        client.query("REC:LAST?;COUN?") == '2,"P2",10.00,0.00,-300.00,BY1,1.50,KAPPA2,5.00,BX,0.00,PDISTANCE1,150.00;2'
+    )
+    assert client.errors() == []
 
 
 def test_a_registration_shows_the_decimals_of_the_gear():
-    assert Door().say("GEAR:HEIG 'Dc';:REC 'P';:REC:LAST?") == '1,"P",0.00,0.00,-300.0'
+    assert EngineClient().query("GEAR:HEIG 'Dc';:REC 'P';:REC:LAST?") == '1,"P",0.00,0.00,-300.0'
 
 
 def test_struck_entries_stay_marked():
-    door = Door()
-    door.say("REC 'P1';:REC 'P2';:REC:STR 2,'wrong, point'")
-    assert door.say("REC:LAST?;COUN?") == '2,"P2",0.00,0.00,-300.00,"struck: wrong, point";2'
-    assert door.say("REC? 1;REC? 2;REC:STR:COUN?") == (
+    client = EngineClient()
+    client.query("REC 'P1';:REC 'P2';:REC:STR 2,'wrong, point'")
+    assert client.query("REC:LAST?;COUN?") == '2,"P2",0.00,0.00,-300.00,"struck: wrong, point";2'
+    assert client.query("REC? 1;REC? 2;REC:STR:COUN?") == (
         '1,"P1",0.00,0.00,-300.00;2,"P2",0.00,0.00,-300.00,"struck: wrong, point";1'
     )
-    door.say("REC:STR 0,'x';STR 3,'x'")
-    assert door.errors() == [-222, -222]
+    client.query("REC:STR 0,'x';STR 3,'x'")
+    assert client.errors() == [-222, -222]
 
 
 def test_all_that_crosses_the_link_is_heard_in_order_with_its_time():
@@ -1004,14 +1011,14 @@ def test_all_that_crosses_the_link_is_heard_in_order_with_its_time():
 
 
 def test_wheels_presets_and_centring_know_min_max_and_def():
-    door = Door()
-    door.say("WHE:Y MIN")
-    assert door.say("COUN:Y?") == "-420.00"
-    door.say("WHE:Y 420;X MAX")
-    assert door.say("COUN:X?;Y?") == "280.00;0.00"
-    door.say("WHE:X DEF")
-    assert door.say("COUN:X?") == "280.00"
-    door.say("COUN:X:PRES MAX")
-    assert door.say("COUN:X?") == "999999.99"
-    door.say("COUN:X:PRES 1E6")
-    assert door.errors() == [-222]
+    client = EngineClient()
+    client.query("WHE:Y MIN")
+    assert client.query("COUN:Y?") == "-420.00"
+    client.query("WHE:Y 420;X MAX")
+    assert client.query("COUN:X?;Y?") == "280.00;0.00"
+    client.query("WHE:X DEF")
+    assert client.query("COUN:X?") == "280.00"
+    client.query("COUN:X:PRES MAX")
+    assert client.query("COUN:X?") == "999999.99"
+    client.query("COUN:X:PRES 1E6")
+    assert client.errors() == [-222]

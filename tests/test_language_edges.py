@@ -5,7 +5,7 @@ import re
 import pytest
 
 from a7sim.instrument.language.commands import COMMANDS
-from tests.door import Door, with_model, with_photographs
+from tests.support.engine_client import EngineClient, with_model, with_photographs
 
 HEADERS = [
     ("SYST:ERR?;VERS?", '0,"No error";1999.0', []),
@@ -94,9 +94,9 @@ WORDS = [
 
 @pytest.mark.parametrize(("line", "reply", "errors"), HEADERS + QUOTES + NUMBERS + WORDS)
 def test_a_line_at_the_edge_of_the_grammar(line, reply, errors):
-    door = with_model()
-    assert door.say(line) == reply
-    assert door.errors() == errors
+    client = with_model()
+    assert client.query(line) == reply
+    assert client.errors() == errors
 
 
 def test_a_plain_query_is_answered_the_same_whether_anybody_listens():
@@ -107,15 +107,15 @@ def test_a_plain_query_is_answered_the_same_whether_anybody_listens():
         for header in COMMANDS.headers():
             query = re.sub(r"\[[^]]*\]", "", header.replace("<n>", "2"))
             if query.endswith("?"):
-                assert (query, quick.say(query)) == (query, heard.say(query))
+                assert (query, quick.query(query)) == (query, heard.query(query))
                 assert queue(quick) == queue(heard)
 
 
 def test_a_listener_hears_a_line_whole_but_for_what_was_given_as_a_token():
-    door = guarded()
-    door.instrument.listener = (heard := []).append
-    door.say("""SYST:LOG "ours""; yours";*OPC?;:SYST:LOGIN 'heerbrugg';*OPC?""")
-    door.say("SYST:LOG heerbrugg")
+    client = guarded()
+    client.instrument.listener = (heard := []).append
+    client.query("""SYST:LOG "ours""; yours";*OPC?;:SYST:LOGIN 'heerbrugg';*OPC?""")
+    client.query("SYST:LOG heerbrugg")
     assert [event.text for event in heard if event.direction == ">"] == [
         'SYST:LOG "(not the token)";*OPC?;:SYST:LOGIN "(the token)";*OPC?',
         "SYST:LOG (kept secret)",
@@ -123,11 +123,11 @@ def test_a_listener_hears_a_line_whole_but_for_what_was_given_as_a_token():
     assert [event.text for event in heard if event.direction == "<"] == ["1"]
 
 
-def guarded() -> Door:
-    door = with_photographs()
-    door.instrument.token = "heerbrugg"
-    return Door(door.instrument)
+def guarded() -> EngineClient:
+    client = with_photographs()
+    client.instrument.token = "heerbrugg"
+    return EngineClient(client.instrument)
 
 
-def queue(door):
-    return list(door.engine.status.errors)
+def queue(client):
+    return list(client.engine.status.errors)

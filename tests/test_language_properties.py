@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from a7sim.plotters import LEAST_COUNT, VARIANTS
-from tests.door import Door
-from tests.examples import examples
+from tests.support.engine_client import EngineClient
+from tests.support.hypothesis_profile import examples
 from tests.test_language import ELEMENTS, EXAMPLES, in_full, in_short
 
 quick = examples(300)
@@ -49,16 +49,16 @@ received = st.lists(
 @quick
 @given(received)
 def test_no_bytes_whatever_raise(flood):
-    door = Door()
-    door.feed(flood + b"\n")
-    door.feed(b"\n*CLS\n")
-    assert door.say("*OPC?") == "1"
+    client = EngineClient()
+    client.feed(flood + b"\n")
+    client.feed(b"\n*CLS\n")
+    assert client.query("*OPC?") == "1"
 
 
 @quick
 @given(received, st.data())
 def test_bytes_in_pieces_get_the_same_replies_as_at_once(flood, data):
-    whole, pieces = Door(), Door()
+    whole, pieces = EngineClient(), EngineClient()
     cuts = sorted(data.draw(st.lists(st.integers(0, len(flood)), max_size=8)))
     parts = [flood[start:end] for start, end in zip([0, *cuts], [*cuts, len(flood)], strict=True)]
     assert b"".join(map(pieces.feed, parts)) == whole.feed(flood)
@@ -69,21 +69,21 @@ def test_bytes_in_pieces_get_the_same_replies_as_at_once(flood, data):
 @quick
 @given(st.one_of(mutated(within_a_unit), st.text(within_a_unit, max_size=30), st.sampled_from(LINES)))
 def test_a_query_gives_one_reply_or_one_error_and_a_command_no_reply(unit):
-    door = Door()
-    reply = door.feed(unit.encode() + b"\n")
-    errors = int(door.say("SYST:ERR:COUN?"))
+    client = EngineClient()
+    reply = client.feed(unit.encode() + b"\n")
+    errors = int(client.query("SYST:ERR:COUN?"))
     if unit.strip() and unit.split()[0].endswith("?"):
         assert (reply.endswith(b"\n"), errors) in ((True, 0), (False, 1))
     else:
         assert reply == b""
         assert errors <= 1
-    assert all(";" in each for each in door.engine.errors), "an error says what was expected or what came"
+    assert all(";" in each for each in client.engine.errors), "an error says what was expected or what came"
 
 
 @quick
 @given(st.lists(st.one_of(mutated(within_a_unit).filter(quotes_close), st.sampled_from(LINES)), max_size=6))
 def test_units_of_one_line_answer_as_on_lines_of_their_own_joined_by_semicolons(units):
-    together, apart = Door(), Door()
+    together, apart = EngineClient(), EngineClient()
     rooted = [unit if unit.lstrip().startswith("*") else f":{unit.lstrip().lstrip(':')}" for unit in units]
     replies = [apart.feed(unit.encode() + b"\n").removesuffix(b"\n") for unit in rooted]
     expected = b";".join(reply for reply in replies if reply)
@@ -97,14 +97,14 @@ def test_an_element_reads_back_within_half_a_least_count_and_in_its_range(named,
     header, name = named
     element = VARIANTS["A7"].elements[name]
     value = element.low + share * (element.high - element.low)
-    door = Door()
-    shown = door.numbers(f"{header} {value!r};:{header}?")[0]
+    client = EngineClient()
+    shown = client.numbers(f"{header} {value!r};:{header}?")[0]
     difference = abs(shown - value)
     if element.endless:
         difference = min(difference, element.high - difference)
     assert difference <= LEAST_COUNT / 2.0 + 1e-9
     assert element.low <= shown <= element.high
-    assert door.errors() == []
+    assert client.errors() == []
 
 
 @quick
@@ -112,28 +112,29 @@ def test_an_element_reads_back_within_half_a_least_count_and_in_its_range(named,
 def test_beyond_its_range_an_element_stays_where_it_is(named, excess, above):
     header, name = named
     element = VARIANTS["A7"].elements[name]
-    door = Door()
-    before = door.say(f"{header}?")
-    assert door.say(f"{header} {element.high + excess if above else element.low - excess!r};:{header}?") == before
-    assert door.errors() == [-222]
+    client = EngineClient()
+    before = client.query(f"{header}?")
+    assert client.query(f"{header} {element.high + excess if above else element.low - excess!r};:{header}?") == before
+    assert client.errors() == [-222]
 
 
 @quick
 @given(st.sampled_from("XYZ"), st.floats(-999999.0, 999999.0), st.floats(-100.0, 100.0))
 def test_a_counter_reads_what_it_was_preset_and_then_what_it_was_turned(axis, reading, amount):
-    door = Door()
-    shown = door.numbers(f"COUN:{axis}:PRES {reading!r};:COUN:{axis}?")[0]
+    client = EngineClient()
+    shown = client.numbers(f"COUN:{axis}:PRES {reading!r};:COUN:{axis}?")[0]
     assert abs(shown - reading) <= LEAST_COUNT / 2.0 + 1e-6
-    turned = door.numbers(f"WHE:{axis} {amount!r};:COUN:{axis}?")[0]
+    turned = client.numbers(f"WHE:{axis} {amount!r};:COUN:{axis}?")[0]
     assert abs(turned - shown - amount) <= LEAST_COUNT / 2.0 + 1e-6
-    assert door.errors() == []
+    assert client.errors() == []
 
 
 @quick
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1, max_size=60), st.sampled_from("\"'"))
 def test_any_printable_text_comes_back_from_its_quotes(text, quote):
-    door = Door()
+    client = EngineClient()
     inner = text.replace('"', '""')
     assert (
-        door.say(f"REC {quote}{text.replace(quote, quote * 2)}{quote};:REC:LAST?") == f'1,"{inner}",0.00,0.00,-300.00'
+        client.query(f"REC {quote}{text.replace(quote, quote * 2)}{quote};:REC:LAST?")
+        == f'1,"{inner}",0.00,0.00,-300.00'
     )

@@ -12,7 +12,7 @@ from a7sim.report.session_tables import session_tables
 from a7sim.scenario import load_scenario
 from a7sim.session.session_batch import open_batch
 from a7sim.session.truth import RelativePose
-from tests.sessions import without_errors
+from tests.support.sessions import without_errors
 
 A_COUNT_OF_HEIGHT_M = 0.01
 HALF_A_COUNT_GON = 0.005

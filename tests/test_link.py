@@ -15,7 +15,7 @@ from a7sim.link.client.client import Client, InstrumentError
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.plotters import VARIANTS
-from tests.door import MODEL_1
+from tests.support.engine_client import MODEL_1
 
 URL = "a7sim://scenarios/akwanga.toml?seed=7"
 SHORT = 0.05

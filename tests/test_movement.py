@@ -14,7 +14,7 @@ from a7sim.instrument.language.shared_instrument import POLL_SECONDS
 from a7sim.link.clock import Clock
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.plotters import VARIANTS, Rates
-from tests.door import Door, with_photographs
+from tests.support.engine_client import EngineClient, with_photographs
 
 RATES = Rates()
 
@@ -65,10 +65,10 @@ def test_a_movement_lasts_by_how_far_it_goes(instrument, engine, line, seconds):
     ],
 )
 def test_pictures_take_their_time(line, seconds):
-    door = with_photographs()
-    door.engine.feed(b'PHOT2:LOAD "102"\n', 0.0)
-    door.engine.feed(line.encode() + b"\n", 100.0)
-    assert door.instrument.busy_until - 100.0 == pytest.approx(seconds)
+    client = with_photographs()
+    client.engine.feed(b'PHOT2:LOAD "102"\n', 0.0)
+    client.engine.feed(line.encode() + b"\n", 100.0)
+    assert client.instrument.busy_until - 100.0 == pytest.approx(seconds)
 
 
 def test_parts_move_at_the_same_time_and_each_does_one_thing_after_the_other(instrument, engine):
@@ -237,14 +237,14 @@ def test_within_a_long_line_others_have_their_turn(engine, line):
 
 def test_what_a_line_cannot_reply_is_not_worked_out(engine):
     """Thirty pictures in a line cost no more than the four that are begun; every one left out is an error."""
-    door = Door(engine.instrument)
+    client = EngineClient(engine.instrument)
     picture = engine.instrument.autograph.picture
     asked = []
     engine.instrument.autograph.picture = lambda *what: asked.append(what) or picture(*what)
-    reply = door.feed(b"EYEP:PICT? 1024,1024,1;" + b"PICT? 1024,1024,1;" * 29 + b"*ESR?\n")
+    reply = client.feed(b"EYEP:PICT? 1024,1024,1;" + b"PICT? 1024,1024,1;" * 29 + b"*ESR?\n")
     assert len(reply) == 3 * (9 + 1024 * 1024) + 3
     assert len(asked) == 4
-    assert door.say("SYST:ERR:COUN?;*ESR?") == "28;132"
+    assert client.query("SYST:ERR:COUN?;*ESR?") == "28;132"
 
 
 @given(
@@ -255,7 +255,7 @@ def test_what_a_line_cannot_reply_is_not_worked_out(engine):
 )
 def test_waiting_changes_no_reply_and_loses_none(parts, size):
     flood = b";".join(parts) + b"\n"
-    patient, hasty = Door(), SharedInstrument(Autograph(VARIANTS["A7"])).open()
+    patient, hasty = EngineClient(), SharedInstrument(Autograph(VARIANTS["A7"])).open()
     time = 0.0
     replies = b""
     for start in range(0, len(flood), size):

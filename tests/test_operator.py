@@ -17,7 +17,7 @@ from a7sim.operator.driving.controls import wrap_gon
 from a7sim.scenario import Observer, load_scenario
 from a7sim.session import open_session, run
 from a7sim.session.session_batch import open_batch
-from tests.sessions import element_errors, read_once, tampered_session, tilted_flight, without_errors
+from tests.support.sessions import element_errors, read_once, tampered_session, tilted_flight, without_errors
 
 CASES = "ABCDE"
 SCENARIOS = Path(__file__).parents[1] / "scenarios"

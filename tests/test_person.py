@@ -15,8 +15,8 @@ from a7sim.scenario import PROFILES, Observer, ScenarioError, load_scenario, obs
 from a7sim.scenario.schema import FilmDeformation, PlannedSlip
 from a7sim.session import open_session, run
 from a7sim.session.session_batch import open_batch
-from tests.processes import a7sim_here
-from tests.sessions import read_once
+from tests.support.processes import a7sim_in_process
+from tests.support.sessions import read_once
 
 WITHOUT_SLIPS = dict.fromkeys(
     (
@@ -91,7 +91,7 @@ def test_the_schema_takes_the_word_and_the_table():
 
 
 def test_the_command_line_knows_the_skills():
-    done = a7sim_here("run", "akwanga", "--skill", "expert")
+    done = a7sim_in_process("run", "akwanga", "--skill", "expert")
     assert done.returncode == 2
     assert all(skill in done.stderr for skill in PROFILES)
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.door import with_model
+from tests.support.engine_client import with_model
+from tests.support.links import new_instrument, serve_on_all_links
 from tests.test_language import REFUSED
-from tests.wires import everywhere, new_desk
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
@@ -49,9 +49,9 @@ def test_the_page_names_every_error_that_a_command_can_meet(maker):
     listed = {command.header: set(maker.errors_of(command)) for command in maker.COMMANDS.commands}
     for number, lines in REFUSED.items():
         for line in lines if number not in OF_EVERY_COMMAND else ():
-            door = with_model()
-            door.say(line)
-            found = door.errors() or [number]
+            client = with_model()
+            client.query(line)
+            found = client.errors() or [number]
             assert found == [number] or number in (-200, -221), line
             assert number in listed[header_of(maker, line)], line
 
@@ -63,7 +63,7 @@ def header_of(maker, line):
 
 @pytest.fixture(scope="module")
 def urls():
-    with everywhere(new_desk()) as opened:
+    with serve_on_all_links(new_instrument()) as opened:
         yield opened
 
 

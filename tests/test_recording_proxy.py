@@ -9,7 +9,7 @@ from a7sim.errors import A7SimError
 from a7sim.link.client import recording_proxy
 from a7sim.link.client.recording_proxy import POLL_INTERVAL_S, RecordingProxy
 from a7sim.link.clock import WallClock
-from tests.served import PATIENCE
+from tests.support.server_thread import TIMEOUT_S
 
 AT_ONCE = struct.pack("ii", 1, 0)
 """Of SO_LINGER: a connection that is closed is reset."""
@@ -42,10 +42,10 @@ class Recorder:
     def until(self, direction, text):
         """Wait until it heard something."""
         with self._is_there:
-            assert self._is_there.wait_for(lambda: (direction, text) in self.heard, PATIENCE), self.heard
+            assert self._is_there.wait_for(lambda: (direction, text) in self.heard, TIMEOUT_S), self.heard
 
     def client(self):
-        return socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE)
+        return socket.create_connection(("127.0.0.1", self.port), timeout=TIMEOUT_S)
 
 
 @contextmanager
@@ -56,7 +56,7 @@ def recording():
             yield recorder
         finally:
             recorder.stop.set()
-            recorder.thread.join(PATIENCE)
+            recorder.thread.join(TIMEOUT_S)
             assert not recorder.thread.is_alive()
 
 
@@ -111,7 +111,7 @@ def test_a_line_to_the_instrument_that_breaks_ends_it_in_a_sentence(monkeypatch)
     monkeypatch.setattr(recording_proxy, "open_port", lambda *_: Broken())
     with recording() as recorder, recorder.client() as client:
         client.sendall(b"*OPC?\n")
-        recorder.thread.join(PATIENCE)
+        recorder.thread.join(TIMEOUT_S)
         assert recorder.error == "a7sim://akwanga: the line to the instrument broke"
 
 
@@ -120,5 +120,5 @@ def test_it_stops_with_a_client_still_there():
         client.sendall(b"*OPC?\n")
         recorder.until("<", "1")
         recorder.stop.set()
-        recorder.thread.join(PATIENCE)
+        recorder.thread.join(TIMEOUT_S)
         assert recorder.heard[-1] == ("-", "")

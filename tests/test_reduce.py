@@ -11,13 +11,13 @@ import pytest
 from a7sim import processing
 from a7sim.errors import A7SimError
 from a7sim.geometry import GON, rotation
-from tests.processes import a7sim_here
+from tests.support.processes import a7sim_in_process
 
 ROOT = Path(__file__).parents[1]
 
 
 def reduce(*arguments):
-    return a7sim_here("reduce", *arguments, cwd=ROOT)
+    return a7sim_in_process("reduce", *arguments, cwd=ROOT)
 
 
 def toml(path):

@@ -18,7 +18,7 @@ from a7sim.processing.strips import PairCamera
 from a7sim.reduction.absolute import Ground
 from a7sim.reduction.cards import deck_lines, read_cards
 from a7sim.reduction.strips import Model
-from tests.examples import examples
+from tests.support.hypothesis_profile import examples
 from tests.test_reduce import reduce
 
 C = 152.0

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from tests.processes import a7sim_here
-from tests.test_reduce_mistakes import CAMERA
+from tests.support.processes import a7sim_in_process
+from tests.test_reduce_errors import CAMERA
 
 FIDUCIALS = {"1": (-106.0, -106.0), "2": (106.0, 106.0), "3": (-106.0, 106.0), "4": (106.0, -106.0)}
 RULED = [(x, y) for x in (0.0, 80.0) for y in (80.0, 0.0, -80.0)]
@@ -77,7 +77,9 @@ def shown(folder, kind, content, *words):
     file = folder / "points.csv"
     file.write_text(content, encoding="utf-8")
     (folder / "camera.toml").write_text(CAMERA, encoding="utf-8")
-    printed, said = (a7sim_here("reduce", kind, "points.csv", *words, *also, cwd=folder) for also in ((), ("--json",)))
+    printed, said = (
+        a7sim_in_process("reduce", kind, "points.csv", *words, *also, cwd=folder) for also in ((), ("--json",))
+    )
     assert (printed.returncode, said.returncode) == (0, 0), printed.stderr + said.stderr
     return json.loads(said.stdout), printed.stdout
 

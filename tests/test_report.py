@@ -12,7 +12,7 @@ import pytest
 from a7sim.report.pointing_rays import pointing_rays
 from a7sim.report.render import render_report
 from a7sim.report.session_folder import read_session
-from tests.pages import Page
+from tests.support.html_pages import Page
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 

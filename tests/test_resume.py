@@ -10,7 +10,7 @@ from a7sim.journal.resuming import find_resumable
 from a7sim.journal.writer import JournalOptions
 from a7sim.scenario import load_scenario
 from a7sim.session.bridge import INDEPENDENT, run_bridge
-from tests.processes import said_here
+from tests.support.processes import a7sim_captured
 
 JOURNAL = "session.jsonl"
 HURRIED = {"plan.parallax_readings": "1"}
@@ -45,9 +45,9 @@ def without_what_was_torn(files):
 )
 def test_a_command_that_was_cut_off_goes_on_to_the_same_bytes_and_exit_code(tmp_path, capsys, words, ends_with):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
-    before = said_here(capsys, *words, "--out", whole)
+    before = a7sim_captured(capsys, *words, "--out", whole)
     cut_off(whole, cut, 0.6)
-    after = said_here(capsys, words[0], "--resume", cut)
+    after = a7sim_captured(capsys, words[0], "--resume", cut)
     assert (before.returncode, after.returncode) == (ends_with, ends_with)
     assert (after.stdout, after.stderr) == (before.stdout, before.stderr)
     assert without_what_was_torn(files_of(cut)) == files_of(whole)
@@ -64,7 +64,7 @@ def test_a_command_that_was_cut_off_goes_on_to_the_same_bytes_and_exit_code(tmp_
 )
 def test_who_says_nothing_too_much_or_what_is_not_there_gets_one_sentence(tmp_path, capsys, command, words, sentence):
     named = {"command": command, "folder": tmp_path}
-    done = said_here(capsys, command, *(str(word).format(**named) for word in words))
+    done = a7sim_captured(capsys, command, *(str(word).format(**named) for word in words))
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert sentence.format(**named) in done.stderr
 

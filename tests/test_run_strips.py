@@ -22,8 +22,8 @@ from a7sim.strip_methods.strip import (
     orient_strip,
     oriented_strip_document,
 )
-from tests.pages import Page
-from tests.sessions import tilted_flight
+from tests.support.html_pages import Page
+from tests.support.sessions import tilted_flight
 from tests.test_cli import a7sim
 
 

@@ -16,8 +16,8 @@ from a7sim.link.client.checked_port import TwinCheckedPort, open_checked_port
 from a7sim.result_documents import as_json
 from a7sim.scenario import load_scenario
 from a7sim.session import run
+from tests.support.links import new_instrument, serve_on
 from tests.test_cli import ROOT, a7sim
-from tests.wires import new_desk, served
 
 CONTROLS = re.compile(r"\x07|\x1b\[[0-9;?]*[A-Za-z]")
 
@@ -26,7 +26,7 @@ OWN = "a7sim://akwanga?seed=7"
 
 @pytest.fixture
 def url():
-    with served("tcp", new_desk()) as served_url:
+    with serve_on("tcp", new_instrument()) as served_url:
         yield served_url
 
 
@@ -73,15 +73,15 @@ def test_a_block_is_shown_as_its_size_and_kept_in_a_file(url, tmp_path):
     file = tmp_path / "left.grey"
     done = a7sim("send", url, "EYEP1:PICT? 33,33,0.5;*OPC?", "--out", file)
     assert (done.returncode, done.stdout) == (0, "#block of 1089 bytes;1\n")
-    assert file.read_bytes() == new_desk().open().feed(b"EYEP1:PICT? 33,33,0.5\n", 0.0)[6:-1]
+    assert file.read_bytes() == new_instrument().open().feed(b"EYEP1:PICT? 33,33,0.5\n", 0.0)[6:-1]
 
 
 def test_a_token_comes_from_a_file_or_the_environment_and_goes_out_first(tmp_path, monkeypatch):
     (tmp_path / "token").write_text("of the file\n")
-    instrument = new_desk()
+    instrument = new_instrument()
     heard = []
     instrument.listener = lambda event: heard.append(event.text) if event.direction == ">" else None
-    with served("tcp", instrument) as url:
+    with serve_on("tcp", instrument) as url:
         monkeypatch.setenv("A7SIM_TOKEN", "of the environment")
         a7sim("send", url, "*OPC?")
         a7sim("send", url, "*OPC?", "--token-file", tmp_path / "token")
@@ -171,7 +171,7 @@ def one_model():
 @pytest.mark.parametrize("kind", ["tcp", "pty", "rfc2217"])
 def test_an_operator_at_a_served_instrument_leaves_the_same_results(one_model, kind, tmp_path):
     scenario, results = one_model
-    with served(kind, new_desk(scenario)) as url, open_checked_port(url, timeout=5.0) as port:
+    with serve_on(kind, new_instrument(scenario)) as url, open_checked_port(url, timeout=5.0) as port:
         run(scenario, 7, tmp_path / "out", port_adapter=lambda twin: TwinCheckedPort(port, twin, url))
     assert (tmp_path / "out" / "results.json").read_text(encoding="utf-8") == results
 
@@ -208,7 +208,7 @@ def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
             self.given += b"\n"
             return self.given
 
-    run(scenario, 7, port_adapter=lambda twin: Eavesdropper(Served(new_desk(scenario).open()), twin, "url"))
+    run(scenario, 7, port_adapter=lambda twin: Eavesdropper(Served(new_instrument(scenario).open()), twin, "url"))
     assert len(read) > 1000
     assert all(line is given for line, given in read if line)
 
@@ -226,7 +226,7 @@ def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
 )
 def test_an_instrument_of_another_scenario_or_seed_is_refused_in_one_sentence(one_model, scenario, seed, sentence):
     with (
-        served("tcp", new_desk(scenario, seed)) as url,
+        serve_on("tcp", new_instrument(scenario, seed)) as url,
         pytest.raises(A7SimError, match=f"{url}: the instrument served {sentence}"),
         open_checked_port(url, timeout=1.0) as port,
     ):
@@ -246,8 +246,8 @@ def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
 
 
 def test_operate_holds_the_lock_and_gives_it_back():
-    instrument = new_desk()
-    with served("tcp", instrument) as url:
+    instrument = new_instrument()
+    with serve_on("tcp", instrument) as url:
         with open_checked_port(url, timeout=1.0):
             assert instrument.lock_holder is not None
             with pytest.raises(A7SimError, match="another client holds its lock"), open_checked_port(url, timeout=1.0):

@@ -18,14 +18,14 @@ from a7sim.link.server.client_session import ServerLimits
 from a7sim.link.server.connections import MAX_READ, MAX_UNREAD, QUICK_ACKNOWLEDGEMENT
 from a7sim.link.server.serving import MAX_REJECTION_NOTICES, Endpoints
 from a7sim.plotters import VARIANTS
-from tests.served import ANYWHERE, PATIENCE, Line, Served
+from tests.support.server_thread import ANY_PORT, TIMEOUT_S, ServerThread, SocketClient
 
 IDENTITY = f"WILD HEERBRUGG,A7,0,{a7sim.__version__}"
 
 
 @pytest.fixture
 def served():
-    with Served() as opened:
+    with ServerThread() as opened:
         yield opened
 
 
@@ -83,7 +83,7 @@ def test_whatever_bytes_come_in_whatever_pieces(served, sent, replies):
 @pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
 def test_a_client_with_nagles_algorithm_waits_for_no_late_acknowledgement(kind):
     """Commands have no reply that could carry the acknowledgement, without which the client keeps its next line."""
-    with Served(doors=Endpoints(**{kind: [ANYWHERE]})) as served:
+    with ServerThread(endpoints=Endpoints(**{kind: [ANY_PORT]})) as served:
         line = served.line()
         if kind == "rfc2217":
             line.socket.recv(64)
@@ -116,7 +116,7 @@ def test_who_waits_by_looking_at_the_status_comes_to_an_end(served):
 
 
 def test_on_the_walls_clock_waiting_really_waits_and_the_others_go_on():
-    with Served(realtime=True) as served:
+    with ServerThread(realtime=True) as served:
         waiting, other = served.line(), served.line()
         began = time.monotonic()
         waiting.send(b"DRIV:X 4;:STAT:OPER:COND?\n")
@@ -132,7 +132,7 @@ def test_on_the_walls_clock_waiting_really_waits_and_the_others_go_on():
 
 
 def test_a_client_that_goes_while_it_waits_leaves_nothing_behind():
-    with Served(realtime=True) as served:
+    with ServerThread(realtime=True) as served:
         waiting = served.line()
         waiting.send(b"SYST:LOCK:REQ?;:DRIV:X 200;*OPC?\n" + b"COUN:X?\n" * 10000)
         assert served.until(lambda: served.instrument.lock_holder is not None)
@@ -146,7 +146,7 @@ def test_a_client_that_goes_while_it_waits_leaves_nothing_behind():
 
 @pytest.fixture
 def guarded():
-    with Served(SharedInstrument(Autograph(VARIANTS["A7"]), token="sesame 8x")) as opened:
+    with ServerThread(SharedInstrument(Autograph(VARIANTS["A7"]), token="sesame 8x")) as opened:
         yield opened
 
 
@@ -171,7 +171,7 @@ def test_after_the_login_the_errors_from_before_it_are_there(guarded):
 
 def test_the_journal_never_holds_a_token_right_or_wrong():
     heard = []
-    with Served(SharedInstrument(Autograph(VARIANTS["A7"]), heard.append, token="sesame")) as guarded:
+    with ServerThread(SharedInstrument(Autograph(VARIANTS["A7"]), heard.append, token="sesame")) as guarded:
         client = guarded.line()
         client.send(b'SYST:LOG "sesam"\nsyst:version?;login  "sesame"\nSYST:LOGIN "sesame"\n')
         assert client.ask("COUN:X?;:SYST:ERR:COUN?") == "0.00;2"
@@ -234,7 +234,7 @@ def test_the_replies_to_a_line_are_bounded(served):
 
 
 def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
-    with Served(terms=ServerLimits(max_clients=3)) as served:
+    with ServerThread(limits=ServerLimits(max_clients=3)) as served:
         lines = [served.line() for _ in range(3)]
         assert [line.ask("*TST?") for line in lines] == ["0"] * 3
         for _ in range(2 * MAX_REJECTION_NOTICES):
@@ -246,11 +246,11 @@ def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
 
 
 def test_why_a_client_is_turned_away():
-    with Served(terms=ServerLimits(max_clients=1)) as served:
+    with ServerThread(limits=ServerLimits(max_clients=1)) as served:
         assert served.line().ask("*TST?") == "0"
         late = served.line()
         assert late.ask("*IDN?") == '-200,"Execution error;expected at most 1 client at a time"'
-        assert late.hung_up()
+        assert late.wait_closed()
 
 
 def test_64_clients_are_let_in_unless_said_otherwise(served):
@@ -260,7 +260,7 @@ def test_64_clients_are_let_in_unless_said_otherwise(served):
 
 
 def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
-    with Served(terms=ServerLimits(write_timeout=0.5)) as served:
+    with ServerThread(limits=ServerLimits(write_timeout=0.5)) as served:
         other = served.line()
         assert other.ask("*TST?") == "0"
         slow = served.line()
@@ -269,15 +269,15 @@ def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
         flood = b"SYST:HELP:HEAD?\n" * 10_000
         kept = [(0, 0)]
         gone = False
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + TIMEOUT_S
         while not gone:
             assert time.monotonic() < until
             try:
                 slow.socket.send(flood)
             except BlockingIOError:
-                kept += served.there(lambda: [_kept(wire) for wire in served.server._wires])
+                kept += served.call(lambda: [_kept(wire) for wire in served.server._wires])
                 assert other.ask("COUN:X?") == "0.00"
-                gone = served.there(lambda: served.server.clients) == 1
+                gone = served.call(lambda: served.server.clients) == 1
             except ConnectionError:
                 gone = True
         assert other.ask("*IDN?") == IDENTITY
@@ -301,7 +301,7 @@ def test_a_client_that_reads_late_gets_every_reply_in_order(served):
 
 
 def test_who_says_nothing_is_told_and_let_go_and_who_speaks_stays():
-    with Served(terms=ServerLimits(idle_timeout=0.4)) as served:
+    with ServerThread(limits=ServerLimits(idle_timeout=0.4)) as served:
         silent, speaking = served.line(), served.line()
         assert silent.ask("SYST:LOCK:REQ?") == "1"
         until = time.monotonic() + 0.8
@@ -320,7 +320,7 @@ def test_ten_thousand_connections_opened_and_dropped_leave_nothing(served):
     descriptors = Path("/proc/self/fd")
     before = len(list(descriptors.iterdir()))
     for i in range(10_000):
-        line = Line(served.port)
+        line = SocketClient(served.port)
         if i % 4 == 0:
             line.send(b"SYST:LOCK:REQ?\n*OP")
         if i % 10:
@@ -357,7 +357,7 @@ def test_a_burst_starves_nobody(served):
 
 
 def test_a_hundred_clients_polling_at_once_are_all_served_alike():
-    with Served(terms=ServerLimits(max_clients=100)) as served:
+    with ServerThread(limits=ServerLimits(max_clients=100)) as served:
         lines = [served.line() for _ in range(100)]
         for n, line in enumerate(lines):
             assert line.ask(f"*ESE {n};*ESE?") == str(n)

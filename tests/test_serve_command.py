@@ -14,8 +14,8 @@ import serial
 
 import a7sim
 from a7sim.link.client.client import Client
-from tests.processes import ANYWHERE, SERVE, Running, said_here
-from tests.served import PATIENCE
+from tests.support.processes import ANY_TCP_PORT, SERVE, RunningServer, a7sim_captured
+from tests.support.server_thread import TIMEOUT_S
 
 IDENTITY = f"WILD HEERBRUGG,A7,3268,{a7sim.__version__}"
 
@@ -27,7 +27,7 @@ def refused(capsys, monkeypatch):
     def told(*arguments, **environment):
         for name, value in environment.items():
             monkeypatch.setenv(name, value)
-        done = said_here(capsys, "serve", *arguments)
+        done = a7sim_captured(capsys, "serve", *arguments)
         assert (done.returncode, done.stdout) == (2, "")
         assert "Traceback" not in done.stderr
         return done.stderr
@@ -39,7 +39,7 @@ def refused(capsys, monkeypatch):
 def everywhere(tmp_path_factory):
     """A server with three doors."""
     link = tmp_path_factory.mktemp("line") / "a7"
-    with Running(*ANYWHERE, "--rfc2217", "127.0.0.1:0", "--pty", str(link), "--seed", "7") as running:
+    with RunningServer(*ANY_TCP_PORT, "--rfc2217", "127.0.0.1:0", "--pty", str(link), "--seed", "7") as running:
         yield running
 
 
@@ -49,7 +49,7 @@ def test_the_document_says_where_it_listens_and_all_doors_lead_to_one_instrument
     assert [door["kind"] for door in document["listening"]] == ["tcp", "rfc2217", "pty"]
     assert [door["url"].partition("://")[0] for door in document["listening"][:2]] == ["tcp", "rfc2217"]
     for n, door in enumerate(document["listening"]):
-        with serial.serial_for_url(door["url"], timeout=PATIENCE) as port:
+        with serial.serial_for_url(door["url"], timeout=TIMEOUT_S) as port:
             client = Client(port)
             assert client.ask("*IDN?") == IDENTITY
             assert client.ask(f"COUN:X?;:DRIV:X {n + 1};:COUN:X?") == f"{n}.00;{n + 1}.00"
@@ -122,11 +122,11 @@ print("audited:", heard)
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_ends_it_within_a_second_with_link_gone_and_journal_whole(tmp_path, number):
     link, out = tmp_path / "a7", tmp_path / "session"
-    with Running(*ANYWHERE, "--pty", str(link), "--out", str(out)) as running:
+    with RunningServer(*ANY_TCP_PORT, "--pty", str(link), "--out", str(out)) as running:
         line = running.line()
         assert line.ask("DRIV:X 5;:COUN:X?") == "5.00"
         line.send(b"COUN:X?\n" * 20000)
-        code, took, errors = running.stopped_by(number)
+        code, took, errors = running.stop(number)
     assert (code, errors) == (0, "")
     assert took < 1.0
     assert not os.path.lexists(link)
@@ -139,13 +139,13 @@ def test_a_signal_ends_it_within_a_second_with_link_gone_and_journal_whole(tmp_p
 
 
 def test_ready_comes_last_and_quiet_says_nothing():
-    with subprocess.Popen([*SERVE, "akwanga", *ANYWHERE], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen([*SERVE, "akwanga", *ANY_TCP_PORT], stdout=subprocess.PIPE, text=True) as process:
         kind, url = process.stdout.readline().split()
         assert process.stdout.readline() == "ready\n"
-        with serial.serial_for_url(url, timeout=PATIENCE) as port:
+        with serial.serial_for_url(url, timeout=TIMEOUT_S) as port:
             assert (kind, Client(port).ask("*IDN?")) == ("tcp", IDENTITY)
         process.terminate()
-        assert (process.stdout.read(), process.wait(PATIENCE)) == ("", 0)
+        assert (process.stdout.read(), process.wait(TIMEOUT_S)) == ("", 0)
 
 
 def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
@@ -153,9 +153,9 @@ def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
     token.write_text("heerbrugg\n")
     for arguments, environment in (
         (("--listen-anyway", "--tcp", "0.0.0.0:0", "--token-file", str(token)), {}),
-        (ANYWHERE, {"A7SIM_TOKEN": "heerbrugg"}),
+        (ANY_TCP_PORT, {"A7SIM_TOKEN": "heerbrugg"}),
     ):
-        with Running(*arguments, **environment) as running, running.line() as line:
+        with RunningServer(*arguments, **environment) as running, running.line() as line:
             line.send(b'COUN:X?\nSYST:LOG "aarau"\nCOUN:X?\n')
             assert line.ask("*IDN?") == IDENTITY
             assert line.ask('SYST:LOG "heerbrugg";:COUN:X?;:SYST:ERR:COUN?') == "0.00;3"

@@ -20,8 +20,8 @@ from a7sim.link.server.connections import MAX_UNREAD
 from a7sim.link.server.faults import ConnectionDropped, FaultInjector, FaultRates, parse_faults
 from a7sim.link.server.serving import Endpoints
 from a7sim.plotters import VARIANTS
-from tests.door import with_model
-from tests.served import ANYWHERE, PATIENCE, Served
+from tests.support.engine_client import with_model
+from tests.support.server_thread import ANY_PORT, TIMEOUT_S, ServerThread
 
 IDENTITY = f"WILD HEERBRUGG,A7,0,{a7sim.__version__}"
 
@@ -33,19 +33,19 @@ def link(tmp_path):
 
 @pytest.fixture
 def terminal(link):
-    with Served(doors=Endpoints(pty=[link])) as served:
+    with ServerThread(endpoints=Endpoints(pty=[link])) as served:
         yield served
 
 
-def at(served, timeout=PATIENCE):
-    return serial.serial_for_url(served.opened[0]["url"], timeout=timeout)
+def at(served, timeout=TIMEOUT_S):
+    return serial.serial_for_url(served.listening[0]["url"], timeout=timeout)
 
 
 # --- pseudo-terminals ----------------------------------------------------------------------------------
 
 
 def test_a_terminal_is_a_serial_port_in_raw_mode(terminal, link):
-    assert str(link.readlink()) == terminal.opened[0]["device"]
+    assert str(link.readlink()) == terminal.listening[0]["device"]
     with at(terminal) as port:
         client = Client(port)
         assert client.ask("*IDN?") == IDENTITY
@@ -57,7 +57,7 @@ def test_a_terminal_is_a_serial_port_in_raw_mode(terminal, link):
 def test_every_byte_of_a_block_comes_through_a_terminal(link):
     door = with_model()
     expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
-    with Served(door.instrument, doors=Endpoints(pty=[link])) as served, at(served) as port:
+    with ServerThread(door.instrument, endpoints=Endpoints(pty=[link])) as served, at(served) as port:
         assert Client(port).block("EYEP1:PICT? 60,50,4") == expected
 
 
@@ -70,8 +70,8 @@ def test_clients_of_a_terminal_come_and_go(terminal):
 def test_the_link_goes_with_the_server_and_an_old_one_is_replaced(link):
     near, far = os.openpty()
     link.symlink_to(os.ttyname(far))
-    with Served(doors=Endpoints(pty=[link])) as served:
-        assert str(link.readlink()) == served.opened[0]["device"] != os.ttyname(far)
+    with ServerThread(endpoints=Endpoints(pty=[link])) as served:
+        assert str(link.readlink()) == served.listening[0]["device"] != os.ttyname(far)
     assert not link.is_symlink()
     os.close(near), os.close(far)
 
@@ -79,14 +79,17 @@ def test_the_link_goes_with_the_server_and_an_old_one_is_replaced(link):
 @pytest.mark.parametrize("make", [lambda path: path.write_text("mine"), Path.mkdir, lambda path: path.symlink_to("x")])
 def test_what_is_no_link_to_a_terminal_is_left_alone(link, make):
     make(link)
-    with pytest.raises(A7SimError, match="expected nothing there or an old link"), Served(doors=Endpoints(pty=[link])):
+    with (
+        pytest.raises(A7SimError, match="expected nothing there or an old link"),
+        ServerThread(endpoints=Endpoints(pty=[link])),
+    ):
         pass
     assert os.path.lexists(link)
     assert [path.name for path in link.parent.iterdir()] == ["a7"]
 
 
 def test_a_link_that_now_leads_elsewhere_is_left_alone(link):
-    with Served(doors=Endpoints(pty=[link])):
+    with ServerThread(endpoints=Endpoints(pty=[link])):
         link.unlink()
         link.symlink_to("/dev/pts/elsewhere")
     assert str(link.readlink()) == "/dev/pts/elsewhere"
@@ -96,14 +99,16 @@ def test_a_folder_that_is_not_there_is_said_and_every_other_door_is_closed_again
     first = tmp_path / "first"
     with (
         pytest.raises(A7SimError, match=r"nowhere/a7: expected a place where a link can be made"),
-        Served(doors=Endpoints(pty=[first, tmp_path / "nowhere" / "a7"])),
+        ServerThread(endpoints=Endpoints(pty=[first, tmp_path / "nowhere" / "a7"])),
     ):
         pass
     assert not first.is_symlink()
 
 
 def test_a_terminal_whose_client_does_not_read_begins_anew(link):
-    with Served(terms=ServerLimits(write_timeout=0.2), doors=Endpoints(pty=[link], tcp=[ANYWHERE])) as served:
+    with ServerThread(
+        limits=ServerLimits(write_timeout=0.2), endpoints=Endpoints(pty=[link], tcp=[ANY_PORT])
+    ) as served:
         first = served.server._terminals[0]._conversation
         far = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(far)
@@ -112,14 +117,14 @@ def test_a_terminal_whose_client_does_not_read_begins_anew(link):
         other = served.line()
         assert other.ask("SYST:LOCK:REQ?") == "1"
         os.close(far)
-        with serial.Serial(str(link), timeout=PATIENCE) as port:
+        with serial.Serial(str(link), timeout=TIMEOUT_S) as port:
             assert Client(port).ask("*IDN?") == IDENTITY
 
 
 def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
     """More than is kept for a client: it is heard no further until it has read, and nothing is lost."""
     count = 3 * MAX_UNREAD // len(IDENTITY)
-    with Served(doors=Endpoints(pty=[link])) as served, at(served) as port:
+    with ServerThread(endpoints=Endpoints(pty=[link])) as served, at(served) as port:
         sender = threading.Thread(target=port.write, args=(b"*IDN?\n" * count,))
         sender.start()
         assert served.until(lambda: served.server._terminals[0]._clogged)
@@ -129,7 +134,7 @@ def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
 
 
 def test_a_terminal_long_silent_frees_its_lock_and_stays(link):
-    with Served(terms=ServerLimits(idle_timeout=0.2), doors=Endpoints(pty=[link])) as served:
+    with ServerThread(limits=ServerLimits(idle_timeout=0.2), endpoints=Endpoints(pty=[link])) as served:
         with at(served) as port:
             assert Client(port).ask("SYST:LOCK:REQ?") == "1"
         assert served.until(lambda: served.instrument.lock_holder is None)
@@ -145,7 +150,7 @@ def test_a_port_over_rfc_2217_carries_every_byte_and_ends_lines_with_cr_as_well(
     door = with_model()
     expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
     assert expected.count(b"\xff") > 0
-    with Served(door.instrument, doors=Endpoints(rfc2217=[ANYWHERE])) as served, at(served) as port:
+    with ServerThread(door.instrument, endpoints=Endpoints(rfc2217=[ANY_PORT])) as served, at(served) as port:
         client = Client(port)
         assert client.block("EYEP1:PICT? 60,50,4") == expected
         port.write(b"*TST?\r")
@@ -163,10 +168,10 @@ def test_a_port_over_rfc_2217_carries_every_byte_and_ends_lines_with_cr_as_well(
 @pytest.mark.parametrize("kind", ["tcp", "pty"])
 def test_a_paced_line_needs_ten_bits_a_byte_both_ways_and_holds_up_nobody(link, kind):
     baud, asked = 2400, 3
-    doors = Endpoints(tcp=[ANYWHERE], pty=[link])
-    with Served(terms=ServerLimits(baud=baud), doors=doors) as served:
-        url = served.opened[0]["url"] if kind == "tcp" else str(link)
-        with serial.serial_for_url(url, timeout=PATIENCE) as port:
+    endpoints = Endpoints(tcp=[ANY_PORT], pty=[link])
+    with ServerThread(limits=ServerLimits(baud=baud), endpoints=endpoints) as served:
+        url = served.listening[0]["url"] if kind == "tcp" else str(link)
+        with serial.serial_for_url(url, timeout=TIMEOUT_S) as port:
             port.write(b"*IDN?\n")
             began = time.monotonic()
             other = threading.Thread(target=served.line().ask, args=("*TST?",))
@@ -176,13 +181,13 @@ def test_a_paced_line_needs_ten_bits_a_byte_both_ways_and_holds_up_nobody(link, 
                 port.write(b"*IDN?\n")
                 assert port.readline() == f"{IDENTITY}\n".encode()
             took = time.monotonic() - began
-            other.join(PATIENCE)
+            other.join(TIMEOUT_S)
     wire = asked * 10 * (len(b"*IDN?\n") + len(IDENTITY) + 1) / baud
     assert wire * 0.95 <= took <= wire * 1.6 + 0.3
 
 
 def test_a_paced_line_keeps_little_and_loses_nothing():
-    with Served(terms=ServerLimits(baud=2_000_000)) as served:
+    with ServerThread(limits=ServerLimits(baud=2_000_000)) as served:
         line = served.line()
         sender = threading.Thread(target=line.send, args=(b"COUN:X?\n" * 5000,))
         sender.start()
@@ -191,7 +196,7 @@ def test_a_paced_line_keeps_little_and_loses_nothing():
 
 
 def test_a_paced_client_that_hangs_up_its_half_is_answered_to_the_end():
-    with Served(terms=ServerLimits(baud=19200)) as served:
+    with ServerThread(limits=ServerLimits(baud=19200)) as served:
         line = served.line()
         line.send(b"*TST?\n" * 50)
         line.socket.shutdown(1)
@@ -202,7 +207,7 @@ def test_a_paced_client_that_hangs_up_its_half_is_answered_to_the_end():
 
 
 def faulty(spec, seed=1, baud=None):
-    return Served(
+    return ServerThread(
         SharedInstrument(Autograph(VARIANTS["A7"])),
         ServerLimits(faults=parse_faults(spec), fault_seed=seed, baud=baud, max_clients=200),
     )

@@ -8,7 +8,7 @@ from a7sim.scenario import load_scenario
 from a7sim.scenario.schema import Condition, ProjectorCondition
 from a7sim.session import open_session, run
 from a7sim.session.session_batch import BatchDriver, open_batch
-from tests.sessions import read_once, tilted_flight, without_errors
+from tests.support.sessions import read_once, tilted_flight, without_errors
 
 SEEDS = (1985, 7)
 OUT_OF_TRUE = Condition(

@@ -6,9 +6,9 @@ import pytest
 import pyvisa
 import serial
 
-from tests.door import MODEL_1
+from tests.support.engine_client import MODEL_1
+from tests.support.links import new_instrument, serve_on_all_links
 from tests.test_language import EXAMPLES, NOT_ON_AN_A7, in_full, in_short
-from tests.wires import everywhere, new_desk
 
 BLOCKS = {"EYEPiece<n>:PICTure?"}
 """Queries whose answers may hold line ends; they are asked apart."""
@@ -126,5 +126,5 @@ def test_the_script_has_200_lines_or_more_and_every_query_of_it_is_answered(firs
 
 @pytest.mark.parametrize("name", CLIENTS)
 def test_every_client_gets_the_same_answers(first, name):
-    with everywhere(new_desk()) as urls, CLIENTS[name](urls) as client:
+    with serve_on_all_links(new_instrument()) as urls, CLIENTS[name](urls) as client:
         assert conversation(client) == first

@@ -19,7 +19,7 @@ from a7sim.reduction.least_squares import Undetermined
 from a7sim.reduction.polynomials import StripAxis, strip_adjustment, strip_axis
 from a7sim.reduction.similarity import similarity_by_iteration, similarity_by_quaternion
 from a7sim.reduction.strips import Model, formed_strip, in_order, is_centre
-from tests.examples import examples
+from tests.support.hypothesis_profile import examples
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -13,8 +13,8 @@ from a7sim.study.auditing import AuditDifference
 from a7sim.study.checkpoint import KINDS, checkpoint_path, load
 from a7sim.study.folder import FILES, PAGE
 from a7sim.study.loading import load_study
-from tests.processes import COMMAND, a7sim, said_here
-from tests.served import PATIENCE
+from tests.support.processes import COMMAND, a7sim, a7sim_captured
+from tests.support.server_thread import TIMEOUT_S
 
 STUDY = """
 schema_version = 1
@@ -55,7 +55,7 @@ def test_a_replicate_in_the_table_is_the_session_that_run_gives_for_its_seed(stu
     line = next(each for each in (out / "replicates.csv").read_text().splitlines() if each.startswith("2,1,"))
     _, _, seed, _, height = line.split(",")
     settings = ("--set", "work=['comparator']", "--set", "comparator.pointings=4")
-    ran = json.loads(said_here(capsys, "run", "a8-strip", "--seed", seed, *settings, "--json").stdout)
+    ran = json.loads(a7sim_captured(capsys, "run", "a8-strip", "--seed", seed, *settings, "--json").stdout)
     checks = ran["ways"]["comparator"]["accuracy_m"]["checks"]
     assert float(height) == pytest.approx(checks["height"], rel=1e-9)
 
@@ -71,7 +71,7 @@ def test_a_study_that_was_killed_goes_on_to_the_same_bytes_and_leaves_no_worker_
     _wait_until(lambda: _gone(killed.pid))
     loaded = load_study(path)
     assert 0 < load(checkpoint_path(out), loaded.identity).done.sum() < 24
-    assert said_here(capsys, "study", path, "--executor", "process", "--out", out, "--quiet").returncode == 0
+    assert a7sim_captured(capsys, "study", path, "--executor", "process", "--out", out, "--quiet").returncode == 0
     assert _files_in(out) == _files_in(whole)
 
 
@@ -88,7 +88,7 @@ def _gone(group):
 
 
 def _wait_until(there):
-    until = time.monotonic() + PATIENCE
+    until = time.monotonic() + TIMEOUT_S
     while not there():
         assert time.monotonic() < until
         time.sleep(0.01)
@@ -102,7 +102,9 @@ def test_the_page_says_what_was_asked_how_and_the_answer(study):
 
 def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    told = said_here(capsys, "study", study[0], "--replicates", 2, "--executor", "process", "--out", tmp_path / "out")
+    told = a7sim_captured(
+        capsys, "study", study[0], "--replicates", 2, "--executor", "process", "--out", tmp_path / "out"
+    )
     assert told.returncode == 0
     assert "matplotlib" in told.stderr
     expected = {*FILES, checkpoint_path(tmp_path).name} - {PAGE} - ({*KINDS} - {checkpoint_path(tmp_path).name})
@@ -118,14 +120,14 @@ def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, c
 )
 def test_replicates_that_cannot_be_are_one_sentence_and_exit_code_2(study, capsys, arguments, words):
     path, out, _ = study
-    told = said_here(capsys, "study", path, "--out", out, *arguments)
+    told = a7sim_captured(capsys, "study", path, "--out", out, *arguments)
     assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
     assert words in told.stderr
 
 
 def test_a_folder_of_something_else_is_left_alone(study, tmp_path, capsys):
     (tmp_path / "precious").write_text("x")
-    told = said_here(capsys, "study", study[0], "--out", tmp_path)
+    told = a7sim_captured(capsys, "study", study[0], "--out", tmp_path)
     assert told.returncode == 2
     assert "expected an empty folder" in told.stderr
     assert [each.name for each in tmp_path.iterdir()] == ["precious"]
@@ -135,7 +137,7 @@ def test_a_failed_audit_is_one_sentence_and_exit_code_3(study, capsys, monkeypat
     path, out, _ = study
     differences = [AuditDifference(2, each, 99, "strip.rms", 0.25, 0.5, 7) for each in (3, 4)]
     monkeypatch.setattr("a7sim.cli.study.audit_study", lambda laid, tally, picks: differences)
-    told = said_here(capsys, "study", path, "--executor", "process", "--out", out, "--audit", 5, "--quiet")
+    told = a7sim_captured(capsys, "study", path, "--executor", "process", "--out", out, "--audit", 5, "--quiet")
     assert (told.returncode, told.stdout) == (3, "")
     assert told.stderr == (
         "a7sim: 2 of 5 sessions differ over the link; cell 2, replicate 3, seed 99: "

@@ -23,8 +23,8 @@ from a7sim.study.folder import write_results
 from a7sim.study.loading import build_study
 from a7sim.study.running import ChunkPolicy, run_study
 from a7sim.study.tally import Tally
-from tests.processes import said_here
-from tests.served import PATIENCE
+from tests.support.processes import a7sim_captured
+from tests.support.server_thread import TIMEOUT_S
 from tests.test_study import BY_COMPARATOR
 
 RUN_BY_MPI = shutil.which("mpiexec", path=os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]]))  # noqa: PTH120
@@ -92,10 +92,10 @@ def test_a_pool_that_lost_a_worker_says_so_and_the_study_goes_on_to_the_same_byt
 def test_an_interrupted_pool_does_not_wait_for_what_its_workers_do():
     with pytest.raises(KeyboardInterrupt), open_executor("pool", 1) as (executor, _):
         worker = executor.submit(os.getpid).result()
-        executor.submit(time.sleep, 10 * PATIENCE)
+        executor.submit(time.sleep, 10 * TIMEOUT_S)
         began = time.monotonic()
         raise KeyboardInterrupt
-    assert time.monotonic() - began < PATIENCE
+    assert time.monotonic() - began < TIMEOUT_S
     with pytest.raises(ProcessLookupError):
         os.kill(worker, 0)
 
@@ -147,14 +147,14 @@ WRONG = {
 @pytest.mark.parametrize("name", list(WRONG))
 def test_a_wrong_executor_is_one_sentence_and_exit_code_2(capsys, name):
     arguments, words = WRONG[name]
-    told = said_here(capsys, "study", "levels", *arguments)
+    told = a7sim_captured(capsys, "study", "levels", *arguments)
     assert (told.returncode, told.stdout, len(told.stderr.splitlines())) == (2, "", 1)
     assert words in told.stderr
 
 
 def test_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch, capsys, nobody):
     monkeypatch.setattr("a7sim.study.dask_executor.WORKER_TIMEOUT_S", 0.5)
-    told = said_here(capsys, "study", "levels", "--executor", "dask", "--scheduler", nobody)
+    told = a7sim_captured(capsys, "study", "levels", "--executor", "dask", "--scheduler", nobody)
     assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
     assert f"--scheduler: expected one that answers at {nobody}" in told.stderr
 
@@ -165,7 +165,7 @@ def test_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch, capsys, n
 )
 def test_what_is_not_installed_is_one_sentence_with_how_to_get_it(monkeypatch, capsys, kind, module, words):
     monkeypatch.setitem(sys.modules, module, None)
-    told = said_here(capsys, "study", "levels", "--executor", kind)
+    told = a7sim_captured(capsys, "study", "levels", "--executor", kind)
     assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
     assert words in told.stderr
 

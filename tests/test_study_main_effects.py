@@ -11,7 +11,7 @@ from a7sim.study.main_effects import MIN_CELLS, main_effects, noise_share
 from a7sim.study.page import study_page
 from a7sim.study.tables import study_tables
 from a7sim.study.tally import Tally
-from tests.pages import Page
+from tests.support.html_pages import Page
 
 
 def a_hypercube(cells, factors, seed=1):

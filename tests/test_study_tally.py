@@ -11,7 +11,7 @@ from a7sim.study.checkpoint import KINDS, checkpoint_path, load, newest_checkpoi
 from a7sim.study.quantile_sketch import CAPACITY, QuantileSketch
 from a7sim.study.statistics import quantile_with_interval
 from a7sim.study.tally import Tally
-from tests.examples import examples
+from tests.support.hypothesis_profile import examples
 
 RNG = np.random.default_rng(3)
 

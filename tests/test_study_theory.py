@@ -27,7 +27,7 @@ from a7sim.study.theory import (
     theory_comparison,
     theory_limits,
 )
-from tests.pages import Page
+from tests.support.html_pages import Page
 
 QUIET = {
     "film.shrinkage_sigma_ppm": 0.0,

@@ -12,7 +12,7 @@ from a7sim.training.attempts import start_attempt
 from a7sim.training.catalogue import find_exercise
 from a7sim.training.checklist import Checklist
 from a7sim.training.progress import Progress
-from tests.sitting_down import Person
+from tests.support.interactive import Person
 
 
 def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: Path) -> None:

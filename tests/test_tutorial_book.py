@@ -6,7 +6,7 @@ import math
 import pytest
 from docs.make_tutorial_pictures import POINTS, afternoon, with_book
 
-from tests.guides import page
+from tests.support.guide_pages import page
 
 
 @pytest.mark.slow

@@ -26,8 +26,8 @@ from a7sim.session import open_session
 from a7sim.session.session_batch import open_batch
 from a7sim.standard_points import CASES, determine_orientation
 from a7sim.strip_methods.strip import ground_control
-from tests.sessions import read_once, without_errors
-from tests.test_crowd import same_to_the_digit
+from tests.support.sessions import read_once, without_errors
+from tests.test_session_batch import same_to_the_digit
 
 LAKE = "akwanga-lake"
 

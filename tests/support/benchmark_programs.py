@@ -1,14 +1,15 @@
-"""Programs of benchmarks/ as modules."""
+"""Programs of `benchmarks/` as modules."""
 
 import sys
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
-def benchmark(name):
-    """Import a program of benchmarks/ as it is when run from there, behind whatever else is called so."""
+def benchmark(name: str) -> ModuleType:
+    """Import a program of `benchmarks/` by its name; that folder is last on the search path."""
     if str(BENCHMARKS) not in sys.path:
         sys.path.append(str(BENCHMARKS))
     return import_module(name)

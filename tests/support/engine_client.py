@@ -1,4 +1,4 @@
-"""A door to an instrument for the tests: lines in, reply lines out, no wire between."""
+"""Client sessions of an instrument without a link: lines in, reply lines out."""
 
 from functools import cache
 
@@ -20,8 +20,8 @@ MODEL_1 = (
 """Lines that mount Akwanga's first model; point 1011 then lies in the field of view of both eyepieces."""
 
 
-class Door:
-    """A client of an instrument."""
+class EngineClient:
+    """A client session whose lines go directly to the engine, with a simulated clock."""
 
     def __init__(self, instrument: SharedInstrument | None = None, cr_ends_line: bool = True) -> None:
         self.instrument = instrument or SharedInstrument(Autograph(VARIANTS["A7"]))
@@ -29,20 +29,22 @@ class Door:
         self.clock = Clock()
 
     def feed(self, received: bytes) -> bytes:
+        """Send bytes, wait until the instrument is idle, and return its reply."""
         return feed_until_idle(self.engine, received, self.clock)
 
-    def say(self, line: str) -> str:
-        """Return the reply to a line without its LF, '' where there is none."""
+    def query(self, line: str) -> str:
+        """Send a line and return its reply without LF, '' if there is none; at most one reply line is allowed."""
         reply = self.feed(line.encode("latin-1") + b"\n").decode("ascii")
         assert reply.count("\n") == (reply != ""), f"{line} was answered {reply!r}"
         return reply.removesuffix("\n")
 
     def numbers(self, line: str) -> list[float]:
-        return [float(each) for each in self.say(line).replace(";", ",").split(",")]
+        """Send a line and return the numbers of its reply."""
+        return [float(number) for number in self.query(line).replace(";", ",").split(",")]
 
     def errors(self) -> list[int]:
-        """Take the error queue off, oldest first."""
-        return [int(self.say("SYST:ERR?").split(",")[0]) for _ in range(int(self.say("SYST:ERR:COUN?")))]
+        """Empty the error queue and return its numbers, oldest first."""
+        return [int(self.query("SYST:ERR?").split(",")[0]) for _ in range(int(self.query("SYST:ERR:COUN?")))]
 
 
 @cache
@@ -50,14 +52,15 @@ def _photographs() -> dict[str, Photograph]:
     return dict(build_scene(load_scenario("akwanga"), SEED).photographs)
 
 
-def with_photographs(listener: Listener | None = None) -> Door:
-    """Return a door to Akwanga's instrument, its pictures in the drawer."""
-    return Door(SharedInstrument(build_autograph(load_scenario("akwanga").instrument, _photographs(), SEED), listener))
+def with_photographs(listener: Listener | None = None) -> EngineClient:
+    """Return a client of Akwanga's instrument; its photographs can be loaded."""
+    autograph = build_autograph(load_scenario("akwanga").instrument, _photographs(), SEED)
+    return EngineClient(SharedInstrument(autograph, listener))
 
 
-def with_model(listener: Listener | None = None) -> Door:
-    """Return a door to Akwanga's instrument with its first model mounted."""
-    door = with_photographs(listener)
+def with_model(listener: Listener | None = None) -> EngineClient:
+    """Return a client of Akwanga's instrument with its first model mounted."""
+    client = with_photographs(listener)
     for line in MODEL_1:
-        assert door.say(line) == ""
-    return door
+        assert client.query(line) == ""
+    return client

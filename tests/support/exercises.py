@@ -1,15 +1,11 @@
-"""All exercises, for the two test files that share `a7sim train check` between them."""
+"""The check of an exercise, as `a7sim train check-exercise` does it."""
 
-from a7sim.training.catalogue import all_exercises
 from a7sim.training.checking import check_exercise
-
-ALL = all_exercises()
-HALF = 11
-"""How many exercises take about as long to check as those that come after them."""
+from a7sim.training.exercise import ExerciseFolder
 
 
-def see_that_it_holds_what_check_asks(shelved):
-    """The reference passes, every faulty one fails for its reason, nothing is dead or below the floor."""
-    found = check_exercise(shelved)
-    assert found.faults == ()
-    assert found.reference_points is not None and found.reference_points >= shelved.exercise.pass_points
+def assert_exercise_holds(entry: ExerciseFolder) -> None:
+    """Assert that the reference passes, faulty scripts fail for their reasons, and no criterion is without effect."""
+    result = check_exercise(entry)
+    assert result.faults == ()
+    assert result.reference_points is not None and result.reference_points >= entry.exercise.pass_points

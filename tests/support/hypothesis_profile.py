@@ -1,4 +1,4 @@
-"""How many examples Hypothesis tries: with `A7SIM_EXAMPLES=50` fifty times as many, and other ones every time."""
+"""Number of examples of Hypothesis: `A7SIM_EXAMPLES=50` multiplies it by 50 and draws new ones in each run."""
 
 import os
 
@@ -11,5 +11,5 @@ settings.register_profile(PROFILE, derandomize=TIMES == 1, deadline=None, max_ex
 
 
 def examples(count: int) -> settings:
-    """Return settings of a test that usually tries so many."""
+    """Return settings of a test with `count` examples, multiplied by `A7SIM_EXAMPLES`."""
     return settings(max_examples=count * TIMES, deadline=None)

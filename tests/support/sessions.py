@@ -1,17 +1,24 @@
-"""Sessions for tests: scenarios changed in what a test is about, orientations solved exactly, lines tampered with."""
+"""Scenarios, exact orientations and tampered links for tests of sessions."""
+
+from collections.abc import Sequence
+from typing import Any
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from a7sim.geometry import GON, angles_of, mxm, mxv, rotation
-from a7sim.scenario import Observer, load_scenario
+from a7sim.scenario import Observer, Scenario, load_scenario
 from a7sim.scenario.schema import FilmDeformation
-from a7sim.session import open_session
+from a7sim.session import Session, open_session
+
+Exchanges = Sequence[tuple[str, str]]
+"""Pairs of words: the first is replaced by the second."""
 
 
-def tilted_flight(tilts, **overrides):
-    """Akwanga's camera, ground and plan over three stations 672 m apart, all errors zero, tilted as asked.
+def tilted_flight(tilts: Sequence[tuple[float, float, float]], **overrides: str) -> Scenario:
+    """Return a scenario with Akwanga's camera, ground and plan, three stations 672 m apart and no errors.
 
     `tilts` are omega, phi and swing off the flight line in gon, for each of the three photographs.
     """
@@ -25,21 +32,21 @@ def tilted_flight(tilts, **overrides):
     return without_errors(msgspec.structs.replace(scenario, photos=photos))
 
 
-def without_errors(scenario):
-    """Return a scenario with film and operator faultless, who need not read twice; counters are still read to 0.01."""
+def without_errors(scenario: Scenario) -> Scenario:
+    """Return a scenario with faultless film and operator and single readings; counters are still read to 0.01."""
     return read_once(msgspec.structs.replace(scenario, film=FilmDeformation(), observer=Observer.faultless()))
 
 
-def read_once(scenario):
-    """Return a scenario whose operator reads every parallax once: for tests of what more readings do not change."""
+def read_once(scenario: Scenario) -> Scenario:
+    """Return a scenario with one reading of each parallax."""
     return msgspec.structs.replace(scenario, plotting=msgspec.structs.replace(scenario.plan, parallax_readings=1))
 
 
-def element_errors(model):
-    """How far the elements of a model's results lie from the exact solution, gon.
+def element_errors(model: dict[str, Any]) -> dict[str, float]:
+    """Return the errors of the elements of a model in results.json, gon.
 
-    Exact given the elements that the method does not turn: the angles at which the true relative rotation and
-    base hold with the base components as they are set.
+    The exact solution holds the elements that the method does not turn: it consists of the angles at which the true
+    relative rotation and base agree with the base components as they are set.
     """
     elements, truth = model["relative_orientation"]["elements"], model["truth"]
     left, right = (1, 2) if model["base"] == "inside" else (2, 1)
@@ -56,7 +63,7 @@ def element_errors(model):
             ]
         )
 
-        def misfit(angles):
+        def misfit(angles: npt.NDArray[np.float64]) -> list[float]:
             turned_left = rotation(*angles)
             of_right = turned_left if right == 1 else mxm(turned_left, relative)
             of_two = turned_left if left == 2 else of_right
@@ -73,30 +80,33 @@ def element_errors(model):
     return errors
 
 
-def _angle(elements, name, projector):
+def _angle(elements: dict[str, float], name: str, projector: int) -> float:
     zero = 0.0 if name == "kappa" else 100.0
     return (elements[f"{name}{projector}"] - zero) * GON
 
 
 class TamperedPort:
-    """A line on which somebody exchanges words on the way to the instrument."""
+    """A port that replaces words of the lines to the instrument."""
 
-    def __init__(self, port, exchanges):
+    def __init__(self, port: Any, exchanges: Exchanges) -> None:
         self._port = port
         self._exchanges = exchanges
 
-    def write(self, data):
+    def write(self, data: bytes) -> Any:
+        """Write bytes, with words replaced."""
         text = data.decode("ascii")
-        for said, heard in self._exchanges:
-            text = text.replace(said, heard)
+        for old, new in self._exchanges:
+            text = text.replace(old, new)
         return self._port.write(text.encode("ascii"))
 
-    def readline(self, size=-1):
-        return self._port.readline(size)
+    def readline(self, size: int | None = -1, /) -> bytes:
+        """Read a reply line."""
+        line: bytes = self._port.readline(size)
+        return line
 
 
-def tampered_session(scenario, exchanges, seed=1):
-    """A session whose operator's words are changed on the line."""
+def tampered_session(scenario: Scenario, exchanges: Exchanges, seed: int = 1) -> Session:
+    """Return a session in which words of the operator's lines are replaced."""
     session = open_session(scenario, seed)
     session.person.client = type(session.person.client)(TamperedPort(session.person.client._port, exchanges))
     return session

@@ -1,0 +1,1 @@
+"""Helpers of the tests, typed and checked like the package."""
