@@ -21,7 +21,7 @@ run: $(READY) ## let the operator work through the Akwanga scenario; files in ru
 	$(BIN)/a7sim run scenarios/akwanga.toml --out runs/akwanga --force
 
 test: $(READY) ## run all tests
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup
 
 lint: $(READY) ## check style, types and the direction of imports
 	$(BIN)/ruff format --check .

@@ -25,6 +25,35 @@ def _let_processes_keep_bytecode() -> None:
 _let_processes_keep_bytecode()
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep the order of the groups when xdist distributes them; it would sort them by their number of tests."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Make each file a group of `--dist loadgroup`, unless a test is marked with a group.
+
+    Groups with slow tests and marked groups come first, so that no worker begins with one at the end.
+    A worker runs all tests of a group, so that fixtures of module scope are made once.
+    """
+    early = set()
+    for item in items:
+        is_marked = item.get_closest_marker("xdist_group") is not None
+        if not is_marked:
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+        if is_marked or item.get_closest_marker("slow") is not None:
+            early.add(_group_of(item))
+    items.sort(key=lambda item: _group_of(item) not in early)
+
+
+def _group_of(item: pytest.Item) -> str:
+    mark = item.get_closest_marker("xdist_group")
+    assert mark is not None, item.nodeid
+    return str(mark.args[0])
+
+
 def pytest_collection_finish() -> None:
     """Let the garbage collector pass over what stays to the end anyway, modules and tests, and come less often."""
     gc.freeze()
