@@ -2,22 +2,22 @@
 
 import gc
 import os
-import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from a7sim.cli import main
+from tests.support.gallery import FinishedSession, Gallery
 from tests.support.hypothesis_profile import PROFILE
 
 settings.load_profile(PROFILE)
 
 
 def _let_processes_keep_bytecode() -> None:
-    """Let no process that a test starts compile the whole package anew, as it would on many a container."""
+    """Let processes that tests start use the compiled package, also where the environment forbids bytecode."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sys.dont_write_bytecode = False
 
@@ -55,44 +55,48 @@ def _group_of(item: pytest.Item) -> str:
 
 
 def pytest_collection_finish() -> None:
-    """Let the garbage collector pass over what stays to the end anyway, modules and tests, and come less often."""
+    """Exclude modules and tests from garbage collection and make it less frequent."""
     gc.freeze()
     gc.set_threshold(200_000, 20, 50)
 
 
-BESIDE_THE_PROJECT = Path(__file__).parents[2] / "shared" / "reference"
+REFERENCE = Path(__file__).parents[2] / "shared" / "reference"
 
 
 @pytest.fixture(scope="session")
 def reference() -> Path:
-    """The folder of measurements and results that nobody of this project made up."""
+    """The folder of measurements and results from sources outside this project."""
     named = os.environ.get("A7SIM_REFERENCE")
-    folder = Path(named) if named else BESIDE_THE_PROJECT
+    folder = Path(named) if named else REFERENCE
     if not named and not folder.is_dir():
         pytest.skip("no reference data: A7SIM_REFERENCE is not set and ../shared/reference is not there")
     assert folder.is_dir(), f"A7SIM_REFERENCE names {folder}, which is no folder"
     return folder
 
 
-def _session_of(out: Path, *words: str) -> int:
-    command = [sys.executable, "-m", "a7sim", "run", "akwanga", *words, "--quiet", "--out", out]
-    return subprocess.run(command, check=False).returncode
+Finished = Callable[..., FinishedSession]
 
 
 @pytest.fixture(scope="session")
-def akwanga_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of Akwanga's session with seed 7, as `a7sim run` leaves it."""
-    out = tmp_path_factory.mktemp("shared") / "akwanga"
-    assert _session_of(out, "--seed", "7") == 0
-    return out
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
+    """Return a function that returns the finished session of a kind and a seed (`tests.support.gallery`)."""
+    folder = tmp_path_factory.getbasetemp()
+    common = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+    gallery = Gallery(common / "gallery")
+    yield gallery.finished
+    gallery.require_unchanged()
 
 
 @pytest.fixture(scope="session")
-def short_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a novice who finds that a picture lies upside down."""
-    out = tmp_path_factory.mktemp("shared") / "upside-down"
-    assert _session_of(out, "--set", "photos.1.laid=upside down", "--skill", "novice") == 1
-    return out
+def akwanga_folder(finished: Finished) -> Path:
+    """The folder of a session of Akwanga with seed 7."""
+    return finished("akwanga", 7).folder
+
+
+@pytest.fixture(scope="session")
+def gave_up_folder(finished: Finished) -> Path:
+    """The folder of a novice's session that ends at a photograph that lies upside down."""
+    return finished("novice gives up").folder
 
 
 Typed = Callable[..., tuple[int | str | None, str, str]]
@@ -100,13 +104,13 @@ Typed = Callable[..., tuple[int | str | None, str, str]]
 
 @pytest.fixture
 def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Typed:
-    """Type a command and return its exit code, what it prints, and what it complains of."""
+    """Return a function that runs a command in this process and returns exit code, output and standard error."""
 
-    def at_the_door(*words: object) -> tuple[int | str | None, str, str]:
+    def run(*words: object) -> tuple[int | str | None, str, str]:
         monkeypatch.setattr(sys, "argv", ["a7sim", *map(str, words)])
-        with pytest.raises(SystemExit) as left:
+        with pytest.raises(SystemExit) as ended:
             main()
         printed = capsys.readouterr()
-        return left.value.code, printed.out, printed.err
+        return ended.value.code, printed.out, printed.err
 
-    return at_the_door
+    return run

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.gallery import READ_ONCE
 from tests.support.processes import a7sim as in_a_process
 from tests.support.processes import a7sim_in_process
 
@@ -26,9 +27,6 @@ WORK_FILES = {
 STRIP_FILES = {"strip.csv", "strip.crd", "strip-output.crd", "strip-numbers.csv"}
 FILES = WORK_FILES | STRIP_FILES
 
-READ_ONCE = ("--set", "plan.parallax_readings=1")
-"""For what more readings of a parallax do not change."""
-
 HEEDING_CTRL_C = """
 import runpy, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -42,10 +40,8 @@ def a7sim(*arguments, cwd=ROOT):
 
 
 @pytest.fixture(scope="module")
-def akwanga_run(tmp_path_factory):
-    out = tmp_path_factory.mktemp("runs") / "akwanga"
-    done = a7sim("run", "scenarios/akwanga.toml", "--seed", 7, *READ_ONCE, "--out", out)
-    assert done.returncode == 0, done.stderr
+def akwanga_run(finished):
+    out, done = finished("akwanga read once", 7)
     return done, out
 
 
@@ -172,12 +168,13 @@ def test_quiet_prints_nothing():
 
 
 def test_options_reach_the_session():
-    done = a7sim("run", "dewitt-pair", "--method", "dependent", "--perfect-observer", "--set", "plan.bx=190", "--json")
+    options = ("--method", "dependent", "--perfect-observer", "--case", "c", "--set", "plan.bx=190")
+    done = a7sim("run", "dewitt-pair", *options, "--json")
     results = json.loads(done.stdout)
     assert results["method"] == "dependent"
     assert results["models"][0]["relative_orientation"]["elements"]["bx"] == 190.0
     assert results["operator"]["struck_out"] == 0
-    assert json.loads(a7sim("run", "akwanga", "--case", "c", *READ_ONCE, "--json").stdout)["case"] == "C"
+    assert results["case"] == "C"
 
 
 def test_an_existing_folder_is_refused_unless_forced_and_nothing_in_it_is_lost(tmp_path):
@@ -220,9 +217,8 @@ def test_bad_input_gets_a_sentence_and_exit_code_2_without_traceback(arguments, 
         assert word in last
 
 
-def test_bad_input_leaves_earlier_results_and_no_new_folder(tmp_path):
-    out = tmp_path / "out"
-    assert a7sim("run", "dewitt-pair", *READ_ONCE, "--out", out, "--quiet").returncode == 0
+def test_bad_input_leaves_earlier_results_and_no_new_folder(finished, tmp_path):
+    out = finished("dewitt-pair", 7).copy_to(tmp_path / "out")
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     (tmp_path / "dewitt-pair.csv").write_bytes("point,xl,yl,xr,yr\nä,1,2,3,4\n".encode("latin-1"))
     (tmp_path / "bad.toml").write_bytes((ROOT / "scenarios" / "dewitt-pair.toml").read_bytes())
@@ -242,9 +238,11 @@ def test_names_with_commas_are_names_like_any_other(tmp_path):
 
 
 @pytest.mark.parametrize("environment", [{"PYTHONIOENCODING": "ascii"}, {"COLUMNS": "40"}, {"NO_COLOR": "1"}])
-def test_any_terminal_gets_its_tables(environment):
-    command = [sys.executable, "-m", "a7sim", "run", "dewitt-pair", *READ_ONCE]
-    done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
+def test_any_terminal_gets_its_tables(environment, monkeypatch):
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    run = in_a_process if "PYTHONIOENCODING" in environment else a7sim
+    done = run("run", "dewitt-pair", *READ_ONCE)
     assert (done.returncode, done.stderr) == (0, "")
 
 

@@ -18,14 +18,14 @@ CONTROL = {"C1", "C2", "C3", "C4"}
 """Points of control in model 1."""
 
 WORDS = ("--seed", SEED, "--contour", f"{HEIGHT:g}", "--line", "road1", "--line", "track1")
+"""As in the session of the gallery."""
 
 
 @pytest.fixture(scope="module")
-def compiled(tmp_path_factory):
-    """What the command ended with and said, and the folder it left."""
-    out = tmp_path_factory.mktemp("compiled") / "sheet"
-    hurried = ("--set", "plan.parallax_readings=1")
-    return a7sim_in_process("compile", "akwanga", *WORDS, *hurried, "--out", out), out
+def compiled(finished):
+    """Result and folder of the command."""
+    out, result = finished("compile", SEED)
+    return result, out
 
 
 @pytest.fixture(scope="module")

@@ -146,15 +146,14 @@ def test_cards_come_as_they_are_or_are_made_again_the_same(akwanga_folder, tmp_p
     assert typed("export", copy, "--to", "cards") == (0, deck, "")
 
 
-def test_cards_of_a_session_without_a_strip_are_refused_in_a_sentence(short_folder, typed):
-    code, _, complaint = typed("export", short_folder, "--to", "cards")
+def test_cards_of_a_session_without_a_strip_are_refused_in_a_sentence(gave_up_folder, typed):
+    code, _, complaint = typed("export", gave_up_folder, "--to", "cards")
     assert code == 2
     assert "expected a session with a strip on the ground, got one without" in complaint
 
 
-def test_cards_of_a_strip_measured_in_several_ways(tmp_path, typed):
-    out = tmp_path / "ways"
-    assert typed("run", "a8-strip", "--quiet", "--out", out)[0] == 0
+def test_cards_of_a_strip_measured_in_several_ways(finished, typed):
+    out = finished("a8-strip").folder
     code, printed, _ = typed("export", out, "--to", "cards", "--way", "A8")
     assert code == 0
     assert len(printed.splitlines()) > 100
@@ -216,10 +215,10 @@ def test_what_differs_is_told_with_the_numbers_of_the_results(akwanga_folder, re
     assert len(everything) > 100
 
 
-def test_sessions_that_ended_differently_can_be_compared(akwanga_folder, short_folder, typed):
+def test_sessions_that_ended_differently_can_be_compared(akwanga_folder, gave_up_folder, typed):
     rows = {
         row["fact"]: row["values"]
-        for row in json.loads(typed("compare", akwanga_folder, short_folder, "--json")[1])["rows"]
+        for row in json.loads(typed("compare", akwanga_folder, gave_up_folder, "--json")[1])["rows"]
     }
     assert rows["status"] == ["complete", "does not fit"]
     assert rows["settings.photos.1.laid"] == ["-", "upside down"]

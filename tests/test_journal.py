@@ -44,11 +44,9 @@ def files_of(folder):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """The folder of a session of the operator, seed 7, that nobody interrupted."""
-    out = tmp_path_factory.mktemp("whole") / "out"
-    assert a7sim("run", "dewitt-pair", "--seed", "7", *SETTINGS, "--out", out).returncode == 0
-    return out
+def whole(finished):
+    """The folder of an uninterrupted session of the operator, seed 7."""
+    return finished("dewitt-pair", 7).folder
 
 
 @pytest.fixture

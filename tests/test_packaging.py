@@ -136,8 +136,8 @@ def test_it_works_away_from_the_checkout(away):
         (["report", "session"], "matplotlib", "report"),
     ],
 )
-def test_what_needs_an_extra_says_so_in_one_sentence(away, short_folder, words, without, extra):
-    given = [str(short_folder) if word == "session" else word for word in words]
+def test_what_needs_an_extra_says_so_in_one_sentence(away, gave_up_folder, words, without, extra):
+    given = [str(gave_up_folder) if word == "session" else word for word in words]
     done = away(*given, without=without)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
     assert done.stderr.startswith("a7sim: ")

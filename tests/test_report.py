@@ -40,20 +40,20 @@ def changed(folder, results, tmp_path):
     return copy
 
 
-def test_a_report_is_written_into_the_folder_or_where_it_is_asked_for(short_folder, tmp_path, typed):
+def test_a_report_is_written_into_the_folder_or_where_it_is_asked_for(gave_up_folder, tmp_path, typed):
     copy = tmp_path / "session"
-    shutil.copytree(short_folder, copy)
+    shutil.copytree(gave_up_folder, copy)
     code, printed, _ = typed("report", copy)
     assert (code, printed) == (0, f"{copy / 'report.html'}\n")
     elsewhere = tmp_path / "elsewhere.html"
-    assert typed("report", short_folder, "--out", elsewhere)[0] == 0
+    assert typed("report", gave_up_folder, "--out", elsewhere)[0] == 0
     assert elsewhere.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
-    assert not (short_folder / "report.html").exists()
+    assert not (gave_up_folder / "report.html").exists()
 
 
-def test_a_report_goes_with_the_session_that_is_written_over(short_folder, tmp_path, typed):
+def test_a_report_goes_with_the_session_that_is_written_over(gave_up_folder, tmp_path, typed):
     copy = tmp_path / "session"
-    shutil.copytree(short_folder, copy)
+    shutil.copytree(gave_up_folder, copy)
     assert typed("report", copy)[0] == 0
     assert typed("run", "akwanga", "--set", "photos.1.laid=upside down", "--force", "--out", copy)[0] == 1
     assert not (copy / "report.html").exists()
@@ -63,10 +63,10 @@ def test_a_report_of_the_same_session_is_the_same_to_the_byte(akwanga_folder, te
     assert render_report(read_session(akwanga_folder)) == text
 
 
-def test_a_report_can_be_shown_in_the_browser(short_folder, tmp_path, typed, monkeypatch):
+def test_a_report_can_be_shown_in_the_browser(gave_up_folder, tmp_path, typed, monkeypatch):
     shown = []
     monkeypatch.setattr("webbrowser.open", shown.append)
-    assert typed("report", short_folder, "--open", "--out", tmp_path / "r.html")[0] == 0
+    assert typed("report", gave_up_folder, "--open", "--out", tmp_path / "r.html")[0] == 0
     assert shown == [(tmp_path / "r.html").as_uri()]
 
 
@@ -159,16 +159,16 @@ def test_the_page_says_what_gives_the_session_again(page, results):
     assert table.row("software")[1] == results["software"]
 
 
-def test_a_request_is_told_with_what_it_changed(short_folder):
-    page = Page(render_report(read_session(short_folder)))
+def test_a_request_is_told_with_what_it_changed(gave_up_folder):
+    page = Page(render_report(read_session(gave_up_folder)))
     line = page.table("What gives this session again").row("command line")[1]
     assert line == "a7sim run akwanga --seed 1985 --set 'photos.1.laid=upside down' --skill novice"
     changed = {row[0]: row[1] for row in page.table("Changed in the scenario's file").rows}
     assert changed == {"photos.1.laid": "upside down", "observer.skill": '"novice"'}
 
 
-def test_a_session_that_does_not_fit_says_so_and_shows_what_there_is(short_folder):
-    page = Page(render_report(read_session(short_folder)))
+def test_a_session_that_does_not_fit_says_so_and_shows_what_there_is(gave_up_folder):
+    page = Page(render_report(read_session(gave_up_folder)))
     assert "does not fit: picture 102 lies upside down" in "".join(page.text)
     assert "Hours by activity" in [table.caption for table in page.tables]
     assert not [table for table in page.tables if "centres" in table.caption]
@@ -200,10 +200,8 @@ def test_rays_that_do_not_give_the_rms_of_the_results_are_not_drawn(akwanga_fold
     assert pointing_rays(read_session(akwanga_folder), other, "left") == {}
 
 
-def test_a_strip_by_comparator_and_readings_has_a_chapter_for_each_way(tmp_path, typed):
-    out = tmp_path / "ways"
-    assert typed("run", "a8-strip", "--quiet", "--out", out)[0] == 0
-    page = Page(render_report(read_session(out)))
+def test_a_strip_by_comparator_and_readings_has_a_chapter_for_each_way(finished):
+    page = Page(render_report(read_session(finished("a8-strip").folder)))
     text = "".join(page.text)
     for words in ("Strip, comparator", "Strip, A8", "A8 minus comparator"):
         assert words in text
@@ -211,10 +209,8 @@ def test_a_strip_by_comparator_and_readings_has_a_chapter_for_each_way(tmp_path,
     assert not [table for table in page.tables if "Hours" in table.caption]
 
 
-def test_a_grid_test_has_its_residuals_at_the_crosses(tmp_path, typed):
-    out = tmp_path / "grid"
-    assert typed("calibrate", "grid-test", "--points", 9, "--levels", 1, "--quiet", "--out", out)[0] == 0
-    page = Page(render_report(read_session(out)))
+def test_a_grid_test_has_its_residuals_at_the_crosses(finished):
+    page = Page(render_report(read_session(finished("grid test").folder)))
     titles = [table.caption for table in page.tables]
     assert "left projector" in titles and "right projector" in titles
     assert "Right projector: residuals at the crosses" in "".join(page.text)

@@ -1,5 +1,6 @@
 """Every command that seats an operator goes on where it was cut off, to the bytes that it would have left."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -86,7 +87,8 @@ def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridg
     shutil.rmtree(cut / INDEPENDENT)
     cut_off(bridged / INDEPENDENT, cut / INDEPENDENT, 0.3)
     begun = find_resumable(cut, "bridge")
-    run_bridge(begun.scenario, begun.seed, cut, journal_options=JournalOptions(resumes=True))
+    document = run_bridge(begun.scenario, begun.seed, cut, journal_options=JournalOptions(resumes=True))
+    assert json.loads((cut / "results.json").read_text(encoding="utf-8")) == json.loads(json.dumps(document))
     assert without_what_was_torn(files_of(cut)) == files_of(bridged)
 
 

@@ -32,11 +32,10 @@ def residuals(strip, role):
 
 
 @pytest.fixture(scope="module")
-def all_strips(tmp_path_factory):
-    out = tmp_path_factory.mktemp("runs") / "all"
-    done = a7sim("run", "akwanga", "--strips", "all", "--set", "plan.parallax_readings=1", "--out", out)
-    assert done.returncode == 0, done.stderr
-    return json.loads((out / "results.json").read_text(encoding="utf-8")), out, done.stdout
+def all_strips(finished):
+    session = finished("all strips")
+    results = json.loads((session.folder / "results.json").read_text(encoding="utf-8"))
+    return results, session.folder, session.result.stdout
 
 
 def test_without_errors_the_strip_returns_the_ground_within_what_the_counters_leave():
@@ -157,9 +156,8 @@ def test_strips_at_the_command_line_print_a_line_a_strip(all_strips):
     assert "--strips all: expected no --case beside it" in wrong.stderr
 
 
-def test_a_run_without_control_says_that_there_is_no_strip():
-    done = a7sim("run", "dewitt-pair", "--set", "plan.parallax_readings=1")
-    assert done.returncode == 0
+def test_a_run_without_control_says_that_there_is_no_strip(finished):
+    done = finished("dewitt-pair", 7).result
     assert "No strip on the ground: the scenario has no ground control" in done.stdout
 
 
@@ -172,17 +170,16 @@ def test_schuts_strip_comes_back_to_a_millimetre_at_the_command_line():
     assert max(strip["accuracy_m"]["checks"]["largest"].values()) < 0.001
 
 
-def test_the_strip_of_paper_p_is_measured_in_two_ways_side_by_side(tmp_path):
-    done = a7sim("run", "a8-strip", "--out", tmp_path / "p")
-    assert done.returncode == 0, done.stderr
-    document = json.loads((tmp_path / "p" / "results.json").read_text(encoding="utf-8"))
+def test_the_strip_of_paper_p_is_measured_in_two_ways_side_by_side(finished):
+    out, done = finished("a8-strip")
+    document = json.loads((out / "results.json").read_text(encoding="utf-8"))
     assert set(document["ways"]) == {"comparator", "A8"}
     for strip in document["ways"].values():
         assert len(strip["joins"]) == 7
         assert strip["polynomial"]["accuracy_m"]["checks"]["points"] == 36
         assert strip["polynomial"]["accuracy_m"]["control"]["points"] == 9
     assert document["a8_minus_comparator_m"]["points"] >= 36
-    assert {path.name for path in (tmp_path / "p").iterdir()} == {
+    assert {path.name for path in out.iterdir()} == {
         "results.json", "comparator-models.csv", "comparator-strip.csv", "a8-models.csv", "a8-strip.csv"
     }  # fmt: skip
     for words in ("Strip, comparator", "Strip, A8", "After the polynomial of degree 2", "A8 minus"):

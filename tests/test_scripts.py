@@ -1,7 +1,5 @@
 """Operator scripts (issue 6): a session written by hand is a session; what it expects comes, or it says where not."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -9,14 +7,14 @@ import pytest
 from a7sim.errors import A7SimError
 from a7sim.journal.script_runner import ScriptRunner
 from a7sim.journal.scripts import Expect, SourceLocation, find_script, read_script
+from tests.support.processes import a7sim_in_process
 
 SCRIPTS = Path(__file__).parents[1] / "scenarios" / "scripts"
 FIRST = "scenario akwanga seed 7\n"
 
 
 def replay(*arguments):
-    command = [sys.executable, "-m", "a7sim", "replay", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    done = a7sim_in_process("replay", *arguments)
     assert "Traceback" not in done.stderr
     return done
 

@@ -16,6 +16,7 @@ from a7sim.link.client.checked_port import TwinCheckedPort, open_checked_port
 from a7sim.result_documents import as_json
 from a7sim.scenario import load_scenario
 from a7sim.session import run
+from tests.support.gallery import READ_ONCE
 from tests.support.links import new_instrument, serve_on
 from tests.test_cli import ROOT, a7sim
 
@@ -177,13 +178,12 @@ def test_an_operator_at_a_served_instrument_leaves_the_same_results(one_model, k
 
 
 @pytest.mark.slow
-def test_operate_leaves_the_results_of_run_to_the_byte(url, tmp_path):
-    for verb, link in (("run", ()), ("operate", ("--link", url))):
-        once = ("--set", "plan.parallax_readings=1")
-        done = a7sim(verb, "akwanga", "--seed", 7, *once, "--out", tmp_path / verb, "--quiet", *link)
-        assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+def test_operate_leaves_the_results_of_run_to_the_byte(url, finished, tmp_path):
+    run_folder = finished("akwanga read once", 7).folder
+    done = a7sim("operate", "akwanga", "--seed", 7, *READ_ONCE, "--out", tmp_path / "operate", "--quiet", "--link", url)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     for file in ("results.json", "book.csv", "session.jsonl", "strip.csv"):
-        assert (tmp_path / "operate" / file).read_bytes() == (tmp_path / "run" / file).read_bytes()
+        assert (tmp_path / "operate" / file).read_bytes() == (run_folder / file).read_bytes()
 
 
 def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
