@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from a7sim.errors import A7SimError
 from tests.support.gallery import READ_ONCE
 from tests.support.processes import a7sim as in_a_process
 from tests.support.processes import a7sim_in_process
@@ -270,8 +271,10 @@ def test_pages_show_what_a_run_prints():
 
 
 def test_debug_shows_the_traceback():
-    assert "Traceback" in in_a_process("run", "nowhere", "--debug").stderr
+    """In a process, the interpreter prints it; after the command, `--debug` lets the same error through."""
     assert "Traceback" in in_a_process("--debug", "run", "nowhere").stderr
+    with pytest.raises(A7SimError, match="nowhere"):
+        a7sim("run", "nowhere", "--debug")
 
 
 def test_a_session_that_does_not_fit_ends_with_1_and_says_why(tmp_path):

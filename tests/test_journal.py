@@ -138,7 +138,9 @@ def test_a_lost_and_an_exchanged_line_are_found(whole, tmp_path):
 
 
 def test_a_journal_cut_at_any_of_its_last_300_bytes_is_read_to_its_last_whole_line(whole, tmp_path):
+    """The journal of the first part of a session, which is read faster 300 times."""
     data = (whole / "session.jsonl").read_bytes()
+    data = data[: data.index(b"\n", 20_000) + 1]
     path = tmp_path / "session.jsonl"
     for cut in range(1, 301):
         left = data[:-cut]

@@ -6,9 +6,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from a7sim.cli import cli
 from a7sim.operator import OperatorGaveUp, measure_models
 from a7sim.operator.driving.scpi_driver import ScpiDriver
 from a7sim.operator.driving.workstation import Workstation
@@ -127,12 +125,8 @@ def test_five_elements_ask_for_three_rows_and_two_points_in_two_of_them(position
 
 
 @pytest.mark.parametrize("procedure", ["numerical", "empirical"])
-def test_a_strip_with_a_corner_under_water_is_worked_to_its_end_at_the_door(procedure, tmp_path):
-    out = tmp_path / "out"
-    quicker = ["--set", "plan.parallax_readings=1"]
-    arguments = ["run", LAKE, "--seed", "7", "--set", f"plan.procedure={procedure}", *quicker, "--out", str(out)]
-    printed = CliRunner().invoke(cli, arguments)
-    assert printed.exit_code == 0, printed.output
+def test_a_strip_with_a_corner_under_water_is_worked_to_its_end_at_the_door(procedure, finished):
+    out, result = finished("akwanga-lake empirical" if procedure == "empirical" else "akwanga-lake", 7)
     document = json.loads((out / "results.json").read_text())
     assert document["status"] == "complete"
     for model, absent, tie in zip(document["models"], "65", ("C3", "C4"), strict=True):
@@ -146,7 +140,7 @@ def test_a_strip_with_a_corner_under_water_is_worked_to_its_end_at_the_door(proc
     assert ",1025," not in (out / "book.csv").read_text()
     assert document["operator"]["remarks"][0] == "1: not pricked on both prints, done without: 6"
     assert document["strip"]["accuracy_m"]["checks"]["height"] < 0.4
-    (bottom,) = [line for line in printed.output.splitlines() if line.startswith(" " * 10 + "c ")]
+    (bottom,) = [line for line in result.stdout.splitlines() if line.startswith(" " * 10 + "c ")]
     assert bottom.split()[0::2] == ["c", "f", "i", "6"]
 
 
