@@ -44,7 +44,7 @@ def study_page():
     """Return the page of study files."""
     responses = ["", "## Responses", "", "| name | unit | what it is |", "| --- | --- | --- |"]
     responses += [f"| `{each.name}` | {each.unit} | {each.meaning} |" for each in RESPONSES.values()]
-    return _page(STUDY_OPENING, [study_schema], study_schema.Study) + "\n".join(responses) + "\n"
+    return _page(STUDY_OPENING, [study_schema], study_schema.StudyDefinition) + "\n".join(responses) + "\n"
 
 
 def _first_sentence(measure):

@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from a7sim.cli.options import Number
+from a7sim.cli.options import NumberType
 from a7sim.errors import A7SimError
 
 PORT, IDLE_MIN = 8515, 30.0
@@ -25,7 +25,7 @@ _OPTIONS = (
     ),
     click.option(
         "--idle-exit",
-        type=Number(min=0.0, min_open=True, max=1e5),
+        type=NumberType(min=0.0, min_open=True, max=1e5),
         default=IDLE_MIN,
         show_default=True,
         metavar="MIN",

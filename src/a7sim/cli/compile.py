@@ -31,7 +31,7 @@ _POINTS = 400
 )
 @click.option("--line", "lines", multiple=True, metavar="NAME", help="Road or track of the scenario.")
 @options.map_scale
-@click.option("--tremor", type=options.Number(0.0, 500.0), metavar="UM", help="Tremor at photo scale.")
+@click.option("--tremor", type=options.NumberType(0.0, 500.0), metavar="UM", help="Tremor at photo scale.")
 @scenario_options
 @output_options("journal, book, map and results")
 @display_options

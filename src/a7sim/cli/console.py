@@ -38,7 +38,7 @@ KEYMAP, VISITED = "console-keys.toml", "console-visited"
 @options.plain
 @click.option(
     "--acuity",
-    type=options.Number(min=0.0, min_open=True, max=1e4),
+    type=options.NumberType(min=0.0, min_open=True, max=1e4),
     default=ACUITY_UM,
     show_default=True,
     metavar="UM",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli.options import TOKEN_VARIABLE, Number, combine_options, token_file
+from a7sim.cli.options import TOKEN_VARIABLE, NumberType, combine_options, token_file
 from a7sim.errors import A7SimError
 from a7sim.link.client.ports import TIMEOUT_S
 
@@ -17,7 +17,7 @@ _SENDABLE = re.compile(f"[ -~]{{1,{MAX_TOKEN_LENGTH}}}")
 
 _TIMEOUT = click.option(
     "--timeout",
-    type=Number(min=0.0, min_open=True, max=1e6),
+    type=NumberType(min=0.0, min_open=True, max=1e6),
     default=TIMEOUT_S,
     show_default=True,
     metavar="SECONDS",

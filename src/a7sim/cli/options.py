@@ -25,7 +25,7 @@ PLACE = click.Path(path_type=Path)
 """A file or a folder, of which whoever opens it says what it should be."""
 
 
-class Number(click.FloatRange):
+class NumberType(click.FloatRange):
     """A finite number within a range."""
 
     name = "number"
@@ -38,12 +38,12 @@ class Number(click.FloatRange):
         return number
 
 
-def greater_than(bound: float) -> Number:
+def greater_than(bound: float) -> NumberType:
     """Return the kind of the numbers above a bound."""
-    return Number(min=bound, min_open=True)
+    return NumberType(min=bound, min_open=True)
 
 
-HEIGHT = Number(-1e6, 1e6)
+HEIGHT = NumberType(-1e6, 1e6)
 """A height or a counter's reading, below the zero or above."""
 
 COUNT = click.IntRange(min=1)
@@ -142,7 +142,7 @@ plain = click.option("--plain", is_flag=True, help="Say in words what the eyes s
 
 def principal_distance(required: bool) -> Option[Any]:
     """Return --c."""
-    return click.option("--c", "c", type=Number(1.0, 1e5), required=required, help="Principal distance, mm.")
+    return click.option("--c", "c", type=NumberType(1.0, 1e5), required=required, help="Principal distance, mm.")
 
 
 def tcp(default: str, multiple: bool = False) -> Option[Any]:

@@ -8,7 +8,7 @@ from typing import Any
 from a7sim.errors import A7SimError
 from a7sim.session.combination_batch import cases_of_strips
 from a7sim.standard_points import CASES
-from a7sim.study.schema import MAX_CELLS, Factor, Settings, Study
+from a7sim.study.schema import MAX_CELLS, Factor, Settings, StudyDefinition
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Cell:
         return ", ".join(f"{factor} {level}" for factor, level in self.levels.items()) or "as it stands"
 
 
-def make_cells(study: Study) -> list[Cell]:
+def make_cells(study: StudyDefinition) -> list[Cell]:
     """Return the cells of a study, numbered from 1. Raises Mistake for factors that do not make a design."""
     for factor in study.factor:
         _see_that_it_varies(factor, study.design)
@@ -99,7 +99,7 @@ def _see_that_it_varies(factor: Factor, design: str) -> None:
         raise A7SimError(f"{where}: expected two different levels or more, got {', '.join(labels) or 'none'}")
 
 
-def _rows(study: Study) -> Sequence[tuple[Level, ...]]:
+def _rows(study: StudyDefinition) -> Sequence[tuple[Level, ...]]:
     choices = [factor_levels(factor) for factor in study.factor]
     if study.design == "full":
         return list(product(*choices))
@@ -110,7 +110,7 @@ def _rows(study: Study) -> Sequence[tuple[Level, ...]]:
     return [first, *others]
 
 
-def _hypercube(study: Study) -> Sequence[tuple[Level, ...]]:
+def _hypercube(study: StudyDefinition) -> Sequence[tuple[Level, ...]]:
     from scipy.stats import qmc  # noqa: PLC0415
 
     if study.samples is None or not study.factor:

@@ -11,7 +11,7 @@ from a7sim.errors import A7SimError
 from a7sim.geometry import Array
 from a7sim.result_documents import Document
 from a7sim.study.cells import Cell
-from a7sim.study.schema import Hypothesis, Study
+from a7sim.study.schema import Hypothesis, StudyDefinition
 from a7sim.study.statistics import CONFIDENCE, binned, compare_cells, holm, regress_on
 
 SMALL_EFFECT = 0.2
@@ -26,7 +26,7 @@ Values = Callable[[str], Array]
 """Replicates ``(cells, n)`` of a response."""
 
 
-def validate_claims(study: Study, cells: Sequence[Cell]) -> None:
+def validate_claims(study: StudyDefinition, cells: Sequence[Cell]) -> None:
     """Raise Mistake for a claim about factors, levels or responses that the study has not."""
     for number, claim in enumerate(study.claim, start=1):
         where = f"claim {number}"

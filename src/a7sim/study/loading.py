@@ -18,7 +18,7 @@ from a7sim.session.strip_combinations import check_strips_possible
 from a7sim.study.cells import Cell, make_cells, make_strip_cells
 from a7sim.study.claims import validate_claims
 from a7sim.study.responses import Response, find_response
-from a7sim.study.schema import Study
+from a7sim.study.schema import StudyDefinition
 from a7sim.study.setting_limits import settings_out_of_range
 from a7sim.study.simulating import Task
 from a7sim.table_files import describe_missing_file, read_toml
@@ -41,7 +41,7 @@ class LoadedStudy:
     A scenario gives those of one cell, or of as many that follow each other as its `Task` says.
     """
 
-    study: Study
+    study: StudyDefinition
     cells: tuple[Cell, ...]
     scenarios: tuple[Scenario, ...]
     responses: tuple[Response, ...]
@@ -113,7 +113,7 @@ def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> 
     mistakes = [error.replace("the scenario", "the study") for error in schema_errors(raw, _expected())]
     if mistakes:
         raise StudyError(source, mistakes)
-    study = msgspec.convert(raw, Study)
+    study = msgspec.convert(raw, StudyDefinition)
     try:
         cells, responses = make_cells(study), [find_response(name) for name in study.responses]
     except A7SimError as error:
@@ -131,7 +131,7 @@ def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> 
     return LoadedStudy(study, tuple(cells), scenarios, tuple(responses), source)
 
 
-def _mistakes_between(study: Study) -> list[str]:
+def _mistakes_between(study: StudyDefinition) -> list[str]:
     mistakes = []
     names = [factor.name for factor in study.factor]
     if len(set(names)) < len(names):
@@ -146,7 +146,7 @@ def _mistakes_between(study: Study) -> list[str]:
     return mistakes
 
 
-def _models_of_strips(study: Study, scenarios: Sequence[Scenario]) -> list[str]:
+def _models_of_strips(study: StudyDefinition, scenarios: Sequence[Scenario]) -> list[str]:
     """Return the names of the models whose cases are combined. Raises Mistake where that cannot be done."""
     paths = [*study.settings, *(path for cell in make_cells(study) for path in cell.settings)]
     if "plan.case" in paths or study.design != "full":
@@ -159,7 +159,7 @@ def _models_of_strips(study: Study, scenarios: Sequence[Scenario]) -> list[str]:
     return list(names.pop())
 
 
-def _scenarios(study: Study, cells: Sequence[Cell], folder: Path, source: str) -> tuple[Scenario, ...]:
+def _scenarios(study: StudyDefinition, cells: Sequence[Cell], folder: Path, source: str) -> tuple[Scenario, ...]:
     """Return the scenario of every cell. Raises StudyError with what is wrong in the first cell that cannot be."""
     beside = folder / study.scenario
     name = beside if beside.is_file() else study.scenario
@@ -179,4 +179,4 @@ def _scenarios(study: Study, cells: Sequence[Cell], folder: Path, source: str) -
 
 @cache
 def _expected() -> msgspec.inspect.Type:
-    return msgspec.inspect.type_info(Study)
+    return msgspec.inspect.type_info(StudyDefinition)

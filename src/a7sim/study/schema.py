@@ -61,7 +61,7 @@ class Hypothesis(_Data, frozen=True, kw_only=True):
     depends_on: Annotated[list[str], Meta(min_length=1, description="1 response of the study or more")] | None = None
 
 
-class Study(_Data, frozen=True, kw_only=True):
+class StudyDefinition(_Data, frozen=True, kw_only=True):
     """A question, the scenario that is asked, and how often."""
 
     schema_version: Literal[1]

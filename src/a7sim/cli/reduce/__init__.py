@@ -8,7 +8,7 @@ import click
 from rich.console import Console
 
 from a7sim import processing
-from a7sim.cli.options import FILE, HEIGHT, Number, principal_distance
+from a7sim.cli.options import FILE, HEIGHT, NumberType, principal_distance
 from a7sim.cli.reduce import options, tables
 from a7sim.errors import A7SimError
 from a7sim.processing import ProcessingResult
@@ -51,7 +51,7 @@ def command() -> None:
 )
 @click.option(
     "--count-mm",
-    type=Number(min=0.0, min_open=True, max=10.0),
+    type=NumberType(min=0.0, min_open=True, max=10.0),
     help="Size of a count, mm (1 for counts in mm): tells how the film has shrunk, and the principal distance to set.",
 )
 @click.option(
@@ -60,8 +60,10 @@ def command() -> None:
     multiple=True,
     help="Correct the points and bring them to the principal point; may be given several times.",
 )
-@click.option("--flying-height", type=Number(1.0, 30000.0), help="Of the camera above the sea, m.")
-@click.option("--ground-height", type=Number(-500.0, 9000.0), default=0.0, show_default=True, help="Above the sea, m.")
+@click.option("--flying-height", type=NumberType(1.0, 30000.0), help="Of the camera above the sea, m.")
+@click.option(
+    "--ground-height", type=NumberType(-500.0, 9000.0), default=0.0, show_default=True, help="Above the sea, m."
+)
 @options.documented
 def interior(
     counts: Path,
@@ -251,7 +253,7 @@ def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, 
 @options.ground(required=True)
 @click.option(
     "--height-weight",
-    type=Number(min=1e-6, max=1e6),
+    type=NumberType(min=1e-6, max=1e6),
     default=1.0,
     show_default=True,
     help="Weight of equations in height against those in plan.",

@@ -4,20 +4,20 @@ from typing import Any
 
 import click
 
-from a7sim.cli.options import FILE, Number, Option, as_document, combine_options, option_help, out_folder
+from a7sim.cli.options import FILE, NumberType, Option, as_document, combine_options, option_help, out_folder
 
 documented = combine_options(out_folder("results.json and tables as CSV; may be there already"), as_document)
 
 principal_point = combine_options(
-    click.option("--x0", type=Number(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
-    click.option("--y0", type=Number(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
+    click.option("--x0", type=NumberType(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
+    click.option("--y0", type=NumberType(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
 )
 
 
 def base(default: str, length: float | None = None) -> Option[Any]:
     """Return --bx, which is a length, or what `default` says, where it is left out."""
     return click.option(
-        "--bx", type=Number(0.001, 1e6), default=length, help=option_help("Length of the base, mm", default)
+        "--bx", type=NumberType(0.001, 1e6), default=length, help=option_help("Length of the base, mm", default)
     )
 
 

@@ -90,7 +90,7 @@ def _graded(progress: Progress, attempt: Attempt) -> Grade:
 @click.argument("exercise", required=False, shell_complete=exercise_argument)
 @click.option(
     "--every",
-    type=options.Number(min=0.1, max=3600.0),
+    type=options.NumberType(min=0.1, max=3600.0),
     default=1.0,
     show_default=True,
     metavar="SECONDS",
