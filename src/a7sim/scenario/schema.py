@@ -45,11 +45,11 @@ Reading = Annotated[float, Meta(ge=-999999, le=999999, description="a counter re
 Ppm = Annotated[float, Meta(ge=-5000, le=5000, description="parts per million from -5000 to 5000")]
 
 
-class _Data(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Frozen data read from a file; unknown keys are mistakes."""
+class FileRecord(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Frozen record read from a file. An unknown key is an error."""
 
 
-class Fiducial(_Data, frozen=True, kw_only=True):
+class Fiducial(FileRecord, frozen=True, kw_only=True):
     """A fiducial mark by its calibrated place."""
 
     name: Name
@@ -57,7 +57,7 @@ class Fiducial(_Data, frozen=True, kw_only=True):
     y: PictureMm
 
 
-class Camera(_Data, frozen=True, kw_only=True):
+class Camera(FileRecord, frozen=True, kw_only=True):
     """A calibrated taking camera."""
 
     name: Name = "RC5"
@@ -69,7 +69,7 @@ class Camera(_Data, frozen=True, kw_only=True):
     """k1, k2, ... of the outward displacement k1 r^3 + k2 r^5 + ..., r and result in mm."""
 
 
-class FilmDeformation(_Data, frozen=True, kw_only=True):
+class FilmDeformation(FileRecord, frozen=True, kw_only=True):
     """How film and pricking deform the imaged coordinates; standard deviations are drawn anew per photograph."""
 
     shrinkage_ppm: tuple[Ppm, Ppm] = (0.0, 0.0)
@@ -84,7 +84,7 @@ class FilmDeformation(_Data, frozen=True, kw_only=True):
     """Identity of a point from one photograph to the next, each coordinate."""
 
 
-class Measured(_Data, frozen=True, kw_only=True):
+class Measured(FileRecord, frozen=True, kw_only=True):
     """Image coordinates that somebody measured: the photograph comes from a file."""
 
     file: Annotated[str, Meta(min_length=1, max_length=255, description="a file name of 1 to 255 characters")]
@@ -98,7 +98,7 @@ class Measured(_Data, frozen=True, kw_only=True):
     """Size of a count; taken from the fiducials when absent, which hides any uniform film shrinkage."""
 
 
-class Photo(_Data, frozen=True, kw_only=True):
+class Photo(FileRecord, frozen=True, kw_only=True):
     """A photograph: where it was taken from, or the file of its measured image coordinates."""
 
     name: Name
@@ -113,7 +113,7 @@ class Photo(_Data, frozen=True, kw_only=True):
     """How the picture was laid in its carrier; upside down is a slip for training."""
 
 
-class Water(_Data, frozen=True, kw_only=True):
+class Water(FileRecord, frozen=True, kw_only=True):
     """A sheet of water: no point on it can be pricked, and its picture shows nothing to set a mark on."""
 
     name: Name = "lake"
@@ -121,7 +121,7 @@ class Water(_Data, frozen=True, kw_only=True):
     """East and north along the shore, once round."""
 
 
-class Terrain(_Data, frozen=True, kw_only=True):
+class Terrain(FileRecord, frozen=True, kw_only=True):
     """Rolling ground about a mean height."""
 
     mean_height: Metres = 0.0
@@ -132,14 +132,14 @@ class Terrain(_Data, frozen=True, kw_only=True):
     water: list[Water] = []
 
 
-class Air(_Data, frozen=True, kw_only=True):
+class Air(FileRecord, frozen=True, kw_only=True):
     """Departures of the rays from straight lines over a plane, as switches."""
 
     earth_curvature: bool = False
     refraction: bool = False
 
 
-class GroundPoint(_Data, frozen=True, kw_only=True):
+class GroundPoint(FileRecord, frozen=True, kw_only=True):
     """A signalised ground point; without Z it stands on the terrain."""
 
     point: Name
@@ -149,7 +149,7 @@ class GroundPoint(_Data, frozen=True, kw_only=True):
     role: Literal["control", "plan", "height", "check"] = "check"
 
 
-class LinePlan(_Data, frozen=True, kw_only=True):
+class LinePlan(FileRecord, frozen=True, kw_only=True):
     """A line that is seen on the ground: a smooth curve through vertices, lighter than what lies beside it."""
 
     name: Name
@@ -159,7 +159,7 @@ class LinePlan(_Data, frozen=True, kw_only=True):
     """East and north."""
 
 
-class Published(_Data, frozen=True, kw_only=True):
+class Published(FileRecord, frozen=True, kw_only=True):
     """A relative orientation that others published, to stand beside the instrument's."""
 
     omega: Gon
@@ -177,7 +177,7 @@ class Published(_Data, frozen=True, kw_only=True):
     source: Text = "the scenario"
 
 
-class ModelPlan(_Data, frozen=True, kw_only=True):
+class ModelPlan(FileRecord, frozen=True, kw_only=True):
     """Two photographs to be set up as a model."""
 
     name: Name
@@ -189,7 +189,7 @@ class ModelPlan(_Data, frozen=True, kw_only=True):
     published: Published | None = None
 
 
-class ProjectorCondition(_Data, frozen=True, kw_only=True):
+class ProjectorCondition(FileRecord, frozen=True, kw_only=True):
     """Faults of one projector, zero for a faultless one."""
 
     principal_distance_mm: OffsetMm = 0.0
@@ -214,7 +214,7 @@ MaintenanceClass = Literal["new", "serviced", "worn"]
 """Classes of maintenance (docs/decisions/0006-condition.md)."""
 
 
-class Condition(_Data, frozen=True, kw_only=True):
+class Condition(FileRecord, frozen=True, kw_only=True):
     """The state of maintenance of an instrument; all zero is a faultless one (never true)."""
 
     upkeep: MaintenanceClass | None = None
@@ -244,7 +244,7 @@ class Condition(_Data, frozen=True, kw_only=True):
     """Share of the passes over zero at which the last drum of the X, Y or Z counter does not carry the next one."""
 
 
-class GridTest(_Data, frozen=True, kw_only=True):
+class GridTest(FileRecord, frozen=True, kw_only=True):
     """What the last adjustment of an A8 left in it, drawn anew for every session (docs/decisions/0005-a8-strip.md)."""
 
     local_um: Sigma = 5.5
@@ -256,7 +256,7 @@ class GridTest(_Data, frozen=True, kw_only=True):
     """Each coordinate; both known within 0.01 to 0.02 mm."""
 
 
-class Instrument(_Data, frozen=True, kw_only=True):
+class Instrument(FileRecord, frozen=True, kw_only=True):
     """Which plotter stands in the room, and in what state."""
 
     variant: Literal["A7", "A8"] = "A7"
@@ -284,7 +284,7 @@ SlipKind = Literal[
 ]
 
 
-class PlannedSlip(_Data, frozen=True, kw_only=True):
+class PlannedSlip(FileRecord, frozen=True, kw_only=True):
     """A slip that is made for certain, once, at the first occasion that fits; what is empty fits everywhere."""
 
     kind: SlipKind
@@ -295,7 +295,7 @@ class PlannedSlip(_Data, frozen=True, kw_only=True):
     """Name of the point; of the fitting for a forgotten lever, of the element for one that is not re-read."""
 
 
-class Observer(_Data, frozen=True, kw_only=True):
+class Observer(FileRecord, frozen=True, kw_only=True):
     """The person in the chair. um are at photo scale; sources in docs/decisions/0004-observer.md and 0008-skill.md."""
 
     skill: Skill | None = None
@@ -373,7 +373,7 @@ OBSERVER_IN_WORDS = f"{', '.join(repr(skill) for skill in get_args(Skill))} or a
 CentreLevels = Annotated[list[Reading], Meta(min_length=2, max_length=10, description="2 to 10 counter readings")]
 
 
-class Plan(_Data, frozen=True, kw_only=True):
+class Plan(FileRecord, frozen=True, kw_only=True):
     """The settings and the procedure on the operator's job sheet."""
 
     method: Literal["independent", "dependent"] = "independent"
@@ -417,7 +417,7 @@ class Plan(_Data, frozen=True, kw_only=True):
     """Whether every model is also levelled and scaled at the instrument, on the control that it shows."""
 
 
-class GridPlate(_Data, frozen=True, kw_only=True):
+class GridPlate(FileRecord, frozen=True, kw_only=True):
     """A glass plate with crosses in equal squares, with which projectors are tested; it lies in the drawer."""
 
     name: Name = "grid"
@@ -463,7 +463,7 @@ class GridPlate(_Data, frozen=True, kw_only=True):
         return replace(camera, name=self.name, principal_point=(0.0, 0.0), distortion=[])
 
 
-class Comparator(_Data, frozen=True, kw_only=True):
+class Comparator(FileRecord, frozen=True, kw_only=True):
     """A comparator, and how its readings become models."""
 
     kind: Literal["mono", "stereo"] = "mono"
@@ -482,7 +482,7 @@ class Comparator(_Data, frozen=True, kw_only=True):
     """P 1.1-1.8, S equations 2 to 5, or the y-parallax equations of thesis 2.34, iterated."""
 
 
-class StripPlan(_Data, frozen=True, kw_only=True):
+class StripPlan(FileRecord, frozen=True, kw_only=True):
     """How models become a strip on the ground, whoever measured them."""
 
     join: Literal["points", "centre", "heights"] = "points"
@@ -496,7 +496,7 @@ StripMethod = Literal["plotter", "comparator", "readings", "bridge"]
 operator who bridges it, base in and base out in turn."""
 
 
-class Scenario(_Data, frozen=True, kw_only=True):
+class Scenario(FileRecord, frozen=True, kw_only=True):
     """A flight, a camera, photographs, an instrument with its faults and an operator with theirs."""
 
     schema_version: Literal[1]

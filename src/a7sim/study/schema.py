@@ -2,9 +2,9 @@
 
 from typing import Annotated, Any, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta
 
-from a7sim.scenario.schema import Name, Text
+from a7sim.scenario.schema import FileRecord, Name, Text
 
 MAX_REPLICATES = 1_000_000
 MAX_CELLS = 2_000
@@ -15,11 +15,7 @@ Settings = dict[str, Any]
 """Values of a scenario by their path, as `--set` names them."""
 
 
-class _Data(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Frozen data read from a file; unknown keys are mistakes."""
-
-
-class Factor(_Data, frozen=True, kw_only=True):
+class Factor(FileRecord, frozen=True, kw_only=True):
     """What a study varies: one value of the scenario, or several together under a name."""
 
     name: Name
@@ -32,7 +28,7 @@ class Factor(_Data, frozen=True, kw_only=True):
     """Of a number in a Latin hypercube; in place of levels."""
 
 
-class Precision(_Data, frozen=True, kw_only=True):
+class Precision(FileRecord, frozen=True, kw_only=True):
     """How well the mean of a response has to be known in every cell before a study ends."""
 
     response: str
@@ -40,7 +36,7 @@ class Precision(_Data, frozen=True, kw_only=True):
     """Of the 95 % interval of its mean."""
 
 
-class Hypothesis(_Data, frozen=True, kw_only=True):
+class Hypothesis(FileRecord, frozen=True, kw_only=True):
     """What somebody holds to be so, and the cells or responses that tell whether it is.
 
     `differ`, two groups of levels of a factor that are said to differ; `alike`, levels that are said to give the same;
@@ -61,7 +57,7 @@ class Hypothesis(_Data, frozen=True, kw_only=True):
     depends_on: Annotated[list[str], Meta(min_length=1, description="1 response of the study or more")] | None = None
 
 
-class StudyDefinition(_Data, frozen=True, kw_only=True):
+class StudyDefinition(FileRecord, frozen=True, kw_only=True):
     """A question, the scenario that is asked, and how often."""
 
     schema_version: Literal[1]

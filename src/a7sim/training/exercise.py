@@ -5,6 +5,8 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct, field
 
+from a7sim.scenario.schema import FileRecord
+
 SCHEMA_VERSION = 1
 
 FULL_MARKS = 100.0
@@ -20,11 +22,7 @@ Id = Annotated[
 Points = Annotated[float, Meta(ge=0, le=FULL_MARKS, description="points, 0 to 100")]
 
 
-class _Data(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Frozen data read from a file; unknown keys are mistakes."""
-
-
-class MetricSpec(_Data, frozen=True, kw_only=True):
+class MetricSpec(FileRecord, frozen=True, kw_only=True):
     """A registered measure with its options."""
 
     measure: Words
@@ -51,14 +49,14 @@ class Criterion(MetricSpec, frozen=True, kw_only=True):
     """Whether who fails it fails the exercise."""
 
 
-class Hint(_Data, frozen=True, kw_only=True):
+class Hint(FileRecord, frozen=True, kw_only=True):
     """A hint and what it costs, in points."""
 
     text: Words
     cost: Points
 
 
-class PlayedRun(_Data, frozen=True, kw_only=True):
+class PlayedRun(FileRecord, frozen=True, kw_only=True):
     """Something done by a script beside the exercise, or by a procedure of the virtual operator."""
 
     script: str = ""
@@ -78,7 +76,7 @@ class FaultyRun(PlayedRun, frozen=True, kw_only=True):
     why: Words
 
 
-class Exercise(_Data, frozen=True, kw_only=True):
+class Exercise(FileRecord, frozen=True, kw_only=True):
     """An exercise."""
 
     schema_version: Literal[1]
