@@ -296,7 +296,7 @@ class PlannedSlip(FileRecord, frozen=True, kw_only=True):
 
 
 class Observer(FileRecord, frozen=True, kw_only=True):
-    """The person in the chair. um are at photo scale; sources in docs/decisions/0004-observer.md and 0008-skill.md."""
+    """The person in the chair. um are at photo scale; sources in docs/decisions/0004-observer.md and 0008-operator-skill.md."""
 
     skill: Skill | None = None
     """Profile that gives all that is not said here; without one, what stands below."""

@@ -1,4 +1,4 @@
-"""Skill profiles: what of an observer differs from one operator to the next (docs/decisions/0008-skill.md)."""
+"""Skill profiles: what of an observer differs from one operator to the next (docs/decisions/0008-operator-skill.md)."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
