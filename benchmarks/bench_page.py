@@ -110,7 +110,8 @@ def page(outcomes: Iterable[Outcome], surroundings: Surroundings, command: str, 
     lines = [
         "# Benchmarks",
         "",
-        f"Written by `{command}`, not by hand. [Targets and measurements](targets.md) has the targets of the whole project.",
+        f"Written by `{command}`, not by hand. "
+        "[Targets and measurements](targets.md) has the targets of the whole project.",
         "",
         str(surroundings),
         "",

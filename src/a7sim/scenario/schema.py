@@ -296,7 +296,7 @@ class PlannedSlip(FileRecord, frozen=True, kw_only=True):
 
 
 class Observer(FileRecord, frozen=True, kw_only=True):
-    """The person in the chair. um are at photo scale; sources in docs/decisions/0004-observer.md and 0008-operator-skill.md."""
+    """The operator as a person; um at photo scale. Sources: docs/decisions/0004-observer.md, 0008-operator-skill.md."""
 
     skill: Skill | None = None
     """Profile that gives all that is not said here; without one, what stands below."""

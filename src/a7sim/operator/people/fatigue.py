@@ -1,4 +1,4 @@
-"""How a person's eyes and attention change over the day: warm-up, fatigue, breaks (docs/decisions/0008-operator-skill.md)."""
+"""Fatigue and breaks of an operator (docs/decisions/0008-operator-skill.md)."""
 
 import numpy as np
 
