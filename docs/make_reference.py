@@ -1,4 +1,4 @@
-"""Write the pages of docs/reference, the list of decisions and the picture of the house, each from the thing itself.
+"""Write the pages of docs/reference, the list of decisions and the picture of the packages, each from the thing itself.
 
 python docs/make_reference.py            # writes them
 python docs/make_reference.py --check    # says whether they are fresh, exit code 1 if not
@@ -10,7 +10,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from makers import commands, files, house, schemas
+from makers import commands, files, packages, schemas
 
 DOCS = Path(__file__).parent
 
@@ -39,7 +39,7 @@ def pages(session):
         "reference/study.md": schemas.study_page(),
         "reference/files.md": files.page(session),
         "decisions/index.md": decisions_page(),
-        "figures/house.svg": house.picture(),
+        "figures/packages.svg": packages.picture(),
     }
 
 
