@@ -1,5 +1,4 @@
-"""Tally of a study's replicates: moments and quantiles of all, and a sample of single replicates, in any chunk sizes.
-"""
+"""Tally of a study's replicates: moments and quantiles of all, and a sample of single replicates."""
 
 from dataclasses import dataclass
 

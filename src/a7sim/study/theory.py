@@ -81,7 +81,9 @@ def theory_limits(scenario: Scenario) -> Sequence[str]:
 
 
 def theory_comparison(scenario: Scenario, response: str, mean: float, sd: float) -> Document:
-    """Return the theoretical precision of a response and the ratio of the simulated one to it; empty without a theory.
+    """Return the theoretical precision of a response and the ratio of the simulated one to it.
+
+    Empty without a theory.
     """
     predicted = predicted_sd(scenario, response)
     if predicted is None:
