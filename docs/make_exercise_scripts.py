@@ -1,4 +1,4 @@
-"""Write the reference and faulty scripts of the exercises that need an observer: `python docs/make_exercise_scripts.py`.
+"""Write the reference and faulty scripts of the exercises that need eyes: `python docs/make_exercise_scripts.py`.
 
 The driver looks through the eyepieces of the exercise's own instrument and writes its settings into a script.
 """
