@@ -178,7 +178,7 @@ def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path, monkeypatch)
 
 def test_an_exercise_is_shown_with_what_is_graded(train):
     out = train("list", "4")[1]
-    assert "The drum reads to 0.01 mm" in out and "25  the other by stands at zero" in out
+    assert "The drum reads to 0.01 mm" in out and "25  the other by is at zero" in out
 
 
 def test_reports_of_student_and_class_in_every_form(train, tmp_path, monkeypatch):
