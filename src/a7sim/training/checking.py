@@ -1,4 +1,4 @@
-"""Checking exercises: the reference passes, every faulty one fails for its reason, no criterion is dead."""
+"""Checks of exercises: the reference passes, each faulty run fails for its reason, each criterion decides something."""
 
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -22,12 +22,12 @@ from a7sim.training.variation import scenario_for
 MIN_HINTS, MIN_FAULTY = 2, 2
 
 NEVER = 1e12
-"""A limit that everything, or nothing, reaches."""
+"""Limit that all values, or none, reach."""
 
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What was found of an exercise: sentences on what is missing or wrong, none where all is well."""
+    """Result of the check of an exercise: sentences on errors, empty without errors."""
 
     name: str
     faults: tuple[str, ...]
@@ -36,7 +36,7 @@ class CheckResult:
 
 @dataclass(frozen=True)
 class _Run:
-    """Something played: its account, and what every criterion's measure came to, which no change of a limit changes."""
+    """Run with its record and the result of each criterion's metric, which changed limits do not affect."""
 
     record: AttemptRecord
     found: Sequence[MetricResult]
@@ -46,12 +46,12 @@ class _Run:
         return cls(record, evaluate_metrics(record))
 
     def grade(self, exercise: Exercise) -> Grade:
-        """Grade it by the limits and weights of an exercise with the same measures."""
+        """Return the grade with the limits and weights of an exercise with the same metrics."""
         return grade_by(exercise, self.found, self.record.seconds)
 
 
 def check_exercise(exercise_folder: ExerciseFolder) -> CheckResult:
-    """Check an exercise whole."""
+    """Check an exercise completely."""
     exercise = exercise_folder.exercise
     faults = list(_of_form(exercise_folder))
     if not _all_there(exercise_folder):
@@ -107,9 +107,9 @@ def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
 
 
 def _accounts(exercise_folder: ExerciseFolder, place: Path) -> dict[str, AttemptRecord]:
-    """Return the accounts of the reference, the faulty ones, who does nothing, who is slow, who stops early.
+    """Return the records of the reference, of the faulty runs, and of runs that do nothing, are slow or stop early.
 
-    The reference is an attempt as a student's, journal and all; the others are rehearsed.
+    The reference is an attempt with a journal, as a student's; the others are dry runs.
     """
     exercise = exercise_folder.exercise
     rehearsals = DryRuns(exercise_folder)
@@ -167,9 +167,9 @@ def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
 
 
 def _dead_criteria(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
-    """Yield what of the criteria decides nothing: limits and weights that may be anything, and no verdict changes.
+    """Yield the criteria that decide nothing: limits and weights whose change does not change any verdict.
 
-    Who does nothing at all is left out: they fail everything.
+    The run without any action is left out: it fails all criteria.
     """
     done = [run for name, run in runs.items() if name != "nothing"]
     verdicts = [_verdict(run, exercise) for run in done]

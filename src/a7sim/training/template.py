@@ -1,4 +1,4 @@
-"""The skeleton of a new exercise, which `check` goes through and says what is still missing."""
+"""Template of a new exercise; `check-exercise` lists what is missing."""
 
 from pathlib import Path
 
@@ -94,7 +94,7 @@ REC "1011"
 
 
 def write_template(folder: Path, number: int) -> Path:
-    """Write the skeleton of an exercise into a new folder and return it. Raises Mistake where that cannot be done."""
+    """Write the template of an exercise into a new folder and return it. Raises A7SimError if that fails."""
     title = folder.name.lstrip("0123456789-_").replace("-", " ").strip().capitalize() or "A new exercise"
     try:
         folder.mkdir(parents=True)
