@@ -25,12 +25,14 @@ LOOKS = 8
 class Driver:
     """Observer without errors that writes its actions into a script."""
 
-    def __init__(self, room, seed, intro):
-        port = InProcessSerial(instrument=room.instrument, clock=room.clock, client="student", timeout=1.0)
-        self.client, self.room = Client(port), room
-        self.model = room.record().model
+    def __init__(self, environment, seed, intro):
+        port = InProcessSerial(
+            instrument=environment.instrument, clock=environment.clock, client="student", timeout=1.0
+        )
+        self.client, self.environment = Client(port), environment
+        self.model = environment.record().model
         self.lines = [
-            f"scenario {room.exercise_folder.exercise.scenario} seed {seed}",
+            f"scenario {environment.exercise_folder.exercise.scenario} seed {seed}",
             "",
             *(f"# {each}" for each in intro),
         ]
@@ -42,7 +44,7 @@ class Driver:
         self.lines.append(f"{line:<34}# {comment}" if comment else line)
 
     def wait(self, seconds, comment=""):
-        self.room.clock.spend(seconds)
+        self.environment.clock.advance(seconds)
         self.lines.append(f"{f'wait {seconds}':<34}# {comment}" if comment else f"wait {seconds}")
 
     def remark(self, *texts):
@@ -60,7 +62,7 @@ class Driver:
 
     def fuse(self, point, follow="XYZ", tell=True):
         """Move the mark onto a point, with Z onto the ground too, and write the setting."""
-        scale = 1e-3 * self.room.scenario.plan.projection_height / self.room.scenario.camera.c
+        scale = 1e-3 * self.environment.scenario.plan.projection_height / self.environment.scenario.camera.c
         bx = self.client.numbers("BASE:BX?")[0]
         for _ in range(LOOKS):
             lx, ly, rx, ry = self.seen(point)
@@ -78,7 +80,7 @@ class Driver:
 
     def point_with_left_eye(self, point, side):
         """Bring the mark onto a point by the wheels, X approached from one side; return the X reading."""
-        scale = 1e-3 * self.room.scenario.plan.projection_height / self.room.scenario.camera.c
+        scale = 1e-3 * self.environment.scenario.plan.projection_height / self.environment.scenario.camera.c
         for _ in range(LOOKS):
             dx, dy = self.client.numbers(f'EYEP1? "{point}"')
             x, y = dx * scale, dy * scale
@@ -90,14 +92,14 @@ class Driver:
             self.say(f"WHE:X {x:.2f};Y {y:.2f}")
         return self.client.numbers("COUN:X?")[0]
 
-    def come_to(self, position, rough):
+    def select_point(self, position, rough):
         self.client.send("DRIV:X {:.2f};Y {:.2f}".format(*rough))
         self.fuse(self.name(position))
 
     def clear(self, element, by):
         """Turn by until the parallax is cleared to the least count; return the drum reading."""
         point, sense = self.name(by), -1.0 if element == "by1" else 1.0
-        scale = 1e-3 * self.room.scenario.plan.projection_height / self.room.scenario.camera.c
+        scale = 1e-3 * self.environment.scenario.plan.projection_height / self.environment.scenario.camera.c
         at = self.client.numbers(f"{header(element)}?")[0]
         for _ in range(LOOKS):
             self.fuse(point, "XYZ", tell=False)

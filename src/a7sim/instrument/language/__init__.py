@@ -1,4 +1,4 @@
-"""The command language of the instrument, without I/O: bytes in, bytes and events out (protocol.md)."""
+"""Command language of the instrument, without I/O: bytes in, bytes and events out (protocol.md)."""
 
 from a7sim.instrument.language.engine import MAX_BUFFERED_BYTES, MAX_LINE_LENGTH, MAX_REPLY, Engine, loggable_reply
 from a7sim.instrument.language.errors import ErrorNumber, format_entry

@@ -1,4 +1,4 @@
-"""What the commands of several subsystems share."""
+"""Functions shared by the commands of several subsystems."""
 
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,7 @@ LIMIT = Choice(("MINimum", "MAXimum", "DEFault"), optional=True)
 
 
 def autograph_for(engine: "Engine") -> "Autograph":
-    """Return the instrument that an engine speaks for."""
+    """Return the instrument of an engine."""
     return engine.instrument.autograph
 
 
@@ -36,7 +36,7 @@ def format_fixed(value: float, decimals: int = 2) -> str:
 
 
 def text_argument(text: str) -> str:
-    """Return a text. Raises LanguageError for an empty one and for one that is too long."""
+    """Return a text argument. Raises CommandError for an empty or too long text."""
     if not 1 <= len(text) <= MAX_TEXT_LENGTH:
         raise CommandError(
             ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {MAX_TEXT_LENGTH} characters, got {len(text)}"

@@ -1,4 +1,4 @@
-"""Photographs in their carriers, and what the eyepieces show."""
+"""Photographs in their carriers, and the views of the eyepieces."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING

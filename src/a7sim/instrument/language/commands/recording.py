@@ -28,7 +28,7 @@ _COMMON_TO_BOTH = {"BX": "bx", "CPHI": "common_phi"}
 
 
 def recorded_element(word: str) -> str:
-    """Return the element that a word in a registration names. Raises LanguageError."""
+    """Return the element named by a word of a registration. Raises CommandError."""
     if word in _COMMON_TO_BOTH:
         return _COMMON_TO_BOTH[word]
     found = re.fullmatch(r"([A-Z]+)([12])", word)
