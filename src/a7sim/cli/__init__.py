@@ -1,4 +1,4 @@
-"""The command line: one thin click command a verb."""
+"""Command line: one click command per subcommand."""
 
 import io
 import sys
@@ -41,14 +41,14 @@ _VERBS = {
 @click.version_option(a7sim.__version__, prog_name="a7sim")
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 def cli(debug: bool) -> None:
-    """A simulated Wild A7 stereoplotter and the operator who works it.
+    """A simulated Wild A7 stereoplotter and its virtual operator.
 
     Example: a7sim run akwanga
     """
 
 
 def main() -> None:
-    """Run the command line; bad input gets one sentence and exit code 2."""
+    """Run the command line; bad input gives one sentence and exit code 2."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     for stream in (sys.stdout, sys.stderr):
@@ -83,7 +83,7 @@ def main() -> None:
 
 
 def _told(error: OSError) -> int:
-    """Say what the operating system refused; a reader who went away needs to be told nothing."""
+    """Print an error of the operating system; a closed output pipe is silent."""
     if isinstance(error, BrokenPipeError):
         sys.stdout = None
         return 1

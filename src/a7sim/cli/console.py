@@ -1,4 +1,4 @@
-"""`a7sim console`: sit down at the instrument."""
+"""`a7sim console`: operate the instrument in a terminal."""
 
 import sys
 from dataclasses import replace
@@ -18,7 +18,7 @@ from a7sim.errors import A7SimError
 from a7sim.scenario import load_scenario
 
 USUAL = "akwanga"
-"""The scenario when nothing is named."""
+"""Default scenario."""
 
 THEMES = ("enamel", "dark", "light", "contrast")
 KEYMAP, VISITED = "console-keys.toml", "console-visited"
@@ -80,9 +80,9 @@ def command(
     token_file: Path | None,
     **_browser: Any,
 ) -> None:
-    """Sit down at the instrument of SCENARIO, or at a served one: the plotter on a terminal, for a person.
+    """Operate the instrument of SCENARIO, or a served one, in a terminal.
 
-    All that is done is journalled, and the next console at the same scenario, seed and variant offers to go on.
+    All actions are journalled, and the next console with the same scenario, seed and variant offers to resume.
 
     Example: a7sim console akwanga
     """
@@ -134,7 +134,7 @@ def command(
 
 
 def _refuse_beside(option: str, given: str | None, **others: object) -> None:
-    """See that an option comes without what is for an instrument in this process. Raises Mistake."""
+    """Raise A7SimError if an option is combined with options of an instrument in this process."""
     if given is not None:
         words = {"scenario": "SCENARIO", "go_on": "--go-on" if others.get("go_on") else "--anew"}
         beside = [words.get(name, f"--{name}") for name, value in others.items() if value is not None]
@@ -148,7 +148,7 @@ def _see_that_textual_is_there() -> None:
 
 
 def _first_visit() -> bool:
-    """Return whether nobody has sat here before, and bear the visit in mind where that can be done."""
+    """Return whether this is the first use, and record it if possible."""
     visited = data_folder() / VISITED
     if visited.exists():
         return False

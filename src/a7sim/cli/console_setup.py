@@ -1,4 +1,4 @@
-"""Where somebody sits down: at an instrument in this process, at a line, or before what others do."""
+"""Set-up of a console: a local instrument, a served one, or playback."""
 
 from collections.abc import Callable, Iterable
 from datetime import datetime
@@ -24,7 +24,7 @@ SESSIONS_FOLDER = "sessions"
 
 
 class LocalConsole:
-    """A seat at the instrument of a scenario in this process. What imports the instrument waits for the screen."""
+    """Console of a scenario's instrument in this process. The instrument is imported after the first paint."""
 
     def __init__(self, name: str, scenario: Scenario, seed: int | None, out: Path | None, go_on: bool | None) -> None:
         self._name, self._scenario = name, scenario
@@ -55,7 +55,7 @@ class LocalConsole:
 
     @property
     def config(self) -> ConsoleConfig:
-        """The seat, as it is before anybody has sat down."""
+        """Configuration before the start."""
         return ConsoleConfig(
             self._opened,
             self._time,
@@ -97,7 +97,7 @@ class LocalConsole:
             self._greeting = f"where it stood, {format_elapsed(last.ended_at_s)} at the instrument; ? is help"
 
     def _opened(self) -> Client:
-        """Sit down in the chair, which is built when the instrument is first spoken to."""
+        """Open the interactive session, which is built on first use."""
         if self._interactive is None:
             from a7sim.journal.interactive import InteractiveSession  # beside the first paint of the screen
 
@@ -117,7 +117,7 @@ class LocalConsole:
         return self._clock.now
 
     def close(self) -> Path | None:
-        """End the journal; return the folder where it is, None where nothing was begun."""
+        """Close the journal; return its folder, None if nothing was started."""
         if self._interactive is None:
             return None
         self._interactive.close()
@@ -125,7 +125,7 @@ class LocalConsole:
 
 
 def remote_console(url: str, sheet: JobSheet, token_file: Path | None, watching: bool = False) -> ConsoleConfig:
-    """Return a seat at a served instrument. Raises Mistake where nobody answers there."""
+    """Return the configuration for a served instrument. Raises A7SimError if it does not answer."""
     token = token_from(token_file)
     Client.open(url, token=token).close()
     wall = WallClock()
@@ -145,7 +145,7 @@ def _watching_now(url: str) -> Callable[[], str]:
 
 
 def playback_console(session: str) -> ConsoleConfig:
-    """Return a seat from which a session that is over is watched. Raises Mistake where there is none."""
+    """Return the configuration for watching a finished session. Raises A7SimError if there is none."""
     from a7sim.journal.recording import open_recording  # only for who watches one
 
     recording = open_recording(session)
@@ -162,5 +162,5 @@ def playback_console(session: str) -> ConsoleConfig:
 
 
 def is_url(watched: str) -> bool:
-    """Whether what is to be watched is an instrument at work rather than a session that is over."""
+    """Return whether the text names a live instrument rather than a finished session."""
     return "://" in watched or Path(watched).is_char_device()

@@ -1,4 +1,4 @@
-"""`a7sim export`: a session in the forms that other programs, printers and people take."""
+"""`a7sim export`: a session in other formats."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -33,7 +33,7 @@ _OPTION_OF = {"speed": "asciicast", "way": "cards"}
 )
 @click.option("--way", metavar="WAY", help="cards: comparator or A8, where the strip was measured so.")
 def command(folder: Path, kind: str, out: Path | None, speed: float | None, way: str | None) -> None:
-    """Write the session in DIR as something else.
+    """Export the session in DIR to another format.
 
     Example: a7sim export runs/akwanga --to asciicast --out akwanga.cast
     """

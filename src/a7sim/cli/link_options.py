@@ -1,4 +1,4 @@
-"""What the commands that talk to a served instrument share; light, so that `a7sim send` starts quickly."""
+"""Options shared by the commands for served instruments; light, so that `a7sim send` starts quickly."""
 
 import os
 import re
@@ -11,7 +11,7 @@ from a7sim.errors import A7SimError
 from a7sim.link.client.ports import TIMEOUT_S
 
 MAX_TOKEN_LENGTH = 1000
-"""Characters: a line of the language has room for it, even if all are quotes that have to be doubled."""
+"""Characters: they fit into a line of the language even if all are doubled quotes."""
 
 _SENDABLE = re.compile(f"[ -~]{{1,{MAX_TOKEN_LENGTH}}}")
 
@@ -25,11 +25,11 @@ _TIMEOUT = click.option(
 )
 
 link_options = combine_options(_TIMEOUT, token_file)
-"""--timeout, --token-file: how to talk to a served instrument."""
+"""--timeout, --token-file: connection to a served instrument."""
 
 
 def token_from(file: Path | None) -> str | None:
-    """Return the token in a file, else that of the environment, None where there is neither. Raises Mistake."""
+    """Return the token in a file, otherwise that of the environment, None without one. Raises A7SimError."""
     if file is None:
         return _token(os.environ[TOKEN_VARIABLE], TOKEN_VARIABLE) if os.environ.get(TOKEN_VARIABLE) else None
     try:

@@ -1,4 +1,4 @@
-"""What several commands ask for, each option once: its name, its kind and what its help says; light to import."""
+"""Options shared by several commands, each defined once; light to import."""
 
 import functools
 import math
@@ -17,21 +17,21 @@ Option = Callable[[Command], Command]
 TOKEN_VARIABLE = "A7SIM_TOKEN"
 
 PLOTTERS = ("A7", "A8")
-"""The variants of the manual, which is not read to say what there is to choose from."""
+"""Plotters, repeated here to avoid importing their data."""
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 PLACE = click.Path(path_type=Path)
-"""A file or a folder, of which whoever opens it says what it should be."""
+"""File or folder; the code that opens it checks which."""
 
 
 class NumberType(click.FloatRange):
-    """A finite number within a range."""
+    """Finite number within a range."""
 
     name = "number"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the number; click lets nan through any range."""
+        """Return the number; click accepts nan in any range."""
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
             self.fail(f"expected a finite number, got {value}", param, ctx)
@@ -39,18 +39,18 @@ class NumberType(click.FloatRange):
 
 
 def greater_than(bound: float) -> NumberType:
-    """Return the kind of the numbers above a bound."""
+    """Return the type of numbers above a bound."""
     return NumberType(min=bound, min_open=True)
 
 
 HEIGHT = NumberType(-1e6, 1e6)
-"""A height or a counter's reading, below the zero or above."""
+"""Height or counter reading of either sign."""
 
 COUNT = click.IntRange(min=1)
 
 
 def combine_options(*options: Option[Any]) -> Option[Any]:
-    """Return several options as one, in their order."""
+    """Return several options as one decorator, in their order."""
 
     def decorated(command: Command) -> Command:
         for option in reversed(options):
@@ -61,7 +61,7 @@ def combine_options(*options: Option[Any]) -> Option[Any]:
 
 
 def group_options(name: str, into: type[Any], *options: Option[Any]) -> Option[Any]:
-    """Return options whose values a command is given as one: a dataclass with a field for each, under a name."""
+    """Return options whose values are passed as one dataclass parameter `name` with a field for each."""
 
     def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(command)
@@ -76,12 +76,12 @@ def group_options(name: str, into: type[Any], *options: Option[Any]) -> Option[A
 
 
 def option_help(option: str, default: str | None = None) -> str:
-    """Return what help says about an option, and about what it is where it is left out."""
+    """Return the help of an option, with its default."""
     return f"{option}." if default is None else f"{option}  [default: {default}]"
 
 
 def seed(default: str = "the scenario's") -> Option[Any]:
-    """Return --seed, which is `default` where it is left out."""
+    """Return --seed with its default in words."""
     return click.option(
         "--seed",
         type=click.IntRange(min=0),
@@ -91,14 +91,14 @@ def seed(default: str = "the scenario's") -> Option[Any]:
 
 
 def out_folder(of: str, default: str | None = None, required: bool = False) -> Option[Any]:
-    """Return --out DIR, a folder of what `of` says."""
+    """Return --out DIR for the contents `of`."""
     return click.option(
         "--out", type=PLACE, metavar="DIR", required=required, help=option_help(f"Folder for {of}", default)
     )
 
 
 def out_file(of: str, default: str | None = None) -> Option[Any]:
-    """Return --out FILE, a file of what `of` says."""
+    """Return --out FILE for the contents `of`."""
     return click.option("--out", type=FILE, metavar="FILE", help=option_help(f"File for {of}", default))
 
 
@@ -106,7 +106,7 @@ force = click.option("--force", is_flag=True, help="Write into a folder that exi
 
 
 def new_folder(of: str, required: bool = False) -> Option[Any]:
-    """Return --out DIR and --force, for a folder that is not there yet."""
+    """Return --out DIR and --force, for a new folder."""
     return combine_options(out_folder(of, required=required), force)
 
 
@@ -116,12 +116,12 @@ as_document = click.option(
 
 
 def quiet(but: str = "") -> Option[Any]:
-    """Return --quiet, which prints nothing but what `but` says."""
+    """Return --quiet, which prints nothing except `but`."""
     return click.option("--quiet", is_flag=True, help=f"Print nothing{f' but {but}' if but else ''}.")
 
 
 def variant(default: str | None = None) -> Option[Any]:
-    """Return --variant, which is that of the scenario where there is no default."""
+    """Return --variant; without a default it is that of the scenario."""
     told = option_help("Which plotter", None if default else "the scenario's")
     return click.option(
         "--variant", type=CaseInsensitiveChoice(PLOTTERS), default=default, show_default=default is not None, help=told
@@ -146,7 +146,7 @@ def principal_distance(required: bool) -> Option[Any]:
 
 
 def tcp(default: str, multiple: bool = False) -> Option[Any]:
-    """Return --tcp, where clients find a bare socket: `default` where it is left out."""
+    """Return --tcp, the endpoint of a raw socket, with its default."""
     told = option_help("Listen on a bare socket", default)
     return click.option(
         "--tcp", default=None if multiple else default, multiple=multiple, metavar="HOST:PORT", help=told

@@ -1,4 +1,4 @@
-"""What the commands that seat an operator share: options, the scenario that they choose, and how they end."""
+"""Options, scenario and output of the commands that run the virtual operator."""
 
 import shlex
 import sys
@@ -44,7 +44,7 @@ _RESUME = click.option(
 
 @dataclass(frozen=True)
 class ScenarioOptions:
-    """What is asked for beside a scenario: seed, overrides of its values, and how good the operator is."""
+    """Options of a scenario: seed, overrides of its values, and the operator's skill."""
 
     seed: int | None
     settings: tuple[str, ...]
@@ -54,7 +54,7 @@ class ScenarioOptions:
 
 @dataclass(frozen=True)
 class OutputOptions:
-    """Where a session is left, or went on from, and when its journal is on the disk."""
+    """Options of the output: folder, resumption, and durability of the journal."""
 
     out: Path | None
     force: bool
@@ -63,12 +63,12 @@ class OutputOptions:
 
     @property
     def folder(self) -> Path | None:
-        """Where the files are."""
+        """Folder of the files."""
         return self.resume or self.out
 
     @property
     def journal_options(self) -> "JournalOptions":
-        """How the journal is kept."""
+        """Options of the journal."""
         from a7sim.journal.writer import JournalOptions
 
         return JournalOptions(self.durability, self.resume is not None)
@@ -76,7 +76,7 @@ class OutputOptions:
 
 @dataclass(frozen=True)
 class DisplayOptions:
-    """How results are told: as tables, as a document, or not at all."""
+    """Form of the results: tables, a document, or nothing."""
 
     as_document: bool
     quiet: bool
@@ -90,7 +90,7 @@ scenario_options = options.group_options(
     click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
     click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error."),
 )
-"""--seed, --set, --skill, --perfect-observer, as `asked`."""
+"""--seed, --set, --skill, --perfect-observer, as `scenario_options`."""
 
 orientation_options = options.combine_options(
     click.option("--case", type=CaseInsensitiveChoice("ABCDE"), help="Standard points used (thesis)."),
@@ -102,12 +102,12 @@ SESSION = "journal, book, tables and results"
 
 
 def output_options(of: str = SESSION) -> options.Option[Any]:
-    """Return --out, --force, --resume, --durability, as `kept`, for a folder of what `of` says."""
+    """Return --out, --force, --resume, --durability, as `output`, for a folder of `of`."""
     return options.group_options("kept", OutputOptions, options.new_folder(of), _RESUME, DURABILITY)
 
 
 display_options = options.group_options("told", DisplayOptions, options.as_document, options.quiet())
-"""--json, --quiet, as `told`."""
+"""--json, --quiet, as `display`."""
 
 _NOT_OF_THE_RESULTS = {
     *("seed", "out", "force", "resume", "durability", "as_document", "quiet"),
@@ -118,21 +118,21 @@ _SAME_RESULTS_AS = {"operate": "run"}
 
 @dataclass(frozen=True)
 class RunRequest:
-    """What an operator is to do: a scenario, its seed, and, where that goes on, what its journal says beside them."""
+    """Requested run: scenario, seed, and, for a resumed session, the settings in its journal."""
 
     scenario: Scenario
     seed: int
     begun_with: Mapping[str, Any] | None = None
 
     def setting(self, name: str, asked: Any) -> Any:
-        """Return what the journal of a session that goes on says under a name, or what is asked for of a new one."""
+        """Return the setting of a resumed session's journal, or the given one for a new session."""
         return asked if self.begun_with is None else self.begun_with.get(name)
 
 
 def resolve_request(
     scenario: str | None, asked: ScenarioOptions, kept: OutputOptions, others: Mapping[str, str | None] | None = None
 ) -> RunRequest:
-    """Return what the options order: a new session, or with --resume the one in its folder. Raises Mistake.
+    """Return the requested run: a new session, or with --resume the one in its folder. Raises A7SimError.
 
     `others` are overrides of the scenario as texts by path.
     """
@@ -145,7 +145,7 @@ def resolve_request(
 def resolve_scenario(
     scenario: str | None, asked: ScenarioOptions, others: Mapping[str, str | None] | None = None
 ) -> tuple[Scenario, int]:
-    """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
+    """Return the scenario and the seed of the options; `others` are texts by path. Raises A7SimError."""
     if scenario is None:
         raise A7SimError(f"{click.get_current_context().info_name}: expected SCENARIO or --resume DIR, got none")
     overrides = _overrides(asked.settings, {**(others or {}), "observer.skill": asked.skill})
@@ -160,7 +160,7 @@ def resolve_scenario(
 
 
 def _command_line(scenario: str, seed: int) -> str:
-    """Return the command under way as anybody could type it for the same results."""
+    """Return a command line that repeats the results of the present command."""
     ctx = click.get_current_context()
     verb = ctx.info_name or ""
     words = ["a7sim", _SAME_RESULTS_AS.get(verb, verb), scenario, "--seed", str(seed)]
@@ -186,9 +186,9 @@ def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> di
 
 
 def resolve_resume(folder: Path, *beside: str) -> "ResumableSession":
-    """Return the session of the command under way that --resume goes on with.
+    """Return the session that --resume continues.
 
-    Raises Mistake where anything but what is named stands `beside` it, since the journal says what was asked for.
+    Raises A7SimError if other options than those named in `beside` are given, because the journal contains them.
     """
     from a7sim.journal.resuming import find_resumable
 
@@ -208,12 +208,12 @@ def _see_that_resume_stands_alone(beside: tuple[str, ...]) -> None:
 
 
 POINTS_A_MODEL = 130
-"""About how many points an operator works on in a model; the bar only needs the order of it."""
+"""Approximate number of points of a model, for the progress bar."""
 
 
 @contextmanager
 def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbacks]":
-    """Show on a terminal how the operator gets on with about so many points."""
+    """Show the progress of about `points` points on a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -230,7 +230,7 @@ def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbac
 
 
 def show_results(document: "Document", told: DisplayOptions, tables: "Callable[[Document], RenderableType]") -> None:
-    """Show the results, and end with exit code 1 where the operator gave up."""
+    """Print the results, and end with exit code 1 if the operator gave up."""
     from rich.console import Console
 
     from a7sim.result_documents import as_json

@@ -1,4 +1,4 @@
-"""`a7sim scenario`: is a scenario file right, and what may it say?"""
+"""`a7sim scenario`: validation and schema of scenario files."""
 
 import click
 
@@ -23,7 +23,7 @@ def command() -> None:
 @click.argument("file", metavar="SCENARIO", shell_complete=scenario_argument)
 @options.as_document
 def validate(file: str, as_document: bool) -> None:
-    """Name every mistake of a SCENARIO and of the files it names; exit code 2 if there is any.
+    """List all errors of a SCENARIO and of the files it names; exit code 2 if there are any.
 
     Example: a7sim scenario validate scenarios/akwanga.toml
     """
@@ -50,7 +50,7 @@ def validate(file: str, as_document: bool) -> None:
 @command.command("schema")
 @options.as_document
 def schema(as_document: bool) -> None:
-    """Print the JSON Schema of scenario files; with --json, within a document such as all commands print.
+    """Print the JSON Schema of scenario files; with --json, within a document as other commands print.
 
     Example: a7sim scenario schema > scenario.schema.json
     """

@@ -40,7 +40,7 @@ from a7sim.scenario import Scenario
 USUAL = Address("127.0.0.1", 5025)
 
 _OF_THE_DOOR = "tcp", "rfc2217", "pty", "baud", "listen_anyway", "token_file", "clients", "idle", "fault", "fault_seed"
-"""What a session that is served again may be told anew."""
+"""Options of a resumed server that may change."""
 
 _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
@@ -93,7 +93,7 @@ def command(
 ) -> None:
     """Serve the instrument of SCENARIO until it is stopped: Ctrl-C and kill end it with exit code 0.
 
-    With --resume it is the instrument of a session that was cut off, as its journal leaves it; clients come anew.
+    With --resume it is the instrument of an interrupted session in the state of its journal; clients must reconnect.
 
     Example: a7sim serve akwanga --tcp 127.0.0.1:5025 --pty ./a7
     """
@@ -115,7 +115,7 @@ def command(
 
 @dataclass(frozen=True)
 class ServedInstrument:
-    """What is served: a desk, the time at it, and the journal of what is said there."""
+    """Served instrument with its clock and journal."""
 
     head: Document
     instrument: SharedInstrument
@@ -156,7 +156,7 @@ def _clock(realtime: bool, now: float = 0.0) -> Clock | WallClock:
 
 
 async def serve(served: ServedInstrument, doors: Endpoints, terms: ServerLimits, told: "StartupMessages") -> None:
-    """Serve an instrument until the process is told to stop. Raises JournalStopped where nothing can be written."""
+    """Serve an instrument until the process is stopped. Raises JournalWriteError if the journal cannot be written."""
     stopped = asyncio.Event()
     broken: list[JournalWriteError] = []
     loop = asyncio.get_running_loop()
@@ -185,14 +185,14 @@ async def serve(served: ServedInstrument, doors: Endpoints, terms: ServerLimits,
 
 @dataclass(frozen=True)
 class StartupMessages:
-    """What is printed once every door is open."""
+    """Messages printed once all endpoints are open."""
 
     head: Document
     as_document: bool
     quiet: bool
 
     def ready(self, opened: list[dict[str, Any]]) -> None:
-        """Print where every door leads."""
+        """Print the addresses of all endpoints."""
         if self.as_document:
             click.echo(as_json(self.head | {"listening": opened}), nl=False)
         elif not self.quiet:

@@ -1,4 +1,4 @@
-"""`a7sim study`: a question asked of the simulator as often as the answer needs."""
+"""`a7sim study`: a Monte Carlo study of a scenario."""
 
 import sys
 from collections.abc import Iterator
@@ -65,12 +65,12 @@ def command(
     as_document: bool,
     quiet: bool,
 ) -> None:
-    """Work the cells of STUDY, a file or the name of one that comes with a7sim, and say what comes of it.
+    """Run the cells of STUDY, a file or the name of one that comes with a7sim, and print the results.
 
-    A study that was cut off goes on with the same command, and one that is done goes on with more --replicates.
-    With --audit, exit code 3 where a session over the link gives another digit than the batch bench.
+    The same command continues an interrupted study, and with more --replicates a finished one. With --audit, exit code
+    3 if a session over the link differs in any digit from the batch.
 
-    With --executor mpi, start it as `mpiexec -n 5 a7sim study STUDY --executor mpi`: one process asks, four work.
+    With --executor mpi, start it as `mpiexec -n 5 a7sim study STUDY --executor mpi`: one process distributes, four run.
 
     Example: a7sim study levels --replicates 50 --out runs/levels --audit 4
     """
@@ -93,7 +93,7 @@ def command(
 
 
 def _leave_page(out: Path, document: Document) -> None:
-    """Leave the page; without matplotlib all else is there nevertheless."""
+    """Write the page; without matplotlib only a message is printed."""
     try:
         write_page(out, document)
     except A7SimError as missing:
@@ -111,16 +111,16 @@ def _audit(loaded: LoadedStudy, tally: Tally, picks: int, silent: bool) -> None:
 
 
 class _Rate(ProgressColumn):
-    """Sessions a second."""
+    """Sessions per second."""
 
     def render(self, task: Task) -> Text:
-        """Return the rate, once there is one."""
+        """Return the rate, once it is known."""
         return Text(f"{task.speed:.1f} a second" if task.speed else "")
 
 
 @contextmanager
 def _watched(loaded: LoadedStudy, tally: Tally, silent: bool) -> Iterator[tuple[Progress, TaskID]]:
-    """Show on a terminal how many sessions are done, at what rate, and how long it will take."""
+    """Show the progress of the sessions on a terminal, with rate and remaining time."""
     title = TextColumn(loaded.study.title, markup=False)
     columns = (title, BarColumn(), MofNCompleteColumn(), _Rate(), TimeRemainingColumn())
     hidden = silent or not sys.stderr.isatty()

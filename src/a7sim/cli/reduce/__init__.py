@@ -1,4 +1,4 @@
-"""`a7sim reduce`: the computing room on anyone's files."""
+"""`a7sim reduce`: reductions of measurements from files."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,16 +18,16 @@ from a7sim.reduction.strips import JoinMethod
 from a7sim.result_documents import Document, as_json
 
 MIN_WIDTH = 80
-"""Columns that every table fits."""
+"""Width in columns that all tables fit."""
 
 
 @click.group("reduce")
 def command() -> None:
     """Compute orientations, centres, strips and blocks from files of measurements.
 
-    Tables are CSV with a header line, or TOML with the columns as keys of an array of tables [[rows]]; decimal
-    points, UTF-8, # begins a comment. Strips are read from N.R.C. cards too (.crd, .cards, or by their look).
-    With --out DIR the results go to results.json and CSV files there.
+    Tables are CSV with a header line, or TOML with the columns as keys of an array of tables [[rows]]; decimal points,
+    UTF-8, comments after #. Strips are also read from N.R.C. cards (.crd, .cards, or recognised by content). With --out
+    DIR the results are written to results.json and CSV files.
 
     Example: a7sim reduce relative scenarios/dewitt-pair.csv --c 152.113
     """
@@ -78,7 +78,7 @@ def interior(
 ) -> None:
     """Refine comparator COUNTS (photo,point,x,y) to mm by the fiducials, named as in the camera.
 
-    Writes image.csv (photo,point,x,y) and, of photographs of neighbouring numbers, pairs.csv for `reduce strip`.
+    Writes image.csv (photo,point,x,y) and, for photographs of consecutive numbers, pairs.csv for `reduce strip`.
 
     Example: a7sim reduce interior counts.csv --camera scenarios/akwanga.toml --out refined
     """
@@ -124,7 +124,8 @@ def relative(
 ) -> None:
     """Orient the two photographs of PAIR (point,xl,yl,xr,yr) to each other.
 
-    Writes the model with its centres to models.csv for `reduce connect`; a column model names it, best LEFT-RIGHT.
+    Writes the model with its centres to models.csv for `reduce connect`; a column `model` names it, preferably
+    LEFT-RIGHT.
 
     Example: a7sim reduce relative scenarios/dewitt-pair.csv --c 152.113
     """
@@ -187,7 +188,7 @@ def similarity(common: Path, method: processing.SimilarityMethod, out: Path | No
 def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_document: bool) -> None:
     """Join two or more MODELS (model,point,X,Y,Z; or one deck of cards) in the system of the first.
 
-    Neighbours share a projection centre, a point named PHOTO:centre; without centres they follow by name.
+    Neighbours share a projection centre, a point named PHOTO:centre; without centres the models are sorted by name.
 
     Example: a7sim reduce connect models.csv --method centre
     """
@@ -268,9 +269,9 @@ def block(
     out: Path | None,
     as_document: bool,
 ) -> None:
-    """Adjust MODELS (model,point,X,Y,Z) of one strip or several to the ground at once, 500 at the most.
+    """Adjust MODELS (model,point,X,Y,Z) of one or several strips to the ground at once, 500 at most.
 
-    Models should be nearly level; --out writes output cards of every strip (strip-1.crd ...).
+    Models should be nearly level; --out writes output cards of each strip (strip-1.crd ...).
 
     Example: a7sim reduce block strip1.csv strip2.csv --ground ground.csv
     """
@@ -280,7 +281,7 @@ def block(
 def _deliver(
     outcome: ProcessingResult, as_document: bool, out: Path | None, shown: Callable[[Document], list[Any]]
 ) -> None:
-    """Write an outcome where it is wanted and print it, as JSON or as the table a surveyor files."""
+    """Write a result to its folder, if any, and print it as JSON or as tables."""
     document = outcome.document if out is None else processing.write_result(outcome, out)
     if as_document:
         click.echo(as_json(document), nl=False)

@@ -1,4 +1,4 @@
-"""Options that several reductions share."""
+"""Options shared by several reductions."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ principal_point = combine_options(
 
 
 def base(default: str, length: float | None = None) -> Option[Any]:
-    """Return --bx, which is a length, or what `default` says, where it is left out."""
+    """Return --bx, a length, with its default in words."""
     return click.option(
         "--bx", type=NumberType(0.001, 1e6), default=length, help=option_help("Length of the base, mm", default)
     )

@@ -1,4 +1,4 @@
-"""`a7sim train`: exercises, from the first counter to an independent strip, graded."""
+"""`a7sim train`: graded exercises, from the first counter to an independent strip."""
 
 import click
 
@@ -20,9 +20,9 @@ _VERBS = {
 
 @click.group("train", cls=LazyGroup, verbs=_VERBS)
 def command() -> None:
-    """Learn to work the plotter: exercises with a checklist, hints, and grades that say what to do better.
+    """Train on the plotter: exercises with a checklist, hints, and grades with advice.
 
-    Exit codes of verify: 0 passed, 1 not passed, 2 usage, 3 a journal that is damaged or does not happen again.
+    Exit codes of grade: 0 passed, 1 not passed, 2 usage, 3 a journal that is damaged or whose replay differs.
 
     Example: a7sim train start 1
     """

@@ -1,4 +1,4 @@
-"""`a7sim train verify` and `watch`: grades."""
+"""`a7sim train grade` and `watch`: grades."""
 
 import time
 from pathlib import Path
@@ -43,9 +43,9 @@ def verify_(
     home: Path | None,
     student: str | None,
 ) -> None:
-    """Grade the last attempt: its journal is worked again. Points and reasons; an exam is over with its first.
+    """Grade the last attempt by replaying its journal: points and reasons. The first grade ends an exam.
 
-    Example: a7sim train verify 4
+    Example: a7sim train grade 4
     """
     if folders:
         raise click.exceptions.Exit(_tell_of_many(grade_submissions(find_submissions(folders), seed), as_document))
@@ -67,7 +67,7 @@ def verify_(
 
 
 def _tell_of_many(handed_in: list[Submission], as_document: bool) -> int:
-    """Print what came of attempts that were handed in; return the exit code."""
+    """Print the results of attempts that were handed in; return the exit code."""
     if as_document:
         documents = [msgspec.to_builtins(each) for each in handed_in]
         click.echo(as_json(document_header("train verify") | {"handed_in": documents}), nl=False)
@@ -98,7 +98,7 @@ def _graded(progress: Progress, attempt: Attempt) -> Grade:
 )
 @student_options
 def watch_(exercise: str | None, every: float, home: Path | None, student: str | None) -> None:
-    """Grade the attempt under way again whenever its journal has grown, until it passes or Ctrl-C. Not in an exam.
+    """Grade the present attempt again whenever its journal grows, until it passes or Ctrl-C. Not in an exam.
 
     Example: a7sim train watch 4
     """

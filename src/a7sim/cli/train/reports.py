@@ -1,4 +1,4 @@
-"""`a7sim train list` and `report`: where students stand."""
+"""`a7sim train list` and `report`: progress of students."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from a7sim.training.exports import HOME_PAGE, to_class_document, to_nbgrader, to
 @options.as_document
 @student_options
 def list_(exercise: str | None, as_document: bool, home: Path | None, student: str | None) -> None:
-    """List the exercises and how far they are done; or show what EXERCISE is about.
+    """List the exercises and the progress in them; or show the text of EXERCISE.
 
     Example: a7sim train list 4
     """
@@ -94,9 +94,9 @@ def _shown(exercise_folder: ExerciseFolder) -> str:
 def report_(
     whole_class: bool, to: str, out: Path | None, home_page: str, home: Path | None, student: str | None
 ) -> None:
-    """Write the sheet of a student or of the class: HTML with figures, CSV as nbgrader's, JSON, or xAPI statements.
+    """Write the page of a student or of the class: HTML with figures, CSV as nbgrader's, JSON, or xAPI statements.
 
-    Example: a7sim train report --class --to html --out class.html
+    Example: a7sim train report --class --format html --out class.html
     """
     whose = None if whole_class else student_name(student)
     with progress_in(home) as progress:

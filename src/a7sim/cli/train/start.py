@@ -1,4 +1,4 @@
-"""`a7sim train start`: sit down at an exercise, play a script of it, or serve it."""
+"""`a7sim train start`: start an exercise in the console, by a script, or as a server."""
 
 import re
 from contextlib import AbstractContextManager
@@ -28,7 +28,7 @@ from a7sim.training.exercise import ExerciseFolder
 from a7sim.training.progress import EXAM, PRACTICE, Attempt, Progress
 
 EXAMINATION = "exam"
-"""The exercise that an exam is about where none is named: a part of the name of its folder."""
+"""Default exercise of an exam: a part of the name of its folder."""
 
 
 @click.command("start")
@@ -57,7 +57,7 @@ def start_(
     home: Path | None,
     student: str | None,
 ) -> None:
-    """Sit down at EXERCISE, or go on with the attempt under way: its goal, a checklist that ticks itself, the console.
+    """Start EXERCISE, or resume the present attempt: its goal, an automatic checklist, the console.
 
     Example: a7sim train start 4
     """

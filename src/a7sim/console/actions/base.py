@@ -1,4 +1,4 @@
-"""What all deeds have in common: the console they are done at, and readings that somebody types in."""
+"""Base of all actions: the console they belong to, and readings that the user types in."""
 
 import re
 from collections.abc import Callable
@@ -18,7 +18,7 @@ _READING = r"([XYZ])\s*=?\s*([-+]?[0-9]*\.?[0-9]+)"
 
 
 class ActionBase:
-    """Somebody at a console, the only class that has these deeds."""
+    """Base class of the console's actions."""
 
     @property
     def _console(self) -> "Console":
