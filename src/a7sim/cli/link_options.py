@@ -21,7 +21,7 @@ _TIMEOUT = click.option(
     default=TIMEOUT_S,
     show_default=True,
     metavar="SECONDS",
-    help="How long a reply is waited for.",
+    help="Seconds to wait for a reply.",
 )
 
 link_options = combine_options(_TIMEOUT, token_file)

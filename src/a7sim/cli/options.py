@@ -86,7 +86,7 @@ def seed(default: str = "the scenario's") -> Option[Any]:
         "--seed",
         type=click.IntRange(min=0),
         metavar="N",
-        help=option_help("Seed of all that is drawn by chance", default),
+        help=option_help("Seed of all random draws", default),
     )
 
 
@@ -102,7 +102,7 @@ def out_file(of: str, default: str | None = None) -> Option[Any]:
     return click.option("--out", type=FILE, metavar="FILE", help=option_help(f"File for {of}", default))
 
 
-force = click.option("--force", is_flag=True, help="Write into a folder that exists.")
+force = click.option("--force", is_flag=True, help="Write into an existing folder.")
 
 
 def new_folder(of: str, required: bool = False) -> Option[Any]:
@@ -110,9 +110,7 @@ def new_folder(of: str, required: bool = False) -> Option[Any]:
     return combine_options(out_folder(of, required=required), force)
 
 
-as_document = click.option(
-    "--json", "as_document", is_flag=True, help="Print what there is to say as one JSON document."
-)
+as_document = click.option("--json", "as_document", is_flag=True, help="Print the result as one JSON document.")
 
 
 def quiet(but: str = "") -> Option[Any]:
@@ -122,9 +120,9 @@ def quiet(but: str = "") -> Option[Any]:
 
 def variant(default: str | None = None) -> Option[Any]:
     """Return --variant; without a default it is that of the scenario."""
-    told = option_help("Which plotter", None if default else "the scenario's")
+    text = option_help("Which plotter", None if default else "the scenario's")
     return click.option(
-        "--variant", type=CaseInsensitiveChoice(PLOTTERS), default=default, show_default=default is not None, help=told
+        "--variant", type=CaseInsensitiveChoice(PLOTTERS), default=default, show_default=default is not None, help=text
     )
 
 
@@ -132,12 +130,12 @@ instrument_of = click.option(
     "--scenario",
     metavar="SCENARIO",
     shell_complete=scenario_argument,
-    help="What the instrument is of; only a journal whose scenario is known can be replayed.",
+    help="Scenario of the instrument; needed to replay the journal.",
 )
 
 map_scale = click.option("--map-scale", type=greater_than(99.0), metavar="N", help="Scale number of the map.")
 
-plain = click.option("--plain", is_flag=True, help="Say in words what the eyes see; nothing rolls. For screen readers.")
+plain = click.option("--plain", is_flag=True, help="Describe the view in text, without animation (for screen readers).")
 
 
 def principal_distance(required: bool) -> Option[Any]:
@@ -147,14 +145,14 @@ def principal_distance(required: bool) -> Option[Any]:
 
 def tcp(default: str, multiple: bool = False) -> Option[Any]:
     """Return --tcp, the endpoint of a raw socket, with its default."""
-    told = option_help("Listen on a bare socket", default)
+    text = option_help("Listen on a raw socket", default)
     return click.option(
-        "--tcp", default=None if multiple else default, multiple=multiple, metavar="HOST:PORT", help=told
+        "--tcp", default=None if multiple else default, multiple=multiple, metavar="HOST:PORT", help=text
     )
 
 
 token_file = click.option(
     "--token-file",
     type=FILE,
-    help=f"File with the token of a server that asks for one; without it, the token is {TOKEN_VARIABLE}'s.",
+    help=f"File with the login token; by default the token is read from {TOKEN_VARIABLE}.",
 )

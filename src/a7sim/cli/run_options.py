@@ -32,13 +32,16 @@ DURABILITY = click.option(
     type=click.Choice(DURABILITIES),
     default="records",
     show_default=True,
-    help="When the journal is on the disk: every line, every registration and the rest within 0.2 s, or never.",
+    help=(
+        "When the journal is flushed to disk: always (every line), records (every registration; the rest within "
+        "0.2 s) or never."
+    ),
 )
 _RESUME = click.option(
     "--resume",
     type=options.PLACE,
     metavar="DIR",
-    help="Go on with the session in DIR, cut off; its journal says what was asked for.",
+    help="Resume the interrupted session in DIR with the options in its journal.",
 )
 
 
@@ -87,8 +90,8 @@ scenario_options = options.group_options(
     ScenarioOptions,
     options.seed(),
     click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario."),
-    click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
-    click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error."),
+    click.option("--skill", type=click.Choice(list(PROFILES)), help="Skill of the operator."),
+    click.option("--perfect-observer", is_flag=True, help="An operator without errors of sight and reading."),
 )
 """--seed, --set, --skill, --perfect-observer, as `scenario_options`."""
 
@@ -192,18 +195,18 @@ def resolve_resume(folder: Path, *beside: str) -> "ResumableSession":
     """
     from a7sim.journal.resuming import find_resumable
 
-    _see_that_resume_stands_alone(beside)
+    _check_resume_alone(beside)
     return find_resumable(folder, click.get_current_context().info_name or "")
 
 
-def _see_that_resume_stands_alone(beside: tuple[str, ...]) -> None:
+def _check_resume_alone(beside: tuple[str, ...]) -> None:
     ctx = click.get_current_context()
     allowed = {"resume", "durability", "as_document", "quiet", *beside}
     for name in ctx.params:
         if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             said = next(each for each in ctx.command.params if each.name == name)
             raise A7SimError(
-                f"--resume: expected no {parameter_label(said)} beside it, since the journal says what was asked for"
+                f"--resume: expected no {parameter_label(said)} with it, because the journal contains the options"
             )
 
 
@@ -222,7 +225,7 @@ def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbac
     columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
     unwatched = told.quiet or told.as_document or not sys.stderr.isatty()
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
-        task = progress.add_task("sitting down", total=points)
+        task = progress.add_task("starting", total=points)
         yield ProgressCallbacks(
             lambda activity: progress.update(task, description=activity),
             lambda: progress.advance(task),

@@ -2,7 +2,7 @@
 
 import click
 
-from a7sim.cli import EXIT_MISTAKE, options
+from a7sim.cli import EXIT_USAGE, options
 from a7sim.cli.completers import scenario_argument
 from a7sim.errors import A7SimError
 from a7sim.result_documents import as_json, document_header
@@ -44,7 +44,7 @@ def validate(file: str, as_document: bool) -> None:
         photographs, models = pluralize(len(scenario.photos), "photograph"), pluralize(len(scenario.models), "model")
         click.echo(f"{file}: {scenario.title}, {photographs}, {models}")
     if mistakes:
-        raise click.exceptions.Exit(EXIT_MISTAKE)
+        raise click.exceptions.Exit(EXIT_USAGE)
 
 
 @command.command("schema")

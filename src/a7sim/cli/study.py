@@ -37,20 +37,23 @@ from a7sim.text import pluralize
 
 @click.command("study")
 @click.argument("study", shell_complete=study_argument)
-@click.option("--replicates", type=int, metavar="N", help="Sessions in every cell, instead of what STUDY says.")
+@click.option("--replicates", type=int, metavar="N", help="Sessions per cell, instead of the number in STUDY.")
 @click.option(
     "--executor",
     type=click.Choice(KINDS),
     default="pool",
     show_default=True,
-    help="Who works: this process alone, a pool of others, dask, or MPI.",
+    help="Where the work runs: in this process, a pool of processes, dask, or MPI.",
 )
 @click.option(
-    "--workers", type=options.COUNT, metavar="N", help="Of the pool or of dask here; as many as there are cores."
+    "--workers",
+    type=options.COUNT,
+    metavar="N",
+    help="Processes of the pool or of local dask; by default the number of cores.",
 )
-@click.option("--scheduler", metavar="URL", help="Of dask, such as tcp://HOST:8786, whose workers work; else its own.")
-@click.option("--audit", type=options.COUNT, metavar="N", help="Work N picked sessions again over the link.")
-@options.new_folder("checkpoint, tables, page and results; a study cut off goes on there")
+@click.option("--scheduler", metavar="URL", help="Scheduler of dask, such as tcp://HOST:8786; by default a local one.")
+@click.option("--audit", type=options.COUNT, metavar="N", help="Run N selected sessions again over the link.")
+@options.new_folder("checkpoint, tables, page and results; an interrupted study continues there")
 @options.as_document
 @options.quiet()
 def command(
@@ -107,7 +110,7 @@ def _audit(loaded: LoadedStudy, tally: Tally, picks: int, silent: bool) -> None:
         click.echo(f"a7sim: {len(differences)} of {worked} differ over the link; {differences[0]}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
     if not silent:
-        click.echo(f"{worked} worked again over the link gave the same digits.")
+        click.echo(f"{worked} run again over the link: same digits.")
 
 
 class _Rate(ProgressColumn):

@@ -10,6 +10,7 @@ from rich.console import Console
 from a7sim import processing
 from a7sim.cli.options import FILE, HEIGHT, NumberType, principal_distance
 from a7sim.cli.reduce import options, tables
+from a7sim.cli.renamed import command_with_renamed_options
 from a7sim.errors import A7SimError
 from a7sim.processing import ProcessingResult
 from a7sim.processing.interior import FlightHeights
@@ -19,6 +20,9 @@ from a7sim.result_documents import Document, as_json
 
 MIN_WIDTH = 80
 """Width in columns that all tables fit."""
+
+
+_WITH_REFERENCE = command_with_renamed_options({"--against": "--reference"})
 
 
 @click.group("reduce")
@@ -195,7 +199,7 @@ def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_d
     _deliver(processing.connect(models, method), as_document, out, tables.connection_tables)
 
 
-@command.command("strip")
+@command.command("strip", cls=_WITH_REFERENCE)
 @click.argument("file", type=FILE)
 @principal_distance(required=False)
 @options.principal_point
@@ -203,7 +207,7 @@ def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_d
 @options.ground(required=False)
 @options.join_method
 @click.option("--polynomial", type=click.Choice(["2", "3"]), help="Adjust the strip by polynomials of this degree.")
-@options.against
+@options.reference
 @options.documented
 def strip(
     file: Path,
@@ -236,10 +240,10 @@ def strip(
     _deliver(outcome, as_document, out, tables.strip_tables)
 
 
-@command.command("absolute")
+@command.command("absolute", cls=_WITH_REFERENCE)
 @click.argument("model", type=FILE)
 @options.ground(required=True)
-@options.against
+@options.reference
 @options.documented
 def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, as_document: bool) -> None:
     """Orient one MODEL or strip (point,X,Y,Z) to the ground.
@@ -249,7 +253,7 @@ def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, 
     _deliver(processing.absolute(model, ground, against), as_document, out, tables.absolute_tables)
 
 
-@command.command("block")
+@command.command("block", cls=_WITH_REFERENCE)
 @click.argument("models", type=FILE, nargs=-1, required=True)
 @options.ground(required=True)
 @click.option(
@@ -259,7 +263,7 @@ def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, 
     show_default=True,
     help="Weight of equations in height against those in plan.",
 )
-@options.against
+@options.reference
 @options.documented
 def block(
     models: tuple[Path, ...],

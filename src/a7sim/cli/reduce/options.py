@@ -27,11 +27,12 @@ def ground(required: bool) -> Option[Any]:
     return click.option("--ground", type=FILE, metavar="FILE", required=required, help=words)
 
 
-against = click.option(
-    "--against",
+reference = click.option(
+    "--reference",
+    "against",
     type=FILE,
     metavar="FILE",
-    help="Coordinates (point,X,Y,Z) to table the differences of the results to.",
+    help="Coordinates (point,X,Y,Z) with which the results are compared.",
 )
 
 join_method = click.option(

@@ -169,7 +169,7 @@ def strip_tables(document: Document) -> Tables:
 
 
 def absolute_tables(document: Document, title: str = "Absolute orientation") -> Tables:
-    """Return the scale, the residuals at the ground points and the accuracies, and differences from given coordinates."""
+    """Return scale, residuals and accuracies at the ground points, and differences from given coordinates."""
     precision = f", s0 {document['s0_m']:.4f} m" if "s0_m" in document else ""
     return [
         f"{title}: scale {document['absolute']['scale']:.9f}{precision}",

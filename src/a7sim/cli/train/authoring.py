@@ -15,7 +15,7 @@ from a7sim.training.template import write_template
 EXIT_FAULTY = 1
 
 
-@click.command("check")
+@click.command("check-exercise")
 @click.argument("exercises", nargs=-1, metavar="[EXERCISE]...", shell_complete=exercise_argument)
 @options.as_document
 def check_(exercises: tuple[str, ...], as_document: bool) -> None:

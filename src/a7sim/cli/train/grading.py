@@ -22,7 +22,7 @@ from a7sim.training.submissions import Submission, find_submissions, grade_submi
 EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
 
 
-@click.command("verify")
+@click.command("grade")
 @click.argument("exercise", required=False, shell_complete=exercise_argument)
 @click.option(
     "--journal",
@@ -35,7 +35,7 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
 @options.seed("that of each attempt handed in")
 @options.as_document
 @student_options
-def verify_(
+def grade_(
     exercise: str | None,
     folders: tuple[Path, ...],
     seed: int | None,

@@ -7,6 +7,7 @@ from rich.console import Console
 
 from a7sim.cli import options
 from a7sim.cli.completers import exercise_argument
+from a7sim.cli.renamed import command_with_renamed_options
 from a7sim.cli.train.options import progress_in, student_name, student_options
 from a7sim.errors import A7SimError
 from a7sim.journal.session_files import write_atomic
@@ -77,18 +78,23 @@ def _shown(exercise_folder: ExerciseFolder) -> str:
     return "\n".join([exercise_folder.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
 
 
-@click.command("report")
-@click.option("--class", "whole_class", is_flag=True, help="Of all students; otherwise of one.")
+@click.command("report", cls=command_with_renamed_options({"--to": "--format"}))
+@click.option("--class", "whole_class", is_flag=True, help="All students instead of one.")
 @click.option(
-    "--to",
+    "--format",
+    "to",
     type=click.Choice(["html", "csv", "json", "xapi"]),
     default="html",
     show_default=True,
     help="A page, nbgrader's table, a document, or statements for a learning record store.",
 )
-@options.out_file("the sheet", "standard output")
+@options.out_file("the page", "standard output")
 @click.option(
-    "--home-page", metavar="URL", default=HOME_PAGE, show_default=True, help="Of the students' accounts, for xapi."
+    "--home-page",
+    metavar="URL",
+    default=HOME_PAGE,
+    show_default=True,
+    help="xapi: home page of the students' accounts.",
 )
 @student_options
 def report_(
