@@ -34,7 +34,7 @@ from a7sim.console.widgets.sketch_panel import PointClicked
 SETTLING_S = 0.02
 """Interval between two early keys of a dialog, in s."""
 
-GO_ON = (("go_on", "go on where it stood"), ("anew", "begin anew; the old session is kept"))
+RESUME_CHOICES = (("resume", "resume the session"), ("new", "start a new session; the old one is kept"))
 
 
 class Console(MessageHandlers, Actions, App[None]):
@@ -97,13 +97,15 @@ class Console(MessageHandlers, Actions, App[None]):
         if resumable is None:
             self.thread.start()
         else:
-            self.push_screen(Choose("the last session", GO_ON, resumable.about), partial(self._decided, resumable))
+            self.push_screen(
+                Choose("the last session", RESUME_CHOICES, resumable.about), partial(self._decided, resumable)
+            )
 
     def _decided(self, resumable: ResumeOffer, answer: str | None) -> None:
         if answer is None:
             self.exit()
         else:
-            resumable.decide(answer == "go_on")
+            resumable.decide(answer == "resume")
             self.thread.start()
 
     def on_unmount(self) -> None:

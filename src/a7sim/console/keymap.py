@@ -99,7 +99,10 @@ def default_keymap() -> Keymap:
 
 def sample() -> str:
     """Return a keymap file with the default keys."""
-    lines = ["# Keys of a7sim console: one or more for every deed; a deed that is left out keeps its own.", "[keys]"]
+    lines = [
+        "# Keys of a7sim console: one or more for each action; an action that is left out keeps its default keys.",
+        "[keys]",
+    ]
     width = max(len(action.name) for action in ACTIONS)
     for action in ACTIONS:
         keys = ", ".join(f"'{key}'" if '"' in key else f'"{key}"' for key in action.keys)

@@ -37,13 +37,11 @@ def find_resumable(folder: Path, command: str) -> ResumableSession:
     for name, expected in (("command", command), ("software", software_version())):
         got = journalled.header.get(name)
         if got != expected:
-            raise A7SimError(
-                f"{journalled.location(1)}: expected a session of {expected} to go on with, got one of {got}"
-            )
+            raise A7SimError(f"{journalled.location(1)}: expected a session of {expected} to resume, got one of {got}")
     version = journalled.header["schema_version"]
     if version != SCHEMA_VERSION:
         raise A7SimError(
-            f"{journalled.location(1)}: expected schema_version {SCHEMA_VERSION} to go on with, got {version}, "
+            f"{journalled.location(1)}: expected schema_version {SCHEMA_VERSION} to resume, got {version}, "
             "which can be replayed only"
         )
     return ResumableSession(journalled, *scenario_of_journal(journalled))

@@ -68,7 +68,7 @@ def _left_in(folder: Path, scenario_hash: str, seed: int) -> SavedSession | None
     if (header.get("scenario_hash"), header.get("seed")) != (scenario_hash, seed):
         return None
     if is_being_written(folder / JOURNAL):
-        return SavedSession(folder, None, f"{folder}: somebody sits there")
+        return SavedSession(folder, None, f"{folder}: the session is in use")
     try:
         return SavedSession(folder, find_resumable(folder, COMMAND))
     except A7SimError as error:

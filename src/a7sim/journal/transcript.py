@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from a7sim.instrument.language import LinkEvent, Listener
 from a7sim.journal.format import Event
 
-_IN_WORDS = {"+": "+ comes", "-": "- goes", "~": "~ goes on"}
+_IN_WORDS = {"+": "+ connects", "-": "- disconnects", "~": "~ continues"}
 
 
 def format_event(event: Event) -> str:

@@ -119,7 +119,7 @@ def block_adjustment(models: Sequence[Model], ground: Ground, height_weight: flo
         if max(moves) < CONVERGED:
             return _result(e, ground, (scales, turns, shifts, free), weights, iteration, normal, scale)
     raise Undetermined(
-        f"the block of {pluralize(len(models), 'model')} does not come to rest in {MAX_ITERATIONS} iterations"
+        f"the block of {pluralize(len(models), 'model')} does not converge in {MAX_ITERATIONS} iterations"
     )
 
 

@@ -183,7 +183,7 @@ def similarity_by_iteration(
                 np.where(on_a_saddle, 1.0, 0.0) * np.array([0.3, 0.6, 0.9]).reshape((3, *(1,) * near.ndim))
             )
             turn = mxm(off, turn)
-    raise Undetermined(f"the similarity of {n} points does not come to rest in {MAX_ITERATIONS} iterations")
+    raise Undetermined(f"the similarity of {n} points does not converge in {MAX_ITERATIONS} iterations")
 
 
 def _of_one_shape(points: Array, targets: Array) -> tuple[Array, Array]:

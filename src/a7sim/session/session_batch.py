@@ -40,7 +40,7 @@ class SessionBatch:
     def run(self, strips: bool = True, whole: bool = True) -> list[Document]:
         """Run to the end and return a document per seed, as `run` does, without lines and book.
 
-        Without `strips` they do not contain the strip on the ground, which costs as much as the rest; unless `whole`,
+        Without `strips` they do not contain the strip on the ground, which doubles the time; unless `whole`,
         the models contain only the keys of `brief_model_document`.
         """
         found: list[list[Document]] = [[] for _ in self.seeds]

@@ -181,7 +181,7 @@ def _said(test: Document) -> str:
         MATTERS: "it matters",
         LITTLE: "there is a difference, too small to matter" if "on" not in test else "a dependence too weak to matter",
         NOTHING: "it does not matter",
-        OPEN: "left open by so many replicates",
+        OPEN: "left open by this number of replicates",
     }[test["verdict"]]
 
 

@@ -15,7 +15,7 @@ from a7sim.errors import A7SimError
 Kind = Literal["process", "pool", "dask", "mpi"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-RESUME_HINT = "the same command goes on where a checkpoint was left (--out)"
+RESUME_HINT = "the same command continues from the checkpoint (--out)"
 """Advice for a study that ended early."""
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

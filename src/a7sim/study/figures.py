@@ -202,7 +202,7 @@ def _forest(tests: Sequence[tuple[Document, Document]], size_of: str, small: flo
     rows = [_row(claim, test) for claim, test in tests]
     size = (WIDTH_IN, _INCHES_BESIDE + _INCHES_A_ROW * len(tests))
     text = "; ".join(f"{row} {test[size_of]:.2f}" for row, (_, test) in zip(rows, tests, strict=True))
-    with drawing(f"claims-{size_of}", f"What the claims come to: {label}", f"{text}.", size, wide=True) as drawn:
+    with drawing(f"claims-{size_of}", f"Tests of the claims: {label}", f"{text}.", size, wide=True) as drawn:
         (axes,) = drawn.axes
         axes.axvspan(-small, small, color=FILL, alpha=0.3, linewidth=0)
         axes.axvline(0.0, color=SOFT, linewidth=0.8)

@@ -59,7 +59,7 @@ def _see_that_it_can_be_written(folder: Path) -> None:
 def _not_beyond(tally: Tally, loaded: LoadedStudy, path: Path) -> Tally:
     done = int(tally.done.max())
     if done > loaded.replicates:
-        raise A7SimError(f"{path}: expected {done} replicates or more, since so many are done, got {loaded.replicates}")
+        raise A7SimError(f"{path}: expected at least the {done} replicates already done, got {loaded.replicates}")
     return tally
 
 

@@ -100,7 +100,7 @@ def seed_for(exercise_folder: ExerciseFolder, played: PlayedRun, otherwise: int 
 
 
 def run_attempt(
-    exercise_folder: ExerciseFolder, played: PlayedRun, folder: Path, seed: int, student: str = "somebody"
+    exercise_folder: ExerciseFolder, played: PlayedRun, folder: Path, seed: int, student: str = "student"
 ) -> str:
     """Run an exercise from its opening to its end in a folder; return the reason if it did not finish."""
     folder.mkdir(parents=True, exist_ok=True)

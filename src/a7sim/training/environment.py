@@ -126,7 +126,7 @@ def resume_environment(exercise_folder: ExerciseFolder, seed: int, folder: Path)
     there = read_journal(folder / JOURNAL)
     if there.header.get("software") != software_version():
         raise A7SimError(
-            f"{there.location(1)}: expected an attempt of {software_version()} to go on with, got one of "
+            f"{there.location(1)}: expected an attempt of {software_version()} to resume, got one of "
             f"{there.header.get('software')} (a7sim train reset begins anew)"
         )
     environment, replay = _replayed(exercise_folder, seed, there)

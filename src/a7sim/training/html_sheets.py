@@ -130,9 +130,7 @@ def _spread(catalogue: Sequence[ExerciseFolder], best: Best) -> PageFigure:
     by_exercise = [[each.grade.points for (_, name), each in best.items() if name == s.name] for s in catalogue]
     numbers = [str(each.exercise.number) for each in catalogue]
     said = "; ".join(
-        f"exercise {n}: median {median(some):g} of {pluralize(len(some), 'student')}"
-        if some
-        else f"exercise {n}: nobody"
+        f"exercise {n}: median {median(some):g} of {pluralize(len(some), 'student')}" if some else f"exercise {n}: none"
         for n, some in zip(numbers, by_exercise, strict=True)
     )
     with drawing("spread", "Points of the class by exercise", said, size=(8.0, 3.6), wide=True) as drawn:

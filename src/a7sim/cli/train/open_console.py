@@ -27,7 +27,7 @@ def open_console(environment: AttemptEnvironment, checklist: Checklist, plain: b
     The simulated clock runs with the wall clock while the console is open.
     """
     try:
-        from a7sim.console.app import Console  # only who sits down loads the screen
+        from a7sim.console.app import Console
     except ImportError as error:
         raise A7SimError("start: expected textual to be installed: pip install 'a7sim[console]'") from error
     from a7sim.console.actions.preset_recovery import LoggedLine

@@ -87,7 +87,7 @@ def start_(
             _serve(environment, address)
         else:
             open_console(environment, checklist, plain)
-    click.echo(f"a7sim train verify {exercise_folder.exercise.number} grades it; a7sim train start goes on with it")
+    click.echo(f"a7sim train grade {exercise_folder.exercise.number} grades it; a7sim train start resumes it")
 
 
 def _attempt(

@@ -26,7 +26,7 @@ class PlaybackActions(ActionBase):
             return False
         if console.playback is None:
             why = "there is nothing to play" if deed in _PLAYED else "hands are off"
-            console.say(f"{why}: you watch what somebody else does at {console.config.where} now", refused=True)
+            console.say(f"{why}: this console only watches {console.config.where}", refused=True)
         else:
             keys = key_labels(console.config.keymap, not console.utf8)
             console.say(f"hands are off: what you watch has been done; {keys['play']} plays and pauses", refused=True)
@@ -99,5 +99,5 @@ class PlaybackActions(ActionBase):
 
     def _playback(self) -> Playback:
         playback = self._console.playback
-        assert playback is not None, "only where there is a film these deeds are done"
+        assert playback is not None, "playback actions need a recording"
         return playback

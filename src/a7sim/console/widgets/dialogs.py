@@ -109,8 +109,8 @@ drum. Ctrl+P lists everything by name, themes too; Ctrl+Q leaves.
 
 
 _HOW_TO_WATCH = """\
-You watch somebody at work: what they see in both eyepieces, their
-counters, elements and book. Your hands are off; your eyes are your own.
+Playback: you see both eyepieces, the counters, the elements and the book
+of the session. Moving the instrument is disabled; the view is your own.
 """
 
 

@@ -131,7 +131,7 @@ class ClientSession:
             if pace is not None:
                 pace.clear()
 
-    # --- how it goes on -------------------------------------------------------------------------------
+    # --- next steps ------------------------------------------------------------------------------------
 
     def _arrived(self, data: bytes) -> None:
         if len(data) <= CHUNK_BYTES and not self._backlog and self._next is None and not self._holds_back():

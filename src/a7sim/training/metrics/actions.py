@@ -29,7 +29,7 @@ class ActionsOutOfOrder(Metric, frozen=True, kw_only=True):
     counts, or the first if it ends in '!'.
     """
 
-    unit = "deeds"
+    unit = "actions"
     chains: list[list[str]]
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
@@ -127,7 +127,7 @@ class UnviewedPoints(Metric, frozen=True, kw_only=True):
             levers = [each.index for each in before if each.what in ("fit", "base", "load")]
             if not readings or max(looks, default=-1) < max(levers, default=0):
                 blind.append(point)
-        told = f"at {join_words(blind)} nobody looked after the last lever" if blind else "looked every time"
+        told = f"at {join_words(blind)} without a look after the last fitting" if blind else "looked every time"
         return MetricResult(float(len(blind)), told)
 
 

@@ -56,7 +56,7 @@ def pointings(record: AttemptRecord, name: str, base: str = "") -> list[Reading]
 
 
 def _turned_there(actions: Sequence[StudentAction], reading: Reading) -> bool:
-    """Return whether a registered element was turned after the mark came to the point.
+    """Return whether a registered element was turned after the mark had reached the point.
 
     The console registers the element in hand with each reading, so its name alone is no indication.
     """

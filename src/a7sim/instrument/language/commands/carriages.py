@@ -77,7 +77,7 @@ def _axis(axis: str) -> list[Command]:
             wheel,
             (Quantity(usual, to_the_ends, name="amount", unit_there=unit),),
             moves=True,
-            help="turn by so much counter, signed",
+            help="turn by a signed counter amount",
         ),
     ]
 

@@ -60,7 +60,7 @@ def _element(header: str, name_of: Callable[[int], str], unit: str, about: str) 
             turn,
             (Quantity(unit, to_the_ends, name="amount"),),
             moves=True,
-            help="turn its drum by so much, signed, between two counts too",
+            help="turn its drum by a signed amount, between two counts too",
         ),
     ]
 
