@@ -58,7 +58,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
     def close(self) -> None:
         """Close the session; its lock is released."""
         if self.is_open and self._engine is not None:
-            self._engine.instrument.close(self._engine.client, self.clock.now)
+            self._connect().close(self._engine.client, self.clock.now)
         self._engine = None
         self.is_open = False
         self.cancel_read()

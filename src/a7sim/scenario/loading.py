@@ -13,7 +13,7 @@ import msgspec
 from a7sim.bundled import bundled_dirs, bundled_names
 from a7sim.errors import A7SimError
 from a7sim.scenario.cross_checks import cross_check_errors
-from a7sim.scenario.schema import Scenario
+from a7sim.scenario.schema import Scenario, register_loader
 from a7sim.scenario.skills import PROFILES
 from a7sim.scenario.validation import schema_errors
 from a7sim.table_files import describe_missing_file, read_toml
@@ -170,3 +170,6 @@ def _index(text: str) -> int:
     if not text.isdecimal():
         raise ValueError
     return int(text)
+
+
+register_loader(lambda path, settings: load_scenario(path, settings=settings))

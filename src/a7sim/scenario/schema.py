@@ -3,7 +3,7 @@
 Each description completes the sentence "expected ..."; validation and the JSON Schema use it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
@@ -507,6 +507,15 @@ out in turn.
 """
 
 
+_loaders: list[Callable[[Path, Mapping[str, Any] | None], "Scenario"]] = []
+"""Loader of scenario files, registered by `a7sim.scenario.loading`, which imports this module."""
+
+
+def register_loader(loader: Callable[[Path, Mapping[str, Any] | None], "Scenario"]) -> None:
+    """Set the function behind `Scenario.load`: it takes the path of a scenario file, and settings by path."""
+    _loaders[:] = [loader]
+
+
 class Scenario(FileRecord, frozen=True, kw_only=True):
     """Flight, camera, photographs, an instrument with its faults and an operator with slips."""
 
@@ -547,9 +556,7 @@ class Scenario(FileRecord, frozen=True, kw_only=True):
         >>> scenario.plan.case, [model.name for model in scenario.models]
         ('E', ['1', '2'])
         """
-        from a7sim.scenario.loading import load_scenario  # noqa: PLC0415 # loading reads all that stands here
-
-        return load_scenario(Path(name), settings=settings)
+        return _loaders[0](Path(name), settings)
 
     @property
     def plan(self) -> Plan:

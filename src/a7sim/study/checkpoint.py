@@ -21,6 +21,9 @@ from a7sim.study.tally import Tally
 PARQUET, NPZ = "checkpoint.parquet", "checkpoint.npz"
 KINDS = (PARQUET, NPZ)
 
+RESUME_HINT = "the same command continues from the checkpoint (--out)"
+"""Advice for a study that ended early."""
+
 _NUMBERS = ("count", "origin", "total", "squares", "low", "high")
 _WHOSE = ("software", "identity")
 

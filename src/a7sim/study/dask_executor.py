@@ -12,7 +12,7 @@ from typing import Any
 
 import a7sim
 from a7sim.errors import A7SimError
-from a7sim.study.executors import RESUME_HINT
+from a7sim.study.checkpoint import RESUME_HINT
 
 WORKER_TIMEOUT_S = 5.0
 """Time limit in seconds for a scheduler to answer and to have a worker."""

@@ -11,12 +11,10 @@ from threading import Thread
 from typing import Any, Literal, ParamSpec, TypeVar, get_args
 
 from a7sim.errors import A7SimError
+from a7sim.study.checkpoint import RESUME_HINT
 
 Kind = Literal["process", "pool", "dask", "mpi"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-
-RESUME_HINT = "the same command continues from the checkpoint (--out)"
-"""Advice for a study that ended early."""
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 

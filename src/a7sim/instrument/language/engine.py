@@ -4,10 +4,11 @@ import hmac
 import math
 import re
 import zlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from a7sim.instrument.errors import AutographError, OutOfRangeError, SettingsConflictError, UnknownNameError
 from a7sim.instrument.language.commands import COMMANDS
+from a7sim.instrument.language.context import LockedInstrument
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.program import (
     CachedQuery,
@@ -20,9 +21,6 @@ from a7sim.instrument.language.program import (
 )
 from a7sim.instrument.language.status import OPERATION_COMPLETE, SETTLING, Status
 from a7sim.instrument.language.token_redaction import redact_token
-
-if TYPE_CHECKING:
-    from a7sim.instrument.language.shared_instrument import SharedInstrument
 
 MAX_LINE_LENGTH = 4096
 """Bytes, without the line end."""
@@ -56,7 +54,7 @@ class Engine:
     Within a long line it is now and then the present time, so that other clients may have their turn.
     """
 
-    def __init__(self, instrument: "SharedInstrument", client: str, cr_ends_line: bool = True) -> None:
+    def __init__(self, instrument: LockedInstrument, client: str, cr_ends_line: bool = True) -> None:
         self.instrument = instrument
         self.client = client
         self.waits_until: float | None = None

@@ -1,34 +1,15 @@
 """State shared by all clients of an instrument: its movement, the lock, the token, and the listener."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
-
-from msgspec import Struct
 
 import a7sim
 from a7sim.instrument.autograph import Autograph, State
+from a7sim.instrument.language.context import LinkEvent, Listener
 from a7sim.instrument.language.engine import Engine
-
-
-class LinkEvent(Struct, frozen=True, gc=False):
-    """Event on the link: simulated time in s, client, direction and text.
-
-    `direction` is '>' for a line to the instrument and '<' for one from it; '+' for a client that connects and '-' for
-    one that disconnects; '~' where a waiting line continues, and '!' where a too long one was dropped. The sequence of
-    events determines the state of the instrument.
-    """
-
-    time: float
-    client: str
-    direction: str
-    text: str
-
 
 POLL_SECONDS = 0.1
 """Simulated s per status query while something moves, so that a client may wait by polling."""
-
-Listener = Callable[[LinkEvent], None]
 
 
 @dataclass

@@ -20,10 +20,6 @@ Limits = tuple[float, float, float]
 """MIN, MAX, DEF."""
 
 
-class CommandContext(Protocol):
-    """Context of a handler: the engine's session with one client."""
-
-
 Handler = Callable[[Any, "Call"], str | bytes | None]
 
 

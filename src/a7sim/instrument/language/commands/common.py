@@ -2,12 +2,12 @@
 
 from typing import TYPE_CHECKING
 
+from a7sim.instrument.language.context import CommandContext
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.table import Choice
 
 if TYPE_CHECKING:
     from a7sim.instrument.autograph import Autograph
-    from a7sim.instrument.language.engine import Engine
 
 
 MAX_TEXT_LENGTH = 1000
@@ -25,7 +25,7 @@ ELEMENT_NODES = (
 LIMIT = Choice(("MINimum", "MAXimum", "DEFault"), optional=True)
 
 
-def autograph_for(engine: "Engine") -> "Autograph":
+def autograph_for(engine: CommandContext) -> "Autograph":
     """Return the instrument of an engine."""
     return engine.instrument.autograph
 
