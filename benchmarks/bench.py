@@ -4,7 +4,7 @@
     python benchmarks/bench.py --full --peers DIR   # as the targets ask, beside the peers in DIR
     python benchmarks/bench.py --only run study
 
-A benchmark that fails or takes too long is said so in the table and the others go on; exit code 1 in the end.
+A benchmark that fails or exceeds its time limit is marked in the table and the others run; then exit code 1.
 """
 
 import argparse
@@ -26,39 +26,39 @@ from bench_page import Outcome, Surroundings, page
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "docs" / "benchmarks.md"
 SCRATCH = "SCRATCH"
-"""Stands for a folder that is gone afterwards."""
+"""Placeholder of a temporary folder."""
 
 SECONDS_TO_END = 10.0
-"""That a benchmark which takes too long has to clear up."""
+"""Time to clean up for a benchmark that exceeds its limit."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Arguments of a benchmark, and about how many s it takes with them."""
+    """Arguments of a benchmark, and its approximate duration in s."""
 
     arguments: str
     seconds: float
 
     @property
     def longest(self) -> float:
-        """Seconds after which it takes too long."""
+        """Time limit in seconds."""
         return 60.0 + 4.0 * self.seconds
 
 
 @dataclass(frozen=True)
 class Benchmark:
-    """A program of this folder, with settings for a quick look and those that the targets ask for."""
+    """Program of this folder, with quick settings and those of the targets."""
 
     program: str
     quick: Settings
     full: Settings
     needs: str = ""
-    """A module it does nothing without."""
+    """Required module."""
     peers: Literal["", "option", "python"] = ""
-    """How it is told where its peers are: by `--peers`, or by the interpreter of an environment of its own name."""
+    """How it gets the location of its peers: by `--peers`, or by the interpreter of an environment of its own name."""
 
     def command(self, settings: Settings, peers: Path | None) -> list[str]:
-        """Return what runs it."""
+        """Return its command."""
         command = [sys.executable, str(HERE / f"{self.program}.py"), "--json", *settings.arguments.split()]
         if peers and self.peers == "option":
             return [*command, "--peers", str(peers)]
@@ -70,7 +70,7 @@ SKILLS = f"5 6 7 8 9 10 11 --out {SCRATCH}"
 
 BENCHMARKS = (
     Benchmark("run", Settings("", 20), Settings("", 20)),
-    Benchmark("crowd", Settings("1 50 200", 30), Settings("", 60)),
+    Benchmark("session_batch", Settings("1 50 200", 30), Settings("", 60)),
     Benchmark("study", Settings("--replicates 200 --growth 20", 170), Settings("--replicates 10000", 900)),
     Benchmark("a8_strip", Settings("200 0", 25), Settings("", 300)),
     Benchmark("reductions", Settings("", 60), Settings("", 60), peers="python"),
@@ -114,7 +114,7 @@ def outcome(benchmark: Benchmark, settings: Settings, peers: Path | None) -> Out
 
 
 def ended(process: subprocess.Popen[str]) -> None:
-    """End a benchmark that still runs, and all that it started."""
+    """Kill a running benchmark and all its processes."""
     if process.poll() is None:
         process.send_signal(signal.SIGINT)
         with suppress(subprocess.TimeoutExpired):
@@ -125,17 +125,17 @@ def ended(process: subprocess.Popen[str]) -> None:
 
 
 def there(module: str) -> bool:
-    """Whether a module can be imported, found out elsewhere."""
+    """Return whether a module can be imported, tested in a subprocess."""
     return subprocess.run([sys.executable, "-c", f"import {module}"], capture_output=True, check=False).returncode == 0
 
 
 def told_time(seconds: float) -> str:
-    """Write how long something takes, for people who think of doing something else in the meantime."""
+    """Return a duration as text."""
     return f"{max(1, round(seconds / 60))} min"
 
 
 def run_all(chosen: Sequence[tuple[Benchmark, Settings]], peers: Path | None) -> list[Outcome]:
-    """Run benchmarks one after the other and say how each goes."""
+    """Run benchmarks one after the other and print their progress."""
     outcomes = []
     for number, (each, settings) in enumerate(chosen, start=1):
         said = f"{number} of {len(chosen)}  {each.program} {settings.arguments}".rstrip()
@@ -147,7 +147,7 @@ def run_all(chosen: Sequence[tuple[Benchmark, Settings]], peers: Path | None) ->
 
 
 def options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """Read the command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     how_long = parser.add_mutually_exclusive_group()
     how_long.add_argument("--quick", action="store_true", help="settings that end in minutes (the default)")
@@ -165,7 +165,7 @@ def options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
 
 def chosen_by(given: argparse.Namespace) -> list[tuple[Benchmark, Settings]]:
-    """Return the benchmarks to run, each with its settings."""
+    """Return the selected benchmarks, each with its settings."""
     return [
         (each, each.full if given.full else each.quick)
         for each in BENCHMARKS
@@ -174,7 +174,7 @@ def chosen_by(given: argparse.Namespace) -> list[tuple[Benchmark, Settings]]:
 
 
 def command_of(given: argparse.Namespace) -> str:
-    """Return what gives the page again, without a path of this machine."""
+    """Return the command that makes the page, without a path of this machine."""
     words = ["--full"] if given.full else []
     words += ["--peers DIR"] if given.peers else []
     words += ["--only", *given.only] if given.only else []

@@ -1,4 +1,4 @@
-"""The page of all benchmarks, in Markdown: what they measured, beside what it was measured on."""
+"""Page of all benchmarks in Markdown: results and machine."""
 
 import datetime
 import os
@@ -10,14 +10,14 @@ from importlib.metadata import version
 from figures import COLUMNS, NOT_THERE, NUMBERS, Figure
 
 QUIET = 0.5
-"""The load in processors above which other work is said to have gone on."""
+"""Load in processors above which other work counts as running."""
 
 PROGRAMS = ("numpy", "scipy")
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a benchmark: its figures, or why there are none."""
+    """Result of a benchmark: its figures, or the reason why there are none."""
 
     program: str
     arguments: str
@@ -25,11 +25,11 @@ class Outcome:
     seconds: float = 0.0
     failure: str = ""
     absent: str = ""
-    """A module that it needs and that is not there."""
+    """Required module that is not installed."""
 
     @property
     def told(self) -> str:
-        """In a few words."""
+        """Return a short description."""
         if self.failure:
             return f"failed: {self.failure}"
         if self.absent:
@@ -47,24 +47,24 @@ class Outcome:
 
 
 def judged(figures: Sequence[Figure]) -> str:
-    """Say how many targets are met and missed."""
+    """Return the numbers of met and missed targets as text."""
     met = [each.met for each in figures]
     return "".join(f", {met.count(verdict)} {word}" for verdict, word in ((True, "met"), (False, "missed")))
 
 
 def in_a_cell(text: str) -> str:
-    """Return a text that leaves the table whole."""
+    """Return a text escaped for a table cell."""
     return text.replace("|", r"\|").replace("<", "&lt;")
 
 
 def loud(verdict: str) -> str:
-    """Return a verdict so that one that was missed is seen."""
+    """Return a verdict with emphasis if it was missed."""
     return f"**{verdict}**" if verdict == "missed" else verdict
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """When and on what the benchmarks ran, without a name of the machine."""
+    """Date and machine of the benchmarks, without the name of the machine."""
 
     date: datetime.date
     processors: int
@@ -75,7 +75,7 @@ class Surroundings:
 
     @classmethod
     def here(cls) -> "Surroundings":
-        """Return those of this machine, now."""
+        """Return the surroundings of this machine, now."""
         versions = [(platform.python_implementation(), platform.python_version())]
         versions += [(name, version(name)) for name in ("a7sim", *PROGRAMS)]
         processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -89,7 +89,7 @@ class Surroundings:
 
     @property
     def company(self) -> str:
-        """Say whether other work went on beside it."""
+        """Return whether other work was running, as text."""
         if self.load > QUIET:
             return (
                 f"**Taken beside other work**: {self.load:.1f} of {self.processors} processors were busy before it "
@@ -99,7 +99,7 @@ class Surroundings:
 
 
 def page(outcomes: Iterable[Outcome], surroundings: Surroundings, command: str, full: bool) -> str:
-    """Return the page of what came of the benchmarks that a command ran."""
+    """Return the page of the results of a command's benchmarks."""
     outcomes = list(outcomes)
     settings = (
         "With the settings that the targets ask for."
@@ -110,7 +110,8 @@ def page(outcomes: Iterable[Outcome], surroundings: Surroundings, command: str, 
     lines = [
         "# Benchmarks",
         "",
-        f"Written by `{command}`, not by hand. [Asked and measured](targets.md) has the targets of the whole project.",
+        f"Written by `{command}`, not by hand. "
+        "[Targets and measurements](targets.md) has the targets of the whole project.",
         "",
         str(surroundings),
         "",
@@ -131,7 +132,7 @@ def page(outcomes: Iterable[Outcome], surroundings: Surroundings, command: str, 
 
 
 def sentence(figures: Sequence[Figure], outcomes: Sequence[Outcome]) -> str:
-    """Return what came of it in one sentence."""
+    """Return a summary sentence."""
     failed = sum(bool(each.failure) for each in outcomes)
     met = sum(each.met is True for each in figures)
     missed = sum(each.met is False for each in figures)

@@ -20,7 +20,7 @@ NONE = Target("at most", 0)
 
 
 class Poller(asyncio.Protocol):
-    """A client that asks again as soon as it is answered, until it is told to stop."""
+    """Client that queries again as soon as it has its answer, until it is stopped."""
 
     def __init__(self, number):
         self._number = number % 256
@@ -33,17 +33,17 @@ class Poller(asyncio.Protocol):
         self.done = False
 
     def connection_made(self, transport):
-        """Take the number."""
+        """Send the client's number."""
         self._transport = transport
         transport.write(b"*ESE %d\n" % self._number)
 
     def ask(self):
-        """Ask once."""
+        """Send a query."""
         self._asked_at = time.perf_counter()
         self._transport.write(QUERY + b";*ESE?\n")
 
     def data_received(self, data):
-        """Check the answer and ask again."""
+        """Check the answer and query again."""
         self._heard += data
         if not self._heard.endswith(b"\n"):
             return
@@ -55,7 +55,7 @@ class Poller(asyncio.Protocol):
         self.ask()
 
     def connection_lost(self, exc):
-        """Count as wrong whatever ends the line before time."""
+        """Count a lost connection as a wrong answer."""
         if not self.done:
             self.wrong.append(b"hung up")
 

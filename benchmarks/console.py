@@ -28,7 +28,7 @@ QUIET_S = 0.12
 
 
 def timed(work: Callable[[], object], times: int = 40) -> float:
-    """Return the median of so many runs, ms."""
+    """Return the median of `times` runs, ms."""
     taken = []
     for _ in range(times):
         began = time.perf_counter()
@@ -52,7 +52,7 @@ def frame_times(columns: int, rows: int) -> tuple[float, float]:
 
 
 class Terminal:
-    """A program on a pseudo-terminal."""
+    """Program on a pseudo-terminal."""
 
     def __init__(self, command: list[str], columns: int, rows: int) -> None:
         self.began = time.perf_counter()
@@ -64,7 +64,7 @@ class Terminal:
         ioctl(self.fd, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
 
     def read(self, seconds: float) -> bytes:
-        """Return what comes within a time, as soon as anything does."""
+        """Return the available bytes, waiting up to a limit for the first."""
         ready, _, _ = select.select([self.fd], [], [], seconds)
         try:
             return os.read(self.fd, 1 << 16) if ready else b""
@@ -72,7 +72,7 @@ class Terminal:
             return b""
 
     def until(self, words: bytes, seconds: float = 20.0) -> float:
-        """Return after how many s since it began the words are on the screen."""
+        """Return the seconds from the start until words are on the screen."""
         come = b""
         while words not in come:
             if time.perf_counter() - self.began > seconds:
@@ -81,7 +81,7 @@ class Terminal:
         return time.perf_counter() - self.began
 
     def drained(self, seconds: float) -> int:
-        """Return how many bytes come within a time."""
+        """Return the number of bytes received within a time."""
         end, size = time.perf_counter() + seconds, 0
         while (left := end - time.perf_counter()) > 0:
             size += len(self.read(left))
@@ -91,7 +91,7 @@ class Terminal:
         os.write(self.fd, keys)
 
     def key_to_frame(self, key: bytes, least: int) -> float:
-        """Return ms from a key until a frame of at least so many bytes is there and nothing more comes."""
+        """Return ms from a key until a frame of at least `least` bytes is complete."""
         self.drained(0.2)
         began = last = time.perf_counter()
         self.send(key)
@@ -111,7 +111,7 @@ class Terminal:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def share_while_turning(self, a_second: int, seconds: float) -> tuple[float, float]:
-        """Return the share of a core and the kilobytes a second drawn while so many keys a second are pressed."""
+        """Return the share of a core and the kilobytes per second drawn at a rate of key presses per second."""
         before, began, size, pressed = self.cpu(), time.perf_counter(), 0, 0
         while (now := time.perf_counter() - began) < seconds:
             if now * a_second >= pressed:
@@ -127,7 +127,7 @@ class Terminal:
 
 
 def floor_app(columns: int, rows: int) -> None:
-    """Run a bare widget that draws noise at every key."""
+    """Run a bare widget that draws noise at each key."""
     from rich.color import Color
     from rich.segment import Segment
     from rich.style import Style
@@ -165,9 +165,9 @@ def floor_app(columns: int, rows: int) -> None:
 
 
 def first_paint(command: list[str], columns: int, rows: int, there: bytes, times: int = 5) -> tuple[float, float]:
-    """Return the shortest time of some starts to the first paint, and the least CPU time spent on one, s.
+    """Return the shortest time of several starts to the first paint, and the least CPU time of one, s.
 
-    The start before them compiles what has not been compiled yet, as the first start of an installed console does.
+    A start before them compiles the byte code, as the first start of an installed console does.
     """
     taken = []
     for _ in range(times + 1):
@@ -201,7 +201,7 @@ def measured(
 
 
 def asked_of(name: str, console: tuple[float, ...], floor: tuple[float, ...]) -> list[Figure]:
-    """Return the console's figures beside the bare widget's."""
+    """Return the console's figures compared with the bare widget's."""
     against = "bare Textual widget"
     told = (
         ("first paint", "s", 1.0, Target("below", 0.8)),

@@ -1,4 +1,4 @@
-"""Recording which random numbers work draws, to draw as many of the same kinds again without the work."""
+"""Recording of random draws, to repeat the same draws without the rest of the work."""
 
 import time
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ _default_rng, _SeedSequence = np.random.default_rng, np.random.SeedSequence
 
 
 class _Recorded:
-    """A generator whose calls are recorded."""
+    """Generator whose calls are recorded."""
 
     def __init__(self, generator, number, calls):
         self._generator, self._number, self._calls = generator, number, calls
@@ -26,12 +26,12 @@ class _Recorded:
 
 @contextmanager
 def recording():
-    """Yield the list in which all generators that are made, and all calls of them, come to stand in their order."""
+    """Yield the list of all generators made in the body, and all their calls, in order."""
     calls = []
     made = 0
 
     class Sequence(_SeedSequence):
-        """A seed sequence whose making is recorded."""
+        """Seed sequence whose creation is recorded."""
 
         def __init__(self, *arguments, **named):
             super().__init__(*arguments, **named)
@@ -52,7 +52,7 @@ def recording():
 
 
 def cpu_seconds_to_draw(calls):
-    """Return how long it takes to make the recorded generators and draw from them again, CPU seconds."""
+    """Return the CPU seconds of making the recorded generators and drawing from them again."""
     seeds = [_SeedSequence(*c[2], **c[3]) for c in calls if c[1] == "SeedSequence"]
     known = {(each.entropy, each.spawn_key): each for each in seeds}
     generators = []

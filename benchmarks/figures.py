@@ -1,8 +1,7 @@
-"""What a benchmark measured, in one shape for all.
+"""Common form of the results of benchmarks.
 
-A benchmark is a function that prints what people want to see of it and returns its figures. As a program it goes on
-with a table of them, or with `--json` has one line of JSON for each and what it printed for people on standard error.
-Exit code 1 where a target is missed.
+A benchmark is a function that prints its details and returns its figures. As a program it then prints a table of them,
+or with `--json` one line of JSON for each, and its details on standard error. Exit code 1 if a target is missed.
 """
 
 import operator
@@ -20,7 +19,7 @@ from a7sim.text_tables import text_table
 
 COLUMNS = ("measured", "value", "against", "ratio", "target", "")
 NUMBERS = (1, 3)
-"""Columns whose entries stand to the right."""
+"""Right-aligned columns."""
 
 NOT_THERE = "not there"
 SENSES = {
@@ -33,7 +32,7 @@ SENSES = {
 
 @dataclass(frozen=True)
 class Target:
-    """What is asked of a figure's value or of its ratio: one limit, or two to be between."""
+    """Target of a figure's value or of its ratio: one limit, or two."""
 
     sense: Literal["at least", "above", "at most", "below", "between"]
     limit: float | tuple[float, float]
@@ -45,7 +44,7 @@ class Target:
         return f"{'ratio ' if self.of == 'ratio' else ''}{self.sense} {numbers}"
 
     def is_met_by(self, number: float) -> bool:
-        """Whether a number is as asked."""
+        """Return whether a number meets it."""
         if isinstance(self.limit, tuple):
             return self.limit[0] <= number <= self.limit[1]
         return bool(SENSES[self.sense](number, self.limit))
@@ -53,26 +52,26 @@ class Target:
 
 @dataclass(frozen=True)
 class Figure:
-    """A number that was measured, its ratio to a floor's or a peer's of the same run, and what is asked of it."""
+    """Measured number, its ratio to a floor or a peer of the same run, and its target."""
 
     name: str
     value: float
     unit: str = ""
     against: str = ""
-    """The floor or peer."""
+    """Floor or peer."""
     ratio: float | None = None
-    """None where the floor or peer is not there."""
+    """None without floor or peer."""
     target: Target | None = None
-    """None where nothing is asked, or not of so few as were worked."""
+    """None without a target, or if the run was too short for it."""
 
     @property
     def met(self) -> bool | None:
-        """Whether it is as asked, None where nothing is or where there is no number to judge."""
+        """Return whether it meets its target, None without a target or a number."""
         judged = self.ratio if self.target and self.target.of == "ratio" else self.value
         return None if self.target is None or judged is None else self.target.is_met_by(judged)
 
     def cells(self) -> tuple[str, ...]:
-        """Return what stands in the `COLUMNS` of a table."""
+        """Return the cells of the `COLUMNS` of a table."""
         ratio = NOT_THERE if self.against and self.ratio is None else number(self.ratio)
         verdict = {None: "", True: "met", False: "missed"}[self.met]
         told = str(self.target) if self.target else ""
@@ -80,7 +79,7 @@ class Figure:
 
 
 def number(value: float | None) -> str:
-    """Write a number with three digits, or all before its point."""
+    """Return a number with three digits, or all before its point."""
     if value is None:
         return ""
     return f"{value:.0f}" if abs(value) >= 100 or float(value).is_integer() else f"{value:.3g}"
@@ -97,7 +96,7 @@ def read(lines: str) -> list[Figure]:
 
 
 def tell(measured: Callable[[], Iterable[Figure]]) -> None:
-    """Measure, tell the figures and end the program."""
+    """Measure, print the figures and exit."""
     as_json = "--json" in sys.argv
     if as_json:
         sys.argv.remove("--json")

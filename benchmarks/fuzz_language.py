@@ -30,10 +30,10 @@ from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 
 ASKED_OF = 1_000_000
-"""Lines that no promise is to be broken by."""
+"""Lines after which no promise may be broken."""
 
 LINES_AN_INSTRUMENT = 500
-"""Lines that one instrument hears before the next takes its place."""
+"""Lines per instrument."""
 
 MOUNTING = b'PHOT1:LOAD "101";:PHOT2:LOAD "102";:PROJ1:PDIS 152.68;:PROJ2:PDIS 152.68;:BASE:BX 194.99;:DRIV:Z -325.71\n'
 
@@ -56,12 +56,12 @@ _QUOTED = re.compile(r""""[^"]*("|$)|'[^']*('|$)""")
 
 
 class Broken(AssertionError):
-    """A line that broke a promise."""
+    """Line that broke a promise."""
 
 
 @contextmanager
 def reported():
-    """Yield a list that takes the number of every error that any conversation reports."""
+    """Yield a list of the numbers of all errors reported in any session."""
     numbers = []
     report = Status.report
 
@@ -77,7 +77,7 @@ def reported():
 
 
 class Fuzzed:
-    """A conversation whose every line is checked."""
+    """Session whose lines are all checked."""
 
     def __init__(self, instrument, numbers, admitted=True):
         self.engine = instrument.open(cr_ends_line=False)
@@ -131,7 +131,7 @@ class Fuzzed:
 
 
 def counted(line):
-    """Return how many queries and how many commands a line holds, by nothing but its quotes and semicolons."""
+    """Return the numbers of queries and commands of a line, by its quotes and semicolons only."""
     if len(line) > MAX_LINE_LENGTH:
         return 0, 1
     bare = _QUOTED.sub(lambda found: "x" * len(found[0]), line.removesuffix(b"\r").decode("latin-1"))
@@ -142,7 +142,7 @@ def counted(line):
 
 
 def count_of(reply):
-    """Return how many queries a reply answers."""
+    """Return the number of queries that a reply answers."""
     if not reply:
         return 0
     taken = parse_reply(reply)
@@ -154,7 +154,7 @@ def count_of(reply):
 
 
 class Author:
-    """Writes lines: good ones, good ones spoilt, and noise."""
+    """Author of lines: good ones, mutated ones, and noise."""
 
     def __init__(self, seed):
         self._dice = random.Random(seed)
@@ -197,7 +197,7 @@ class Author:
 
 
 def instruments(seed):
-    """Yield one new instrument after the other, each with a model mounted; every fourth asks for a token."""
+    """Yield new instruments, each with a model mounted; every fourth requires a token."""
     scenario = load_scenario("akwanga")
     drawer = build_scene(scenario, seed).mountable
     number = 0
@@ -211,7 +211,7 @@ def instruments(seed):
 
 
 def fuzz(lines, seed):
-    """Try so many lines and return the tally. Raises Broken, or whatever the engine raises."""
+    """Test a number of lines and return the tally. Raises Broken, or any exception of the engine."""
     author, tally = Author(seed), Counter()
     with reported() as numbers:
         supply = instruments(seed)

@@ -1,7 +1,7 @@
 """What the journal costs, as a share of the time of the same session without it, and how quickly it is sought in.
 
 Session and session with journal take turns, so that both meet the same machine; the quickest of each are compared,
-since whatever else goes on there only makes them slower.
+because other work can only make them slower.
 Usage: python benchmarks/journal.py [--repeats N] [--events N]
 """
 
@@ -25,7 +25,7 @@ from a7sim.scene import build_scene
 from a7sim.session import run
 
 ASKED_OF = 100_000
-"""Events of the session that is to be sought in within a second."""
+"""Events of the session in which seeking must take less than a second."""
 
 SESSION_S = 8 * 3600.0
 SEEKS = 20
@@ -61,7 +61,7 @@ def cost(home, repeats):
 
 
 def long_session(folder, events):
-    """Leave the journal of a session of so many events: turning, looking, reading, registering."""
+    """Write the journal of a session with a number of events: turning, looking, reading, registering."""
     scenario = load_scenario("akwanga")
     instrument = SharedInstrument(build_autograph(scenario.instrument, build_scene(scenario, SEED).mountable, SEED))
     folder.mkdir()

@@ -95,7 +95,7 @@ def ratio_of(rates, others):
 
 
 def figures_of(group, contenders, peers, target):
-    """Return how near ours is to the floor, and how far ahead of the peers, those that are not there among them."""
+    """Return the ratio of ours to the floor and to each peer, including the missing peers."""
     ours, floor, *_ = contenders
     rates = {each.name: each.rates for each in contenders}
     name, rate = f"{group}: COUN:X?", statistics.median(ours.rates)

@@ -79,7 +79,7 @@ def sampled(names: list[str], seed: int) -> list[str]:
 
 
 def exit_codes() -> dict[str, int | None]:
-    """Return what mutmut's first look came to, by mutant; None where it has not been worked."""
+    """Return the results of mutmut's first run by mutant; None where it has not run."""
     found: dict[str, int | None] = {}
     for path in MUTANTS.rglob("*.meta"):
         found |= json.loads(path.read_text(encoding="utf-8"))["exit_code_by_key"]

@@ -1,4 +1,4 @@
-"""Servers in processes of their own, for the benchmarks of the link."""
+"""Servers in separate processes, for the benchmarks of the link."""
 
 import json
 import socket
@@ -12,7 +12,7 @@ SECONDS_TO_START = 20.0
 
 @contextmanager
 def running(command, **how):
-    """Run a command, whose standard output is a pipe of text, until the context ends."""
+    """Run a command, with its standard output as a pipe of text, until the context ends."""
     process = subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True, **how)
     try:
         yield process
@@ -23,7 +23,7 @@ def running(command, **how):
 
 @contextmanager
 def a7sim(*options):
-    """Serve the Akwanga instrument; yield the process and what `--json` says of where it listens, by kind."""
+    """Serve the Akwanga instrument; yield the process and its endpoints by kind."""
     serve = [sys.executable, "-m", "a7sim", "serve", "akwanga", "--json", *options]
     with running(serve) as process:
         document = ""
@@ -35,20 +35,20 @@ def a7sim(*options):
 
 
 def standing_at(port, reading=-123.45):
-    """Drive to where the X counter answers eight bytes, as many as ask for it."""
+    """Drive to a reading whose answer of the X counter has eight bytes, the number of bytes of the other servers."""
     with socket.create_connection(("127.0.0.1", port)) as connection:
         connection.sendall(f"DRIV:X {reading};*OPC?\n".encode())
         connection.recv(16)
 
 
 def free_port():
-    """Return a port at which nobody listens."""
+    """Return a free port."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         return listener.getsockname()[1]
 
 
 def once(attempt):
-    """Return what an attempt returns as soon as it fails with no OSError."""
+    """Return the result of an attempt as soon as it raises no OSError."""
     deadline = time.monotonic() + SECONDS_TO_START
     while True:
         try:

@@ -30,7 +30,7 @@ ROUNDS = 9
 TIMES_POSELIB = 10
 ONE_PAIR_US = 300
 ASKED_POINTS = (6, 9, 15)
-"""Points of the pairs that targets are asked of."""
+"""Points of the pairs with a target."""
 
 TARGETS = {
     "batch": Target("at least", TIMES_POSELIB, "ratio"),
@@ -43,7 +43,7 @@ AIR_TO_VISION = np.diag([1.0, -1.0, -1.0])
 
 
 def peer(module):
-    """The module, or None with a line that says so."""
+    """Return the module, or None with a message."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -52,7 +52,7 @@ def peer(module):
 
 
 def best_time(call, rounds=ROUNDS):
-    """The shortest of some rounds, in seconds: what the machine can do when nobody disturbs it."""
+    """Return the shortest of several rounds, in seconds, which other work disturbs least."""
     took = []
     for _ in range(rounds):
         began = time.perf_counter()
@@ -62,7 +62,7 @@ def best_time(call, rounds=ROUNDS):
 
 
 def plan_of(n, rng):
-    """Points of the model in bases: Gruber's six, rows of three and five, or scattered; 60 % overlap."""
+    """Return points of the model in bases: Gruber's six, rows of three and five, or scattered; 60 % overlap."""
     columns = {6: 2, 9: 3, 15: 5}.get(n)
     if columns is None:
         return rng.uniform((0.0, -1.0), (1.0, 1.0), (n, 2)).T
@@ -70,7 +70,7 @@ def plan_of(n, rng):
 
 
 def pairs(rng, n, count):
-    """Images ``(2, n, count)`` of both photographs of near-vertical pairs, with errors of measurement."""
+    """Return images ``(2, n, count)`` of both photographs of near-vertical pairs, with errors of measurement."""
     plan = plan_of(n, rng)[:, :, None] * BASE
     points = np.concatenate([np.broadcast_to(plan, (2, n, count)), -C * rng.uniform(0.95, 1.05, (1, n, count))])
     images = []
@@ -82,14 +82,14 @@ def pairs(rng, n, count):
 
 
 def rms_parallax_um(image1, image2, turns, bases):
-    """Rms of the residual y-parallaxes at picture scale that poses leave, the same for every program."""
+    """Return the rms of the residual y-parallaxes of poses at picture scale, the same for all programs."""
     level = np.broadcast_to(np.eye(3)[:, :, None], turns.shape)
     condition = coplanarity(rays_of(image1, C), rays_of(image2, C), level, turns, bases)
     return 1000.0 * np.sqrt(2.0 * np.mean((condition.discrepancies / condition.steepness) ** 2))
 
 
 def relative():
-    """Relative orientation from zero: batched against one call a pair."""
+    """Relative orientation from zero: batched compared with one call per pair."""
     poselib, pycolmap = peer("poselib"), peer("pycolmap")
     print("relative orientation, 5 um image noise, c = 152 mm, 60 % overlap, tilts to 1.5 deg, from zero")
     print(
@@ -130,7 +130,7 @@ def relative():
 
 
 def relative_figures(n, took, theory, rms):
-    """Return how long a pair of n points took each program, and our rms beside what theory gives."""
+    """Return the time per pair of n points of each program, and our rms compared with theory."""
     name, ours = f"relative orientation, {n} points", took["a7sim batch"]
     asked = TARGETS if n in ASKED_POINTS else {}
     times = {peer: took[peer] / ours if peer in took else None for peer in ("poselib", "pycolmap")}
@@ -143,7 +143,7 @@ def relative_figures(n, took, theory, rms):
 
 
 def _many():
-    """A million pairs in blocks: what memory it takes."""
+    """A million pairs in blocks: memory."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     rng = np.random.default_rng(1)
     took, oriented, squares = 0.0, 0, 0.0
@@ -201,19 +201,19 @@ def _by_pycolmap(pycolmap, image1, image2):
 
 
 def _seen(image):
-    """Image points as computer vision has them, a list of arrays ``(n, 2)``."""
+    """Return image points in the convention of computer vision, a list of arrays ``(n, 2)``."""
     return [np.ascontiguousarray((image[..., i] * [[1.0], [-1.0]]).T) for i in range(image.shape[-1])]
 
 
 def _from_vision(turns, shifts):
-    """Rotation right to left and base, in the left photograph's frame, from x2 = R x1 + t of computer vision."""
+    """Return rotation right to left and base, in the left photograph's frame, from x2 = R x1 + t of computer vision."""
     back = transposed(turns)
     turned = np.einsum("ij,jk...,kl->il...", AIR_TO_VISION, back, AIR_TO_VISION)
     return turned, np.einsum("ij,jk...,k...->i...", AIR_TO_VISION, back, -shifts)
 
 
 def similarity():
-    """The similarity of models of six points to the ground: batched against one call a model."""
+    """Similarity of models of six points to the ground: batched compared with one call per model."""
     pycolmap = peer("pycolmap")
     rng = np.random.default_rng(6)
     sigma, count = 0.02, BLOCK
@@ -266,7 +266,7 @@ BENCHMARKS = {"relative": relative, "similarity": similarity}
 
 
 def on_one_thread():
-    """Start this program again with libraries on one thread, where it is not so already."""
+    """Start this program again with libraries on one thread, unless they already are."""
     if any(os.environ.get(name) != "1" for name in THREADS):  # libraries read it when they are loaded
         os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **dict.fromkeys(THREADS, "1")})
 

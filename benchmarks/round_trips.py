@@ -1,7 +1,7 @@
-"""Clients that time round trips of one query, the same code whoever answers.
+"""Clients that time round trips of one query, with the same code for all servers.
 
-As a program, a VISA client in a process of its own: `python round_trips.py RESOURCE LIBRARY` prints the first answer,
-then for every number on standard input so many times in s as a JSON list. It needs nothing but pyvisa.
+As a program, a VISA client in a separate process: `python round_trips.py RESOURCE LIBRARY` prints the first answer,
+then for each number n on standard input the times in s of n round trips as a JSON list. It needs only pyvisa.
 """
 
 import json
@@ -15,7 +15,7 @@ PATIENCE = 5.0
 
 
 def timed(ask, count):
-    """Return the times in s of so many round trips, one after the other."""
+    """Return the times in s of `count` consecutive round trips."""
     took = []
     for _ in range(count):
         began = time.perf_counter()
@@ -25,7 +25,7 @@ def timed(ask, count):
 
 
 def by_socket(port):
-    """Return what asks over TCP by a bare socket."""
+    """Return the query function over TCP by a raw socket."""
     connection = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     line = QUERY + b"\n"
@@ -44,7 +44,7 @@ def by_socket(port):
 
 
 def by_pyserial(device):
-    """Return what asks a terminal by pyserial."""
+    """Return the query function of a terminal by pyserial."""
     import serial  # a peer's environment has none
 
     port = serial.Serial(device, timeout=PATIENCE)
@@ -58,7 +58,7 @@ def by_pyserial(device):
 
 
 def by_visa(resource, library):
-    """Return what asks a VISA resource."""
+    """Return the query function of a VISA resource."""
     import pyvisa
 
     if "a7sim://" in resource:

@@ -1,6 +1,6 @@
 """Time an Akwanga session against its floor: the same lines through the same client to a port that only answers.
 
-Prints the ratio of both with the accuracy of the session beside it.
+Prints the ratio of both with the accuracy of the session.
 """
 
 import statistics
@@ -17,7 +17,7 @@ SEEDS = range(1, 6)
 
 
 class Parrot:
-    """A port that answers every line at once with what the instrument answered in the session."""
+    """Port that answers each line at once with the recorded answer of the instrument."""
 
     def __init__(self, answers):
         self._answers = iter(answers)
@@ -30,7 +30,7 @@ class Parrot:
 
 
 def floor_of(scenario, seed):
-    """Seconds that the session's conversation takes with nothing behind it."""
+    """Return the seconds of the session's traffic without an instrument."""
     said = []
     session = open_session(scenario, seed, lambda event: said.append((event.direction, event.text)))
     list(measure_models(session.person, session.job))

@@ -27,10 +27,10 @@ from a7sim.training.grading import grade_folder
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 
 ASKED = {"first-order": Target("at least", 98), "trained": Target("at least", 90), "novice": Target("below", 60)}
-"""Share of the attempts at each of the exercises `OF` that a profile is to pass, %."""
+"""Required share of passed attempts at each of the exercises `OF` by profile, %."""
 
 ASKED_OF = 50
-"""Seeds that this is asked of."""
+"""Seeds for this requirement."""
 
 OF = range(5, 12)
 
@@ -39,7 +39,7 @@ BY_HAND = {
     "04-parallax": PlayedRun(procedure="measure parallaxes"),
     "05-one-projector": PlayedRun(procedure="relative orientation"),
 }
-"""What the operator does where the reference is a script."""
+"""Procedures of exercises whose reference is a script."""
 
 COLOURS = {"first-order": "#1f5f8b", "trained": "#6b8e23", "novice": "#a3431f"}
 MARKS = {"first-order": "o", "trained": "s", "novice": "D"}
@@ -48,7 +48,7 @@ INK, SOFT, FAINT = "#222222", "#6f6f6f", "#dddddd"
 
 @dataclass(frozen=True)
 class Tried:
-    """What a profile's attempts at an exercise came to."""
+    """Results of a profile's attempts at an exercise."""
 
     exercise: str
     title: str
@@ -58,23 +58,23 @@ class Tried:
     median_points: float
     median_minutes: float
     failed: str
-    """Criteria that were failed, how often, those of most attempts first."""
+    """Failed criteria with their counts, most frequent first."""
 
     @property
     def share(self):
-        """Of its attempts, %."""
+        """Share of passed attempts, %."""
         return 100.0 * self.passed / self.seeds
 
     @property
     def figure(self):
-        """How many passed, beside what is asked of them."""
+        """Return the number of passed attempts compared with the requirement."""
         asked = int(self.exercise.partition("-")[0]) in OF and self.seeds >= ASKED_OF
         name = f"{self.exercise}, {self.profile}: passed of {self.seeds}"
         return Figure(name, self.share, "%", target=ASKED[self.profile] if asked else None)
 
 
 def procedure_of(shelved):
-    """Return what the operator does at an exercise, None where no procedure is known."""
+    """Return the operator's procedure at an exercise, None without one."""
     reference = shelved.exercise.reference
     return reference if reference.procedure else BY_HAND.get(shelved.name)
 
@@ -93,7 +93,7 @@ def attempt(name, profile, seed):
 
 
 def tried(exercises, seeds, workers):
-    """Return what all profiles' attempts came to, by exercise, then by profile."""
+    """Return the results of all profiles' attempts, by exercise, then by profile."""
     wanted = [(shelved.name, profile, seed) for shelved in exercises for profile in ASKED for seed in seeds]
     with ProcessPoolExecutor(workers) as pool:
         came = dict(zip(wanted, pool.map(attempt, *zip(*wanted, strict=True), chunksize=2), strict=True))

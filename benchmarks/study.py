@@ -2,9 +2,9 @@
 
 A replicate is two models in five cases, three readings each of by' and by", twenty centres, and the twenty-five strips
 that the models make, with residuals at checks. Prints CPU seconds of one process and peak memory; the ratio is to be at
-most five. Growth with replicates, points measured, and models is told by the straight line through the times (what is
-there without any, what one more costs) and how far they depart from it, and by the slope of their logarithms: 1 is
-linear, less where a part of the time does not grow. Works studies/thesis-1985.toml once that is there.
+most five. Growth with replicates, points measured, and models is given by the straight line through the times (fixed
+cost, cost of one more) with the departures from it, and by the slope of their logarithms: 1 is linear, less
+if a part of the time does not grow. Works studies/thesis-1985.toml once that is there.
 Usage: python benchmarks/study.py [--replicates N] [--chunk N] [--growth N]
 """
 
@@ -30,34 +30,34 @@ from a7sim.study.simulating import replicate_seed
 
 TARGET = Target("at most", 5, "ratio")
 ASKED_OF = 10_000
-"""Replicates that the target is asked of."""
+"""Replicates for the target."""
 
 RECORDED = 50
-"""Replicates whose draws are recorded and drawn again as often as there are replicates."""
+"""Replicates whose draws are recorded and repeated for the number of replicates."""
 
 SETTINGS = {"plan.parallax_readings": 3, "plan.measure_with": "both", "plan.centre_levels": [4900, 5100]}
 
 
 def cpu_seconds(work):
-    """CPU seconds that some work takes in this process."""
+    """Return the CPU seconds of work in this process."""
     began = time.process_time()
     work()
     return time.process_time() - began
 
 
 def sessions(scenario, seeds):
-    """Documents of sessions without their own strips."""
+    """Return documents of sessions without their own strips."""
     return open_batch(scenario, seeds).run(strips=False)
 
 
 class Thesis:
-    """The whole work of the thesis, without a study's file: sessions in every case, strips of all combinations."""
+    """Work of the thesis without a study's file: sessions in all cases, strips of all combinations."""
 
     def __init__(self):
         self.scenarios = {case: load_scenario("akwanga", settings={**SETTINGS, "plan.case": case}) for case in CASES}
 
     def replicates(self, seeds):
-        """Rms at checks ``(strips, 3, sessions that came to their end)``."""
+        """Return rms at checks ``(strips, 3, complete sessions)``."""
         by_case = {case: sessions(scenario, seeds) for case, scenario in self.scenarios.items()}
         complete = [i for i in range(len(seeds)) if all(each[i]["status"] == "complete" for each in by_case.values())]
         models = {case: [models_from_documents(each[i]["models"]) for i in complete] for case, each in by_case.items()}
@@ -77,7 +77,7 @@ class Thesis:
 
 
 def study_work():
-    """What works replicates: the study's file where it is there, else the same work put together here."""
+    """Return the work of replicates: of the study's file if it exists, otherwise composed here."""
     try:
         tasks = load_study("thesis-1985", replicates=1).tasks
     except StudyError:
@@ -86,14 +86,14 @@ def study_work():
 
 
 def cpu_seconds_to_draw_often(calls, times):
-    """CPU seconds of drawing what was recorded, so many times."""
+    """Return the CPU seconds of `times` repetitions of the recorded draws."""
     return sum(cpu_seconds_to_draw(calls) for _ in range(times))
 
 
 def the_whole(replicates, chunk):
     """Print the time of all replicates and of drawing their random numbers; return both, and memory, as figures.
 
-    Half is drawn before each chunk and half after it, so that a change of the machine's speed hits both.
+    Half is drawn before each chunk and half after it, so that a change of the machine's speed affects both.
     """
     work, what = study_work()
     seeds = [replicate_seed(1985, replicate) for replicate in range(replicates)]
@@ -126,7 +126,7 @@ def the_whole(replicates, chunk):
 
 
 def flight_of(models, points):
-    """A strip of so many models with so many signalised points in each to be measured."""
+    """Return a strip with numbers of models and of signalised points in each."""
     scenario = load_scenario("akwanga")
     first = scenario.photos[0]
     photos = [
@@ -157,7 +157,7 @@ def flight_of(models, points):
 
 
 def growth(replicates):
-    """Print how time grows with replicates, points and models; return lines, departures and slopes as figures."""
+    """Print the growth of time with replicates, points and models; return lines, departures and slopes as figures."""
     plain = load_scenario("akwanga")
     grown = {
         "replicates": [(n, plain, n) for n in (5 * replicates // 2, 5 * replicates, 10 * replicates)],

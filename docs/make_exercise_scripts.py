@@ -1,6 +1,6 @@
-"""Write the reference and the faulty scripts of the exercises that need eyes: `python docs/make_exercise_scripts.py`.
+"""Write the reference and faulty scripts of the exercises that need eyes: `python docs/make_exercise_scripts.py`.
 
-The driver looks through the eyepieces at the exercise's own instrument and writes down where handles came to stand.
+The driver looks through the eyepieces of the exercise's own instrument and writes its settings into a script.
 """
 
 import sys
@@ -23,14 +23,16 @@ LOOKS = 8
 
 
 class Driver:
-    """Somebody with perfect eyes who writes a script of what they do."""
+    """Observer without errors that writes its actions into a script."""
 
-    def __init__(self, room, seed, intro):
-        port = InProcessSerial(instrument=room.instrument, clock=room.clock, client="student", timeout=1.0)
-        self.client, self.room = Client(port), room
-        self.model = room.record().model
+    def __init__(self, environment, seed, intro):
+        port = InProcessSerial(
+            instrument=environment.instrument, clock=environment.clock, client="student", timeout=1.0
+        )
+        self.client, self.environment = Client(port), environment
+        self.model = environment.record().model
         self.lines = [
-            f"scenario {room.exercise_folder.exercise.scenario} seed {seed}",
+            f"scenario {environment.exercise_folder.exercise.scenario} seed {seed}",
             "",
             *(f"# {each}" for each in intro),
         ]
@@ -42,7 +44,7 @@ class Driver:
         self.lines.append(f"{line:<34}# {comment}" if comment else line)
 
     def wait(self, seconds, comment=""):
-        self.room.clock.spend(seconds)
+        self.environment.clock.advance(seconds)
         self.lines.append(f"{f'wait {seconds}':<34}# {comment}" if comment else f"wait {seconds}")
 
     def remark(self, *texts):
@@ -59,8 +61,8 @@ class Driver:
         return self.client.numbers(f'EYEP1? "{point}";:EYEP2? "{point}"')
 
     def fuse(self, point, follow="XYZ", tell=True):
-        """Bring the mark onto a point, with Z onto the ground too; write down where it came to stand."""
-        scale = 1e-3 * self.room.scenario.plan.projection_height / self.room.scenario.camera.c
+        """Move the mark onto a point, with Z onto the ground too, and write the setting."""
+        scale = 1e-3 * self.environment.scenario.plan.projection_height / self.environment.scenario.camera.c
         bx = self.client.numbers("BASE:BX?")[0]
         for _ in range(LOOKS):
             lx, ly, rx, ry = self.seen(point)
@@ -77,27 +79,27 @@ class Driver:
             self.lines.append(line)
 
     def point_with_left_eye(self, point, side):
-        """Bring the mark onto a point by the wheels, X coming from one side; return the reading of X."""
-        scale = 1e-3 * self.room.scenario.plan.projection_height / self.room.scenario.camera.c
+        """Bring the mark onto a point by the wheels, X approached from one side; return the X reading."""
+        scale = 1e-3 * self.environment.scenario.plan.projection_height / self.environment.scenario.camera.c
         for _ in range(LOOKS):
             dx, dy = self.client.numbers(f'EYEP1? "{point}"')
             x, y = dx * scale, dy * scale
             if abs(x) < 0.0051 and abs(y) < 0.0051:
                 break
             if x * side < 0:
-                self.say(f"WHE:X {-0.50 * side:.2f}", "too far: back, and come again")
+                self.say(f"WHE:X {-0.50 * side:.2f}", "too far: turn back and approach again")
                 continue
             self.say(f"WHE:X {x:.2f};Y {y:.2f}")
         return self.client.numbers("COUN:X?")[0]
 
-    def come_to(self, position, rough):
+    def select_point(self, position, rough):
         self.client.send("DRIV:X {:.2f};Y {:.2f}".format(*rough))
         self.fuse(self.name(position))
 
     def clear(self, element, by):
-        """Turn by until the parallax is gone, to the least count; return what the drum shows."""
+        """Turn by until the parallax is cleared to the least count; return the drum reading."""
         point, sense = self.name(by), -1.0 if element == "by1" else 1.0
-        scale = 1e-3 * self.room.scenario.plan.projection_height / self.room.scenario.camera.c
+        scale = 1e-3 * self.environment.scenario.plan.projection_height / self.environment.scenario.camera.c
         at = self.client.numbers(f"{header(element)}?")[0]
         for _ in range(LOOKS):
             self.fuse(point, "XYZ", tell=False)
@@ -109,7 +111,7 @@ class Driver:
         return at
 
     def turn_to_clear(self, element, position):
-        """Turn a drum between its counts until a point is clear; return by how much."""
+        """Turn a drum between its counts until a point is clear; return the turn."""
         point, turned, probe = self.name(position), 0.0, 0.02
         for _ in range(LOOKS):
             before = self._parallax(point)
@@ -129,7 +131,7 @@ class Driver:
         return left - right
 
     def fiducials(self, projector):
-        """Look at the fiducials, and write down that it was done and what was seen."""
+        """Read the fiducials, and write the query and the readings into the script."""
         fields = self.client.fields(f"PHOT{projector}:FID?")
         shown = ", ".join(f'"{each}"' if i % 3 == 0 else each for i, each in enumerate(fields))
         self.lines.append(f"expect PHOT{projector}:FID? = {shown} +- 0.001")
@@ -146,11 +148,11 @@ class Driver:
 
 
 ROUGH = {"1": (0, 0), "2": (195, 0), "3": (0, 182), "4": (195, 182), "5": (0, -182), "6": (195, -182)}
-"""About where the standard points lie below the centres, mm."""
+"""Approximate positions of the standard points below the centres, mm."""
 
 
 def scripts_of(name, seed, play, variants):
-    """Write the reference and the faulty scripts of an exercise: file name, what is done otherwise, and the heading."""
+    """Write the scripts of an exercise from `variants`: file name, variant and heading of each."""
     exercise_folder = find_exercise(name)
     for file, otherwise, intro in variants:
         with (
@@ -168,7 +170,7 @@ def parallax(driver, otherwise):
     signs = {"by1": "by'", "by2": 'by"'}
     for position in "315624":
         driver.remark(f"Point {position}")
-        driver.wait(240, "to look, to turn and to write takes its time")
+        driver.wait(240, "time to look, to turn and to write")
         name = driver.name(position)
         if otherwise == "in the air" and position != "3":
             driver.client.send("DRIV:X {:.2f};Y {:.2f}".format(*ROUGH[position]))
@@ -185,7 +187,7 @@ def parallax(driver, otherwise):
                 at = -at
             for again in range(2):
                 if again and otherwise != "no second":
-                    driver.say(f"{header(element)} {at - 0.08:.2f}", "away, to see it anew")
+                    driver.say(f"{header(element)} {at - 0.08:.2f}", "turn away before the second reading")
                 if not (again and otherwise == "no second"):
                     driver.say(f"{header(element)} {at:.2f}", "" if again else f"cleared with {signs[element]}")
                 if not again:
@@ -200,29 +202,29 @@ def parallax(driver, otherwise):
 def counters(driver, otherwise):
     places = {"A": (40.0, 60.0), "B": (150.0, -80.0), "C": (97.5, 12.34)}
     for name, (x, y) in places.items():
-        driver.remark(f"Place {name}: X {x:.2f}, Y {y:.2f}, twice, coming from smaller readings")
-        driver.wait(120, "to find the place and to read")
+        driver.remark(f"Position {name}: X {x:.2f}, Y {y:.2f}, twice, approached from smaller readings")
+        driver.wait(120, "time to set the position and to read")
         for again in range(2):
             if again and otherwise == "no second":
                 driver.record(name)
                 continue
             from_above = otherwise == "from above" and name in "BC"
             step = -0.50 if from_above else 0.50
-            driver.say(f"DRIV:X {x - step:.2f};Y {y - step:.2f}", "near it" if not again else "away, and back again")
+            driver.say(f"DRIV:X {x - step:.2f};Y {y - step:.2f}", "approach" if not again else "move away and return")
             if otherwise == "by motor" and name == "C":
-                driver.say(f"DRIV:X {x:.2f};Y {y:.2f}", "run there")
+                driver.say(f"DRIV:X {x:.2f};Y {y:.2f}", "run by motor")
             elif otherwise == "off by a tenth" and name == "B":
-                driver.say(f"WHE:X {step - 0.10:.2f};Y {step:.2f}", "the drum misread")
+                driver.say(f"WHE:X {step - 0.10:.2f};Y {step:.2f}", "the drum is misread")
             else:
                 driver.say(f"WHE:X {step:.2f};Y {step:.2f}", "by hand, upwards" if step > 0 else "by hand, downwards")
             driver.record(name)
-    driver.remark("Two drums to the hundredth")
+    driver.remark("Set two drums to the hundredth")
     driver.wait(60)
     driver.say("PROJ1:BZ 1.25")
     driver.say("PROJ2:BY -0.37")
     driver.remark(
-        "The play of the X spindle: point 1 under the mark of the left eye, first coming from smaller readings, then",
-        "from larger ones. The picture stands alike both times; the counter does not.",
+        "The play of the X spindle: the mark of the left eye on point 1, approached first from smaller readings, then",
+        "from larger ones. The picture is the same both times; the counter readings differ.",
     )
     driver.wait(180)
     point, read = driver.name("1"), {}
@@ -256,7 +258,7 @@ def fittings(driver, otherwise):
             if lying[projector - 1] != name:
                 driver.say(f'PHOT{projector}:LOAD "{name}"')
                 lying[projector - 1] = name
-        driver.wait(200, "to lay pictures takes its time")
+        driver.wait(200, "time to place the pictures")
         driver.say(f"BASE:MODE {short_form(base)}")
         for fitting, position in REQUIRED_FITTINGS[polarity, base].as_words().items():
             if (letter, fitting) != forgotten.get(otherwise):
@@ -273,11 +275,13 @@ def interior(driver, otherwise):
     places = {each.name: (each.x, each.y) for each in camera.fiducials}
     pictures = {1: "101", 2: "102"} if otherwise != "exchanged" else {1: "102", 2: "101"}
     for projector, picture in pictures.items():
-        driver.remark(f"{picture}: laid, its fiducials looked at, centred")
+        driver.remark(f"{picture}: place it, read its fiducials, centre it")
         driver.say(f'PHOT{projector}:LOAD "{picture}"')
-        driver.wait(300, "laying it takes five minutes")
+        driver.wait(300, "time to place the picture, five minutes")
         displaced = driver.fiducials(projector)
-        driver.lines.append("# The mean displacement is the shift, how they go round is the turn; both are taken away.")
+        driver.lines.append(
+            "# The mean displacement is the shift, the tangential displacement is the rotation; both are corrected."
+        )
         xy, d = np.array([places[name] for name in displaced]).T, np.array(list(displaced.values())).T
         turn = float((xy[0] * d[1] - xy[1] * d[0]).sum() / (xy**2).sum()) / GON
         shift = -(d.mean(axis=1) + camera.principal_point)
@@ -288,7 +292,7 @@ def interior(driver, otherwise):
         scale = float((xy * np.array(list(left.values())).T).sum() / (xy**2).sum())
         driver.wait(60, "to compute")
         driver.lines.append(
-            f"# The film is smaller by {-1e6 * scale:.0f} parts in a million, and so is the principal distance."
+            f"# The film and the principal distance are smaller by {-1e6 * scale:.0f} parts in a million."
         )
         c = camera.c if otherwise == "certificate" else camera.c * (1.0 + scale)
         driver.say(f"PROJ{projector}:PDIS {c:.2f}")
@@ -304,7 +308,7 @@ def one_projector(driver, otherwise):
     rounds = 1 if otherwise == "one round" else 4
     for number in range(1, rounds + 1):
         driver.remark(f"Round {number}")
-        driver.wait(600, "five points to go to, to look at and to turn at")
+        driver.wait(600, "time to look and to turn at five points")
         for position, element in steps:
             driver.select_point(position, ROUGH[position])
             amount = driver.turn_to_clear(element, position)
@@ -312,16 +316,16 @@ def one_projector(driver, otherwise):
                 _, y, z = driver.client.numbers("COUN?")
                 n = (1.0 + (z / y) ** 2) / 2.0
                 driver.client.send(f"{header(element)}:TURN {(n - 1.0) * amount:.4f}")
-                told = f"point 6 asks for {amount:.4f}; {n:.2f} times that"
+                told = f"point 6 needs {amount:.4f}; multiplied by {n:.2f}"
                 amount *= n
             else:
                 told = f"clears point {position}"
             driver.lines.append(f"{f'{header(element)}:TURN {amount:.4f}':<34}# {told}")
     if otherwise == "last point":
-        driver.remark("Knocked by the sleeve")
+        driver.remark("An accidental turn")
         driver.say("PROJ2:PHI:TURN 0.06")
     if otherwise != "not checked":
-        driver.remark("All six points once more, hands off the elements")
+        driver.remark("All six points once more, without turning an element")
         driver.wait(300)
         for position in "123456":
             driver.select_point(position, ROUGH[position])
@@ -332,7 +336,7 @@ def slip(driver, otherwise):
     made = make_handout("book with a slip", driver.environment.scenario, driver.environment.seed, {})
     kind, entry, right = made.hidden["kind"], made.hidden["entry"], made.hidden["right"][0]
     wrong = made.papers["book.csv"].splitlines()[entry].split(",")
-    driver.lines += ["# What follows from the copy that the seed above makes.", ""]
+    driver.lines += ["# The answer for the copy made by the seed above.", ""]
     if otherwise == "entry":
         entry += 1
     if otherwise == "kind":
@@ -357,23 +361,27 @@ ALL = {
         counters,
         [
             ("reference.a7s", "", [COUNTERS]),
-            ("faulty-from-above.a7s", "from above", [COUNTERS, "By mistake B and C are come to from larger readings."]),
+            (
+                "faulty-from-above.a7s",
+                "from above",
+                [COUNTERS, "Mistake: B and C are approached from larger readings."],
+            ),
             (
                 "faulty-no-second.a7s",
                 "no second",
-                [COUNTERS, "By mistake a place is registered twice without leaving it."],
+                [COUNTERS, "Mistake: a position is registered twice without leaving it."],
             ),
             (
                 "faulty-misread.a7s",
                 "off by a tenth",
-                [COUNTERS, "By mistake the last drum is misread by a tenth at B."],
+                [COUNTERS, "Mistake: the last drum is misread by a tenth at B."],
             ),
             (
                 "faulty-by-motor.a7s",
                 "by motor",
-                [COUNTERS, "By mistake the carriages are run to C instead of turned there."],
+                [COUNTERS, "Mistake: the carriages are run to C by motor, not by the handwheels."],
             ),
-            ("faulty-one-side.a7s", "one side", [COUNTERS, "By mistake point 1 is come to from one side only."]),
+            ("faulty-one-side.a7s", "one side", [COUNTERS, "Mistake: point 1 is approached from one side only."]),
         ],
     ),
     "fittings": (
@@ -382,11 +390,15 @@ ALL = {
         fittings,
         [
             ("reference.a7s", "", [FITTED]),
-            ("faulty-y-collar.a7s", "y collar", [FITTED, "By mistake the Y collar stays out in A."]),
-            ("faulty-dove.a7s", "dove", [FITTED, "By mistake the Dove prisms stay as they are in B."]),
-            ("faulty-diapositive.a7s", "diapositive", [FITTED, "By mistake the diapositive lever stays in C."]),
-            ("faulty-triangulation.a7s", "triangulation", [FITTED, "By mistake the triangulation lever stays in D."]),
-            ("faulty-blind.a7s", "blind", [FITTED, "By mistake nobody looks into the eyepieces from B on."]),
+            ("faulty-y-collar.a7s", "y collar", [FITTED, "Mistake: the Y collar is left out in A."]),
+            ("faulty-dove.a7s", "dove", [FITTED, "Mistake: the Dove prisms are not changed in B."]),
+            ("faulty-diapositive.a7s", "diapositive", [FITTED, "Mistake: the diapositive lever is not changed in C."]),
+            (
+                "faulty-triangulation.a7s",
+                "triangulation",
+                [FITTED, "Mistake: the triangulation lever is not changed in D."],
+            ),
+            ("faulty-blind.a7s", "blind", [FITTED, "Mistake: the eyepieces are not used from B on."]),
         ],
     ),
     "interior": (
@@ -395,10 +407,14 @@ ALL = {
         interior,
         [
             ("reference.a7s", "", [LAID]),
-            ("faulty-sign.a7s", "sign", [LAID, "By mistake the shift of the left picture has the wrong sign."]),
-            ("faulty-certificate.a7s", "certificate", [LAID, "By mistake the film's shrinkage is forgotten."]),
-            ("faulty-exchanged.a7s", "exchanged", [LAID, "By mistake the photographs have changed places."]),
-            ("faulty-not-checked.a7s", "not checked", [LAID, "By mistake nobody looks again after centring."]),
+            ("faulty-sign.a7s", "sign", [LAID, "Mistake: the shift of the left picture has the wrong sign."]),
+            ("faulty-certificate.a7s", "certificate", [LAID, "Mistake: the shrinkage of the film is ignored."]),
+            ("faulty-exchanged.a7s", "exchanged", [LAID, "Mistake: the photographs are exchanged."]),
+            (
+                "faulty-not-checked.a7s",
+                "not checked",
+                [LAID, "Mistake: the fiducials are not read again after centring."],
+            ),
         ],
     ),
     "one-projector": (
@@ -410,12 +426,16 @@ ALL = {
             (
                 "faulty-one-round.a7s",
                 "one round",
-                [CLEARED, "By mistake omega is not over-corrected, and all ends after a round."],
+                [CLEARED, "Mistake: omega is not over-corrected, and only one round is made."],
             ),
-            ("faulty-left-turned.a7s", "left turned", [CLEARED, "By mistake by' is turned instead of by\"."]),
-            ("faulty-omega-first.a7s", "omega first", [CLEARED, 'By mistake omega" comes first.']),
-            ("faulty-not-checked.a7s", "not checked", [CLEARED, "By mistake no point is looked at again in the end."]),
-            ("faulty-last-point.a7s", "last point", [CLEARED, 'By mistake phi" is knocked in the end.']),
+            ("faulty-left-turned.a7s", "left turned", [CLEARED, "Mistake: by' is turned instead of by\"."]),
+            ("faulty-omega-first.a7s", "omega first", [CLEARED, 'Mistake: omega" is turned first.']),
+            (
+                "faulty-not-checked.a7s",
+                "not checked",
+                [CLEARED, "Mistake: the points are not visited again at the end."],
+            ),
+            ("faulty-last-point.a7s", "last point", [CLEARED, 'Mistake: phi" is accidentally turned at the end.']),
         ],
     ),
     "slip": (
@@ -424,9 +444,9 @@ ALL = {
         slip,
         [
             ("reference.a7s", "", [FOUND]),
-            ("faulty-entry.a7s", "entry", [FOUND, "By mistake the next entry is blamed."]),
-            ("faulty-kind.a7s", "kind", [FOUND, "By mistake it is taken for another slip."]),
-            ("faulty-right.a7s", "right", [FOUND, "By mistake the wrong entry is given as the right one."]),
+            ("faulty-entry.a7s", "entry", [FOUND, "Mistake: the next entry is answered."]),
+            ("faulty-kind.a7s", "kind", [FOUND, "Mistake: the slip is answered as another kind."]),
+            ("faulty-right.a7s", "right", [FOUND, "Mistake: the wrong value is answered as the correct one."]),
         ],
     ),
     "parallax": (
@@ -434,16 +454,16 @@ ALL = {
         4,
         parallax,
         [
-            ("reference.a7s", "", [INTRO, "The way over the model is 3, 1, 5, 6, 2, 4."]),
-            ("faulty-by2-left.a7s", "left", [INTRO, 'By mistake by" stays where it cleared point 3.']),
-            ("faulty-not-cleared.a7s", "wrong way", [INTRO, "By mistake by' is turned the wrong way at point 5."]),
+            ("reference.a7s", "", [INTRO, "The order of the points is 3, 1, 5, 6, 2, 4."]),
+            ("faulty-by2-left.a7s", "left", [INTRO, 'Mistake: by" is left at the setting that cleared point 3.']),
+            ("faulty-not-cleared.a7s", "wrong way", [INTRO, "Mistake: by' is turned the wrong way at point 5."]),
             (
                 "faulty-no-second-reading.a7s",
                 "no second",
-                [INTRO, "By mistake nothing is turned between two readings."],
+                [INTRO, "Mistake: no drum is turned between two readings."],
             ),
-            ("faulty-in-the-air.a7s", "in the air", [INTRO, "By mistake Z stays where point 3 asked for it."]),
-            ("faulty-half.a7s", "half", [INTRO, 'By mistake by" is not read at points 4 to 6.']),
+            ("faulty-in-the-air.a7s", "in the air", [INTRO, "Mistake: Z is left at the setting for point 3."]),
+            ("faulty-half.a7s", "half", [INTRO, 'Mistake: by" is not read at points 4 to 6.']),
         ],
     ),
 }

@@ -1,6 +1,6 @@
-"""Make the pictures of docs/student-guide.md: exercise 4 at the console, by its own keys.
+"""Make the pictures of docs/student-guide.md: exercise 4 at the console, by its keys.
 
-Run `python -m docs.make_guide_pictures` at the top of the repository. Somebody who sees exactly turns the wheels.
+Run `python -m docs.make_guide_pictures` at the top of the repository. The observer has no errors.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ FIRST, *OTHERS = ("1011", "1013", "1015", "1021", "1023", "1025")
 
 
 class Student:
-    """Somebody at the console who sees exactly, and has it photographed."""
+    """Student without errors of sight at the console, whose screen is exported."""
 
     def __init__(self, person, room):
         self.person, self.room, self.point = person, room, FIRST
@@ -40,7 +40,7 @@ class Student:
         return self.looker.numbers(f'EYEP1? "{self.point}";:EYEP2? "{self.point}"')
 
     async def set_down(self):
-        """Bring the mark onto the point and the ground."""
+        """Set the mark on the point and on the ground."""
         for _ in range(LOOKS):
             lx, _, rx, _ = self.seen()
             z, bx = self.looker.numbers("COUN:Z?;:BASE:BX?")
@@ -50,7 +50,7 @@ class Student:
             await self.person.turn((ly + ry) / 2 * self.scale, "up", "down")
 
     async def clear(self, sense):
-        """Turn the by in hand until the images stand level."""
+        """Turn the selected by until the images agree in height."""
         for _ in range(LOOKS):
             _, ly, _, ry = self.seen()
             await self.person.turn(-(ly - ry) * self.scale / sense, "+", "-")
@@ -67,12 +67,12 @@ class Student:
         await self.register()
 
     async def at_rest(self):
-        """Put the by in hand back to zero."""
+        """Set the selected by to zero."""
         await self.person.press("s")
         await self.person.type_in("0")
 
     async def measure(self, point):
-        """Do a whole point: by', then by"."""
+        """Measure a point: by', then by"."""
         await self.at_rest()
         self.point = point
         await self.person.press("g")
@@ -94,7 +94,7 @@ class Student:
 
 
 def bare(svg):
-    """Return a picture that fetches nothing, in the reader's own letters of fixed width, and a third of it left out."""
+    """Return a picture without external resources, in a generic monospace font, without clip paths."""
     svg = re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL)
     svg = re.sub(r"font-family: ?[^;]*;", "font-family: monospace;", svg)
     svg = re.sub(r'<clipPath id="[^"]*-line-\d+">.*?</clipPath>\s*', "", svg, flags=re.DOTALL)

@@ -33,7 +33,7 @@ MOUNTED = {
     "A7": 'PHOT1:LOAD "101";:PHOT2:LOAD "102";:PROJ1:PDIS 152.68;:PROJ2:PDIS 152.68;:BASE:BX 194.99;:DRIV:Z -325.71',
     "A8": 'PHOT1:LOAD "101";:PHOT2:LOAD "102"',
 }
-"""What is done before an example: the first model of Akwanga is laid and the mark is at its middle."""
+"""Set-up of an example: the first model of Akwanga is mounted and the mark is in its middle."""
 
 GROUPS = {
     "*": "Common commands of IEEE 488.2",
@@ -99,7 +99,7 @@ GIVEN = {
     "RECord:STRike": '1,"wrong point"',
     "NOTE": '"coffee"',
 }
-"""What follows the header in its example."""
+"""Parameters of the examples."""
 
 BEFORE = {
     "RECord?": 'REC "1011"',
@@ -107,7 +107,7 @@ BEFORE = {
     "RECord:STRike": 'REC "1011"',
     "SYSTem:ERRor[:NEXT]?": "FOO",
 }
-"""What is done before an example, beside mounting."""
+"""Further set-up of examples."""
 
 SHOWN_BY = {
     "DRIVe:X": "COUN:X?",
@@ -124,7 +124,7 @@ SHOWN_BY = {
     "RECord": "REC:LAST?",
     "RECord:STRike": "REC:LAST?",
 }
-"""What shows the effect of a command that has no query of its own header."""
+"""Queries that show the effect of commands without a query of their own."""
 
 BOUNDS = {
     "*ESE": "0 to 255",
@@ -135,7 +135,7 @@ BOUNDS = {
     "GEAR:PLAN": "more than 0 to 100",
     "EYEPiece<n>:PICTure?": f"1 to {MAX_PICTURE} columns and rows, magnification 0.1 to 100",
 }
-"""Limits that hold for both plotters and have no MIN, MAX and DEF."""
+"""Limits of both plotters without MIN, MAX and DEF."""
 
 ALSO = {
     "PHOTo<n>:LOAD": (-221, -224),
@@ -153,7 +153,7 @@ ALSO = {
     "SYSTem:LOGin": (-203,),
     "EYEPiece<n>:PICTure?": (-430,),
 }
-"""Errors that do not follow from what a command takes."""
+"""Errors that do not follow from the parameters."""
 
 WHEN = {
     -101: "a byte that is no printable ASCII",
@@ -175,7 +175,7 @@ WHEN = {
     -365: "nothing came for too long, and the server hangs up",
     -430: "the replies to one line would be larger than the instrument keeps",
 }
-"""What brings each error about."""
+"""Cause of each error."""
 
 LONGEST_SHOWN = 56
 
@@ -187,7 +187,7 @@ def _equipment(variant):
 
 
 class Instrument:
-    """A new plotter with its first model mounted."""
+    """New plotter with its first model mounted."""
 
     def __init__(self, variant):
         scenario, drawer = _equipment(variant)
@@ -206,7 +206,7 @@ class Instrument:
 
 
 def example_of(command):
-    """Return the line of an example and what the instrument answers."""
+    """Return the line of an example and the instrument's answer."""
     variant = "A8" if command.header.startswith("COMMon") else "A7"
     instrument = Instrument(variant)
     instrument.say(BEFORE.get(command.header, ""))
@@ -224,7 +224,7 @@ def _said(command):
 
 
 def ranges_of(command, variant):
-    """Return what a command takes at a plotter, '' where it takes nothing that is limited."""
+    """Return the ranges of a command at a plotter, '' without limits."""
     if command.header == "BASE:MODE":
         return " or ".join(VARIANTS[variant].base_modes)
     instrument = Instrument(variant)
@@ -262,7 +262,7 @@ def _limits(quantity, engine, number):
 
 
 def errors_of(command):
-    """Return the errors that a command alone can meet; -101, -102, -108 and -113 are everybody's."""
+    """Return the errors specific to a command; -101, -102, -108 and -113 apply to all."""
     errors = set(ALSO.get(command.header, ()))
     kinds = [*command.parameters, *([command.repeated_parameter] if command.repeated_parameter else [])]
     if any(not kind.optional for kind in command.parameters):
@@ -328,7 +328,7 @@ def _row(command: Command):
 
 
 def _code(text):
-    """Return code for a cell of a table; a bar in backticks is not told alike by all that read Markdown."""
+    """Return code for a cell of a table; not all Markdown readers escape a bar in backticks."""
     return f"<code>{escape(text, quote=False).replace('|', '&#124;')}</code>" if "|" in text else f"`{text}`"
 
 

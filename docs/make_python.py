@@ -1,7 +1,7 @@
-"""Write python.md: what a script takes from a7sim, as its docstrings say it.
+"""Write python.md, the Python API, from the docstrings.
 
-python docs/make_python.py            # writes it
-python docs/make_python.py --check    # says whether it is fresh, exit code 1 if not
+python docs/make_python.py            # writes the page
+python docs/make_python.py --check    # exit code 1 if the page is stale
 """
 
 import inspect
@@ -16,20 +16,18 @@ import a7sim
 
 PAGE = Path(__file__).parent / "python.md"
 
-HEAD = """# The Python face
+HEAD = """# Python API
 
-    pip install a7sim
-
-Everything a script needs comes from `a7sim` itself. Importing it is light: what is named is imported when it is asked
-for, and it is typed (`py.typed`). This page is written from the docstrings by `docs/make_python.py`, and a test runs
-every example. A mistake of a user is an `a7sim.A7SimError`, whose text is one sentence.
+A script imports all it needs from `a7sim`. The package imports each public name on first use, and it is typed
+(`py.typed`). `docs/make_python.py` writes this page from the docstrings, and a test runs each example. Bad input
+raises `a7sim.A7SimError`, whose text is one sentence.
 """
 
 ORDER = (
     *("connect", "Client", "InstrumentError", "Scenario", "Operator", "Study", "Autograph"),
-    *("reduction", "computing", "A7SimError"),
+    *("reduction", "processing", "A7SimError"),
 )
-"""The names in the order in which a script meets them."""
+"""The public names in the order of the page."""
 
 
 def page() -> str:
@@ -40,12 +38,14 @@ def page() -> str:
 def _section(name: str, what: Any) -> Iterator[str]:
     if isinstance(what, ModuleType):
         yield f"## a7sim.{name}"
-        yield from _told(what)
-        yield from (f"- `{each}`: {_sentence(getattr(what, each))}" for each in what.__all__ if _is_told(what, each))
+        yield from _docstring_lines(what)
+        yield from (
+            f"- `{each}`: {_sentence(getattr(what, each))}" for each in what.__all__ if _is_documented(what, each)
+        )
         yield ""
         return
     yield f"## {name}{_signature(what)}" if inspect.isfunction(what) else f"## {name}"
-    yield from _told(what)
+    yield from _docstring_lines(what)
     if inspect.isclass(what):
         members = list(_members(what))
         yield from members
@@ -53,7 +53,7 @@ def _section(name: str, what: Any) -> Iterator[str]:
             yield ""
 
 
-def _is_told(module: ModuleType, name: str) -> bool:
+def _is_documented(module: ModuleType, name: str) -> bool:
     what = getattr(module, name)
     return callable(what) and bool(inspect.getdoc(what)) and (inspect.isclass(what) or inspect.isfunction(what))
 
@@ -86,7 +86,7 @@ def _sentence(what: Any) -> str:
     return " ".join(first.split())
 
 
-def _told(what: Any) -> Iterator[str]:
+def _docstring_lines(what: Any) -> Iterator[str]:
     """Yield a docstring with its examples as code."""
     for paragraph in re.split(r"\n\s*\n", inspect.getdoc(what) or ""):
         is_code = paragraph.startswith(">>>")

@@ -1,25 +1,32 @@
-"""Write the pages of docs/reference, the list of decisions and the picture of the house, each from the thing itself.
+"""Write the pages of docs/reference, the list of decisions and the picture of the packages, each from the thing itself.
 
 python docs/make_reference.py            # writes them
 python docs/make_reference.py --check    # says whether they are fresh, exit code 1 if not
 """
 
+import re
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from makers import commands, files, house, schemas
+from makers import commands, files, packages, schemas
 
 DOCS = Path(__file__).parent
 
 
 def decisions_page():
-    """Return the list of decisions, by their titles."""
-    lines = ["# Decisions", "", "Why things are as they are, and every assumption that has no source.", ""]
+    """Return the table of decisions with status, date and summary, read from their files."""
+    lines = [
+        *("# Decisions", "", "The reason for each choice of design, and every assumption without a source.", ""),
+        *("| number | title | status | date | summary |", "| ---: | --- | --- | --- | --- |"),
+    ]
     for path in sorted((DOCS / "decisions").glob("0*.md")):
-        title = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
-        lines.append(f"- [{title.replace('. ', ' ', 1)}]({path.name})")
+        text = path.read_text(encoding="utf-8")
+        number, title = text.splitlines()[0].removeprefix("# ").split(". ", 1)
+        block = dict(re.findall(r"^- \*\*(\w+):\*\* (.*(?:\n  .*)*)", text, re.M))
+        summary = " ".join(block["Summary"].split())
+        lines.append(f"| {number} | [{title}]({path.name}) | {block['Status']} | {block['Date']} | {summary} |")
     return "\n".join(lines) + "\n"
 
 
@@ -32,7 +39,7 @@ def pages(session):
         "reference/study.md": schemas.study_page(),
         "reference/files.md": files.page(session),
         "decisions/index.md": decisions_page(),
-        "figures/house.svg": house.picture(),
+        "figures/packages.svg": packages.picture(),
     }
 
 

@@ -1,6 +1,6 @@
-"""Make the pictures of docs/tutorial.md and the book of six points in it: a newcomer's afternoon, key by key.
+"""Make the pictures of docs/tutorial.md and its book of six points, key by key.
 
-Run `python -m docs.make_tutorial_pictures` at the top of the repository. The newcomer sees exactly.
+Run `python -m docs.make_tutorial_pictures` at the top of the repository. The observer has no errors.
 """
 
 import asyncio
@@ -20,7 +20,7 @@ BEGIN, END = "<!-- book: written by make_tutorial_pictures.py -->", "<!-- end of
 
 
 class Newcomer(Student):
-    """Somebody who lays two photographs, centres them and clears six points."""
+    """Student who mounts two photographs, centres them and clears six points."""
 
     def __init__(self, person, door, photographed):
         super().__init__(
@@ -73,7 +73,7 @@ class Newcomer(Student):
 
 
 async def afternoon(photographed=None):
-    """Do all of it and return the book; `photographed`, if anybody, is told the name of each picture and its SVG."""
+    """Run the tutorial and return the book; `photographed`, if given, is called with name and SVG of each picture."""
     door = with_photographs()
     async with at(door).run_test(size=SIZE) as pilot:
         newcomer = Newcomer(Person(pilot), door, photographed)

@@ -31,7 +31,7 @@ NO_DOCUMENT = {
     "completion": "a script for a shell",
     "train start": "a checklist, and the instrument",
     "train watch": "a screen",
-    "train report": "--to json",
+    "train report": "--format json",
     "train reset": "does what it says",
     "train new": "writes a folder",
 }
@@ -141,8 +141,8 @@ FLOWN = ("--c", "152.676", "--photo-scale", "8000", "--photo-base", "91")
         (["run", "--out"], "expected a value after '--out', got none"),
         (["prepare", "--heights", "1"], "expected 2 values after '--heights', got fewer"),
         (["train", "start", "1", "--script", "."], "--script: expected a file, got the folder '.'"),
-        (["train", "verify", "--journal", __file__], "--journal: expected a folder, got the file"),
-        (["train", "verify", "--journal", "nowhere"], "--journal: expected one that exists, got 'nowhere'"),
+        (["train", "grade", "--journal", __file__], "--journal: expected a folder, got the file"),
+        (["train", "grade", "--journal", "nowhere"], "--journal: expected one that exists, got 'nowhere'"),
         (["train", "start", "1", "--link", "localhost"], "--link: expected tcp://HOST:PORT, got 'localhost'"),
         (["run", "/"], "/: expected a scenario file or one of a8-strip, "),
         (["study", "/"], "/: expected the file of a study or one of a7-a8-comparator, "),
@@ -209,7 +209,7 @@ def test_without_textual_the_console_says_how_to_get_it(typed, monkeypatch):
     ],
     ids=["too deep", "not UTF-8"],
 )
-@pytest.mark.parametrize("words", [["run"], ["study"], ["train", "check"], ["console", "akwanga", "--keymap"]])
+@pytest.mark.parametrize("words", [["run"], ["study"], ["train", "check-exercise"], ["console", "akwanga", "--keymap"]])
 def test_every_reader_of_toml_refuses_it_in_the_same_words(typed, tmp_path, words, content, sentence):
     folder = tmp_path / "20-clouds"
     folder.mkdir()
@@ -272,7 +272,7 @@ def test_no_command_imports_scipy_textual_or_matplotlib_to_say_its_options():
 IN_A_SHELL = ("a7sim ser", "a7sim run akwanga-", "a7sim train ve")
 COMPLETED = [
     ("a7sim ser", {"serve"}),
-    ("a7sim train ve", {"verify"}),
+    ("a7sim train gr", {"grade"}),
     ("a7sim run --ca", {"--case"}),
     ("a7sim run --case ", {"A", "B", "C", "D", "E"}),
     ("a7sim run akwanga-", {"akwanga-a8", "akwanga-lake"}),

@@ -155,7 +155,7 @@ def test_a_session_that_cannot_be_gone_on_with_is_kept_and_said_so(tmp_path: Pat
         assert "begun anew, since the last session cannot be gone on with" in person.message()
         assert "the journal is damaged" in person.message()
 
-    with pytest.raises(A7SimError, match=r"--go-on: expected a session of akwanga .* damaged"):
+    with pytest.raises(A7SimError, match=r"--resume: expected a session of akwanga .* damaged"):
         place(out, go_on=True)
     assert sat_at(place(out), told) == tmp_path / "mine-2"
 
@@ -164,7 +164,7 @@ def test_a_folder_of_something_else_is_not_touched(tmp_path: Path) -> None:
     (tmp_path / "letters").mkdir()
     with pytest.raises(A7SimError, match="expected a folder that does not exist yet"):
         place(tmp_path / "letters")
-    with pytest.raises(A7SimError, match=r"--go-on: expected a session of akwanga at seed 7 .* found none"):
+    with pytest.raises(A7SimError, match=r"--resume: expected a session of akwanga at seed 7 .* found none"):
         place(go_on=True)
     assert list((tmp_path / "letters").iterdir()) == []
 
@@ -276,12 +276,12 @@ def test_after_kill_9_nothing_that_was_recorded_is_lost(data: Path) -> None:
     ("arguments", "words"),
     [
         (["akwanga", "--variant", "A8"], "models[1].base: expected 'inside', all that an A8 has, got 'outside'"),
-        (["--connect", "tcp://127.0.0.1:1", "--go-on"], "--connect tcp://127.0.0.1:1: expected no --go-on beside it"),
-        (["--watch", "clearing", "--seed", "7", "--anew"], "expected no --seed and no --anew beside it"),
+        (["--connect", "tcp://127.0.0.1:1", "--resume"], "--connect tcp://127.0.0.1:1: expected no --resume beside it"),
+        (["--watch", "clearing", "--seed", "7", "--new"], "expected no --seed and no --new beside it"),
         (["akwanga", "--watch", "clearing"], "expected no SCENARIO beside it"),
         (["--watch", "nowhere"], "nowhere: expected the folder of a session, its journal, or a script"),
         (["--watch", "tcp://127.0.0.1:1"], "expected an instrument to answer there"),
-        (["akwanga", "--go-on"], "--go-on: expected a session of akwanga at seed"),
+        (["akwanga", "--resume"], "--resume: expected a session of akwanga at seed"),
     ],
 )
 def test_what_cannot_be_done_is_one_sentence_and_exit_2(

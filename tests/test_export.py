@@ -154,12 +154,12 @@ def test_cards_of_a_session_without_a_strip_are_refused_in_a_sentence(gave_up_fo
 
 def test_cards_of_a_strip_measured_in_several_ways(finished, typed):
     out = finished("a8-strip").folder
-    code, printed, _ = typed("export", out, "--to", "cards", "--way", "A8")
+    code, printed, _ = typed("export", out, "--to", "cards", "--method", "A8")
     assert code == 0
     assert len(printed.splitlines()) > 100
     code, _, complaint = typed("export", out, "--to", "cards")
     assert code == 2 and "(--way comparator or A8 has one)" in complaint
-    code, _, complaint = typed("export", out, "--to", "cards", "--way", "A9")
+    code, _, complaint = typed("export", out, "--to", "cards", "--method", "A9")
     assert code == 2 and "(comparator, A8), got A9" in complaint
     code, _, complaint = typed("export", out, "--to", "asciicast")
     assert code == 2 and "expected the journal or the book of an operator" in complaint

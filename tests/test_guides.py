@@ -47,14 +47,14 @@ def test_what_the_teacher_is_told_to_type_works(room):
     scripts = dict(zip(names, blocks(text, "a7s"), strict=True))
     folder = Path("20-set-the-base")
     for words, remark in commands(text):
-        if words[1:2] == ["check"] and "exit code" not in remark:
+        if words[1:2] == ["check-exercise"] and "exit code" not in remark:
             for path in folder.iterdir():
                 path.unlink()
             (folder / "text.md").write_text("Set the base.\n")
             (folder / "exercise.toml").write_text(toml)
             for name, script in scripts.items():
                 (folder / name).write_text(script)
-        seed = ["--seed", "4"] if words[1] == "verify" else []
+        seed = ["--seed", "4"] if words[1] == "grade" else []
         out = type_in(room, [*words, *seed], remark)
         if "holds" in remark:
             assert out.strip() == remark.strip()

@@ -338,7 +338,7 @@ def test_tables_of_a_strip_keep_to_the_width(tmp_path, monkeypatch, columns):
     monkeypatch.setenv("COLUMNS", str(columns))
     models, ground = flat_strip(np.random.default_rng(9), 4, noise=0.02)
     path, known = models_file(tmp_path / "m.csv", models), ground_file(tmp_path / "g.csv", ground)
-    done = reduce("strip", path, "--ground", known, "--polynomial", 2, "--against", known)
+    done = reduce("strip", path, "--ground", known, "--polynomial", 2, "--reference", known)
     assert done.returncode == 0, done.stderr
     assert max(map(len, done.stdout.splitlines())) <= columns
     for words in ("Absolute orientation", "Polynomials of degree 2", "twist", "mean square", "control, 8 points"):

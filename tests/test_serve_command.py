@@ -152,7 +152,7 @@ def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
     token = tmp_path / "token"
     token.write_text("heerbrugg\n")
     for arguments, environment in (
-        (("--listen-anyway", "--tcp", "0.0.0.0:0", "--token-file", str(token)), {}),
+        (("--allow-remote", "--tcp", "0.0.0.0:0", "--token-file", str(token)), {}),
         (ANY_TCP_PORT, {"A7SIM_TOKEN": "heerbrugg"}),
     ):
         with RunningServer(*arguments, **environment) as running, running.line() as line:
@@ -168,7 +168,7 @@ def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
         (["--rfc2217", "192.0.2.1:2217"], "192.0.2.1:2217: expected an address of this machine alone"),
         (["--tcp", "[::]:0"], "[::]:0: expected an address of this machine alone"),
         (["--tcp", "example.org:0"], "example.org:0: expected an address of this machine alone"),
-        (["--listen-anyway"], "--listen-anyway: expected a token"),
+        (["--allow-remote"], "--allow-remote: expected a token"),
         (["--token-file", "nowhere"], "--token-file nowhere: expected a file with a token"),
         (["--token-file", os.devnull], f"--token-file {os.devnull}: expected a token of 1 to 1000 printable ASCII"),
         (["--token-file", __file__], "characters on one line"),

@@ -9,7 +9,7 @@ from a7sim.study.checkpoint import save
 from a7sim.study.executors import open_executor
 from a7sim.study.loading import SEARCH_PATH, build_study, load_study
 from a7sim.study.running import ChunkPolicy, _Size, run_study
-from a7sim.study.schema import Factor, Study
+from a7sim.study.schema import Factor, StudyDefinition
 from a7sim.study.tally import Tally
 
 BY_COMPARATOR = {
@@ -31,7 +31,7 @@ def laid(tmp_path, raw=BY_COMPARATOR, **changes):
 
 def a_design(design, *factors, **others):
     required = {"schema_version": 1, "title": "t", "question": "q", "scenario": "akwanga", "responses": ["hours"]}
-    return Study(**required, design=design, factor=list(factors), **others)
+    return StudyDefinition(**required, design=design, factor=list(factors), **others)
 
 
 CASE = Factor(name="case", path="plan.case", levels=["A", "B", "C"])

@@ -43,14 +43,14 @@ def test_a_script_that_passes_ends_in_zero_and_ticks_the_checklist(train):
     code, out, err = at_the_references_seed(train)
     assert (code, err) == (0, "")
     assert out.count("[x]") == 5 and "[ ]" not in out
-    code, out, _ = train("verify", 4)
+    code, out, _ = train("grade", 4)
     assert code == 0 and "passed, 100 of 100 points" in out
 
 
 def test_who_has_done_nothing_is_told_what_is_missing_and_ends_in_one(train, tmp_path):
     (tmp_path / "nothing.a7s").write_text('scenario akwanga\nNOTE "where do I begin?"\n')
     assert train("start", 4, "--script", tmp_path / "nothing.a7s")[0] == 0
-    code, out, _ = train("verify", "--json")
+    code, out, _ = train("grade", "--json")
     document = json.loads(out)
     assert code == 1 and document["passed"] is False
     assert next(m["reason"] for m in document["marks"] if m["id"] == "complete").startswith("24 of 24 registrations")
@@ -64,16 +64,16 @@ def test_hints_come_in_their_order_cost_points_and_end(train, tmp_path):
         assert train("hint", 4)[1].startswith(f"hint {number} (-{hint.cost:g} points): {hint.text[:20]}")
     code, _, err = train("hint", 4)
     assert code == 2 and "all 3 were given" in err
-    assert "passed, 90 of 100 points" in train("verify", 4)[1]
+    assert "passed, 90 of 100 points" in train("grade", 4)[1]
     (journal,) = (tmp_path / "home").rglob("session.jsonl")
-    assert "passed, 90 of 100 points" in train("verify", "--journal", journal.parent, "--seed", 4)[1]
+    assert "passed, 90 of 100 points" in train("grade", "--journal", journal.parent, "--seed", 4)[1]
 
 
 def test_a_damaged_journal_ends_in_three(train, tmp_path):
     at_the_references_seed(train)
     (journal,) = (tmp_path / "home").rglob("session.jsonl")
     journal.write_bytes(journal.read_bytes().replace(b"PROJ1:BY 0.14", b"PROJ1:BY 0.15", 1))
-    code, _, err = train("verify", 4)
+    code, _, err = train("grade", 4)
     assert code == 3 and "the journal is damaged" in err
 
 
@@ -84,7 +84,7 @@ def test_an_exam_gives_no_hints_ticks_nothing_and_is_over_with_its_grade(train, 
     assert "there are no hints" in train("hint")[2]
     assert train("watch")[0] == 2
     assert "expected --exam" in train("start", 4)[2]
-    assert train("verify")[0] == 1
+    assert train("grade")[0] == 1
     with Progress(tmp_path / "home") as progress:
         last = progress.last("ada")
         assert last.closed and last.seed == attempt_seed("ada", "04-parallax", "exam") != attempt_seed(
@@ -107,7 +107,7 @@ def test_answers_are_those_that_the_exercise_asks_for(train):
     train("start", 1, "--seed", 1, "--script", EXERCISES / "01-counters" / "reference.a7s")
     assert "expected play=" in train("answer", "slip=3")[2]
     assert train("answer", "play=0.31")[1] == "play=0.31\n"
-    assert train("verify")[0] == 1
+    assert train("grade")[0] == 1
     assert train("answer", "play=0.07")[0] == 0
     assert train("watch", 1, "--every", "0.1")[0] == 0
 
@@ -125,7 +125,7 @@ def test_a_closed_attempt_takes_neither_hints_nor_answers(train, tmp_path):
     (tmp_path / "nothing.a7s").write_text("scenario akwanga\n*CLS\n")
     train("start", "--exam", "--script", tmp_path / "nothing.a7s")
     assert "expected --exam, since an exam is under way" in train("start", "exam")[2]
-    train("verify")
+    train("grade")
     for words in (("hint",), ("answer", "x=1")):
         code, _, err = train(*words)
         assert code == 2 and "expected an attempt that is open, got one that is closed" in err
@@ -148,12 +148,12 @@ def test_whoever_says_no_name_is_the_one_who_logged_in(train, monkeypatch):
 def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
     at_the_references_seed(train)
     (journal,) = (tmp_path / "home").rglob("session.jsonl")
-    code, _, err = train("verify", "--journal", journal.parent)
+    code, _, err = train("grade", "--journal", journal.parent)
     assert code == 3 and "expected an attempt with scenario_hash" in err
-    assert train("verify", "--journal", journal.parent, "--seed", 4)[0] == 0
+    assert train("grade", "--journal", journal.parent, "--seed", 4)[0] == 0
     (tmp_path / "empty").mkdir()
     folders = ["--journal", journal.parent, "--journal", tmp_path / "home", "--journal", tmp_path / "empty"]
-    code, out, err = train("verify", "--seed", 4, "--json", *folders)
+    code, out, err = train("grade", "--seed", 4, "--json", *folders)
     handed_in = json.loads(out)["handed_in"]
     assert code == 3 and "expected the journal of a session" in err
     assert [bool(each["grade"]) for each in handed_in] == [True, True, False]
@@ -178,15 +178,15 @@ def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path, monkeypatch)
 
 def test_an_exercise_is_shown_with_what_is_graded(train):
     out = train("list", "4")[1]
-    assert "The drum reads to 0.01 mm" in out and "25  the other by stands at zero" in out
+    assert "The drum reads to 0.01 mm" in out and "25  the other by is at zero" in out
 
 
 def test_reports_of_student_and_class_in_every_form(train, tmp_path, monkeypatch):
     at_the_references_seed(train)
-    train("verify")
+    train("grade")
     monkeypatch.setenv("A7SIM_STUDENT", "Bob O'Neill")
     train("start", 4, "--seed", 4, "--script", EXERCISES / "04-parallax" / "faulty-by2-left.a7s")
-    train("verify")
+    train("grade")
     rows = list(csv.DictReader(io.StringIO(train("report", "--class", "--to", "csv")[1])))
     assert [(row["student_id"], row["assignment"], float(row["score"])) for row in rows] == [
         ("Bob O'Neill", "04-parallax", 70.0),
@@ -208,7 +208,7 @@ def test_reports_of_student_and_class_in_every_form(train, tmp_path, monkeypatch
 
 def test_the_list_says_what_is_passed(train):
     at_the_references_seed(train)
-    train("verify")
+    train("grade")
     document = json.loads(train("list", "--json")[1])
     four = next(each for each in document["exercises"] if each["number"] == 4)
     assert (four["state"], four["points"], four["attempts"]) == ("passed", 100.0, 1)
@@ -217,7 +217,7 @@ def test_the_list_says_what_is_passed(train):
 
 def test_a_skeleton_is_read_and_check_says_what_is_missing(train, tmp_path):
     assert train("new", tmp_path / "30-clouds")[0] == 0
-    code, out, err = train("check", tmp_path / "30-clouds")
+    code, out, err = train("check-exercise", tmp_path / "30-clouds")
     assert code == 1 and err == ""
     assert "hint: expected 2 hints or more, got 1" in out and "faulty: expected 2" in out
     assert train("new", tmp_path / "30-clouds")[0] == 2
@@ -230,7 +230,7 @@ def test_check_finds_an_exercise_that_does_not_hold(train, tmp_path):
         (folder / path.name).write_text(path.read_text())
     toml = folder / "exercise.toml"
     toml.write_text(toml.read_text().replace("excellent = 12\npass = 30", "excellent = 1\npass = 1e6"))
-    code, out, _ = train("check", folder)
+    code, out, _ = train("check-exercise", folder)
     assert code == 1
     assert re.search(r"cleared: expected excellent no better than eye and least count, 5\.9\d+, got 1\n", out)
     assert "faulty-not-cleared.a7s: expected cleared to fail, got opposed" in out

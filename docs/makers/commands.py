@@ -1,4 +1,4 @@
-"""The page of commands, from the click tree."""
+"""The reference page of the commands, made from the click tree."""
 
 import re
 from inspect import cleandoc
@@ -10,36 +10,36 @@ from a7sim.cli.usage_errors import describe_range
 
 OPENING = """# Commands
 
-Every command answers `--help` with what stands here. Bad input gets one sentence and exit code 2; `--debug` in any place shows the traceback instead.
+`COMMAND --help` prints what this page contains. For bad input a command prints one sentence and ends with exit code 2; `--debug` anywhere on the line shows the traceback instead.
 
-| exit code | what it says |
+| exit code | meaning |
 | --- | --- |
 | 0 | done |
-| 1 | the work did not come to its end: the operator gave up, an instrument refused a line, an exercise is not passed |
-| 2 | what was asked for is no good, or a file cannot be read or written |
-| 3 | a replay, a grade or an audit found something else than was written down |
-| 130 | interrupted by Ctrl-C; what was observed is in the journal |
+| 1 | not completed: the operator gave up, an instrument rejected a line, an exercise is not passed |
+| 2 | bad input, or a file that cannot be read or written |
+| 3 | a replay, a grade or an audit differs from the record |
+| 130 | interrupted by Ctrl-C; the journal contains all observations made until then |
 """
 
 EXAMPLE = re.compile(r"^Example: (.*)", re.MULTILINE | re.DOTALL)
 
 
 def page():
-    """Return the page."""
+    """Return the page as Markdown."""
     context = click.Context(cli, info_name="a7sim")
-    return "\n".join([OPENING, *_of_group(cli, context, "##")]).rstrip() + "\n"
+    return "\n".join([OPENING, *_group_lines(cli, context, "##")]).rstrip() + "\n"
 
 
-def _of_group(group, context, level):
+def _group_lines(group, context, level):
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         inner = click.Context(command, info_name=name, parent=context)
-        yield from _of_command(command, inner, level)
+        yield from _command_lines(command, inner, level)
         if isinstance(command, click.Group):
-            yield from _of_group(command, inner, level + "#")
+            yield from _group_lines(command, inner, level + "#")
 
 
-def _of_command(command, context, level):
+def _command_lines(command, context, level):
     text = cleandoc(command.help or "")
     example = EXAMPLE.search(text)
     about = EXAMPLE.sub("", text).strip()
@@ -47,7 +47,7 @@ def _of_command(command, context, level):
     yield ""
     yield f"`{' '.join([context.command_path, *command.collect_usage_pieces(context)])}`"
     yield ""
-    yield _escaped(about)
+    yield _escape(about)
     yield ""
     if example:
         yield from ("```sh", " ".join(example[1].split()), "```", "")
@@ -62,21 +62,21 @@ def _row(option, context):
     words, about = option.get_help_record(context)
     extra = option.get_help_extra(context)
     bracketed = re.compile(r"\s*\[(?:[^\[\]]|\[[^\]]*\])*\]$")
-    told = bracketed.sub("", about) if any(extra.values()) else about
+    meaning = bracketed.sub("", about) if any(extra.values()) else about
     limits = ", ".join(
         filter(None, (describe_range(option.type) if "range" in extra else "", extra.get("required", "")))
     )
-    told, spoken, said = told.partition("  [default: ")
-    told += "." if spoken else ""
-    default = str(extra.get("default", said.removesuffix("]")))
-    meaning = f"{told} ({limits})" if limits else told
+    meaning, separator, stated = meaning.partition("  [default: ")
+    meaning += "." if separator else ""
+    default = str(extra.get("default", stated.removesuffix("]")))
+    meaning = f"{meaning} ({limits})" if limits else meaning
     words = words.replace(" RANGE", "")
-    return f"| <code>{_celled(words)}</code> | {_celled(_escaped(meaning))} | {default} |"
+    return f"| <code>{_table_cell(words)}</code> | {_table_cell(_escape(meaning))} | {default} |"
 
 
-def _escaped(text):
+def _escape(text):
     return text.replace("<", "&lt;").replace("\b\n", "")
 
 
-def _celled(text):
+def _table_cell(text):
     return text.replace("|", "&#124;")

@@ -1,58 +1,57 @@
-"""The page of files: what a session of Akwanga leaves in its folder, read from the folder itself."""
+"""The reference page of a session's files, read from the folder of a session of Akwanga."""
 
 import json
 
-OPENING = """# What stands in a session's folder
+OPENING = """# Files of a session
 
-`--out DIR` of `run`, `operate`, `compile`, `calibrate` and `bridge` leaves a folder. CSV has a header line, UTF-8, decimal points and `#` for remarks; names of points and photographs are text.
-Lengths are mm in photographs and at the instrument, m on the ground, angles gon. Every file is there whole or not at all, except the journal, which grows a line at a time.
+`run`, `operate`, `compile`, `calibrate` and `bridge` write a folder with `--out DIR`. CSV files have a header line, UTF-8 text, decimal points, and remarks after `#`; names of points and photographs are text.
+Lengths are mm in photographs and at the instrument and m on the ground; angles are gon. Each file is written whole or not at all, except the journal, which grows line by line.
 
-What follows was read from the folder of `a7sim run akwanga --seed 7`.
+The tables below are read from the folder of `a7sim run akwanga --seed 7`.
 """
 
-TOLD = {
-    "session.jsonl": "The journal: a header, then every line (`>`) and reply (`<`) with simulated time, clients that come and go (`+`, `-`), entries of the book; a checksum at each line's end that follows from all before it. It holds no truth. [Decision 12](../decisions/0012-journal.md).",
-    "session.scenario.json": "The scenario as it was worked, with what `--set` changed. It lists faults and planted slips, so it is truth: keep it from students.",
-    "session.states.jsonl": "The instrument's state every 2000 events, so that a replay can begin there. Truth, too.",
-    "book.csv": "The observation book as the operator wrote it, struck entries and all.",
-    "models.csv": "Model coordinates and perspective centres; centres are points `PHOTO:centre`.",
+CONTENTS = {
+    "session.jsonl": "The journal: a header, then each line (`>`) and reply (`<`) with its simulated time, connected and disconnected clients (`+`, `-`), and entries of the observation book; each line ends with a checksum over all lines before it. The journal contains no truth. [Decision 12](../decisions/0012-journal.md).",
+    "session.scenario.json": "The scenario of the session, with the changes of `--set`. It lists faults and planned slips, so it is truth: do not give it to students.",
+    "session.states.jsonl": "The state of the instrument every 2000 events, from which a replay can start. It is truth, too.",
+    "book.csv": "The observation book of the operator, with struck-out entries.",
+    "models.csv": "Model coordinates and perspective centres; a centre is the point `PHOTO:centre`.",
     "strip.csv": "All points of the strip on the ground.",
     "strip.crd": "The same strip as N.R.C. cards: control, models, ties (thesis 4.3).",
-    "strip-output.crd": "The cards that a strip program gives back, with residuals and deviations in three more fields.",
-    "strip-numbers.csv": "Which number on the cards stands for which point.",
-    "results.json": "All results, as `--json` prints them; below.",
+    "strip-output.crd": "The output cards of a strip program, with residuals and deviations in three more fields.",
+    "strip-numbers.csv": "The number on the cards of each point.",
+    "results.json": "All results, as `--json` prints them; see below.",
 }
-"""What each file is; a file that a session leaves and that is not told of here is an error."""
+"""The contents of each file. A file of a session without an entry here is an error."""
 
 ELSEWHERE = """## Files of other commands
 
-| file | of | what it is |
+| file | written by | contents |
 | --- | --- | --- |
-| `report.html` | `report` | the session on one page that needs nothing beside it |
-| `case-A` to `case-E`, `strips.csv` | `run --strips all` | the five sessions, each a folder as above, and the accuracy of every combination |
-| `comparator-models.csv`, `a8-strip.csv` and their like | scenarios worked by comparator or as an A8's readings | models and strip of each way |
-| `residuals.csv` | `calibrate`, `reduce` | residuals at every cross and level; at every point |
-| `map.geojson`, `map.svg` | `compile` | contours and lines as data and as a sheet |
-| `session.jsonl.torn` | `--resume` | a last line that was cut off in the middle of being written |
-| `cells.csv`, `comparisons.csv`, `replicates.csv`, `checkpoint.npz`, `study.html` | `study` | the cells' moments, what differs between them, the replicates, where to go on, the page |
-| `answers.txt`, `hints.txt` | `train` | what a student answered beside the instrument, and the hints they took |
+| `report.html` | `report` | the report of the session on one self-contained page |
+| `case-A` to `case-E`, `strips.csv` | `run --strips all` | the five sessions, each a folder as above, and the accuracy of each combination |
+| `comparator-models.csv`, `a8-strip.csv` and the like | scenarios with the methods `comparator` or `a8` | models and strip of each method |
+| `residuals.csv` | `calibrate`, `reduce` | residuals at each cross and level; at each point |
+| `map.geojson`, `map.svg` | `compile` | contours and lines as data and as a map |
+| `session.jsonl.torn` | `--resume` | an incomplete last line of the journal |
+| `cells.csv`, `comparisons.csv`, `replicates.csv`, `checkpoint.npz`, `study.html` | `study` | moments of the cells, differences between cells, replicates, checkpoint, page |
+| `answers.txt`, `hints.txt` | `train` | answers of the student, and hints taken |
 """
 
 DEPTH = 4
-LISTED_AT_MOST = 12
 
 
 def page(folder):
-    """Return the page, told from a session's folder. Raises KeyError for a file that nobody has told of."""
-    names = sorted((path.name for path in folder.iterdir()), key=list(TOLD).index)
-    lines = [OPENING, "| file | what it is | columns |", "| --- | --- | --- |"]
-    lines += [f"| `{name}` | {TOLD[name]} | {_columns(folder / name)} |" for name in names]
+    """Return the page, read from the folder of a session. Raises KeyError for a file without an entry in `CONTENTS`."""
+    names = sorted((path.name for path in folder.iterdir()), key=list(CONTENTS).index)
+    lines = [OPENING, "| file | contents | columns |", "| --- | --- | --- |"]
+    lines += [f"| `{name}` | {CONTENTS[name]} | {_columns(folder / name)} |" for name in names]
     results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     lines += [
         "",
         "## results.json",
         "",
-        "Every name, indented as it stands; of a list the first, of a table whose names are points or photographs the first as well.",
+        "All keys, indented by level; of a list the first element, of a table keyed by points or photographs the first entry.",
         "",
     ]
     lines += ["```text", *_outline(results), "```", "", ELSEWHERE]
@@ -83,7 +82,7 @@ def _outline(value, depth=0):
 
 
 def _named(table):
-    """Return the names of a table that all documents have: those that are points or photographs only once."""
+    """Return the entries of a table; of a table keyed by points or photographs only the first."""
     alike = {json.dumps(_shape(inner)) for inner in table.values()}
     names = list(table.items())
     if len(names) > 2 and len(alike) == 1 and isinstance(names[0][1], dict):

@@ -1,4 +1,4 @@
-"""The pages of scenario, exercise and study files, from the structs that read them and what their source says of each key."""
+"""Reference pages of scenario, exercise and study files, made from their structs and the strings below the fields."""
 
 import ast
 import inspect
@@ -14,17 +14,17 @@ from a7sim.training.metrics import MEASURES
 
 SCENARIO_OPENING = """# Scenario files
 
-A scenario is one TOML file: a flight, its photographs, the plotter in the room, the person in the chair, and what they are to do. `a7sim scenario validate FILE` names every mistake with its place;
-`a7sim scenario schema` prints the same as JSON Schema, for an editor. `--set PATH=VALUE` of `run` and its like changes any value by its path: `observer.parallax_um`, `photos.1.laid`, `plan.bx`.
-Angles are gon; lengths mm at the instrument and in photographs, m on the ground, um at photo scale where a name ends in `_um`. A key without a default must be there.
+A scenario is one TOML file: a flight, its photographs, the plotter, the operator and the work to be done. `a7sim scenario validate FILE` lists each error with its place;
+`a7sim scenario schema` prints the JSON Schema for an editor. `--set PATH=VALUE` of `run` and the like changes any value by its path: `observer.parallax_um`, `photos.1.laid`, `plan.bx`.
+Angles are gon. Lengths are mm at the instrument and in photographs, m on the ground, and um at photo scale if the name ends in `_um`. A key without a default is required.
 """
 EXERCISE_OPENING = """# Exercise files
 
-`exercise.toml` in a folder of its own, beside `text.md` and the scripts it names. A worked example stands in [the teacher's guide](../teacher-guide.md); `a7sim train check` says what is missing. Why it is so: [decision 14](../decisions/0014-training.md).
+An exercise is a folder with `exercise.toml`, `text.md` and the scripts that `exercise.toml` names. [The teacher's guide](../teacher-guide.md) has a complete example; `a7sim train check-exercise` lists what is missing. The reasons are in [decision 14](../decisions/0014-training.md).
 """
 STUDY_OPENING = """# Study files
 
-One TOML file asks one question of one scenario. How to write and work one is told in [the researcher's guide](../researcher-guide.md); why it is so, in [decision 15](../decisions/0015-studies.md).
+A study is one TOML file with one question about one scenario. [The researcher's guide](../researcher-guide.md) explains how to write and run one; the reasons are in [decision 15](../decisions/0015-studies.md).
 """
 
 
@@ -35,16 +35,16 @@ def scenario_page():
 
 def exercise_page():
     """Return the page of exercise files."""
-    measures = ["", "## Measures", "", "| measure | what it comes to |", "| --- | --- |"]
+    measures = ["", "## Metrics", "", "| metric | value |", "| --- | --- |"]
     measures += [f"| `{name}` | {_first_sentence(each)} |" for name, each in sorted(MEASURES.items())]
     return _page(EXERCISE_OPENING, [exercise_schema], exercise_schema.Exercise) + "\n".join(measures) + "\n"
 
 
 def study_page():
     """Return the page of study files."""
-    responses = ["", "## Responses", "", "| name | unit | what it is |", "| --- | --- | --- |"]
+    responses = ["", "## Responses", "", "| name | unit | meaning |", "| --- | --- | --- |"]
     responses += [f"| `{each.name}` | {each.unit} | {each.meaning} |" for each in RESPONSES.values()]
-    return _page(STUDY_OPENING, [study_schema], study_schema.Study) + "\n".join(responses) + "\n"
+    return _page(STUDY_OPENING, [study_schema], study_schema.StudyDefinition) + "\n".join(responses) + "\n"
 
 
 def _first_sentence(measure):
@@ -52,15 +52,15 @@ def _first_sentence(measure):
 
 
 def _page(opening, modules, root):
-    told = {name: notes for module in modules for name, notes in notes_of(module).items()}
+    notes = {name: text for module in modules for name, text in notes_of(module).items()}
     lines = [opening]
     for each in _reached(root):
-        lines += _of_struct(each, told)
+        lines += _struct_lines(each, notes)
     return "\n".join(lines).rstrip() + "\n"
 
 
 def notes_of(module):
-    """Return what the source says of each key of each class: {class: {key: text}}; inherited keys are told too."""
+    """Return the string below each field of each class as {class: {key: text}}; inherited fields are included."""
     tree = ast.parse(Path(inspect.getsourcefile(module)).read_text(encoding="utf-8"))
     classes = {node.name: _notes_in(node) for node in tree.body if isinstance(node, ast.ClassDef)}
     return {
@@ -87,7 +87,7 @@ def _notes_in(node):
 
 
 def _reached(root):
-    """Return the structs that a file can hold, the root first, each once, in the order in which they come up."""
+    """Return the structs reachable from `root`, root first, each once, in order of first use."""
     found = [root]
     for each in found:
         for key in msgspec.structs.fields(each):
@@ -105,7 +105,7 @@ def _structs_in(kind):
     return list(dict.fromkeys(cls for each in [*inner, *several] for cls in _structs_in(each)))
 
 
-def _of_struct(struct, told):
+def _struct_lines(struct, notes):
     yield f"## {struct.__name__}"
     yield ""
     yield inspect.getdoc(struct)
@@ -113,7 +113,7 @@ def _of_struct(struct, told):
     yield "| key | expected | default | |"
     yield "| --- | --- | --- | --- |"
     for key in msgspec.structs.fields(struct):
-        note = told.get(struct.__name__, {}).get(key.name, "")
+        note = notes.get(struct.__name__, {}).get(key.name, "")
         cells = (f"`{key.encode_name}`", expected(msgspec.inspect.type_info(key.type)), _default(key), note)
         yield "| " + " | ".join(cell.replace("|", "\\|").replace("<", "&lt;") for cell in cells) + " |"
     yield ""
@@ -130,7 +130,7 @@ PLAIN = {
 
 
 def expected(kind):
-    """Return what a key takes, in words."""
+    """Return a description of the values that a key accepts."""
     if isinstance(kind, msgspec.inspect.Metadata):
         described = (kind.extra_json_schema or {}).get("description")
         return described or expected(kind.type)

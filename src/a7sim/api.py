@@ -1,4 +1,4 @@
-"""What a script does with the simulator in a line: connect to an instrument, let the operator work, work a study."""
+"""Python API: connect to an instrument, run the virtual operator, run a study."""
 
 from dataclasses import dataclass
 from os import PathLike
@@ -25,16 +25,18 @@ from a7sim.study.loading import LoadedStudy, load_study
 from a7sim.study.running import run_study
 
 Name = str | PathLike[str]
-"""A file, or the name of what comes with a7sim."""
+"""A file, or the name of one that comes with a7sim."""
 
 
 def connect(
     to: Name | Scenario, seed: int | None = None, timeout: float = TIMEOUT_S, token: str | None = None
 ) -> Client:
-    """Return a client of a served instrument, by its URL or device, or of a new one in this process, by its scenario.
+    """Return a client of a served instrument, given by URL or device, or of a new one in this process, given by
+    scenario.
 
-    A new one has the photographs and the faults that a seed draws, the scenario's own if none is given. A reply is
-    waited for `timeout` s; a `token` is shown to a server that asks for one. Raises Mistake where nobody answers.
+    A new instrument has the photographs and the faults drawn by `seed`, by default the scenario's own. `timeout` is the
+    wait for a reply in s; `token` is the login of a server that requires one. Raises A7SimError if no instrument
+    answers.
 
     >>> from a7sim import connect
     >>> with connect("akwanga", seed=7) as client:
@@ -55,10 +57,10 @@ def connect(
 
 
 class Operator:
-    """The virtual operator, who works the job of a scenario and knows only what can be seen and read.
+    """Virtual operator for the job of a scenario, with no information but views and readings.
 
-    `scenario` is one that was loaded, a file, or the name of one that comes with a7sim; `seed` draws film, instrument
-    and operator.
+    `scenario` is a loaded scenario, a file, or the name of one that comes with a7sim; `seed` draws film, instrument and
+    operator.
 
     >>> from a7sim import Operator
     >>> results = Operator("dewitt-pair", seed=7).run()
@@ -79,11 +81,11 @@ class Operator:
         token: str | None = None,
         watcher: ProgressCallbacks | None = None,
     ) -> Document:
-        """Work through the scenario and return the document of results, as `a7sim run --json` prints it.
+        """Run the scenario and return the document of results, as `a7sim run --json` prints it.
 
-        With a `link`, the URL of an instrument served anew from the same scenario and seed, that one is worked, as by
-        `a7sim operate`. With `out` the files of a session are left there. Raises Mistake; an operator who gives up is
-        no error but a `status` with a `message`.
+        With a `link`, the URL of an instrument served anew from the same scenario and seed, that instrument is used, as
+        by `a7sim operate`. With `out` the files of the session are written there. Raises A7SimError; an operator who
+        gives up is no error but a `status` with a `message`.
         """
         folder = None if out is None else Path(out)
         if link is None:
@@ -104,7 +106,7 @@ class Operator:
 
 @dataclass(frozen=True)
 class Study:
-    """A scenario worked as often as a question needs, in every cell of a design.
+    """Monte Carlo study of a scenario in all cells of a design.
 
     >>> from a7sim import Study
     >>> study = Study.load("levels", replicates=2)
@@ -116,14 +118,14 @@ class Study:
 
     @classmethod
     def load(cls, name: Name, replicates: int | None = None) -> Self:
-        """Return a study of a file, or of one that comes with a7sim. Raises Mistake, which names every mistake."""
+        """Return a study of a file, or of one that comes with a7sim. Raises A7SimError with all errors."""
         return cls(load_study(Path(name), replicates))
 
     def run(self, out: Name | None = None, workers: int = 1, *, force: bool = False) -> Document:
-        """Work all cells and return the document of findings, as `a7sim study --json` prints it.
+        """Run all cells and return the document of findings, as `a7sim study --json` prints it.
 
-        Several `workers` are processes: a script that asks for them does so below `if __name__ == "__main__":`. With
-        `out` the tables are left there, and a study that was cut off there goes on. Raises Mistake.
+        Several `workers` are processes: a script must call this below `if __name__ == "__main__":`. With `out` the
+        tables are written there, and an interrupted study continues. Raises A7SimError.
         """
         folder = None if out is None else Path(out)
         tally = open_tally(self.loaded, folder, force)

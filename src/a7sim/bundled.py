@@ -1,4 +1,4 @@
-"""Where scenarios, exercises and studies stand that come with a7sim: in an installed package, and in a checkout."""
+"""Scenarios, exercises and studies that come with a7sim, in an installed package or in a checkout."""
 
 from pathlib import Path
 from typing import Literal
@@ -9,12 +9,12 @@ _PACKAGE = Path(__file__).parent
 
 
 def bundled_dirs(kind: Kind) -> tuple[Path, Path]:
-    """Return the folders in which those of a kind may stand."""
+    """Return the folders that may contain files of a kind."""
     return _PACKAGE / kind, _PACKAGE.parents[1] / kind
 
 
 def bundled_names(kind: Kind) -> list[str]:
-    """Return the names of all of a kind that come with a7sim, in alphabetical order."""
+    """Return the names of all files of a kind that come with a7sim, in alphabetical order."""
     files = "*/exercise.toml" if kind == "exercises" else "*.toml"
     found = {file for shelf in bundled_dirs(kind) for file in shelf.glob(files)}
     return sorted({file.parent.name if kind == "exercises" else file.stem for file in found})

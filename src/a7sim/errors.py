@@ -1,5 +1,5 @@
-"""The one kind of error that a user can put right."""
+"""Base class of errors that a user can correct."""
 
 
 class A7SimError(ValueError):
-    """Bad input: its text is the sentence for the user (what was expected, what came, where)."""
+    """Bad input: its text is one sentence for the user (expected, got, where)."""

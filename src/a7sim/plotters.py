@@ -1,7 +1,7 @@
-"""The manual of the plotters as frozen data: what each has, how far it goes, how it is fitted.
+"""Data of the plotters: elements, ranges, gears and fittings.
 
-The instrument is built from it and the operator has read it. Source unless said otherwise: the thesis,
-tables 3.2, 3.3 and 3.7 and section 3.2.3.6 (geometry.md, Counters and ranges, Gears, Fittings).
+Instrument and operator use the same data. Source unless stated otherwise: the thesis, tables 3.2, 3.3 and 3.7 and
+section 3.2.3.6 (geometry.md, Counters and ranges, Gears, Fittings).
 """
 
 from collections.abc import Mapping
@@ -15,24 +15,24 @@ import numpy.typing as npt
 _Counts = TypeVar("_Counts", float, npt.NDArray[np.float64])
 
 TILTS = ("omega", "phi", "kappa")
-"""Elements that turn a projector, from the primary axis inward."""
+"""Elements that rotate a projector, from the primary axis inward."""
 
 LEAST_COUNT = 0.01
-"""mm and gon, of every counter of the elements and of X and Y (thesis table 3.7)."""
+"""mm and gon, of all counters of the elements and of X and Y (thesis table 3.7)."""
 
 COUNTER_DECIMALS = 2
 
 NOT_VISIBLE = "9.91E37"
-"""What the command language answers for what cannot be seen or measured (SCPI's not-a-number)."""
+"""Reply of the command language for a quantity that cannot be seen or measured (SCPI's not-a-number)."""
 
 
 SCPI_VERSION = "1999.0"
-"""The edition of SCPI that the command language follows, as it answers."""
+"""Edition of SCPI of the command language, as reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """An orientation element: its range and its counter zero, in mm or gon."""
+    """Orientation element: its range and its counter zero, in mm or gon."""
 
     low: float
     high: float
@@ -43,7 +43,7 @@ class Element:
 
 @dataclass(frozen=True, slots=True)
 class Gear:
-    """A height gear: how many units its counter advances a mm, and the decimals it shows."""
+    """Height gear: counter units per mm, and decimals."""
 
     units_per_mm: float
     decimals: int = COUNTER_DECIMALS
@@ -51,15 +51,15 @@ class Gear:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What counts a carriage: ``at_origin + units_per_mm * position`` until it is preset."""
+    """Scale of a carriage: ``at_origin + units_per_mm * position`` until it is preset."""
 
     units_per_mm: float = 1.0
     at_origin: float = 0.0
     """Its reading in the origin of the instrument frame."""
     unit: str = "mm"
-    """What a reading may be given in, empty where it is no length."""
+    """Unit in which a reading may be given, empty if it is no length."""
     preset: bool = True
-    """Whether it can be made to show another reading."""
+    """Whether it can be preset."""
 
 
 MILLIMETRES = Scale()
@@ -68,7 +68,7 @@ GEARED = Scale(unit="")
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """How fast the parts of a plotter go [assumption of this project: no source gives any of it]."""
+    """Speeds of the parts of a plotter [assumption of this project: no source gives any of it]."""
 
     carriage: float = 10.0
     """mm/s of the X, Y and Z carriages."""
@@ -77,20 +77,20 @@ class Rates:
     angle: float = 1.0
     """gon/s of tilts, swings and pictures on their carriers."""
     lever: float = 2.0
-    """s to put over a fitting or the Zeiss parallelogram."""
+    """s to change a fitting or the Zeiss parallelogram."""
     gear: float = 10.0
     """s to exchange the wheels of a height gear."""
     laying: float = 15.0
-    """s to lay a picture on its carrier or to take it off."""
+    """s to mount or remove a picture."""
 
     def of(self, unit: str) -> float:
-        """Return how far an element that counts in mm or gon goes in a second."""
+        """Return the speed of an element in mm or gon per second."""
         return self.angle if unit == "gon" else self.length
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A type of plotter. An element or fitting that is not listed is one the instrument does not have."""
+    """Type of a plotter. The instrument does not have elements or fittings that are not listed."""
 
     name: str
     elements: Mapping[str, Element]
@@ -103,19 +103,19 @@ class Variant:
         default_factory=lambda: MappingProxyType({"X": MILLIMETRES, "Y": MILLIMETRES, "Z": GEARED})
     )
     centres_on_base: tuple[float, float] = (0.0, 1.0)
-    """Where the left-hand and the right-hand centre stand along X, as shares of bx from the origin."""
+    """X positions of the left-hand and the right-hand centre, as shares of bx from the origin."""
     carriages_at_rest: Mapping[str, float] = field(
         default_factory=lambda: MappingProxyType({"X": 0.0, "Y": 0.0, "Z": -300.0})
     )
     field_radius_mm: float = 10.0
     """Radius of the field of view at photo scale [assumption; no source at hand]."""
     rod_limit_gon: float = 62.0
-    """Inclination from the plumb line that a space rod can take [assumption; no source at hand]."""
+    """Maximum inclination of a space rod from the plumb line [assumption; no source at hand]."""
     carriage_lead_mm: float = 5.0
-    """What a turn of an X, Y or Z spindle moves its carriage [assumption; mm a turn were not found in any source]."""
+    """Travel of a carriage per turn of an X, Y or Z spindle [assumption; no source states mm per turn]."""
     centring_mm: float = 15.0
     centring_gon: float = 20.0
-    """How far a picture can be shifted and turned on its carrier [assumption; no source at hand]."""
+    """Range of shift and rotation of a picture on its carrier [assumption; no source at hand]."""
     rates: Rates = Rates()
 
     def missing_elements(self, *elements: str) -> list[str]:
@@ -123,7 +123,7 @@ class Variant:
         return [name for name in elements if name not in self.elements]
 
     def tilts(self, counts: Mapping[str, _Counts], projector: int) -> tuple[_Counts, _Counts, _Counts]:
-        """Return omega, phi and kappa of a projector in gon from their zeros, by what the counters of elements show."""
+        """Return omega, phi and kappa of a projector in gon from their zeros, by the counter readings of elements."""
         omega, phi, kappa = (
             counts[name] - self.elements[name].zero for name in (f"{name}{projector}" for name in TILTS)
         )
@@ -132,7 +132,7 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class Fittings:
-    """The positions of the five fittings."""
+    """Positions of the five fittings."""
 
     dove: str
     triangulation: str
@@ -141,7 +141,7 @@ class Fittings:
     ycollar: str
 
     def as_words(self) -> dict[str, str]:
-        """Return the position of every fitting by its name."""
+        """Return the position of each fitting by its name."""
         return {name: getattr(self, name) for name in POSITIONS_OF}
 
 
@@ -154,7 +154,7 @@ POSITIONS_OF: Mapping[str, tuple[str, str]] = MappingProxyType(
         "ycollar": ("in", "out"),
     }
 )
-"""The two positions that every fitting has."""
+"""The two positions of each fitting."""
 
 REQUIRED_FITTINGS: Mapping[tuple[str, str], Fittings] = MappingProxyType(
     {
@@ -164,7 +164,7 @@ REQUIRED_FITTINGS: Mapping[tuple[str, str], Fittings] = MappingProxyType(
         ("positive", "outside"): Fittings("inside", "front", "left", "in", "out"),
     }
 )
-"""The thesis's table: the fittings that belong to a picture and a base."""
+"""The thesis's table: the fittings required by picture and base."""
 
 
 BASE_COMPONENTS = ("by1", "by2", "bz1", "bz2")
@@ -234,11 +234,11 @@ A8 = Variant(
     ),
     centres_on_base=(-0.5, 0.5),
 )
-"""The Autograph A8: P 3.1 and 3.2, and docs/decisions/0007-a8.md, which says what of this is assumed.
+"""The Autograph A8: P 3.1 and 3.2, and docs/decisions/0007-a8.md, which lists the assumptions.
 
 X and Y are read in units of 2 mm about 200.00, the middle of the base; the glass scale 1:10 000 reads mm, the others
-metres of the ground, and a glass scale can be shifted in its holder, which is how Z is preset. Common Phi turns the
-main frame, with both projectors and the base, about the Y axis.
+metres of the ground, and a glass scale can be shifted in its holder, which presets Z. Common Phi rotates the main
+frame, with both projectors and the base, about the Y axis.
 """
 
 VARIANTS: Mapping[str, Variant] = MappingProxyType({"A7": A7, "A8": A8})

@@ -1,4 +1,4 @@
-"""Documents of results: what `--json` prints and `results.json` holds (files.md), the same for every command."""
+"""Documents of results: the contents of `--json` and `results.json` (files.md), the same for all commands."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -19,7 +19,7 @@ Document = dict[str, Any]
 
 
 def document_header(command: str) -> Document:
-    """Return what every document says first."""
+    """Return the first keys of a document."""
     return {"schema_version": SCHEMA_VERSION, "command": command}
 
 
@@ -43,7 +43,7 @@ def elements_document(values: Mapping[str, Array], sigmas: Mapping[str, Array]) 
 
 
 def statistics_document(adjustment: Adjustment, names: Sequence[str], observations: Sequence[str]) -> Document:
-    """Return the statistics of an adjustment whose unknowns and observations are named; correlations row by row."""
+    """Return the statistics of an adjustment with named unknowns and observations; correlations row by row."""
     return {
         "unknowns": list(names),
         "correlations": adjustment.correlations.tolist(),
@@ -63,7 +63,7 @@ def similarity_document(found: Similarity) -> Document:
 
 
 def joins_document(strip: Strip) -> list[Document]:
-    """Return the connections of a strip's models."""
+    """Return the joins of a strip's models."""
     return [
         {
             "models": [join.before, join.after],
@@ -76,7 +76,7 @@ def joins_document(strip: Strip) -> list[Document]:
 
 
 def absolute_document(oriented: AbsoluteOrientation) -> Document:
-    """Return an absolute orientation with its residuals, how accurate it is, and its warnings."""
+    """Return an absolute orientation with its residuals, accuracy and warnings."""
     return {
         "absolute": similarity_document(oriented.similarity),
         "residuals_m": residuals_document(oriented.fit),
@@ -86,7 +86,7 @@ def absolute_document(oriented: AbsoluteOrientation) -> Document:
 
 
 def adjustment_document(adjusted: StripAdjustment) -> Document:
-    """Return a polynomial adjustment: its residuals and what it found the strip to be."""
+    """Return a polynomial adjustment: its residuals and the deformation of the strip."""
     found = adjusted.deformation
     return {
         "degree": adjusted.degree,
@@ -104,7 +104,7 @@ def adjustment_document(adjusted: StripAdjustment) -> Document:
 
 
 def residuals_document(fit: GroundFit) -> Document:
-    """Return computed minus given at every ground point, with its role; null where nothing is given."""
+    """Return computed minus given at each ground point, with its role; null where nothing is given."""
     return {
         point: {"role": role} | {axis: _known(value) for axis, value in zip("XYZ", residual, strict=True)}
         for point, role, residual in zip(fit.ground.points, fit.ground.roles, fit.residuals.T.tolist(), strict=True)

@@ -1,4 +1,4 @@
-"""The standard points of a model (thesis fig. 4.1) and the cases of numerical relative orientation (thesis 3.4.2)."""
+"""Standard points of a model (thesis fig. 4.1) and cases of numerical relative orientation (thesis 3.4.2)."""
 
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
@@ -17,14 +17,14 @@ PLACES: Mapping[str, tuple[float, float]] = MappingProxyType(
 def determine_orientation(positions: Collection[str]) -> bool:
     """Return whether y-parallaxes at positions determine the five elements of a relative orientation.
 
-    A point in every row tells what goes with y and its square, two that are apart in two of the rows what goes with x.
+    A point in each row determines the terms in y and its square, two separate points in two of the rows those in x.
     """
     apart = [_extent([label for label in row if label in positions]) for row in FIGURE_4_1]
     return min(apart) >= 0.0 and sum(extent > 0.0 for extent in apart) >= 2
 
 
 def _extent(row: Sequence[str]) -> float:
-    """Return how far apart the outermost of some positions in a row are, in bases; less than nothing for none."""
+    """Return the distance of the outermost of some positions in a row, in bases; negative for none."""
     return PLACES[row[-1]][0] - PLACES[row[0]][0] if row else -1.0
 
 

@@ -1,10 +1,6 @@
-"""Reading and writing the files that people send: tables in CSV or TOML, UTF-8, decimal points, `#` comments.
+"""Reading and writing of table files: CSV or TOML, UTF-8, decimal points, `#` comments.
 
-A table in CSV has a header line; in TOML it is an array of tables named `rows` with the columns as keys::
-
-    [[rows]]
-    point = "101"
-    X = 440728.0
+A table in CSV has a header line; in TOML it is an array of tables named `rows` with the columns as keys.
 """
 
 import csv
@@ -22,15 +18,15 @@ from a7sim.errors import A7SimError
 from a7sim.text import pluralize
 
 MAX_FILE_BYTES = 20_000_000
-"""Bytes; a longer file is refused before it is read."""
+"""Bytes; a longer file is rejected before it is read."""
 
 MAX_NAME_LENGTH = 64
 
 MAX_NUMBER = 1e12
-"""Nothing that is measured in mm, m or counts is larger."""
+"""Maximum of any measurement in mm, m or counts."""
 
 DECIMALS = 6
-"""Of the numbers in the CSV files that are written."""
+"""Of the numbers in written CSV files."""
 
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\x85\u2028\u2029]")
 _TOML = re.compile(r"\[|[\w.\"'-]+\s*=")
@@ -38,36 +34,36 @@ _TOML = re.compile(r"\[|[\w.\"'-]+\s*=")
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A data row: where it stands, its texts and its numbers by column."""
+    """Data row: its location, texts and numbers by column."""
 
     line: int
     texts: dict[str, str]
     numbers: dict[str, float]
     unit: str = "line"
-    """What `line` counts: lines of CSV, rows of TOML."""
+    """Unit of `line`: lines of CSV, rows of TOML."""
 
     @property
     def location(self) -> str:
-        """Where the row stands, in words."""
+        """Location of the row as text."""
         return f"{self.unit} {self.line}"
 
 
 @dataclass(frozen=True)
 class Table:
-    """The cells of a file by row and column, as they stand there."""
+    """Cells of a file by row and column, as text."""
 
     path: Path
     columns: tuple[str, ...]
     cells: tuple[tuple[int, dict[str, str]], ...]
     """Line of each row and its cells by column."""
     header: str
-    """Where the columns are named, in words."""
+    """Location of the column names as text."""
     unit: str
 
     def rows(self, texts: Sequence[str], numbers: Sequence[str], gaps: Sequence[str] = ()) -> list[Row]:
-        """Return the rows with the named columns, numbers finite; in those of `gaps` an empty cell is nan.
+        """Return the rows with the named columns, numbers finite; in columns of `gaps` an empty cell is nan.
 
-        Raises Mistake with file, line and column when they cannot be read so.
+        Raises A7SimError with file, line and column.
         """
         wanted = [*texts, *numbers]
         missing = [column for column in wanted if column not in self.columns]
@@ -108,12 +104,12 @@ class Table:
 
 
 def describe_missing_file(path: Path) -> str:
-    """Return what is found where a file is looked for and there is none."""
+    """Return a description of a path that is not a file."""
     return "a folder" if path.is_dir() else "no such file"
 
 
 def read_text(path: str | Path) -> str:
-    """Return the text of a file. Raises Mistake with line and column for bytes that are none, and for long files."""
+    """Return the text of a file. Raises A7SimError with line and column for invalid bytes, and for long files."""
     path = Path(path)
     try:
         with path.open("rb") as file:
@@ -134,7 +130,7 @@ def read_text(path: str | Path) -> str:
 
 
 def _shown(text: str) -> str:
-    """Return the beginning of a text from a file, fit to stand in a sentence."""
+    """Return the start of a text from a file, printable within a sentence."""
     return "".join(each if each.isprintable() else " " for each in text[:80])
 
 
@@ -143,14 +139,14 @@ def _place(before: str) -> str:
 
 
 def first_line(text: str) -> str:
-    """Return the first line that is neither empty nor a comment, as it stands."""
+    """Return the first line that is neither empty nor a comment."""
     return next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
 
 
 def read_table(path: str | Path, text: str | None = None) -> Table:
-    """Return the table of a CSV or TOML file, told apart by the ending or else the first line.
+    """Return the table of a CSV or TOML file, recognised by the suffix or else the first line.
 
-    `text` is that of the file where it has been read already. Raises Mistake.
+    `text` saves reading the file again. Raises A7SimError.
     """
     path = Path(path)
     text = read_text(path) if text is None else text
@@ -164,12 +160,12 @@ def read_table(path: str | Path, text: str | None = None) -> Table:
 
 
 def read_rows(path: str | Path, texts: Sequence[str], numbers: Sequence[str], gaps: Sequence[str] = ()) -> list[Row]:
-    """Return the rows of a file that must have the named columns (see `Table.rows`)."""
+    """Return the rows of a file with the named columns (see `Table.rows`)."""
     return read_table(path).rows(texts, numbers, gaps)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """Return the tables of a TOML file. Raises Mistake."""
+    """Return the tables of a TOML file. Raises A7SimError."""
     return _toml(Path(path), read_text(path))
 
 
@@ -236,7 +232,7 @@ def _toml_cell(path: Path, row: int, column: str, value: Any) -> str:
 
 
 def rows_by_key(path: str | Path, rows: Sequence[Row], *columns: str) -> dict[tuple[str, ...], Row]:
-    """Return the rows by the texts of the named columns. Raises Mistake when two rows have the same."""
+    """Return the rows by the texts of the named columns. Raises A7SimError if two rows have the same."""
     found: dict[tuple[str, ...], Row] = {}
     for row in rows:
         key = tuple(row.texts[column] for column in columns)
@@ -251,7 +247,7 @@ def rows_by_key(path: str | Path, rows: Sequence[Row], *columns: str) -> dict[tu
 
 
 def natural_sort_key(name: str) -> tuple[tuple[str | tuple[int, str], ...], str]:
-    """Return a key that sorts names as people number them: 2 before 10, `7a` before `7b`."""
+    """Return a natural sort key of names with numbers: 2 before 10, `7a` before `7b`."""
     parts = re.split(r"([0-9]+)", name)
     shown = [part.lstrip("0") if i % 2 else part for i, part in enumerate(parts)]
     return tuple((len(part), part) if i % 2 else part for i, part in enumerate(shown)), name
@@ -273,9 +269,9 @@ def _cell(value: str | float | None) -> str:
 
 
 def write_files(folder: str | Path, texts: Mapping[str, str]) -> None:
-    """Write texts to the named files of a folder, made if it is not there; a file is replaced whole or not at all.
+    """Write texts to the named files of a folder, which is created if necessary; each file is replaced atomically.
 
-    Raises Mistake for a folder that cannot be written.
+    Raises A7SimError for a folder that cannot be written.
     """
     folder = Path(folder)
     try:

@@ -1,10 +1,10 @@
-"""How a count is said: 1 reading, 2 readings."""
+"""Numbers with nouns: 1 reading, 2 readings."""
 
 
 def pluralize(number: float, one: str, many: str | None = None) -> str:
-    """Return a number with what is counted; `many` where it is not `one` with an s.
+    """Return a number with its noun; `many` is the plural, by default `one` with an s.
 
-    >>> counted(1, "reading"), counted(0, "reading"), counted(2, "cross", "crosses")
+    >>> pluralize(1, "reading"), pluralize(0, "reading"), pluralize(2, "cross", "crosses")
     ('1 reading', '0 readings', '2 crosses')
     """
     shown = f"{number:g}" if isinstance(number, float) else str(number)

@@ -1,4 +1,4 @@
-"""The command line: one thin click command a verb."""
+"""Command line: one click command per subcommand."""
 
 import io
 import sys
@@ -11,44 +11,44 @@ from a7sim.cli.lazy_group import LazyCommand, LazyGroup
 from a7sim.cli.usage_errors import format_usage_error
 from a7sim.errors import A7SimError
 
-EXIT_DOES_NOT_FIT, EXIT_MISTAKE, EXIT_DIFFERS, EXIT_INTERRUPTED = 1, 2, 3, 130
+EXIT_DOES_NOT_FIT, EXIT_USAGE, EXIT_DIFFERS, EXIT_INTERRUPTED = 1, 2, 3, 130
 
-_VERBS = {
-    "run": LazyCommand("a7sim.cli.run:command", "Let the operator work through a scenario, up to the strip."),
-    "operate": LazyCommand("a7sim.cli.operate:command", "Let the operator work an instrument that is served."),
-    "compile": LazyCommand("a7sim.cli.compile:command", "Let the operator draw contours and lines of a model."),
+_COMMANDS = {
+    "run": LazyCommand("a7sim.cli.run:command", "Run the virtual operator on a scenario, through to the strip."),
+    "operate": LazyCommand("a7sim.cli.operate:command", "Run the virtual operator on a served instrument."),
+    "compile": LazyCommand("a7sim.cli.compile:command", "Draw contours and lines of a model."),
     "calibrate": LazyCommand("a7sim.cli.calibrate:command", "Test both projectors with a grid plate."),
-    "bridge": LazyCommand("a7sim.cli.bridge:command", "Carry a strip on at the instrument (aeropolygon)."),
+    "bridge": LazyCommand("a7sim.cli.bridge:command", "Bridge a strip at the instrument (aeropolygon)."),
     "prepare": LazyCommand("a7sim.cli.prepare:command", "Choose scales, gears, projection height and bx for a flight."),
     "reduce": LazyCommand("a7sim.cli.reduce:command", "Compute orientations, strips and blocks from files."),
     "scenario": LazyCommand("a7sim.cli.scenario:command", "Check scenario files and describe them."),
     "serve": LazyCommand("a7sim.cli.serve:command", "Serve an instrument on TCP, RFC 2217 and ptys."),
-    "send": LazyCommand("a7sim.cli.send:command", "Say lines to an instrument and print its replies."),
-    "console": LazyCommand("a7sim.cli.console:command", "Sit down at the instrument yourself, on a terminal."),
-    "record": LazyCommand("a7sim.cli.record:command", "Journal what a client and an instrument say."),
-    "replay": LazyCommand("a7sim.cli.replay:command", "Say a session or a script again to a fresh instrument."),
+    "send": LazyCommand("a7sim.cli.send:command", "Send command lines to an instrument and print its replies."),
+    "console": LazyCommand("a7sim.cli.console:command", "Operate the instrument yourself in a terminal."),
+    "record": LazyCommand("a7sim.cli.record:command", "Record the traffic between a client and an instrument."),
+    "replay": LazyCommand("a7sim.cli.replay:command", "Replay a session or a script on a fresh instrument."),
     "report": LazyCommand("a7sim.cli.report:command", "Write the report of a session on one page."),
-    "export": LazyCommand("a7sim.cli.export:command", "Write a session as film, book, forms or cards."),
-    "compare": LazyCommand("a7sim.cli.compare:command", "Lay the results of sessions beside each other."),
-    "train": LazyCommand("a7sim.cli.train:command", "Learn to work it: exercises with hints and grades."),
-    "study": LazyCommand("a7sim.cli.study:command", "Work a scenario as often as a question needs."),
-    "doctor": LazyCommand("a7sim.cli.doctor:command", "Say what is installed, what is missing, how to get it."),
-    "completion": LazyCommand("a7sim.cli.completion:command", "Print the script that lets a shell complete commands."),
+    "export": LazyCommand("a7sim.cli.export:command", "Export a session as asciicast, book, forms or cards."),
+    "compare": LazyCommand("a7sim.cli.compare:command", "Compare the results of sessions."),
+    "train": LazyCommand("a7sim.cli.train:command", "Train on the plotter: exercises with hints and grades."),
+    "study": LazyCommand("a7sim.cli.study:command", "Run a Monte Carlo study of a scenario."),
+    "doctor": LazyCommand("a7sim.cli.doctor:command", "Report what is installed and what is missing."),
+    "completion": LazyCommand("a7sim.cli.completion:command", "Print a shell completion script."),
 }
 
 
-@click.group(cls=LazyGroup, verbs=_VERBS, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=LazyGroup, commands=_COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(a7sim.__version__, prog_name="a7sim")
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 def cli(debug: bool) -> None:
-    """A simulated Wild A7 stereoplotter and the operator who works it.
+    """A simulated Wild A7 stereoplotter and its virtual operator.
 
     Example: a7sim run akwanga
     """
 
 
 def main() -> None:
-    """Run the command line; bad input gets one sentence and exit code 2."""
+    """Run the command line; bad input gives one sentence and exit code 2."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     for stream in (sys.stdout, sys.stderr):
@@ -58,35 +58,35 @@ def main() -> None:
         code = cli.main(arguments, prog_name="a7sim", standalone_mode=False)
     except NoArgsIsHelpError as error:
         error.show()
-        code = EXIT_MISTAKE
+        code = EXIT_USAGE
     except click.ClickException as error:
         if debug:
             raise
         click.echo(f"a7sim: {format_usage_error(error)}", err=True)
-        code = EXIT_MISTAKE
+        code = EXIT_USAGE
     except (click.Abort, KeyboardInterrupt):
         if debug:
             raise
         click.echo("a7sim: interrupted", err=True)
         code = EXIT_INTERRUPTED
-    except A7SimError as mistake:
+    except A7SimError as bad_input:
         if debug:
             raise
-        for line in str(mistake).splitlines():
+        for line in str(bad_input).splitlines():
             click.echo(f"a7sim: {line}", err=True)
-        code = EXIT_MISTAKE
+        code = EXIT_USAGE
     except OSError as error:
         if debug:
             raise
-        code = _told(error)
+        code = _report_os_error(error)
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _told(error: OSError) -> int:
-    """Say what the operating system refused; a reader who went away needs to be told nothing."""
+def _report_os_error(error: OSError) -> int:
+    """Print an error of the operating system; a closed output pipe is silent."""
     if isinstance(error, BrokenPipeError):
         sys.stdout = None
         return 1
     place = error.filename or "standard output"
     click.echo(f"a7sim: {place}: expected to be able to write and read: {error.strerror}", err=True)
-    return EXIT_MISTAKE
+    return EXIT_USAGE

@@ -1,4 +1,4 @@
-"""`a7sim bridge`: a strip carried on at the instrument, beside independent models."""
+"""`a7sim bridge`: a strip bridged at the instrument, compared with independent models."""
 
 import click
 
@@ -16,7 +16,7 @@ from a7sim.cli.run_options import (
 )
 
 _POINTS_A_MODEL = 260
-"""About how many points an operator works on in a model in both ways."""
+"""Approximate number of points of a model in both methods, for the progress bar."""
 
 
 @click.command("bridge")
@@ -25,7 +25,7 @@ _POINTS_A_MODEL = 260
 @output_options()
 @display_options
 def command(scenario: str | None, asked: ScenarioOptions, kept: OutputOptions, told: DisplayOptions) -> None:
-    """Bridge the strip of SCENARIO with base in and out in turn, and work it as independent models for comparison.
+    """Bridge the strip of SCENARIO with base in and out in turn, and measure independent models for comparison.
 
     Example: a7sim bridge bridge --seed 7 --out runs/bridge
     """

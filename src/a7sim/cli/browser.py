@@ -1,4 +1,4 @@
-"""`a7sim console --browser`: the console that was asked for, served to browsers of this machine."""
+"""`a7sim console --browser`: the console served to browsers of this machine."""
 
 import os
 import sys
@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from a7sim.cli.options import Number
+from a7sim.cli.options import NumberType
 from a7sim.errors import A7SimError
 
 PORT, IDLE_MIN = 8515, 30.0
@@ -25,7 +25,7 @@ _OPTIONS = (
     ),
     click.option(
         "--idle-exit",
-        type=Number(min=0.0, min_open=True, max=1e5),
+        type=NumberType(min=0.0, min_open=True, max=1e5),
         default=IDLE_MIN,
         show_default=True,
         metavar="MIN",
@@ -43,12 +43,12 @@ def browser_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def is_browser_child() -> bool:
-    """Whether this process draws what a browser shows, as its server says."""
+    """Return whether this process draws for a browser, as set by its server."""
     return "TEXTUAL_DRIVER" in os.environ
 
 
 def serve_in_browser(context: click.Context) -> bool:
-    """Serve the command of a context without its browser, until it is ended or left alone, if that was asked for."""
+    """Serve the command of a context without its browser option until it ends or is idle; False if not requested."""
     if not context.params["browser"]:
         _refuse_without_browser(context)
         return False

@@ -45,7 +45,7 @@ def command(
     kept: OutputOptions,
     told: DisplayOptions,
 ) -> None:
-    """Test both projectors of SCENARIO's plotter with a grid plate, as at a service.
+    """Test both projectors of SCENARIO's plotter with a grid plate, as in a service.
 
     Example: a7sim calibrate grid-test --points 25 --out runs/grid-test
     """

@@ -1,4 +1,4 @@
-"""`a7sim compare`: what differs between sessions."""
+"""`a7sim compare`: differences between sessions."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from a7sim.errors import A7SimError
 @click.option("--all", "everything", is_flag=True, help="Also what is the same.")
 @options.as_document
 def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> None:
-    """Lay the results of sessions beside each other: settings, elements, residuals, centres, strips, times, slips.
+    """Compare the results of sessions: settings, elements, residuals, centres, strips, times, slips.
 
     Example: a7sim compare runs/akwanga runs/akwanga-e
     """

@@ -1,4 +1,4 @@
-"""`a7sim compile`: the operator draws contours and lines of a model."""
+"""`a7sim compile`: contours and lines of a model."""
 
 import click
 
@@ -17,7 +17,7 @@ from a7sim.cli.run_options import (
 )
 
 _POINTS = 400
-"""About how many points and vertices an operator works on; the bar only needs the order of it."""
+"""Approximate number of points and vertices of a model, for the progress bar."""
 
 
 @click.command("compile")
@@ -31,7 +31,7 @@ _POINTS = 400
 )
 @click.option("--line", "lines", multiple=True, metavar="NAME", help="Road or track of the scenario.")
 @options.map_scale
-@click.option("--tremor", type=options.Number(0.0, 500.0), metavar="UM", help="Tremor at photo scale.")
+@click.option("--tremor", type=options.NumberType(0.0, 500.0), metavar="UM", help="Tremor at photo scale.")
 @scenario_options
 @output_options("journal, book, map and results")
 @display_options
@@ -47,7 +47,7 @@ def command(
     kept: OutputOptions,
     told: DisplayOptions,
 ) -> None:
-    """Let the operator set up a model of SCENARIO, level it, and draw contours and lines from it.
+    """Set up a model of SCENARIO with the virtual operator, level it, and draw contours and lines.
 
     Example: a7sim compile akwanga --model 1 --contour 460 --interval 10 --line road1 --out runs/sheet
     """

@@ -1,4 +1,4 @@
-"""What arguments and options name: what comes with a7sim, which shells complete (else files), and plain choices."""
+"""Shell completion of arguments and options: names of files that come with a7sim, other files, and choices."""
 
 from collections.abc import Callable, Iterable
 
@@ -11,7 +11,7 @@ Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]
 
 
 def _or_files(names: Callable[[], Iterable[str]]) -> Completer:
-    """Return a completer of names; where none begins so, the shell completes files."""
+    """Return a completer of names; the shell completes files if no name matches."""
 
     def completer(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
         found = [CompletionItem(name) for name in names() if name.startswith(incomplete)]
@@ -25,17 +25,17 @@ def _scripts() -> list[str]:
 
 
 class CaseInsensitiveChoice(click.Choice[str]):
-    """A choice that takes small letters for capitals, and is shown and completed in its own."""
+    """Choice that accepts lower and upper case, and is shown and completed in its own."""
 
     def __init__(self, choices: Iterable[str]) -> None:
         super().__init__(list(choices), case_sensitive=False)
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        """Return the choices as help shows them."""
+        """Return the choices as in help."""
         return f"[{'|'.join(self.choices)}]"
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Return the choices that begin so."""
+        """Return the matching choices."""
         return [CompletionItem(each) for each in self.choices if each.lower().startswith(incomplete.lower())]
 
 

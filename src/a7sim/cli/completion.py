@@ -1,4 +1,4 @@
-"""`a7sim completion`: what a shell needs to complete commands, options and names."""
+"""`a7sim completion`: shell completion of commands, options and names."""
 
 import os
 import sys
@@ -11,7 +11,7 @@ from a7sim.errors import A7SimError
 
 SHELLS = ("bash", "zsh", "fish")
 VARIABLE = "_A7SIM_COMPLETE"
-"""Set by the script when it asks a7sim what goes on a line."""
+"""Set by the script when it queries completions."""
 
 
 @click.command("completion")

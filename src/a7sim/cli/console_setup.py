@@ -1,4 +1,4 @@
-"""Where somebody sits down: at an instrument in this process, at a line, or before what others do."""
+"""Set-up of a console: a local instrument, a served one, or playback."""
 
 from collections.abc import Callable, Iterable
 from datetime import datetime
@@ -24,27 +24,27 @@ SESSIONS_FOLDER = "sessions"
 
 
 class LocalConsole:
-    """A seat at the instrument of a scenario in this process. What imports the instrument waits for the screen."""
+    """Console of a scenario's instrument in this process. The instrument is imported after the first paint."""
 
-    def __init__(self, name: str, scenario: Scenario, seed: int | None, out: Path | None, go_on: bool | None) -> None:
+    def __init__(self, name: str, scenario: Scenario, seed: int | None, out: Path | None, resume: bool | None) -> None:
         self._name, self._scenario = name, scenario
         self._seed = scenario.seed if seed is None else seed
         self._folder = out or data_folder() / SESSIONS_FOLDER / scenario_name(name)
-        self._go_on = go_on
+        self._resume = resume
         self._clock, self._wall = Clock(), WallClock()
         self._left: SavedSession | None = None
         self._interactive: InteractiveSession | None = None
         self._greeting = ""
-        if go_on is not None or (out is not None and out.exists()):
-            self._answered_beforehand(out)
+        if resume is not None or (out is not None and out.exists()):
+            self._decide_by_options(out)
 
-    def _answered_beforehand(self, out: Path | None) -> None:
+    def _decide_by_options(self, out: Path | None) -> None:
         last = self._last()
-        if self._go_on:
+        if self._resume:
             if last is None or last.begun is None:
                 found = last.error if last else "found none"
                 raise A7SimError(
-                    f"--go-on: expected a session of {self._name} at seed {self._seed} in {self._folder}: {found}"
+                    f"--resume: expected a session of {self._name} at seed {self._seed} in {self._folder}: {found}"
                 )
             self._decide(last, True)
         elif last is None and out is not None and out.exists():
@@ -55,7 +55,7 @@ class LocalConsole:
 
     @property
     def config(self) -> ConsoleConfig:
-        """The seat, as it is before anybody has sat down."""
+        """Configuration before the start."""
         return ConsoleConfig(
             self._opened,
             self._time,
@@ -69,37 +69,37 @@ class LocalConsole:
     def _last(self) -> "SavedSession | None":
         if not self._folder.exists():
             return None
-        from a7sim.journal.session_store import last_session  # only where there may be one
+        from a7sim.journal.session_store import last_session
 
         return last_session(self._folder, self._scenario, self._seed)
 
     def _resumable(self) -> ResumeOffer | None:
-        if self._go_on is not None:
+        if self._resume is not None:
             return None
         last = self._last()
         if last is None:
             return None
         if last.begun is None:
-            self._greeting = f"begun anew, since the last session cannot be gone on with: {last.error}"
+            self._greeting = f"new session: the last one cannot be resumed: {last.error}"
             return None
         if not last.has_changes:
             self._decide(last, True)
             self._greeting = ""
             return None
-        when = datetime.fromtimestamp(last.last_activity).strftime("%Y-%m-%d %H:%M")  # as the person's clock shows it
-        about = f"{format_elapsed(last.ended_at_s)} at the instrument, left {when}, kept in {last.folder}"
-        return ResumeOffer(about, lambda goes_on: self._decide(last, goes_on))
+        when = datetime.fromtimestamp(last.last_activity).strftime("%Y-%m-%d %H:%M")  # local time
+        about = f"{format_elapsed(last.ended_at_s)} at the instrument, left {when}, in {last.folder}"
+        return ResumeOffer(about, lambda resumes: self._decide(last, resumes))
 
-    def _decide(self, last: "SavedSession", goes_on: bool) -> None:
-        if goes_on:
+    def _decide(self, last: "SavedSession", resumes: bool) -> None:
+        if resumes:
             self._left = last
             self._wall = WallClock(now=last.ended_at_s)
-            self._greeting = f"where it stood, {format_elapsed(last.ended_at_s)} at the instrument; ? is help"
+            self._greeting = f"resumed after {format_elapsed(last.ended_at_s)} at the instrument; ? is help"
 
     def _opened(self) -> Client:
-        """Sit down in the chair, which is built when the instrument is first spoken to."""
+        """Open the interactive session, which is built on first use."""
         if self._interactive is None:
-            from a7sim.journal.interactive import InteractiveSession  # beside the first paint of the screen
+            from a7sim.journal.interactive import InteractiveSession  # during the first paint of the screen
 
             begun = self._left.begun if self._left else None
             self._interactive = InteractiveSession(self._scenario, self._seed, self._folder, self._clock, begun)
@@ -117,7 +117,7 @@ class LocalConsole:
         return self._clock.now
 
     def close(self) -> Path | None:
-        """End the journal; return the folder where it is, None where nothing was begun."""
+        """Close the journal; return its folder, None if nothing was started."""
         if self._interactive is None:
             return None
         self._interactive.close()
@@ -125,7 +125,7 @@ class LocalConsole:
 
 
 def remote_console(url: str, sheet: JobSheet, token_file: Path | None, watching: bool = False) -> ConsoleConfig:
-    """Return a seat at a served instrument. Raises Mistake where nobody answers there."""
+    """Return the configuration for a served instrument. Raises A7SimError if it does not answer."""
     token = token_from(token_file)
     Client.open(url, token=token).close()
     wall = WallClock()
@@ -145,8 +145,8 @@ def _watching_now(url: str) -> Callable[[], str]:
 
 
 def playback_console(session: str) -> ConsoleConfig:
-    """Return a seat from which a session that is over is watched. Raises Mistake where there is none."""
-    from a7sim.journal.recording import open_recording  # only for who watches one
+    """Return the configuration for watching a finished session. Raises A7SimError if there is none."""
+    from a7sim.journal.recording import open_recording
 
     recording = open_recording(session)
     title = str(recording.journalled.header.get("title", ""))
@@ -157,10 +157,10 @@ def playback_console(session: str) -> ConsoleConfig:
         sheet=JobSheet(title),
         watching=True,
         recording=recording,
-        greeting=lambda: "hands off: space plays, . steps, g jumps; ? is help",
+        greeting=lambda: "playback: space plays, . steps, g jumps; ? is help",
     )
 
 
 def is_url(watched: str) -> bool:
-    """Whether what is to be watched is an instrument at work rather than a session that is over."""
+    """Return whether the text names a live instrument rather than a finished session."""
     return "://" in watched or Path(watched).is_char_device()

@@ -1,4 +1,4 @@
-"""`a7sim doctor`: what is installed, what is missing and how to get it. It needs nothing of what it looks for."""
+"""`a7sim doctor`: installed and missing libraries, without importing them."""
 
 import json
 import os
@@ -24,7 +24,7 @@ MIN_TERMINAL = (80, 24)
 """Columns and lines that the console needs."""
 
 NOT_FOR_USERS = ("all", "dev", "docs")
-"""Extras that say nothing of their own."""
+"""Extras that are not reported."""
 
 _KINDS: tuple[Kind, ...] = ("scenarios", "exercises", "studies")
 _REQUIREMENT = re.compile(r"([\w.-]+)\s*(?:\[([^]]*)\])?\s*\(?([^;)]*)\)?\s*(?:;(.*))?")
@@ -34,7 +34,7 @@ _BOUND = re.compile(r"(>=|<=|==|!=|<|>)\s*([\w.]+)")
 
 
 class Library(NamedTuple):
-    """A library that is asked for, and the version that is there, None where there is none."""
+    """Required library, and its installed version, None if missing."""
 
     name: str
     asked: str
@@ -42,16 +42,16 @@ class Library(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """Whether it is there in a version that is asked for."""
+        """Return whether a suitable version is installed."""
         return self.installed is not None and satisfies(self.installed, self.asked)
 
 
 @click.command("doctor")
 @options.as_document
 def command(as_document: bool) -> None:
-    """Say what is installed, what is missing and how to get it, and what the terminal can do.
+    """Report what is installed and what is missing, and the abilities of the terminal.
 
-    Exit code 1 where a library is missing that every command needs; extras may be missing.
+    Exit code 1 if a library is missing that all commands need; extras may be missing.
 
     Example: a7sim doctor
     """
@@ -65,7 +65,7 @@ def command(as_document: bool) -> None:
 
 
 def examine() -> dict[str, Any]:
-    """Return what is found, as the document of `--json`. Raises Mistake where a7sim is not installed."""
+    """Return the report as the document of `--json`. Raises A7SimError if a7sim is not installed."""
     asked = libraries()
     extras = {name: _of_extra(name, parts) for name, parts in asked.items() if name not in ("", *NOT_FOR_USERS)}
     return {
@@ -118,7 +118,7 @@ def _colours() -> int:
 
 
 def libraries() -> dict[str, list[Library]]:
-    """Return by extra, '' for all commands, the libraries that this platform is asked for. Raises Mistake."""
+    """Return by extra, '' for all commands, the libraries required on this platform. Raises A7SimError."""
     try:
         requirements = metadata.requires("a7sim") or []
     except metadata.PackageNotFoundError as error:
@@ -154,7 +154,7 @@ def _version(name: str) -> str | None:
 
 
 def satisfies(version: str, asked: str) -> bool:
-    """Return whether a version lies within bounds such as '>=8.2,<9'."""
+    """Return whether a version is within bounds such as '>=8.2,<9'."""
     return all(_holds(_numbers(version), sign, _numbers(bound)) for sign, bound in _BOUND.findall(asked))
 
 

@@ -1,4 +1,4 @@
-"""`a7sim export`: a session in the forms that other programs, printers and people take."""
+"""`a7sim export`: a session in other formats."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from a7sim.cli import options
+from a7sim.cli.renamed import command_with_renamed_options
 from a7sim.errors import A7SimError
 from a7sim.journal.session_files import BOOK, write_atomic
 from a7sim.report.asciicast import make_cast
@@ -13,31 +14,31 @@ from a7sim.report.card_decks import strip_deck
 from a7sim.report.forms import forms_text
 from a7sim.report.session_folder import SessionFolder, read_session
 
-_OPTION_OF = {"speed": "asciicast", "way": "cards"}
+_OPTION_OF = {"speed": "asciicast", "method": "cards"}
 
 
-@click.command("export")
+@click.command("export", cls=command_with_renamed_options({"--method": "--method"}))
 @click.argument("folder", type=options.PLACE, metavar="DIR")
 @click.option(
     "--to",
     "kind",
     required=True,
     type=click.Choice(["asciicast", "book", "forms", "cards"]),
-    help="A film of the terminal, the observation book as CSV or on printed forms, or N.R.C. cards.",
+    help="A terminal recording, the observation book as CSV or on printed forms, or N.R.C. cards.",
 )
-@options.out_file("what is made", "standard output")
+@options.out_file("the export", "standard output")
 @click.option(
     "--speed",
     type=options.greater_than(0.0),
-    help="How many times as fast as it happened, of an asciicast  [default: 120]",
+    help="asciicast: multiple of the original speed  [default: 120]",
 )
-@click.option("--way", metavar="WAY", help="cards: comparator or A8, where the strip was measured so.")
-def command(folder: Path, kind: str, out: Path | None, speed: float | None, way: str | None) -> None:
-    """Write the session in DIR as something else.
+@click.option("--method", metavar="METHOD", help="cards: comparator or A8, for a strip measured by this method.")
+def command(folder: Path, kind: str, out: Path | None, speed: float | None, method: str | None) -> None:
+    """Export the session in DIR to another format.
 
     Example: a7sim export runs/akwanga --to asciicast --out akwanga.cast
     """
-    for name, value in (("speed", speed), ("way", way)):
+    for name, value in (("speed", speed), ("method", method)):
         if value is not None and kind != _OPTION_OF[name]:
             raise A7SimError(f"--{name}: expected only with --to {_OPTION_OF[name]}, got it with --to {kind}")
     kept = read_session(folder)
@@ -45,7 +46,7 @@ def command(folder: Path, kind: str, out: Path | None, speed: float | None, way:
         "asciicast": lambda: make_cast(kept, speed or 120.0),
         "book": lambda: _book(kept),
         "forms": lambda: forms_text(kept),
-        "cards": lambda: strip_deck(kept, way),
+        "cards": lambda: strip_deck(kept, method),
     }
     text = makers[kind]()
     if out is None:

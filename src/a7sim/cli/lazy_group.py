@@ -1,4 +1,4 @@
-"""Commands that are imported when they are asked for."""
+"""Groups of commands that are imported on use."""
 
 import importlib
 from collections.abc import Mapping
@@ -7,40 +7,48 @@ from typing import Any, NamedTuple
 import click
 from click.shell_completion import CompletionItem
 
+from a7sim.cli.renamed import warn_renamed
+
 
 class LazyCommand(NamedTuple):
-    """Where a command stands, as `module:name`, and what a list of commands says of it."""
+    """Import path of a command, as `module:name`, and its short help."""
 
     import_path: str
     short_help: str
 
 
 class LazyGroup(click.Group):
-    """A group whose commands are imported when they are asked for; to list them nothing is imported."""
+    """Group whose commands are imported on use; listing them imports nothing."""
 
-    def __init__(self, *args: Any, verbs: Mapping[str, LazyCommand], **kwargs: Any) -> None:
+    def __init__(
+        self, *args: Any, commands: Mapping[str, LazyCommand], renamed: Mapping[str, str] | None = None, **kwargs: Any
+    ) -> None:
         super().__init__(*args, **kwargs)
-        self._verbs = verbs
+        self._commands = commands
+        self._renamed = renamed or {}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in their order."""
-        return list(self._verbs)
+        """Return the names of the commands in order."""
+        return list(self._commands)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import and return a verb's command."""
-        if cmd_name not in self._verbs:
+        """Import and return a command."""
+        if cmd_name in self._renamed:
+            warn_renamed(cmd_name, self._renamed[cmd_name])
+            cmd_name = self._renamed[cmd_name]
+        if cmd_name not in self._commands:
             return None
-        module, _, name = self._verbs[cmd_name].import_path.partition(":")
-        command = getattr(importlib.import_module(module), name)
-        return command if isinstance(command, click.Command) else None
+        module, _, name = self._commands[cmd_name].import_path.partition(":")
+        found = getattr(importlib.import_module(module), name)
+        return found if isinstance(found, click.Command) else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write what the verbs are about."""
+        """Write the short help of all commands."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, verb.short_help) for name, verb in self._verbs.items()])
+            formatter.write_dl([(name, command.short_help) for name, command in self._commands.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Return the verbs that begin so, and the group's own options."""
-        named = ((name, verb) for name, verb in self._verbs.items() if name.startswith(incomplete))
+        """Return the matching commands, and the group's own options."""
+        named = ((name, command) for name, command in self._commands.items() if name.startswith(incomplete))
         own = click.Command.shell_complete(self, ctx, incomplete)
-        return [*(CompletionItem(name, help=verb.short_help) for name, verb in named), *own]
+        return [*(CompletionItem(name, help=command.short_help) for name, command in named), *own]

@@ -1,4 +1,4 @@
-"""What the commands that talk to a served instrument share; light, so that `a7sim send` starts quickly."""
+"""Options shared by the commands for served instruments; light, so that `a7sim send` starts quickly."""
 
 import os
 import re
@@ -6,30 +6,30 @@ from pathlib import Path
 
 import click
 
-from a7sim.cli.options import TOKEN_VARIABLE, Number, combine_options, token_file
+from a7sim.cli.options import TOKEN_VARIABLE, NumberType, combine_options, token_file
 from a7sim.errors import A7SimError
 from a7sim.link.client.ports import TIMEOUT_S
 
 MAX_TOKEN_LENGTH = 1000
-"""Characters: a line of the language has room for it, even if all are quotes that have to be doubled."""
+"""Characters: they fit into a line of the language even if all are doubled quotes."""
 
 _SENDABLE = re.compile(f"[ -~]{{1,{MAX_TOKEN_LENGTH}}}")
 
 _TIMEOUT = click.option(
     "--timeout",
-    type=Number(min=0.0, min_open=True, max=1e6),
+    type=NumberType(min=0.0, min_open=True, max=1e6),
     default=TIMEOUT_S,
     show_default=True,
     metavar="SECONDS",
-    help="How long a reply is waited for.",
+    help="Seconds to wait for a reply.",
 )
 
 link_options = combine_options(_TIMEOUT, token_file)
-"""--timeout, --token-file: how to talk to a served instrument."""
+"""--timeout, --token-file: connection to a served instrument."""
 
 
 def token_from(file: Path | None) -> str | None:
-    """Return the token in a file, else that of the environment, None where there is neither. Raises Mistake."""
+    """Return the token in a file, otherwise that of the environment, None without one. Raises A7SimError."""
     if file is None:
         return _token(os.environ[TOKEN_VARIABLE], TOKEN_VARIABLE) if os.environ.get(TOKEN_VARIABLE) else None
     try:

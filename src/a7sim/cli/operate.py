@@ -1,4 +1,4 @@
-"""`a7sim operate`: the operator works an instrument that is served."""
+"""`a7sim operate`: the virtual operator at a served instrument."""
 
 from pathlib import Path
 
@@ -41,10 +41,10 @@ def command(
     force: bool,
     told: DisplayOptions,
 ) -> None:
-    """Let the operator work the served instrument of SCENARIO, with the same results as `a7sim run`.
+    """Run the virtual operator on the served instrument of SCENARIO, with the same results as `a7sim run`.
 
-    The instrument must be served anew from the same scenario and seed: what is true of it never crosses the link, so a
-    twin of it in this process stands for the truth, and a reply that is not the twin's ends the session.
+    The instrument must be newly served from the same scenario and seed. The truth never crosses the link, so a
+    reference instrument in this process provides it, and a reply that differs from its replies ends the session.
 
     Example: a7sim operate akwanga --link tcp://127.0.0.1:5025
     """

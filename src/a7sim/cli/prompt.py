@@ -1,4 +1,4 @@
-"""A prompt at an instrument, with history and completion of headers."""
+"""Prompt of an instrument, with history and completion of headers."""
 
 import csv
 import os
@@ -22,7 +22,7 @@ _LEAVING = ("exit", "quit", "bye")
 
 
 def run_prompt(url: str, client: Client) -> None:
-    """Ask for lines and show what comes of each, until the end of input or `exit`."""
+    """Read lines and print their replies, until the end of input or `exit`."""
     identity = send_line(client, "*IDN?").shown or "an instrument that does not say what it is"
     headers = _headers(client)
     click.echo(f"{url}: {identity}. Tab completes, help lists the headers, exit leaves.")
@@ -60,7 +60,7 @@ def _headers(client: Client) -> list[str]:
 
 @contextmanager
 def _editing(headers: list[str]) -> Iterator[None]:
-    """Give `input` completion and a history that lasts, where the platform has readline."""
+    """Give `input` completion and a persistent history, if the platform has readline."""
     try:
         import readline  # not on every platform
     except ImportError:
@@ -88,7 +88,7 @@ def _editing(headers: list[str]) -> Iterator[None]:
 
 
 def data_folder() -> Path:
-    """Return the folder where the platform keeps a program's own files."""
+    """Return the platform's folder for data of a program."""
     home = Path.home()
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local"

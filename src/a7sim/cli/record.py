@@ -1,4 +1,4 @@
-"""`a7sim record`: a journal of what a client and an instrument say to each other."""
+"""`a7sim record`: a journal of the traffic between a client and an instrument."""
 
 import signal
 import socket
@@ -41,9 +41,9 @@ def command(
     durability: Durability,
     as_document: bool,
 ) -> None:
-    """Stand between a client and the instrument at URL, and journal what they say until stopped, by Ctrl-C or kill.
+    """Record the traffic between a client and the instrument at URL until stopped by Ctrl-C or kill.
 
-    Clients come one after the other; each line and each reply is journalled before it goes on.
+    Clients connect one after the other; each line and each reply is journalled before it is passed on.
 
     Example: a7sim record tcp://127.0.0.1:5025 --tcp 127.0.0.1:5026 --out runs/recorded
     """

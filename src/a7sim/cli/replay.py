@@ -1,4 +1,4 @@
-"""`a7sim replay`: a session worked again on a fresh instrument."""
+"""`a7sim replay`: a session replayed on a fresh instrument."""
 
 import time
 from contextlib import nullcontext
@@ -56,7 +56,7 @@ def command(
     as_document: bool,
     quiet: bool,
 ) -> None:
-    """Say the lines of SESSION again to a fresh instrument: a folder, a journal, or a script (.a7s).
+    """Replay a SESSION on a fresh instrument: a folder, a journal, or a script (.a7s).
 
     Example: a7sim replay runs/akwanga --verify --quiet
     """
@@ -82,14 +82,14 @@ def command(
 
 
 class PlaybackClock:
-    """The wall's time beside the session's: what is told waits until it is due."""
+    """Clock of the playback: output waits for its time in the session."""
 
     def __init__(self, speed: float) -> None:
         self._speed = speed
         self._begun: tuple[float, float] | None = None
 
     def until(self, now: float) -> None:
-        """Wait until it is so late in the session, counted from when this was first asked."""
+        """Wait until a time in the session, counted from the first call."""
         if self._begun is None:
             self._begun = time.monotonic(), now
         wall, session = self._begun
@@ -102,7 +102,7 @@ def _is_script(session: str) -> bool:
 
 
 def _line(journalled: JournalFile, begin: str) -> int:
-    """Return the first line that is to be told. Raises Mistake where there is none."""
+    """Return the first line to be printed. Raises A7SimError if there is none."""
     found = find_line(journalled, begin)
     if found is None:
         raise A7SimError(f"--from {begin}: expected a time, @LINE or the text of a note within {journalled.path}")
@@ -110,7 +110,7 @@ def _line(journalled: JournalFile, begin: str) -> int:
 
 
 def _told(journalled: JournalFile, first: int, pace: PlaybackClock, silent: bool, as_document: bool) -> None:
-    """Tell a conversation with an instrument that nobody can build again."""
+    """Print the traffic of a journal whose instrument cannot be rebuilt."""
     for number in range(first, len(journalled) + 1):
         event = journalled.event(number)
         pace.until(event.t)
@@ -188,7 +188,7 @@ def _ended(
 def play_script(
     session: str, pace: PlaybackClock, out: Path | None, force: bool, silent: bool, as_document: bool
 ) -> None:
-    """Play a script, and end with exit code 3 where it and the instrument part."""
+    """Run a script, and end with exit code 3 at a failed expectation."""
     script = read_script(find_script(session))
     journal = Journal()
     told = TranscriptListener(lambda text: None if silent else click.echo(text), pace.until, journal.on_link_event)

@@ -13,7 +13,7 @@ from a7sim.cli import options
 @options.out_file("the page", "DIR/report.html")
 @click.option("--open", "shown", is_flag=True, help="Show it in the browser.")
 def command(folder: Path, out: Path | None, shown: bool) -> None:
-    """Write the report of the session in DIR: figures, tables and settings on one page that needs nothing beside it.
+    """Write the report of the session in DIR: figures, tables and settings on one self-contained page.
 
     Example: a7sim report runs/akwanga --open
     """

@@ -1,4 +1,4 @@
-"""`a7sim run`: the operator works through a scenario."""
+"""`a7sim run`: the virtual operator on a scenario."""
 
 import click
 
@@ -42,7 +42,7 @@ def command(
     kept: OutputOptions,
     told: DisplayOptions,
 ) -> None:
-    """Let the operator set up the models of SCENARIO, a file or the name of one that comes with a7sim.
+    """Run the virtual operator on SCENARIO, a file or the name of one that comes with a7sim, through to the strip.
 
     Example: a7sim run akwanga --case E --seed 7 --out runs/akwanga-e
     """

@@ -1,4 +1,4 @@
-"""What the commands that seat an operator share: options, the scenario that they choose, and how they end."""
+"""Options, scenario and output of the commands that run the virtual operator."""
 
 import shlex
 import sys
@@ -32,19 +32,22 @@ DURABILITY = click.option(
     type=click.Choice(DURABILITIES),
     default="records",
     show_default=True,
-    help="When the journal is on the disk: every line, every registration and the rest within 0.2 s, or never.",
+    help=(
+        "When the journal is flushed to disk: always (every line), records (every registration; the rest within "
+        "0.2 s) or never."
+    ),
 )
 _RESUME = click.option(
     "--resume",
     type=options.PLACE,
     metavar="DIR",
-    help="Go on with the session in DIR, cut off; its journal says what was asked for.",
+    help="Resume the interrupted session in DIR with the options in its journal.",
 )
 
 
 @dataclass(frozen=True)
 class ScenarioOptions:
-    """What is asked for beside a scenario: seed, overrides of its values, and how good the operator is."""
+    """Options of a scenario: seed, overrides of its values, and the operator's skill."""
 
     seed: int | None
     settings: tuple[str, ...]
@@ -54,7 +57,7 @@ class ScenarioOptions:
 
 @dataclass(frozen=True)
 class OutputOptions:
-    """Where a session is left, or went on from, and when its journal is on the disk."""
+    """Options of the output: folder, resumption, and durability of the journal."""
 
     out: Path | None
     force: bool
@@ -63,12 +66,12 @@ class OutputOptions:
 
     @property
     def folder(self) -> Path | None:
-        """Where the files are."""
+        """Folder of the files."""
         return self.resume or self.out
 
     @property
     def journal_options(self) -> "JournalOptions":
-        """How the journal is kept."""
+        """Options of the journal."""
         from a7sim.journal.writer import JournalOptions
 
         return JournalOptions(self.durability, self.resume is not None)
@@ -76,7 +79,7 @@ class OutputOptions:
 
 @dataclass(frozen=True)
 class DisplayOptions:
-    """How results are told: as tables, as a document, or not at all."""
+    """Form of the results: tables, a document, or nothing."""
 
     as_document: bool
     quiet: bool
@@ -87,10 +90,10 @@ scenario_options = options.group_options(
     ScenarioOptions,
     options.seed(),
     click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario."),
-    click.option("--skill", type=click.Choice(list(PROFILES)), help="How good the operator is."),
-    click.option("--perfect-observer", is_flag=True, help="An operator who sees and reads without any error."),
+    click.option("--skill", type=click.Choice(list(PROFILES)), help="Skill of the operator."),
+    click.option("--perfect-observer", is_flag=True, help="An operator without errors of sight and reading."),
 )
-"""--seed, --set, --skill, --perfect-observer, as `asked`."""
+"""--seed, --set, --skill, --perfect-observer, as `scenario_options`."""
 
 orientation_options = options.combine_options(
     click.option("--case", type=CaseInsensitiveChoice("ABCDE"), help="Standard points used (thesis)."),
@@ -102,12 +105,12 @@ SESSION = "journal, book, tables and results"
 
 
 def output_options(of: str = SESSION) -> options.Option[Any]:
-    """Return --out, --force, --resume, --durability, as `kept`, for a folder of what `of` says."""
+    """Return --out, --force, --resume, --durability, as `output`, for a folder of `of`."""
     return options.group_options("kept", OutputOptions, options.new_folder(of), _RESUME, DURABILITY)
 
 
 display_options = options.group_options("told", DisplayOptions, options.as_document, options.quiet())
-"""--json, --quiet, as `told`."""
+"""--json, --quiet, as `display`."""
 
 _NOT_OF_THE_RESULTS = {
     *("seed", "out", "force", "resume", "durability", "as_document", "quiet"),
@@ -118,21 +121,21 @@ _SAME_RESULTS_AS = {"operate": "run"}
 
 @dataclass(frozen=True)
 class RunRequest:
-    """What an operator is to do: a scenario, its seed, and, where that goes on, what its journal says beside them."""
+    """Requested run: scenario, seed, and, for a resumed session, the settings in its journal."""
 
     scenario: Scenario
     seed: int
     begun_with: Mapping[str, Any] | None = None
 
     def setting(self, name: str, asked: Any) -> Any:
-        """Return what the journal of a session that goes on says under a name, or what is asked for of a new one."""
+        """Return the setting of a resumed session's journal, or the given one for a new session."""
         return asked if self.begun_with is None else self.begun_with.get(name)
 
 
 def resolve_request(
     scenario: str | None, asked: ScenarioOptions, kept: OutputOptions, others: Mapping[str, str | None] | None = None
 ) -> RunRequest:
-    """Return what the options order: a new session, or with --resume the one in its folder. Raises Mistake.
+    """Return the requested run: a new session, or with --resume the one in its folder. Raises A7SimError.
 
     `others` are overrides of the scenario as texts by path.
     """
@@ -145,7 +148,7 @@ def resolve_request(
 def resolve_scenario(
     scenario: str | None, asked: ScenarioOptions, others: Mapping[str, str | None] | None = None
 ) -> tuple[Scenario, int]:
-    """Return the scenario and the seed that the options choose; `others` are texts by path. Raises Mistake."""
+    """Return the scenario and the seed of the options; `others` are texts by path. Raises A7SimError."""
     if scenario is None:
         raise A7SimError(f"{click.get_current_context().info_name}: expected SCENARIO or --resume DIR, got none")
     overrides = _overrides(asked.settings, {**(others or {}), "observer.skill": asked.skill})
@@ -160,7 +163,7 @@ def resolve_scenario(
 
 
 def _command_line(scenario: str, seed: int) -> str:
-    """Return the command under way as anybody could type it for the same results."""
+    """Return a command line that repeats the results of the present command."""
     ctx = click.get_current_context()
     verb = ctx.info_name or ""
     words = ["a7sim", _SAME_RESULTS_AS.get(verb, verb), scenario, "--seed", str(seed)]
@@ -186,34 +189,34 @@ def _overrides(settings: tuple[str, ...], texts: Mapping[str, str | None]) -> di
 
 
 def resolve_resume(folder: Path, *beside: str) -> "ResumableSession":
-    """Return the session of the command under way that --resume goes on with.
+    """Return the session that --resume continues.
 
-    Raises Mistake where anything but what is named stands `beside` it, since the journal says what was asked for.
+    Raises A7SimError if other options than those named in `beside` are given, because the journal contains them.
     """
     from a7sim.journal.resuming import find_resumable
 
-    _see_that_resume_stands_alone(beside)
+    _check_resume_alone(beside)
     return find_resumable(folder, click.get_current_context().info_name or "")
 
 
-def _see_that_resume_stands_alone(beside: tuple[str, ...]) -> None:
+def _check_resume_alone(beside: tuple[str, ...]) -> None:
     ctx = click.get_current_context()
     allowed = {"resume", "durability", "as_document", "quiet", *beside}
     for name in ctx.params:
         if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             said = next(each for each in ctx.command.params if each.name == name)
             raise A7SimError(
-                f"--resume: expected no {parameter_label(said)} beside it, since the journal says what was asked for"
+                f"--resume: expected no {parameter_label(said)} with it, because the journal contains the options"
             )
 
 
 POINTS_A_MODEL = 130
-"""About how many points an operator works on in a model; the bar only needs the order of it."""
+"""Approximate number of points of a model, for the progress bar."""
 
 
 @contextmanager
 def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbacks]":
-    """Show on a terminal how the operator gets on with about so many points."""
+    """Show the progress of about `points` points on a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -222,7 +225,7 @@ def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbac
     columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
     unwatched = told.quiet or told.as_document or not sys.stderr.isatty()
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
-        task = progress.add_task("sitting down", total=points)
+        task = progress.add_task("starting", total=points)
         yield ProgressCallbacks(
             lambda activity: progress.update(task, description=activity),
             lambda: progress.advance(task),
@@ -230,7 +233,7 @@ def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbac
 
 
 def show_results(document: "Document", told: DisplayOptions, tables: "Callable[[Document], RenderableType]") -> None:
-    """Show the results, and end with exit code 1 where the operator gave up."""
+    """Print the results, and end with exit code 1 if the operator gave up."""
     from rich.console import Console
 
     from a7sim.result_documents import as_json

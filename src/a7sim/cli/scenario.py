@@ -1,8 +1,8 @@
-"""`a7sim scenario`: is a scenario file right, and what may it say?"""
+"""`a7sim scenario`: validation and schema of scenario files."""
 
 import click
 
-from a7sim.cli import EXIT_MISTAKE, options
+from a7sim.cli import EXIT_USAGE, options
 from a7sim.cli.completers import scenario_argument
 from a7sim.errors import A7SimError
 from a7sim.result_documents import as_json, document_header
@@ -23,7 +23,7 @@ def command() -> None:
 @click.argument("file", metavar="SCENARIO", shell_complete=scenario_argument)
 @options.as_document
 def validate(file: str, as_document: bool) -> None:
-    """Name every mistake of a SCENARIO and of the files it names; exit code 2 if there is any.
+    """List all errors of a SCENARIO and of the files it names; exit code 2 if there are any.
 
     Example: a7sim scenario validate scenarios/akwanga.toml
     """
@@ -44,13 +44,13 @@ def validate(file: str, as_document: bool) -> None:
         photographs, models = pluralize(len(scenario.photos), "photograph"), pluralize(len(scenario.models), "model")
         click.echo(f"{file}: {scenario.title}, {photographs}, {models}")
     if mistakes:
-        raise click.exceptions.Exit(EXIT_MISTAKE)
+        raise click.exceptions.Exit(EXIT_USAGE)
 
 
 @command.command("schema")
 @options.as_document
 def schema(as_document: bool) -> None:
-    """Print the JSON Schema of scenario files; with --json, within a document such as all commands print.
+    """Print the JSON Schema of scenario files; with --json, within a document as other commands print.
 
     Example: a7sim scenario schema > scenario.schema.json
     """

@@ -1,4 +1,4 @@
-"""`a7sim send`: lines to a served instrument, one after the other or at a prompt."""
+"""`a7sim send`: command lines to a served instrument, given or at a prompt."""
 
 import sys
 from collections.abc import Iterable
@@ -26,9 +26,9 @@ EXIT_REFUSED = 1
 def command(
     url: str, lines: tuple[str, ...], timeout: float, token_file: Path | None, out: Path | None, as_document: bool
 ) -> None:
-    """Send each LINE to the instrument at URL and print its replies; what it refuses ends in exit code 1.
+    """Send each LINE to the instrument at URL and print its replies; errors of the instrument give exit code 1.
 
-    Without a LINE they come from standard input, or from a prompt on a terminal. URL is a7sim://SCENARIO?seed=N,
+    Without a LINE they are read from standard input, or from a prompt on a terminal. URL is a7sim://SCENARIO?seed=N,
     tcp://HOST:PORT, rfc2217://HOST:PORT, or the path of a device or pty.
 
     Example: a7sim send a7sim://akwanga '*IDN?' 'BASE:BX 194.99;BX?'

@@ -13,6 +13,7 @@ from a7sim.cli import options
 from a7sim.cli.completers import scenario_argument
 from a7sim.cli.link_options import token_from
 from a7sim.cli.options import TOKEN_VARIABLE
+from a7sim.cli.renamed import command_with_renamed_options
 from a7sim.cli.run_options import (
     OutputOptions,
     ScenarioOptions,
@@ -37,37 +38,50 @@ from a7sim.link.server.serving import Endpoints, Server
 from a7sim.result_documents import Document, as_json, document_header
 from a7sim.scenario import Scenario
 
-USUAL = Address("127.0.0.1", 5025)
+DEFAULT_ADDRESS = Address("127.0.0.1", 5025)
 
-_OF_THE_DOOR = "tcp", "rfc2217", "pty", "baud", "listen_anyway", "token_file", "clients", "idle", "fault", "fault_seed"
-"""What a session that is served again may be told anew."""
+_SERVER_OPTIONS = (
+    "tcp",
+    "rfc2217",
+    "pty",
+    "baud",
+    "allow_remote",
+    "token_file",
+    "clients",
+    "idle",
+    "fault",
+    "fault_seed",
+)
+"""Options of a resumed server that may change."""
 
 _STOPPING = ("SIGTERM", "SIGINT", "SIGHUP")
 
 
-@click.command("serve")
+@click.command("serve", cls=command_with_renamed_options({"--listen-anyway": "--allow-remote"}))
 @click.argument("scenario", required=False, shell_complete=scenario_argument)
-@options.tcp(str(USUAL), multiple=True)
-@click.option("--rfc2217", multiple=True, metavar="HOST:PORT", help="Listen as a serial port over telnet.")
-@click.option("--pty", multiple=True, type=options.PLACE, metavar="PATH", help="Make a link to a pseudo-terminal.")
+@options.tcp(str(DEFAULT_ADDRESS), multiple=True)
+@click.option("--rfc2217", multiple=True, metavar="HOST:PORT", help="Listen as a serial port over telnet (RFC 2217).")
 @click.option(
-    "--baud", type=click.IntRange(50, 10_000_000), metavar="N", help="As slow as a wire of so many bits a second."
+    "--pty", multiple=True, type=options.PLACE, metavar="PATH", help="Create a pseudo-terminal and a link to it."
 )
-@click.option("--realtime", is_flag=True, help="Movement lasts as long on the wall as on the simulated clock.")
-@click.option("--listen-anyway", is_flag=True, help="Let other machines in; clients must log in with a token.")
+@click.option("--baud", type=click.IntRange(50, 10_000_000), metavar="N", help="Pace each line at this baud rate.")
+@click.option("--realtime", is_flag=True, help="Run movement in real time.")
+@click.option("--allow-remote", is_flag=True, help="Allow other machines; clients must log in with a token.")
 @options.token_file
-@click.option("--clients", type=options.COUNT, metavar="N", default=64, show_default=True, help="Most at a time.")
+@click.option(
+    "--clients", type=options.COUNT, metavar="N", default=64, show_default=True, help="Maximum number of clients."
+)
 @click.option(
     "--idle",
     type=options.greater_than(0.0),
     default=3600.0,
     show_default=True,
     metavar="SECONDS",
-    help="Drop who is silent for so long.",
+    help="Disconnect a client after this many idle seconds.",
 )
-@click.option("--fault", metavar="FAULTS", help=f"Fail now and then: {EXAMPLE}")
+@click.option("--fault", metavar="FAULTS", help=f"Inject faults: {EXAMPLE}")
 @click.option(
-    "--fault-seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Draws the faults."
+    "--fault-seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Seed of the faults."
 )
 @scenario_options
 @output_options("the journal")
@@ -80,7 +94,7 @@ def command(
     pty: tuple[Path, ...],
     baud: int | None,
     realtime: bool,
-    listen_anyway: bool,
+    allow_remote: bool,
     token_file: Path | None,
     clients: int,
     idle: float,
@@ -93,29 +107,29 @@ def command(
 ) -> None:
     """Serve the instrument of SCENARIO until it is stopped: Ctrl-C and kill end it with exit code 0.
 
-    With --resume it is the instrument of a session that was cut off, as its journal leaves it; clients come anew.
+    With --resume it is the instrument of an interrupted session in the state of its journal; clients must reconnect.
 
     Example: a7sim serve akwanga --tcp 127.0.0.1:5025 --pty ./a7
     """
-    doors = _doors(tcp, rfc2217, pty)
+    endpoints = _endpoints(tcp, rfc2217, pty)
     token = token_from(token_file)
-    _refuse_open_doors(doors, listen_anyway, token)
-    terms = ServerLimits(
+    _check_remote_access(endpoints, allow_remote, token)
+    limits = ServerLimits(
         baud, parse_faults(fault) if fault is not None else None, fault_seed, idle, max_clients=clients
     )
     if kept.resume is not None:
-        served = _served_again(resolve_resume(kept.resume, *_OF_THE_DOOR), token, kept.journal_options)
+        served = _resumed_instrument(resolve_resume(kept.resume, *_SERVER_OPTIONS), token, kept.journal_options)
     else:
         loaded, seed = resolve_scenario(scenario, asked)
         kept.journal_options.prepare(kept.out, kept.force)
-        served = _served_anew(loaded, seed, token, realtime, kept)
+        served = _new_instrument(loaded, seed, token, realtime, kept)
     with served.journal:
-        run(serve(served, doors, terms, StartupMessages(served.head, as_document, quiet)))
+        run(serve(served, endpoints, limits, StartupMessages(served.head, as_document, quiet)))
 
 
 @dataclass(frozen=True)
 class ServedInstrument:
-    """What is served: a desk, the time at it, and the journal of what is said there."""
+    """Served instrument with its clock and journal."""
 
     head: Document
     instrument: SharedInstrument
@@ -123,7 +137,7 @@ class ServedInstrument:
     journal: Journal
 
 
-def _served_anew(
+def _new_instrument(
     scenario: Scenario, seed: int, token: str | None, realtime: bool, kept: OutputOptions
 ) -> ServedInstrument:
     autograph = Autograph.from_scenario(scenario, seed)
@@ -137,7 +151,9 @@ def _served_anew(
     )
 
 
-def _served_again(begun: ResumableSession, token: str | None, journal_options: JournalOptions) -> ServedInstrument:
+def _resumed_instrument(
+    begun: ResumableSession, token: str | None, journal_options: JournalOptions
+) -> ServedInstrument:
     if begun.setting("login") != (token is not None):
         asked, given = ("a", "none") if token is None else ("no", "one")
         raise A7SimError(
@@ -155,8 +171,10 @@ def _clock(realtime: bool, now: float = 0.0) -> Clock | WallClock:
     return WallClock(now=now) if realtime else Clock(now)
 
 
-async def serve(served: ServedInstrument, doors: Endpoints, terms: ServerLimits, told: "StartupMessages") -> None:
-    """Serve an instrument until the process is told to stop. Raises JournalStopped where nothing can be written."""
+async def serve(
+    served: ServedInstrument, endpoints: Endpoints, limits: ServerLimits, messages: "StartupMessages"
+) -> None:
+    """Serve an instrument until the process is stopped. Raises JournalWriteError if the journal cannot be written."""
     stopped = asyncio.Event()
     broken: list[JournalWriteError] = []
     loop = asyncio.get_running_loop()
@@ -172,10 +190,10 @@ async def serve(served: ServedInstrument, doors: Endpoints, terms: ServerLimits,
     loop.set_exception_handler(fail)
     for name in _STOPPING:
         loop.add_signal_handler(getattr(signal, name), stopped.set)
-    server = Server(served.instrument, served.clock, terms)
-    opened = await server.open(doors)
+    server = Server(served.instrument, served.clock, limits)
+    opened = await server.open(endpoints)
     try:
-        told.ready(opened)
+        messages.print_ready(opened)
         await stopped.wait()
     finally:
         await server.close()
@@ -185,19 +203,19 @@ async def serve(served: ServedInstrument, doors: Endpoints, terms: ServerLimits,
 
 @dataclass(frozen=True)
 class StartupMessages:
-    """What is printed once every door is open."""
+    """Messages printed once all endpoints are open."""
 
     head: Document
     as_document: bool
     quiet: bool
 
-    def ready(self, opened: list[dict[str, Any]]) -> None:
-        """Print where every door leads."""
+    def print_ready(self, opened: list[dict[str, Any]]) -> None:
+        """Print the addresses of all endpoints."""
         if self.as_document:
             click.echo(as_json(self.head | {"listening": opened}), nl=False)
         elif not self.quiet:
-            for door in opened:
-                click.echo(f"{door['kind']:<8}{door['url']}")
+            for endpoint in opened:
+                click.echo(f"{endpoint['kind']:<8}{endpoint['url']}")
             click.echo("ready")
         sys.stdout.flush()
 
@@ -206,23 +224,23 @@ def _head(scenario: Scenario, seed: int) -> Document:
     return document_header("serve") | {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
 
 
-def _doors(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]) -> Endpoints:
+def _endpoints(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, ...]) -> Endpoints:
     sockets = [parse_address(text, "--tcp") for text in tcp]
     if not (tcp or rfc2217 or pty):
-        sockets = [USUAL]
+        sockets = [DEFAULT_ADDRESS]
     if len({path.absolute() for path in pty}) < len(pty):
         raise A7SimError(f"--pty: expected a path of its own for each, got {', '.join(map(str, pty))}")
     return Endpoints(sockets, [parse_address(text, "--rfc2217") for text in rfc2217], pty)
 
 
-def _refuse_open_doors(doors: Endpoints, listen_anyway: bool, token: str | None) -> None:
-    asked = [("--tcp", each) for each in doors.tcp] + [("--rfc2217", each) for each in doors.rfc2217]
+def _check_remote_access(endpoints: Endpoints, allow_remote: bool, token: str | None) -> None:
+    asked = [("--tcp", each) for each in endpoints.tcp] + [("--rfc2217", each) for each in endpoints.rfc2217]
     for option, address in asked:
-        if not address.loopback and not listen_anyway:
+        if not address.loopback and not allow_remote:
             raise A7SimError(
-                f"{option} {address}: expected an address of this machine alone (--listen-anyway lets others in)"
+                f"{option} {address}: expected an address of this machine alone (--allow-remote allows others)"
             )
-    if listen_anyway and token is None:
+    if allow_remote and token is None:
         raise A7SimError(
-            f"--listen-anyway: expected a token, from --token-file or in the environment as {TOKEN_VARIABLE}"
+            f"--allow-remote: expected a token, from --token-file or in the environment as {TOKEN_VARIABLE}"
         )

@@ -1,4 +1,4 @@
-"""`a7sim study`: a question asked of the simulator as often as the answer needs."""
+"""`a7sim study`: a Monte Carlo study of a scenario."""
 
 import sys
 from collections.abc import Iterator
@@ -37,20 +37,23 @@ from a7sim.text import pluralize
 
 @click.command("study")
 @click.argument("study", shell_complete=study_argument)
-@click.option("--replicates", type=int, metavar="N", help="Sessions in every cell, instead of what STUDY says.")
+@click.option("--replicates", type=int, metavar="N", help="Sessions per cell, instead of the number in STUDY.")
 @click.option(
     "--executor",
     type=click.Choice(KINDS),
     default="pool",
     show_default=True,
-    help="Who works: this process alone, a pool of others, dask, or MPI.",
+    help="Where the work runs: in this process, a pool of processes, dask, or MPI.",
 )
 @click.option(
-    "--workers", type=options.COUNT, metavar="N", help="Of the pool or of dask here; as many as there are cores."
+    "--workers",
+    type=options.COUNT,
+    metavar="N",
+    help="Processes of the pool or of local dask; by default the number of cores.",
 )
-@click.option("--scheduler", metavar="URL", help="Of dask, such as tcp://HOST:8786, whose workers work; else its own.")
-@click.option("--audit", type=options.COUNT, metavar="N", help="Work N picked sessions again over the link.")
-@options.new_folder("checkpoint, tables, page and results; a study cut off goes on there")
+@click.option("--scheduler", metavar="URL", help="Scheduler of dask, such as tcp://HOST:8786; by default a local one.")
+@click.option("--audit", type=options.COUNT, metavar="N", help="Run N selected sessions again over the link.")
+@options.new_folder("checkpoint, tables, page and results; an interrupted study continues there")
 @options.as_document
 @options.quiet()
 def command(
@@ -65,12 +68,12 @@ def command(
     as_document: bool,
     quiet: bool,
 ) -> None:
-    """Work the cells of STUDY, a file or the name of one that comes with a7sim, and say what comes of it.
+    """Run the cells of STUDY, a file or the name of one that comes with a7sim, and print the results.
 
-    A study that was cut off goes on with the same command, and one that is done goes on with more --replicates.
-    With --audit, exit code 3 where a session over the link gives another digit than the batch bench.
+    The same command continues an interrupted study, and with more --replicates a finished one. With --audit, exit code
+    3 if a session over the link differs in any digit from the batch.
 
-    With --executor mpi, start it as `mpiexec -n 5 a7sim study STUDY --executor mpi`: one process asks, four work.
+    With --executor mpi, start it as `mpiexec -n 5 a7sim study STUDY --executor mpi`: one process distributes, four run.
 
     Example: a7sim study levels --replicates 50 --out runs/levels --audit 4
     """
@@ -93,7 +96,7 @@ def command(
 
 
 def _leave_page(out: Path, document: Document) -> None:
-    """Leave the page; without matplotlib all else is there nevertheless."""
+    """Write the page; without matplotlib only a message is printed."""
     try:
         write_page(out, document)
     except A7SimError as missing:
@@ -107,20 +110,20 @@ def _audit(loaded: LoadedStudy, tally: Tally, picks: int, silent: bool) -> None:
         click.echo(f"a7sim: {len(differences)} of {worked} differ over the link; {differences[0]}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
     if not silent:
-        click.echo(f"{worked} worked again over the link gave the same digits.")
+        click.echo(f"{worked} run again over the link: same digits.")
 
 
 class _Rate(ProgressColumn):
-    """Sessions a second."""
+    """Sessions per second."""
 
     def render(self, task: Task) -> Text:
-        """Return the rate, once there is one."""
+        """Return the rate, once it is known."""
         return Text(f"{task.speed:.1f} a second" if task.speed else "")
 
 
 @contextmanager
 def _watched(loaded: LoadedStudy, tally: Tally, silent: bool) -> Iterator[tuple[Progress, TaskID]]:
-    """Show on a terminal how many sessions are done, at what rate, and how long it will take."""
+    """Show the progress of the sessions on a terminal, with rate and remaining time."""
     title = TextColumn(loaded.study.title, markup=False)
     columns = (title, BarColumn(), MofNCompleteColumn(), _Rate(), TimeRemainingColumn())
     hidden = silent or not sys.stderr.isatty()

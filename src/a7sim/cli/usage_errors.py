@@ -1,4 +1,4 @@
-"""What click complains of, in the words of the house: what was expected, what came, where."""
+"""Usage errors of click in the form expected, got, where."""
 
 import re
 from difflib import get_close_matches
@@ -22,7 +22,7 @@ _WORDS = (
 
 
 def format_usage_error(error: click.ClickException) -> str:
-    """Return the sentence for whoever typed a command, without a line end."""
+    """Return the error message of a command, without a line end."""
     context = error.ctx if isinstance(error, click.UsageError) else None
     more = f" ({context.command_path} --help says more)" if context else ""
     return f"{_said(error, context)}{more}"
@@ -45,7 +45,7 @@ def _said(error: click.ClickException, context: click.Context | None) -> str:
 
 
 def _of_bounds(error: click.BadParameter) -> str | None:
-    """Return what a choice or a range expected and got, None for a complaint of another kind."""
+    """Return expected and actual value of a choice or a range, None for another error."""
     kind = error.param.type if error.param is not None else None
     got, refused, _ = error.message.partition(" is not ")
     if not refused or " is not a valid" in error.message:
@@ -58,7 +58,7 @@ def _of_bounds(error: click.BadParameter) -> str | None:
 
 
 def describe_range(bounds: click.IntRange | click.FloatRange) -> str:
-    """Return what a range holds: 1 to 5, or 0 or more."""
+    """Return a range as text: 1 to 5, or 0 or more."""
     low, high = bounds.min, bounds.max
     if low is not None and high is not None and not bounds.min_open:
         return f"{low:.12g} to {high:.12g}"
@@ -74,7 +74,7 @@ def _or_like(word: str, context: click.Context) -> str:
 
 
 def parameter_label(parameter: click.Parameter) -> str:
-    """Return what people call an option or an argument: --seed, SCENARIO."""
+    """Return the name of an option or an argument: --seed, SCENARIO."""
     if isinstance(parameter, click.Option):
         return max(parameter.opts, key=len)
     return parameter.metavar or parameter.human_readable_name.upper()

@@ -1,1 +1,1 @@
-"""The console: the instrument for a person, on a terminal. It speaks only the command language."""
+"""Console of the instrument in a terminal. It uses only the command language."""

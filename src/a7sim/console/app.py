@@ -1,4 +1,4 @@
-"""The console: the screen, what it knows, and what the station tells it."""
+"""Application of the console: its screen, its state, and its instrument thread."""
 
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -32,13 +32,13 @@ from a7sim.console.widgets.playback import Playback
 from a7sim.console.widgets.sketch_panel import PointClicked
 
 SETTLING_S = 0.02
-"""Between two keys for a dialog, where they were pressed before anything answered."""
+"""Interval between two early keys of a dialog, in s."""
 
-GO_ON = (("go_on", "go on where it stood"), ("anew", "begin anew; the old session is kept"))
+RESUME_CHOICES = (("resume", "resume the session"), ("new", "start a new session; the old one is kept"))
 
 
 class Console(MessageHandlers, Actions, App[None]):
-    """The instrument for a person."""
+    """Console of the instrument."""
 
     CSS_PATH = "app.tcss"
     TITLE = "a7sim console"
@@ -75,7 +75,7 @@ class Console(MessageHandlers, Actions, App[None]):
     # --- the screen -----------------------------------------------------------------------------------
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """Return what all lines go through: not what translates the terminal's own colours, which no theme has."""
+        """Return the filters of all lines, without the translation of the terminal's own colours."""
         return [each for each in super().get_line_filters() if not isinstance(each, ANSIToTruecolor)]
 
     def get_default_screen(self) -> Screen[Any]:
@@ -83,11 +83,11 @@ class Console(MessageHandlers, Actions, App[None]):
         return self.main
 
     def get_theme_variable_defaults(self) -> dict[str, str]:
-        """Return the colours that themes of the library do not have."""
+        """Return the colours that the library's themes do not have."""
         return dict(DRUMS)
 
     def on_main_screen_laid(self) -> None:
-        """Sit down, at the session that was left if that is wanted."""
+        """Start, resuming an earlier session if wanted."""
         self.say(f"sitting down at {self.config.where or 'the instrument'} ...")
         self.call_after_refresh(self._sit_down)
         self.set_interval(1.0, self._masthead)
@@ -97,17 +97,19 @@ class Console(MessageHandlers, Actions, App[None]):
         if resumable is None:
             self.thread.start()
         else:
-            self.push_screen(Choose("the last session", GO_ON, resumable.about), partial(self._decided, resumable))
+            self.push_screen(
+                Choose("the last session", RESUME_CHOICES, resumable.about), partial(self._decided, resumable)
+            )
 
     def _decided(self, resumable: ResumeOffer, answer: str | None) -> None:
         if answer is None:
             self.exit()
         else:
-            resumable.decide(answer == "go_on")
+            resumable.decide(answer == "resume")
             self.thread.start()
 
     def on_unmount(self) -> None:
-        """End the conversation."""
+        """Close the client session."""
         self.thread.stop()
 
     def say(self, words: str, refused: bool = False) -> None:
@@ -127,7 +129,7 @@ class Console(MessageHandlers, Actions, App[None]):
     # --- keys -----------------------------------------------------------------------------------------
 
     def key_pressed(self, event: events.Key) -> bool:
-        """Do the deed of a key; return whether it has one."""
+        """Run the action of a key; return whether it has one."""
         name = self._by_key.get(key_name(event.key, event.character))
         if self._early is not None and name not in ACTIONS_WHILE_DISCONNECTED:
             self._early.append(event)
@@ -138,7 +140,7 @@ class Console(MessageHandlers, Actions, App[None]):
         return True
 
     def press_early_keys(self) -> None:
-        """Press a key that was pressed before anything answered, and the next when all is done that came of it."""
+        """Process a key pressed before the instrument answered, and the next when its effects are complete."""
         if not self._early:
             self._early = None
         elif not self._settled:
@@ -156,19 +158,19 @@ class Console(MessageHandlers, Actions, App[None]):
 
     @property
     def _settled(self) -> bool:
-        """Whether what lies over the screen, if anything does, is ready for a key, and has dealt with the last."""
+        """Return whether a dialog, if any, is ready for a key, and has processed the last one."""
         if self.screen is self.main:
             return True
         focused = self.screen.focused
         return focused is not None and not (self.screen.message_queue_size or focused.message_queue_size)
 
     def forget_early_keys(self) -> None:
-        """Press none of the keys that wait: nobody wants to turn an instrument that did not answer."""
+        """Discard the early keys: an instrument that did not answer must not move."""
         if self._early:
             self._early.clear()
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
-        """Return what the palette lists: every deed by its name, and the library's own."""
+        """Return the commands of the palette: all actions by name, and the library's own."""
         for action in actions_for(self.config.watching, self.config.recording is not None):
             keys = " ".join(key_display(key, not self.utf8) for key in self.config.keymap[action.name])
             yield SystemCommand(action.description, f"{action.group}, {keys}", partial(self.run_by_name, action.name))
@@ -177,7 +179,7 @@ class Console(MessageHandlers, Actions, App[None]):
     # --- panels ---------------------------------------------------------------------------------------
 
     def refresh_panels(self) -> None:
-        """Show the dials, the hands and the book as they are."""
+        """Update readouts, selection and book."""
         met, dials = self.met, self.dials
         if met is None or dials is None or not self.main.is_there:
             return

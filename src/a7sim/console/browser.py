@@ -1,6 +1,6 @@
-"""The console in a browser: served to this machine alone, with nothing fetched from anywhere else.
+"""Console in a browser, served to this machine only, without any external resources.
 
-Every page that is opened has a console of its own, in a process of its own, which ends with the page.
+Each open page has a console in a separate process, which ends with the page.
 """
 
 import asyncio
@@ -32,12 +32,12 @@ _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; font-src 'self'; img-src 'self' data:; "
     "connect-src ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""What a page may fetch: its own parts, and the conversation with its console. xterm.js writes styles of its own."""
+"""Content security policy: own resources, and the connection to the console. xterm.js writes styles of its own."""
 
 
 @dataclass
 class OpenPages:
-    """Who looks on: pages that are open, and a call when there has been none for some seconds."""
+    """Open pages, and a call when there has been none for some seconds."""
 
     idle_s: float
     left_alone: Callable[[], None]
@@ -45,12 +45,12 @@ class OpenPages:
     _alarm: asyncio.TimerHandle | None = None
 
     def watch(self) -> None:
-        """Count from now how long nobody has been there."""
+        """Start counting the time without an open page."""
         self._alarm = asyncio.get_running_loop().call_later(self.idle_s, self.left_alone)
 
     @contextmanager
     def page_open(self, page: web.WebSocketResponse) -> Iterator[None]:
-        """Take a page for open."""
+        """Count a page as open."""
         if self._alarm is not None:
             self._alarm.cancel()
         self.pages.add(page)
@@ -63,29 +63,29 @@ class OpenPages:
 
 
 class BrowserServer(Server):
-    """Serves a command that draws a console to browsers of this machine."""
+    """Server of a command that draws a console, for browsers of this machine."""
 
     def __init__(self, command: Sequence[str], port: int, visitors: OpenPages) -> None:
         super().__init__(shlex.join(command), LOOPBACK, port, TITLE, templates_path=PAGE)
         self._visitors = visitors
 
     async def application(self) -> web.Application:
-        """Return the pages, each only for who asks for it by a name of this machine."""
+        """Return the pages, each only for requests that use a name of this machine."""
         application = await self._make_app()
         application.middlewares.append(_this_machine_alone)
         return application
 
     async def on_startup(self, app: web.Application) -> None:
-        """Say nothing: who called says where the console is."""
+        """Print nothing: the caller prints the address."""
 
     async def on_shutdown(self, app: web.Application) -> None:
-        """Close the pages that are open; their consoles end with them."""
+        """Close the open pages; their consoles end with them."""
         for page in list(self._visitors.pages):
             await page.close()
 
     @aiohttp_jinja2.template("app_index.html")
     async def handle_index(self, request: web.Request) -> dict[str, Any]:
-        """Return what the page is made of."""
+        """Return the contents of the page."""
         smallest, largest = FONT_SIZES
         size = min(max(to_int(request.query.get("fontsize", ""), 16), smallest), largest)
         return {"title": TITLE, "websocket": f"ws://{request.host}/ws", "font_size": size}
@@ -97,7 +97,7 @@ class BrowserServer(Server):
 
 @web.middleware
 async def _this_machine_alone(request: web.Request, handler: Callable[[web.Request], Any]) -> web.StreamResponse:
-    """Refuse pages of other sites, which a browser lets speak to this machine too."""
+    """Reject pages of other sites, which a browser allows to access this machine."""
     origin = request.headers.get("Origin")
     if request.url.host not in OWN_NAMES or origin not in (None, f"http://{request.host}"):
         raise web.HTTPForbidden(text="expected to be asked from this machine, by a page of this server")
@@ -108,9 +108,9 @@ async def _this_machine_alone(request: web.Request, handler: Callable[[web.Reque
 
 
 def serve(command: Sequence[str], port: int, idle_s: float, told: Callable[[str], None]) -> bool:
-    """Serve a command at a port, 0 for any that is free, until a signal ends it; return whether it was left alone.
+    """Serve a command at a port, 0 for any free one, until a signal ends it; return whether it ended as idle.
 
-    `told` gets the address once it is open. It also ends when no page has been open for `idle_s` seconds.
+    `told` is called with the address. It also ends when no page has been open for `idle_s` seconds.
     """
     try:
         door = socket.create_server((LOOPBACK, port))

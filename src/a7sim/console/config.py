@@ -1,4 +1,4 @@
-"""What the console is given when somebody sits down: the instrument, the sheet, the keys, and the terminal's limits."""
+"""Configuration of a console: instrument, job sheet, keys, and limits of the terminal."""
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ResumeOffer:
-    """A session that was left or cut off: what it is, and what is called with whether to go on with it."""
+    """Offer to resume an earlier session: its description, and the callback with the decision."""
 
     about: str
     decide: Callable[[bool], None]
@@ -26,47 +26,47 @@ class ResumeOffer:
 
 @dataclass(frozen=True)
 class ConsoleConfig:
-    """Everything that a console is made of."""
+    """Configuration of a console."""
 
     connect: Callable[[], Client]
     time: Callable[[], float]
-    """Seconds at the instrument since somebody sat down."""
+    """Returns the seconds at the instrument since the start."""
     alone: bool = True
-    """Whether nobody else can turn at this instrument."""
+    """Whether no other client can move this instrument."""
     where: str = ""
-    """The scenario or the address, as errors name it."""
+    """Scenario or address, for error messages."""
     sheet: JobSheet = field(default_factory=JobSheet)
     keymap: Keymap = field(default_factory=default_keymap)
     drawing: DrawingMode | None = None
-    """How pictures are drawn; None for the best that the terminal can."""
+    """Drawing mode; None for the best of the terminal."""
     acuity_um: float = ACUITY_UM
     theme: str = "enamel"
     tasks: Callable[[], Sequence[str]] | None = None
-    """What there is to do, a line each, asked again every second; None where nobody has set any tasks."""
+    """Returns the tasks, one per line, queried every second; None without tasks."""
     exercise_goal: str = ""
-    """What is to be reached, told over the eyepieces until the first key."""
+    """Goal of the exercise, shown over the eyepieces until the first key."""
     welcome: bool = False
-    """Whether to tell a first-time visitor what there is."""
+    """Whether to show the introduction for a first-time user."""
     resumable: Callable[[], ResumeOffer | None] = lambda: None
-    """Looks for a session to go on with, once the screen is there."""
+    """Returns a session to resume, called once the screen is shown."""
     greeting: Callable[[], str] = lambda: ""
-    """What is to be said when the instrument first answers."""
+    """Returns the message when the instrument first answers."""
     history: Callable[[], Iterable[LoggedLine]] = tuple
-    """What was said in the session that is gone on with."""
+    """Returns the lines of the resumed session."""
     watching: bool = False
-    """Whether somebody else turns and this console only shows it."""
+    """Whether this console only shows an instrument that another client moves."""
     recording: "Recording | None" = None
-    """The session that is watched, where it is over."""
+    """Recording to be watched, if any."""
 
 
 def speaks_utf8(environment: Mapping[str, str] = os.environ) -> bool:
-    """Whether a terminal shows more than ASCII, as the locale tells it; where none is named it is taken to."""
+    """Return whether a terminal shows more than ASCII, by its locale; without a locale it is assumed."""
     named = next((environment[name] for name in ("LC_ALL", "LC_CTYPE", "LANG") if environment.get(name)), "utf-8")
     return "utf" in named.lower()
 
 
 def best_drawing(utf8: bool, no_color: bool, colour_system: str | None) -> DrawingMode:
-    """Return the best drawing for a terminal: without UTF-8 in ASCII, with 16 colours or none in shades."""
+    """Return the best drawing mode for a terminal: ASCII without UTF-8, shades with 16 colours or none."""
     if not utf8:
         return DrawingMode.ASCII
     if no_color or colour_system in (None, "standard", "windows"):

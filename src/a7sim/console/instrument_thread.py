@@ -1,6 +1,6 @@
-"""The conversation with the instrument: all that the screen says and asks, in a thread of its own.
+"""Thread of the instrument: all lines that the screen sends and all its queries.
 
-A slow line blocks no screen, and a line that breaks is opened again as soon as somebody answers there.
+A slow line does not block the screen, and a broken connection is reopened as soon as possible.
 """
 
 import queue
@@ -19,16 +19,16 @@ from a7sim.link.client.client import Client, InstrumentError
 from a7sim.plotters import VARIANTS, Variant
 
 POLL_S = 0.5
-"""How often a served instrument is looked at while nobody turns anything here: another may."""
+"""Interval in s of polling a served instrument while this console is idle: another client may move it."""
 
 RETRY_S = 1.0
-"""How often a line that broke is tried again."""
+"""Interval in s of reconnecting."""
 
 SLOW_S = 0.05
-"""Pictures that take longer are not waited for with the dials."""
+"""Pictures that take longer than this, in s, are shown after the readouts."""
 
 InstrumentRequest = Callable[[Client], None]
-"""Something to say to the instrument."""
+"""Request to the instrument."""
 
 
 class ConnectionLostError(Exception):
@@ -36,7 +36,7 @@ class ConnectionLostError(Exception):
 
 
 class InstrumentThread:
-    """One conversation. `tell` is called in the thread of the station."""
+    """One client session in a thread. `tell` is called in that thread."""
 
     def __init__(
         self, connect: Callable[[], Client], tell: Callable[[StationMessage], None], alone: bool = True
@@ -55,25 +55,25 @@ class InstrumentThread:
         self._thread = threading.Thread(target=self._run, name="station", daemon=True)
 
     def start(self) -> None:
-        """Begin the conversation."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End the conversation once what was ordered is said."""
+        """Stop the thread once all requests are sent."""
         self._leaving.set()
         self._orders.put(None)
         if self._thread.is_alive():
             self._thread.join(timeout=2.0)
 
     def submit(self, order: InstrumentRequest) -> None:
-        """Have something said; the dials are read afterwards."""
+        """Submit a request; the readouts are updated afterwards."""
         with self._counting:
             self._waiting += 1
             self._at_rest.clear()
         self._orders.put(order)
 
     def send(self, *lines: str) -> None:
-        """Have lines said that ask nothing."""
+        """Send lines without queries."""
 
         def said(client: Client) -> None:
             for line in lines:
@@ -82,18 +82,18 @@ class InstrumentThread:
         self.submit(said)
 
     def look(self, look: ViewRequest) -> None:
-        """Change what the eyepieces are to show."""
+        """Change the requested view of the eyepieces."""
         if look != self._look:
             self._look = look
             self.submit(lambda _: None)
 
     def wait_idle(self, timeout: float) -> bool:
-        """Wait until all that was ordered is said and shown; return whether it came to that."""
+        """Wait until all requests are sent and their results shown; return whether that happened in time."""
         return self._at_rest.wait(timeout)
 
     @property
     def is_idle(self) -> bool:
-        """Whether all that was ordered is said and shown."""
+        """Return whether all requests are sent and their results shown."""
         return self._at_rest.is_set()
 
     def _run(self) -> None:
@@ -107,7 +107,7 @@ class InstrumentThread:
                 self._leaving.wait(RETRY_S)
 
     def _forget_orders(self) -> None:
-        """Drop what was ordered of an instrument that did not answer: it is not turned when it does again."""
+        """Discard the requests to an instrument that did not answer: it must not move when it answers again."""
         while not self._orders.empty():
             self._orders.get()
         with self._counting:
@@ -132,7 +132,7 @@ class InstrumentThread:
                 self._refresh(client, variant, asked, obeyed)
 
     def _obey_waiting(self, client: Client) -> int:
-        """Say all that waits, at least one thing, or nothing when it is time to look; return how much."""
+        """Execute the waiting requests, at least one, or none when it is time to look; return their number."""
         try:
             order = self._orders.get(timeout=self._poll_s)
         except queue.Empty:
@@ -148,7 +148,7 @@ class InstrumentThread:
                 return obeyed
 
     def _obey(self, client: Client, order: InstrumentRequest) -> None:
-        """Say one thing; what the instrument refuses to answer is told, and only silence breaks the conversation."""
+        """Execute a request; errors of the instrument are reported, and only a missing answer ends the connection."""
         try:
             order(client)
         except InstrumentError as refused:
@@ -173,7 +173,7 @@ class InstrumentThread:
                 self._at_rest.set()
 
     def _show(self, client: Client, dials: Readouts, look: ViewRequest) -> None:
-        """Tell dials and pictures in one go where pictures come quickly, else the dials before the pictures."""
+        """Report readouts and pictures together if pictures come quickly, otherwise the readouts first."""
         changed = self._shown is None or dials != self._shown[0]
         self._shown = dials, look
         if changed and self._sight_took_s > SLOW_S:
@@ -197,7 +197,7 @@ class InstrumentThread:
 
 
 def view_point(client: Client, eye: int, point: str) -> tuple[float, float] | None:
-    """Ask an eye where a point stands from the mark: dx, dy in um, None outside its field of view."""
+    """Query the position of a point in an eyepiece: dx, dy in um, None outside its field of view."""
     doubled = point.replace('"', '""')
     dx, dy = client.numbers(f'EYEP{eye}? "{doubled}"')
     return (dx, dy) if max(abs(dx), abs(dy)) < 1e9 else None

@@ -1,4 +1,4 @@
-"""Which key does what: the keys that the console comes with, and a person's own in TOML."""
+"""Keymap: the default keys, and the user's own in TOML."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from a7sim.errors import A7SimError
 from a7sim.table_files import read_toml
 
 Keymap = Mapping[str, tuple[str, ...]]
-"""Names of keys, by deed."""
+"""Names of keys, by action."""
 
 MODIFIERS = ("ctrl", "alt", "shift")
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """Something that a key does: its name, the keys it has by default, what it does, and where help lists it."""
+    """Action of a key: its name, its default keys, its description, and its group in help."""
 
     name: str
     keys: tuple[str, ...]
@@ -26,10 +26,10 @@ class Action:
 
 
 PLAYBACK_ACTIONS = "watching"
-"""The group of what is done only while one watches."""
+"""Group of actions of playback only."""
 
 VIEW_ACTIONS = ("eyes", "screen")
-"""The groups of what is done at the instrument and while one watches."""
+"""Groups of actions both at the instrument and while watching."""
 
 ACTIONS = (
     Action("x_up", ("right",), "X handwheel, forward", "hands"),
@@ -79,11 +79,11 @@ ACTIONS = (
     Action("help", ("?",), "help", "screen"),
     Action("quit", ("q",), "leave", "screen"),
 )
-"""All that keys do. Same keys on every plotter that has the part."""
+"""All actions. The keys are the same for all plotters that have the part."""
 
 
 def actions_for(watching: bool, film: bool = True) -> tuple[Action, ...]:
-    """Return what keys do at the instrument, or while one watches, be it a film or what is done now."""
+    """Return the actions at the instrument, or while watching a recording or a live instrument."""
     played = {PLAYBACK_ACTIONS} if film else set()
     return tuple(
         action
@@ -93,13 +93,16 @@ def actions_for(watching: bool, film: bool = True) -> tuple[Action, ...]:
 
 
 def default_keymap() -> Keymap:
-    """Return the keys that the console comes with."""
+    """Return the default keys."""
     return {action.name: action.keys for action in ACTIONS}
 
 
 def sample() -> str:
-    """Return a file of all keys as they are by default."""
-    lines = ["# Keys of a7sim console: one or more for every deed; a deed that is left out keeps its own.", "[keys]"]
+    """Return a keymap file with the default keys."""
+    lines = [
+        "# Keys of a7sim console: one or more for each action; an action that is left out keeps its default keys.",
+        "[keys]",
+    ]
     width = max(len(action.name) for action in ACTIONS)
     for action in ACTIONS:
         keys = ", ".join(f"'{key}'" if '"' in key else f'"{key}"' for key in action.keys)
@@ -108,7 +111,7 @@ def sample() -> str:
 
 
 def load_keymap(path: Path) -> Keymap:
-    """Return the keymap of a file; deeds it does not name keep their keys. Raises Mistake in one sentence."""
+    """Return the keymap of a file; actions that it does not name keep their keys. Raises A7SimError."""
     content = read_toml(path)
     unknown = sorted(set(content) - {"keys"})
     table = content.get("keys", {})
@@ -151,7 +154,7 @@ def _refuse_shared(path: Path, keymap: Keymap) -> None:
 
 
 def actions_by_key(keymap: Keymap, watching: bool = False) -> dict[str, str]:
-    """Return the name of the deed that every key does; who watches has those of the hands too where they are free."""
+    """Return the action of each key; while watching, also actions of the controls on free keys."""
     at_the_instrument, watched = (
         {key: action.name for action in actions_for(each) for key in keymap[action.name]} for each in (False, True)
     )
@@ -159,7 +162,7 @@ def actions_by_key(keymap: Keymap, watching: bool = False) -> dict[str, str]:
 
 
 def key_name(key: str, character: str | None) -> str:
-    """Return how a keymap writes a key that the terminal reports by its name and, maybe, its character."""
+    """Return the keymap name of a key reported by the terminal."""
     return character if character and character.isprintable() and character != " " else key
 
 
@@ -177,6 +180,6 @@ _SHOWN = {
 
 
 def key_display(key: str, plain: bool = False) -> str:
-    """Return a key as help writes it; plain is without any character beyond ASCII."""
+    """Return a key as in help; `plain` uses ASCII only."""
     written = _SHOWN.get(key, key)
     return key.capitalize() if plain and not written.isascii() else written

@@ -1,4 +1,4 @@
-"""What the screen asks the station to look at, and what the station tells the screen."""
+"""Messages between the screen and the instrument thread."""
 
 from dataclasses import dataclass, field
 
@@ -10,30 +10,30 @@ from a7sim.plotters import Variant
 
 @dataclass(frozen=True)
 class ViewRequest:
-    """What the eyepieces are to show: pictures of so many columns and rows; none of 0 columns."""
+    """Requested view of the eyepieces: pictures with these columns and rows; none with 0 columns."""
 
     columns: int = 0
     rows: int = 0
     magnification: float = 8.0
     eyes: tuple[int, ...] = (1, 2)
     point: str | None = None
-    """The point of which the eye is to say where it stands."""
+    """Point whose position in the eyepieces is queried."""
 
 
 @dataclass(frozen=True)
 class ViewResult:
-    """What the eyepieces show."""
+    """View of the eyepieces."""
 
     look: ViewRequest
     pictures: dict[int, Greys] = field(default_factory=dict)
     """Greys ``(rows, columns)`` by eye."""
     seen: dict[int, tuple[float, float] | None] = field(default_factory=dict)
-    """dx, dy in um of the point, by eye; None where it is not in the field of view."""
+    """dx, dy in um of the point, by eye; None outside the field of view."""
 
 
 @dataclass(frozen=True)
 class Connected:
-    """An instrument answers."""
+    """The instrument answers."""
 
     identity: Identity
     variant: Variant
@@ -41,17 +41,17 @@ class Connected:
 
 @dataclass(frozen=True)
 class CommandsRejected:
-    """The instrument has refused something: what it said."""
+    """The instrument rejected commands: its errors."""
 
     errors: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class ConnectionLost:
-    """The instrument does not answer any more, and why."""
+    """The instrument no longer answers, with the reason."""
 
     why: str
 
 
 StationMessage = Connected | Readouts | ViewResult | CommandsRejected | ConnectionLost
-"""What the station tells the screen."""
+"""Message of the instrument thread to the screen."""

@@ -1,4 +1,4 @@
-"""The colours of the console: Wild's green-grey enamel, black drums with ivory digits, one warm accent."""
+"""Colour themes of the console: Wild's green-grey enamel, black drums with ivory digits, one warm accent."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ DRUMS: Mapping[str, str] = {
     "lever": "#16181a",
     "lever-word": "#f2ead2",
 }
-"""What every theme says beside the usual colours, as `enamel` has it."""
+"""Colours beside the library's own, as in `enamel`."""
 
 THEMES = (
     Theme(

@@ -1,9 +1,8 @@
 """Pure functions of projective geometry on component-first arrays.
 
-Axes: X along the base, Y away from the operator, Z up, right-handed, millimetres. A picture lies at
-z = -c of its camera. Angles are radians here and gon everywhere else. An array of points has shape
-``(3, ...)``, one of image points ``(2, ...)``, one of rotations ``(3, 3, ...)``: one point and ten thousand
-sessions are the same call.
+Axes: X along the base, Y away from the operator, Z up, right-handed, millimetres. A picture is at z = -c of its camera.
+Angles are radians here and gon everywhere else. An array of points has shape ``(3, ...)``, one of image points ``(2,
+...)``, one of rotations ``(3, 3, ...)``: the same call serves one point and ten thousand sessions.
 """
 
 from a7sim.geometry._atmosphere import (

@@ -1,6 +1,6 @@
-"""What lens, air and the earth's curve do to a ray between the ground and the film.
+"""Effects of lens, air and earth curvature on a ray between the ground and the film.
 
-The scene applies these, the reductions take them off again; the formulas stand only here.
+The scene applies them, the reductions remove them; the formulas are only here.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The y-parallax of a model point and how every orientation element changes it."""
+"""The y-parallax of a model point and its derivatives by the orientation elements."""
 
 import numpy as np
 import numpy.typing as npt
@@ -45,7 +45,7 @@ def parallax_coefficients(
 
 
 def _changes_of_y(r: Array, angles: Array) -> Array:
-    """Return how y changes with kappa, phi, omega, by and bz, shape ``(5, ...)``."""
+    """Return the derivatives of y by kappa, phi, omega, by and bz, shape ``(5, ...)``."""
     omega, phi, kappa = angles
     slope = r[1] / r[2]
     about_kappa = rotation(omega, phi, kappa)[:, 2]
@@ -62,10 +62,10 @@ def _changes_of_y(r: Array, angles: Array) -> Array:
 def near_vertical_parallax_coefficients(
     x: npt.ArrayLike, y: npt.ArrayLike, z: npt.ArrayLike, b: npt.ArrayLike
 ) -> Array:
-    """Return the coefficients of thesis 2.32, shape ``(10, ...)``, in mm a radian or mm a mm.
+    """Return the coefficients of thesis 2.32, shape ``(10, ...)``, in mm per radian or mm per mm.
 
     x and y are counted from the left-hand centre in mm, z is the distance below the centres, b the base. This is the
-    equation as the thesis prints it, which `parallax_coefficients` is held against; the plotter's own tilts need that.
+    equation as printed in the thesis, a test of `parallax_coefficients`, which the plotter's own tilts require.
     """
     x, y, z, b = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (x, y, z, b)))
     across = z * (1.0 + y**2 / z**2)

@@ -1,4 +1,4 @@
-"""Rays of a camera: where a point is imaged, and where two rays meet."""
+"""Rays of a camera: images of points, and intersections of two rays."""
 
 import numpy as np
 import numpy.typing as npt
@@ -35,8 +35,8 @@ def stereoscopic_intersection(
 ) -> tuple[Array, Array]:
     """Return the model points ``(3, ...)`` and y-parallaxes ``(...)`` of pairs of rays, in closed form.
 
-    As in the plotter, the floating mark stands where x-parallax vanishes: X and Z are common to both rays,
-    Y is the mean of both and the parallax is ``p = y1 - y2``.
+    As in the plotter, the floating mark is at zero x-parallax: X and Z are common to both rays, Y is the mean of both
+    and the parallax is ``p = y1 - y2``.
     """
     base = centre2 - centre1
     determinant = direction1[0] * direction2[2] - direction1[2] * direction2[0]

@@ -62,7 +62,7 @@ def angles_of(m: Array) -> tuple[Array, Array, Array]:
 
 
 def turn_of(m: Array) -> Array:
-    """Return the angle in radians, 0 to pi, through which rotations ``(3, 3, ...)`` turn."""
+    """Return the angle in radians, 0 to pi, of rotations ``(3, 3, ...)``."""
     axis = np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
     return np.asarray(np.arctan2(length_of(axis), m[0, 0] + m[1, 1] + m[2, 2] - 1.0))
 

@@ -1,4 +1,4 @@
-"""The plotter: its parts as frozen data, the assembled Autograph, and the language it is worked in."""
+"""The plotter: its parts as frozen data, the assembled Autograph, and its command language."""
 
 from a7sim.instrument.autograph import Autograph, build_autograph
 from a7sim.instrument.errors import AutographError, OutOfRangeError, SettingsConflictError, UnknownNameError

@@ -23,27 +23,27 @@ from a7sim.scene import build_scene
 from a7sim.scene.photograph import Photograph
 
 MARK_RADIUS_MM = 0.02
-"""The floating mark, 40 um across at photo scale."""
+"""Floating mark, 40 um across at photo scale."""
 
 MOVE_CENTRES = ("bx", "by1", "by2", "bz1", "bz2", "common_phi")
 COUNTED_FROM_ZERO = ("phi1", "phi2", "omega1", "omega2", "common_phi")
-"""Tilts, whose counters do not read zero where they are none."""
+"""Tilts, whose counters do not read zero at zero tilt."""
 
 CAMERA_CACHE_SIZE = 64
-"""Of the tilts at which they stood last: bx, by and bz move a camera and do not turn it."""
+"""Number of recent tilts whose camera rotations are cached: bx, by and bz move a camera without rotating it."""
 
 State = dict[str, Any]
-"""How an instrument stands, as data that JSON can hold."""
+"""State of an instrument as data for JSON."""
 
 
 class Autograph:
-    """A plotter worked by its handles. Lengths in mm, angles in gon, all as its counters count them.
+    """Plotter operated by its controls. Lengths in mm, angles in gon, all as its counters read.
 
-    Every method that moves something raises a Refusal and moves nothing when the instrument cannot do it. Who works at
-    the plotter itself, without the line of text, can do and see more than an operator can.
+    Each method that moves something raises an AutographError and moves nothing if the instrument cannot do it. This
+    class gives more access than the link does to an operator.
 
     >>> from a7sim import Autograph, Scenario
-    >>> plotter = Autograph.of_scenario(Scenario.load("akwanga"), seed=7)
+    >>> plotter = Autograph.from_scenario(Scenario.load("akwanga"), seed=7)
     >>> plotter.load(1, "101")
     >>> plotter.set_element("bx", 194.994)
     >>> plotter.element("bx")
@@ -99,7 +99,7 @@ class Autograph:
 
     @classmethod
     def from_parts(cls, instrument: Instrument, photographs: Mapping[str, Photograph], seed: int) -> Self:
-        """Return the instrument of a scenario with its photographs in the drawer."""
+        """Return the instrument of a scenario with its photographs, none mounted."""
         return cls(
             VARIANTS[instrument.variant],
             draw_condition(instrument, seed),
@@ -111,7 +111,7 @@ class Autograph:
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, seed: int) -> Self:
-        """Return the instrument of a scenario, with the photographs and faults that a seed draws. Raises Mistake."""
+        """Return the instrument of a scenario, with the photographs and faults that a seed draws. Raises A7SimError."""
         return cls.from_parts(scenario.instrument, build_scene(scenario, seed).mountable, seed)
 
     def _element_spindle(self, name: str, element: Element) -> Spindle:
@@ -130,15 +130,15 @@ class Autograph:
     # --- elements -------------------------------------------------------------------------------------
 
     def element(self, name: str) -> float:
-        """Return what the counter of an element shows. Raises SettingsConflict if the variant has none such."""
+        """Return the counter reading of an element. Raises SettingsConflictError if the variant does not have it."""
         return self._spindle(name).shown
 
     def set_element(self, name: str, value: float) -> None:
-        """Set an element through its counter, to the least count."""
+        """Set an element by its counter, to the least count."""
         self._run_element(name, round(value / LEAST_COUNT) * LEAST_COUNT, self._rng)
 
     def turn_element(self, name: str, amount: float) -> None:
-        """Turn the drum of an element by so much of its counter, to wherever between two counts that is."""
+        """Turn the drum of an element by an amount of its counter, to any position between two counts."""
         self._run_element(name, self._spindle(name).value_after_turn(amount))
 
     def _run_element(self, name: str, target: float, rng: np.random.Generator | None = None) -> None:
@@ -160,7 +160,7 @@ class Autograph:
         return self._spindles[name]
 
     def element_data(self, name: str) -> Element:
-        """Return range and zero of an element. Raises SettingsConflict if the variant has none such."""
+        """Return range and zero of an element. Raises SettingsConflictError if the variant does not have it."""
         self._spindle(name)
         return self.variant.elements[name]
 
@@ -175,13 +175,13 @@ class Autograph:
         self._forget_poses()
 
     def fitting(self, name: str) -> str:
-        """Return the position of a fitting. Raises SettingsConflict if the variant has none such."""
+        """Return the position of a fitting. Raises SettingsConflictError if the variant does not have it."""
         if name not in self.variant.fittings:
             raise SettingsConflictError(f"an {self.variant.name} has no fitting {name}")
         return self.fittings.as_words()[name]
 
     def set_fitting(self, name: str, position: str) -> None:
-        """Put a fitting into one of its two positions."""
+        """Set a fitting to one of its two positions."""
         self.fitting(name)
         if position not in POSITIONS_OF[name]:
             raise UnknownNameError(f"expected {' or '.join(POSITIONS_OF[name])}, got {position}")
@@ -195,7 +195,7 @@ class Autograph:
         self.fittings = fittings
 
     def reset(self) -> None:
-        """Run every element that has a counter zero to it, base inside, fittings for a positive, presets off."""
+        """Move all elements with a counter zero to it, base inside, fittings for a positive, presets off."""
         for name in self._spindles:
             if name not in ("c1", "c2"):
                 self._turn(name, self.variant.elements[name].zero, self._rng)
@@ -212,9 +212,9 @@ class Autograph:
             self._taken[part] = self._taken.get(part, 0.0) + seconds
 
     def pop_travel_times(self) -> dict[str, float]:
-        """Return how many seconds each part has moved since this was last asked, those that did not left out.
+        """Return the seconds that each part has moved since the last call; parts that did not move are left out.
 
-        State changes at once: what is read meanwhile is what stands at the end of the movement.
+        The state changes at once: readings during a movement are those at its end.
         """
         taken, self._taken = self._taken, {}
         return taken
@@ -222,9 +222,9 @@ class Autograph:
     # --- how all of it stands -------------------------------------------------------------------------
 
     def state(self, changes: int = 0) -> State:
-        """Return all that handles and chance have made of the instrument, for `restore`: part of the truth.
+        """Return the complete state for `restore`: part of the truth.
 
-        Of the recorder it holds what has changed after so many `changes`.
+        Of the recorder it contains the changes after the first `changes` ones.
         """
         dice = self._rng.bit_generator.state
         return {
@@ -246,7 +246,7 @@ class Autograph:
         }
 
     def restore(self, state: State) -> None:
-        """Stand as when a state was taken, with what it holds registered on top of what is registered."""
+        """Restore a state; its registrations are added to the present ones."""
         for parts, name in ((self._spindles, "spindles"), (self._carriages, "carriages"), (self._counters, "counters")):
             for key, each in state[name].items():
                 parts[key].restore(each)
@@ -270,7 +270,7 @@ class Autograph:
         self._forget_poses()
 
     def restore_registrations(self, state: State) -> None:
-        """Register what a state holds on top of what is registered."""
+        """Add the registrations of a state to the present ones."""
         for number, point, readings, struck in state["registered"]:
             self.recorder.apply(Registration(number, point, tuple((name, text) for name, text in readings), struck))
 
@@ -281,12 +281,15 @@ class Autograph:
         return self._counters[axis].reading(self._carriages[axis].at)
 
     def counter_text(self, axis: str) -> str:
-        """Return the reading of a counter with the decimals that it shows."""
+        """Return the reading of a counter with its decimals."""
         return self._counters[axis].text(self._carriages[axis].at)
 
     @property
     def counter_scales(self) -> dict[str, tuple[float, float]]:
-        """What each counter shows in the origin of the frame, and its units a mm, by axis; what it missed included."""
+        """Reading of each counter at the origin of the frame, and its units per mm, by axis.
+
+        Missed carries included.
+        """
         return {axis: (each.offset, each.units_per_mm) for axis, each in self._counters.items()}
 
     def counter_limits(self, axis: str) -> tuple[float, float]:
@@ -295,20 +298,20 @@ class Autograph:
         return self._counters[axis].reading(low), self._counters[axis].reading(high)
 
     def counter_at_rest(self, axis: str) -> float:
-        """Return the counter reading where a carriage stands when the instrument is at rest."""
+        """Return the counter reading of a carriage when the instrument is at rest."""
         return self._counters[axis].reading(self.variant.carriages_at_rest[axis])
 
     def preset(self, axis: str, reading: float) -> None:
-        """Make a counter show a reading where its carriage stands.
+        """Preset a counter to a reading at the present position of its carriage.
 
-        Raises SettingsConflict if the variant reads a scale there that is not to be shifted.
+        Raises SettingsConflictError if the variant has a fixed scale there.
         """
         if not self.variant.scales[axis].preset:
             raise SettingsConflictError(f"an {self.variant.name} reads {axis} on a fixed scale")
         self._counters[axis].preset(reading, self._carriages[axis].at)
 
     def drive(self, axis: str, reading: float) -> None:
-        """Run a carriage until its counter shows a reading, and on if the counter slipped on the way."""
+        """Drive a carriage until its counter shows a reading, and further if the counter slipped on the way."""
         counter = self._counters[axis]
         self._move(axis, counter.position(reading))
         if counter.slip_share and abs(counter.position(reading) - self._carriages[axis].at) > counter.half_count:
@@ -316,7 +319,7 @@ class Autograph:
                 self._move(axis, counter.position(reading))
 
     def turn_handwheel(self, axis: str, amount: float) -> None:
-        """Turn a handwheel by so many counter units; its collar decides which way the carriage goes."""
+        """Turn a handwheel by an amount in counter units; its collar decides the direction of the carriage."""
         polarity = self._polarity()
         sense = handwheel_senses(self._acting_fittings(polarity), polarity)[axis]
         step = sense * amount / self._counters[axis].units_per_mm
@@ -339,7 +342,7 @@ class Autograph:
         self._counters[axis].advance(before, position, self._rng)
 
     def set_height_gear(self, gear: str | float) -> None:
-        """Engage a height gear by its combination or by its counter units a mm."""
+        """Engage a height gear by its combination or by its counter units per mm."""
         if isinstance(gear, str):
             if gear not in self.variant.height_gears:
                 known = ", ".join(self.variant.height_gears)
@@ -360,7 +363,7 @@ class Autograph:
         elements: Mapping[str, float] | None = None,
         base_mode: str | None = None,
     ) -> None:
-        """Refuse what brings a rod beyond its limit, or further beyond it where `reset` has left it so."""
+        """Raise an error for a change that moves a rod beyond its limit, or further beyond it after `reset`."""
         here = [each.at for each in self._carriages.values()]
         there = [carriages.get(axis, each.at) for axis, each in self._carriages.items()] if carriages else here
         for projector in (1, 2):
@@ -404,7 +407,7 @@ class Autograph:
         return x * math.cos(tilt) + z * math.sin(tilt), y, z * math.cos(tilt) - x * math.sin(tilt)
 
     def _share_of_base(self, projector: int, base_mode: str) -> float:
-        """Return where a projector stands along X, as a share of bx; base out exchanges the two (geometry.md)."""
+        """Return the X position of a projector as a share of bx; base out exchanges the two (geometry.md)."""
         on_the_left = (projector == 1) == (base_mode == "inside")
         return self.variant.centres_on_base[0 if on_the_left else 1]
 
@@ -412,11 +415,11 @@ class Autograph:
 
     @property
     def catalogue(self) -> list[str]:
-        """Names of the photographs in the drawer and in the carriers."""
+        """Names of the available and the mounted photographs."""
         return list(self._photographs)
 
     def load(self, projector: int, name: str) -> None:
-        """Put a photograph on a carrier, by hand, in place of any that lies there."""
+        """Mount a photograph on a carrier, by hand, in place of a mounted one."""
         if name not in self._photographs:
             raise UnknownNameError(f"expected one of {', '.join(self.catalogue)}, got {name}")
         other = self._carriers.get(3 - projector)
@@ -430,7 +433,7 @@ class Autograph:
         self._takes(f"carrier {projector}", self.variant.rates.laying)
 
     def unload(self, projector: int) -> None:
-        """Take the photograph off a carrier."""
+        """Remove the photograph from a carrier."""
         self.carrier(projector)
         del self._carriers[projector]
         self._takes(f"carrier {projector}", self.variant.rates.laying)
@@ -441,13 +444,13 @@ class Autograph:
         return carrier.photograph.name if carrier else None
 
     def carrier(self, projector: int) -> Carrier:
-        """Return a carrier that holds a picture. Raises SettingsConflict when there is none in it."""
+        """Return a carrier with a picture. Raises SettingsConflictError if it is empty."""
         if projector not in self._carriers:
             raise SettingsConflictError(f"there is no picture in projector {projector}")
         return self._carriers[projector]
 
     def centre_picture(self, projector: int, dx: float, dy: float, dkappa: float) -> None:
-        """Shift (mm) and turn (gon) a picture on its carrier, counted from where it was laid."""
+        """Shift (mm) and rotate (gon) a picture on its carrier, counted from its initial placement."""
         limits = (self.variant.centring_mm, self.variant.centring_mm, self.variant.centring_gon)
         for value, limit in zip((dx, dy, dkappa), limits, strict=True):
             if not abs(value) <= limit:
@@ -466,13 +469,13 @@ class Autograph:
     # --- the space rods and the view ------------------------------------------------------------------
 
     def _forget_poses(self, *projectors: int) -> None:
-        """Let poses be worked out anew, of all projectors where none is named."""
+        """Discard cached poses, of all projectors if none is named."""
         for projector in projectors or (1, 2):
             self._poses.pop(projector, None)
             self._nominal_centres.pop(projector, None)
 
     def pose(self, projector: int) -> tuple[Array, Array]:
-        """Return where a projector really stands: centre ``(3,)`` in mm and rotation ``(3, 3)``."""
+        """Return the true pose of a projector: centre ``(3,)`` in mm and rotation ``(3, 3)``."""
         if projector not in self._poses:
             tilts = [self._really(f"{name}{projector}") * GON for name in ("omega", "phi", "kappa")]
             share = self._share_of_base(projector, self.base_mode)
@@ -483,23 +486,23 @@ class Autograph:
         return self._poses[projector]
 
     def _really(self, name: str) -> float:
-        """Return where an element stands, angles of tilt counted from their counter zero."""
+        """Return the true position of an element, angles of tilt counted from their counter zero."""
         if name not in self._spindles:
             return 0.0
         position = self._spindles[name].position
         return position - self.variant.elements[name].zero if name in COUNTED_FROM_ZERO else position
 
     def mark_in_model(self) -> Array:
-        """Return where the floating mark really stands in the instrument frame, ``(3,)`` in mm; not to write."""
+        """Return the true position of the floating mark in the instrument frame, ``(3,)`` in mm; read-only."""
         if self._mark is None:
             self._mark = self._guides @ np.array([self._carriages[axis].position for axis in "XYZ"])
             self._mark.flags.writeable = False
         return self._mark
 
     def readings_at(self, place: Array) -> dict[str, float]:
-        """Return what the counters would show, unrounded, with the mark at a place ``(3,)`` of the frame.
+        """Return the counter readings, unrounded, with the mark at a position ``(3,)`` of the frame.
 
-        Part of the truth: no command of the language asks it.
+        Part of the truth: no command of the language returns it.
         """
         on_the_guides = dict(zip("XYZ", np.linalg.solve(self._guides, place).tolist(), strict=True))
         return {
@@ -509,13 +512,14 @@ class Autograph:
         }
 
     def mark_on_carrier(self, projector: int) -> Array:
-        """Return the place ``(2,)`` in mm on a carrier where the space rod brings the floating mark."""
+        """Return the position ``(2,)`` in mm on a carrier to which the space rod projects the floating mark."""
         return self.on_carrier(projector, self.mark_in_model())
 
     def on_carrier(self, projector: int, place: Array) -> Array:
-        """Return the place ``(2,)`` in mm on a carrier where the space rod brings a place ``(3,)`` of the frame.
+        """Return the position ``(2,)`` in mm on a carrier to which the space rod projects a position ``(3,)`` of the
+        frame.
 
-        Part of the truth, but where the mark stands.
+        Part of the truth, except at the mark.
         """
         return place_on_carrier(
             place,
@@ -548,10 +552,9 @@ class Autograph:
         return left[0] - right[0], left[1] - right[1]
 
     def picture(self, eyepiece: int, columns: int, rows: int, magnification: float) -> Array:
-        """Return grey values 0..1, shape ``(rows, columns)``, of what an eyepiece shows about the mark.
+        """Return grey values 0..1, shape ``(rows, columns)``, of the view of an eyepiece about the mark.
 
-        At magnification 1 the longer side spans the field of view. Outside the field and without a picture
-        all is dark.
+        At magnification 1 the longer side spans the field of view. Outside the field and without a picture all is dark.
         """
         projector = projector_in_view(eyepiece, self.fittings)
         carrier = self._carriers.get(projector)
@@ -593,7 +596,7 @@ class Autograph:
 
 @lru_cache(maxsize=CAMERA_CACHE_SIZE)
 def _camera(omega: float, phi: float, kappa: float, missed: tuple[float, ...]) -> CameraAttitude:
-    """Return a camera turned by angles in radians; not to write."""
+    """Return a camera rotated by angles in radians; read-only."""
     camera = attitude_from_angles(omega, phi, kappa, np.array(missed))
     camera.rotation.flags.writeable = False
     return camera
@@ -608,12 +611,12 @@ def _runout_of(condition: Condition, axis: str, lead: float) -> PeriodicError | 
 
 
 def guide_matrix(condition: Condition) -> Array:
-    """Return the matrix ``(3, 3)`` from positions on the spindles to places in the frame."""
+    """Return the matrix ``(3, 3)`` from positions on the spindles to positions in the frame."""
     x, y, z = condition.carriage_scale_ppm
     xy, xz, yz = condition.carriage_skew_ppm
     return np.eye(3) + 1e-6 * np.array([[x, xy, xz], [0.0, y, yz], [0.0, 0.0, z]])
 
 
 def build_autograph(instrument: Instrument, photographs: Mapping[str, Photograph], seed: int) -> Autograph:
-    """Return the instrument of a scenario with its photographs in the drawer."""
+    """Return the instrument of a scenario with its photographs, none mounted."""
     return Autograph.from_parts(instrument, photographs, seed)

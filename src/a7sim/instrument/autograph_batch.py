@@ -1,7 +1,7 @@
-"""Many plotters of one kind held as arrays, each with its own pictures and faults: the twin of `Autograph`.
+"""Batch of plotters of one type as arrays, each with its own pictures and faults: the batch twin of `Autograph`.
 
-`who` are the indices ``(m,)`` of the instruments that are worked; what comes in and goes out has them as its last axis.
-An instrument that cannot do something does not do it, and says why when asked by `refused`.
+`active` are the indices ``(m,)`` of the active instruments; parameters and results have them as their last axis. An
+instrument that cannot execute an action does nothing; `pop_errors` returns the reason.
 """
 
 import math
@@ -24,34 +24,34 @@ from a7sim.scenario.schema import Condition, Instrument, ProjectorCondition
 from a7sim.scene.photograph import Photograph
 
 SHIFTS = ("bx", "by1", "by2", "bz1", "bz2")
-"""Elements that turn no projector."""
+"""Elements that rotate no projector."""
 
 
 _RIGHT = {
     arrangement: {name: POSITIONS_OF[name].index(position) for name, position in fittings.as_words().items()}
     for arrangement, fittings in REQUIRED_FITTINGS.items()
 }
-"""Which of its two positions each fitting has by rights, by polarity and base."""
+"""Required position of each fitting, by polarity and base."""
 
 
 @dataclass(frozen=True)
 class FittingEffects:
-    """What base, levers, prisms and collars of every instrument come to."""
+    """Effects of base, levers, prisms and collars of each instrument."""
 
     uncrossed: BoolArray
     """Where the left eye sees the left picture ``(instruments,)``."""
     signs: Mapping[int, Array]
-    """Of what is seen of the picture in a projector ``(2, instruments)``, in um for a mm."""
+    """Signs of the view of the picture in a projector ``(2, instruments)``, in um for a mm."""
     senses: Array
     """Of the handwheels X, Y and Z ``(3, instruments)``."""
 
 
 _OF_A_BUNDLE = 19
-"""Numbers that make the bundle of a projector."""
+"""Numbers of the bundle of a projector."""
 
 
 class ProjectorBundles:
-    """The bundles of the projectors of many instruments, in rows of one array, so that a look picks them out once."""
+    """Bundles of the projectors of a batch, in rows of one array, so that one look selects them once."""
 
     def __init__(self, rows: Array) -> None:
         self._rows = rows
@@ -59,17 +59,17 @@ class ProjectorBundles:
         self.turned = rows[:9].reshape(3, 3, sessions)
         self.centre = rows[9:12]
         self.swung = rows[12:16].reshape(2, 2, sessions)
-        """By the swing of the projector, which its picture is seen with."""
+        """By the swing of the projector with which its picture is seen."""
         self.principal_point = rows[16:18]
         self.c = rows[18]
 
     def take(self, active: Indices) -> "ProjectorBundles":
-        """Return those of some, to be read at once and not written to."""
+        """Return the bundles of the active instruments, read-only."""
         return self if active.size == self.c.size else ProjectorBundles(take(self._rows, active))
 
 
 class AutographBatch:
-    """Plotters worked by their handles, all together. Lengths in mm, angles in gon, as the counters count them."""
+    """Batch of plotters operated by their controls. Lengths in mm, angles in gon, as the counters read."""
 
     def __init__(
         self,
@@ -109,11 +109,11 @@ class AutographBatch:
         for n, each in self._bundles.items():
             each.principal_point[:] = 1e-3 * self._of_projectors(n, lambda projector: projector.principal_point_um)
         self._missed = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
-        """By how much the axes miss the centre, in the frame (see `pose`)."""
+        """Distance of the axes from the centre, in the frame (see `pose`)."""
         self._common = np.zeros((3, 3, self.instruments))
-        """The rotation by the common Phi, where there is one."""
+        """Rotation by the common Phi, if any."""
         self._told = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
-        """Where the drums say that the centres stand."""
+        """Positions of the centres by the drums."""
         for n in (1, 2):
             self._stand(everywhere, n)
 
@@ -150,7 +150,7 @@ class AutographBatch:
     # --- refusals -------------------------------------------------------------------------------------
 
     def pop_errors(self, active: Indices) -> dict[int, list[str]]:
-        """Return what was refused since the last asking, by instrument."""
+        """Return the errors since the last call, by instrument."""
         return {int(each): self._refusals.pop(int(each)) for each in active if int(each) in self._refusals}
 
     def _refuse(self, active: Indices, why: str, number: int = -222) -> None:
@@ -160,15 +160,15 @@ class AutographBatch:
     # --- elements -------------------------------------------------------------------------------------
 
     def elements(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
-        """Return what the counters of elements show ``(m,)``."""
+        """Return the counter readings of elements ``(m,)``."""
         return {name: self._drums[name].shown(active) for name in names}
 
     def set_element(self, active: Indices, name: str, values: Array) -> None:
-        """Set an element through its counters to values ``(m,)``, to the least count."""
+        """Set an element by its counters to values ``(m,)``, to the least count."""
         self._run_element(active, name, np.round(values / LEAST_COUNT) * LEAST_COUNT, self._rngs)
 
     def turn_element(self, active: Indices, name: str, amounts: Array) -> None:
-        """Turn the drums of an element by so much ``(m,)``, to wherever between two counts that is."""
+        """Turn the drums of an element by amounts ``(m,)``, to any position between two counts."""
         self._run_element(
             active, name, self._drums[name].value_after_turn(active, amounts) if name in self._drums else amounts
         )
@@ -209,16 +209,16 @@ class AutographBatch:
             self._stand(active, n)
 
     def fitting(self, active: Indices, name: str) -> npt.NDArray[np.str_]:
-        """Return the positions ``(m,)`` in which a fitting stands."""
+        """Return the positions ``(m,)`` of a fitting."""
         return np.array(POSITIONS_OF[name])[self._fittings[name][active]]
 
     def set_fitting(self, active: Indices, name: str, position: str) -> None:
-        """Put a fitting into one of its two positions."""
+        """Set a fitting to one of its two positions."""
         self._fittings[name][active] = POSITIONS_OF[name].index(position)
         self._levers = None
 
     def reset(self, active: Indices) -> None:
-        """Run every element that has a counter zero to it, base inside, fittings for a positive, presets off."""
+        """Move all elements with a counter zero to it, base inside, fittings for a positive, presets off."""
         for name, drums in self._drums.items():
             if name not in ("c1", "c2"):
                 drums.turn_to(active, np.full(active.size, self.variant.elements[name].zero), self._rngs)
@@ -239,12 +239,12 @@ class AutographBatch:
     # --- carriages, counters, gears -------------------------------------------------------------------
 
     def counter(self, active: Indices, axis: str) -> Array:
-        """Return what the X, Y or Z counters show ``(m,)``."""
+        """Return the readings of the X, Y or Z counters ``(m,)``."""
         row = AXES.index(axis)
         return round_like_counter(self._unrounded(active, row, self._carriages.at[row][active]), self._decimals[row])
 
     def counters(self, active: Indices) -> Array:
-        """Return what the X, Y and Z counters show ``(3, m)``."""
+        """Return the readings of the X, Y and Z counters ``(3, m)``."""
         readings = take(self._offsets, active) + self._units[:, None] * take(self._carriages.at, active)
         if len(set(self._decimals)) == 1:
             return round_like_counter(readings, self._decimals[0])
@@ -256,13 +256,13 @@ class AutographBatch:
         return np.asarray(self._offsets[row][active] + self._units[row] * position)
 
     def preset(self, active: Indices, axis: str, reading: float) -> None:
-        """Make the counters show a reading where their carriages stand."""
+        """Preset the counters to a reading at the present positions of their carriages."""
         row = AXES.index(axis)
         shown = round(reading, self._decimals[row])
         self._offsets[row, active] = shown - self._units[row] * self._carriages.at[row][active]
 
     def set_height_gear(self, active: Indices, gear: str | float) -> None:
-        """Engage a height gear; all instruments have the same."""
+        """Engage a height gear, the same in all instruments."""
         units, decimals = float(gear) if not isinstance(gear, str) else 0.0, COUNTER_DECIMALS
         if isinstance(gear, str):
             engaged = self.variant.height_gears[gear]
@@ -274,7 +274,7 @@ class AutographBatch:
         self._offsets[row, active] = round_like_counter(reading, decimals) - units * position
 
     def drive(self, active: Indices, axis: str, readings: Array) -> BoolArray:
-        """Run carriages until their counters show readings ``(m,)``; return which went."""
+        """Drive carriages until their counters show readings ``(m,)``; return which reached them."""
         row = AXES.index(axis)
         wanted = round_like_counter(readings, self._decimals[row])
         went = self._move(active, row, (wanted - self._offsets[row][active]) / self._units[row])
@@ -289,9 +289,9 @@ class AutographBatch:
         return float(0.5000001 * 10.0 ** -self._decimals[row] / self._units[row])
 
     def turn_handwheels(self, active: Indices, amounts: Array) -> None:
-        """Turn the handwheels X, Y and, where there is a third, Z by so many counter units ``(k, m)``, in that order.
+        """Turn the handwheels X, Y and, if there is a third row, Z by counter units ``(k, m)``, in that order.
 
-        Their collars decide which way the carriages go.
+        Their collars decide the directions of the carriages.
         """
         k = len(amounts)
         before = take(self._carriages.at, active)
@@ -319,7 +319,7 @@ class AutographBatch:
         return np.asarray(allowed)
 
     def _slip(self, active: Indices, row: int, before: Array, after: Array) -> None:
-        """Let counters miss carries on the way from one position ``(m,)`` to another (see `Counter.passed`)."""
+        """Let counters miss carries on the way from one position ``(m,)`` to another (see `Counter.advance`)."""
         if self._no_slips:
             return
         for i in np.flatnonzero(self._slip_shares[active] > 0.0):
@@ -335,7 +335,7 @@ class AutographBatch:
     def _rods_can(
         self, active: Indices, centres: Mapping[int, Array] | None = None, mark: Array | None = None
     ) -> BoolArray:
-        """Return where no rod comes beyond its limit, nor further beyond it, with other centres or marks ``(3, m)``."""
+        """Return where no rod moves beyond its limit, nor further beyond it, with other centres or marks ``(3, m)``."""
         now = take(self._carriages.at, active)
         mark = now if mark is None else mark
         able = np.ones(active.size, dtype=bool)
@@ -350,9 +350,9 @@ class AutographBatch:
         return able
 
     def _rods_surely_can(self, active: Indices, before: Array, low: Array, high: Array) -> bool:
-        """Return whether all carriages can go from marks ``(3, m)`` to between others ``(k,)``, one axis after another.
+        """Return whether all carriages can move from marks ``(3, m)`` into a range ``(k,)``, one axis after another.
 
-        Looks at the box that holds all marks, seen from that which holds all centres.
+        Compares the box of all marks with the box of all centres.
         """
         k = len(low)
         lowest, highest = before.min(axis=1), before.max(axis=1)
@@ -367,7 +367,7 @@ class AutographBatch:
 
     @property
     def _surely_within(self) -> float:
-        """How far to the side a rod may reach for all the depth, well within its limit."""
+        """Return a lateral reach of a rod at all depths, well within its limit."""
         return 0.99 * math.tan(self.variant.rod_limit_gon * GON)
 
     def _centres_told(
@@ -377,7 +377,7 @@ class AutographBatch:
         elements: Mapping[str, Array] = MappingProxyType({}),
         base_inside: BoolArray | None = None,
     ) -> Array:
-        """Return where the drums say ``(3, m)`` that centres stand, or would with other elements or another base."""
+        """Return the positions of centres by the drums ``(3, m)``, optionally with other elements or another base."""
 
         def drum(name: str) -> Array:
             if name in elements:
@@ -392,14 +392,14 @@ class AutographBatch:
         return np.array([x, y, z])
 
     def _shares(self, n: int, inside: BoolArray) -> Array:
-        """Return where projectors stand along X ``(m,)``, as shares of bx."""
+        """Return the X positions of projectors ``(m,)``, as shares of bx."""
         left, right = self.variant.centres_on_base
         return np.where(inside == (n == 1), left, right)
 
     # --- pictures -------------------------------------------------------------------------------------
 
     def load(self, active: Indices, projector: int, name: str) -> None:
-        """Put a photograph on the carriers of a projector, by hand."""
+        """Mount a photograph on the carriers of a projector, by hand."""
         photographs = [each[name] for each in self._photographs]
         laid = np.zeros((3, self.instruments))
         shift, turn = self._laying_sigmas
@@ -410,7 +410,7 @@ class AutographBatch:
         self._levers = None
 
     def unload(self, active: Indices, projector: int) -> None:
-        """Take the photographs off the carriers of a projector."""
+        """Remove the photographs from the carriers of a projector."""
         del self._carriers[projector]
         self._levers = None
 
@@ -426,7 +426,7 @@ class AutographBatch:
     # --- the space rods and the view ------------------------------------------------------------------
 
     def _stand(self, active: Indices, n: int) -> None:
-        """Put the projectors where their elements, the base and their faults bring them."""
+        """Compute the poses of projectors from their elements, the base and their faults."""
         omega, phi, kappa = (self._really(active, f"{name}{n}") * GON for name in ("omega", "phi", "kappa"))
         turned = rotation(omega, phi, kappa)
         self._missed[n][:, active] = mxv(turned, take(self._axes[n], active))
@@ -441,7 +441,7 @@ class AutographBatch:
         self._shift(active, n, self._centres_told(active, n))
 
     def _shift(self, active: Indices, n: int, told: Array) -> None:
-        """Put the projectors, turned as they stand, where base, by and bz bring them and these are told ``(3, m)``."""
+        """Move the projectors, with unchanged rotation, to the positions by base, by and bz, given as ``(3, m)``."""
         base = (self._really(active, name) for name in ("bx", f"by{n}", f"bz{n}"))
         place = projection_centre(self._shares(n, take(self._base_inside, active)), *base)
         centre = place + take(self._missed[n], active) - take(self._axes[n], active)
@@ -457,23 +457,23 @@ class AutographBatch:
         return position - self.variant.elements[name].zero if name in COUNTED_FROM_ZERO else position
 
     def pose(self, active: Indices, projector: int) -> tuple[Array, Array]:
-        """Return where projectors really stand: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
+        """Return the true poses of projectors: centres ``(3, m)`` in mm and rotations ``(3, 3, m)``."""
         bundles = self._bundles[projector].take(active)
         return bundles.centre, bundles.turned
 
     def readings_at(self, active: Indices, place: Array) -> dict[str, Array]:
-        """Return what the counters would show ``(m,)``, unrounded, with the marks at places ``(3, m)``."""
+        """Return the counter readings ``(m,)``, unrounded, with the marks at positions ``(3, m)``."""
         guides = np.moveaxis(self._guides[:, :, active], -1, 0)
         carriage = np.asarray(np.linalg.solve(guides, place.T[:, :, None])[:, :, 0].T, dtype=float)
         free = self._carriages.position_without_periodic_error(active, carriage)
         return {axis: self._unrounded(active, row, free[row]) for row, axis in enumerate(AXES)}
 
     def mark(self, active: Indices) -> Array:
-        """Return where the floating marks really stand ``(3, m)``."""
+        """Return the true positions of the floating marks ``(3, m)``."""
         return mxv(take(self._guides, active), self._carriages.position(active))
 
     def _mark_on_carrier(self, active: Indices, projector: int, bundles: ProjectorBundles, mark: Array) -> Array:
-        """Return the places ``(2, m)`` in mm on carriers where the space rods bring floating marks ``(3, m)``."""
+        """Return the positions ``(2, m)`` in mm on carriers to which the space rods project marks ``(3, m)``."""
         local, rods = self._local[projector], self._rods[projector]
         return place_on_carrier(
             mark,
@@ -549,14 +549,14 @@ class AutographBatch:
 
 
 def _reach(centre: Array, mark: Array) -> tuple[Array, Array]:
-    """Return how far marks ``(3, m)`` lie beside centres ``(3, m)`` and below them ``(m,)``."""
+    """Return the distances of marks ``(3, m)`` beside centres ``(3, m)`` and below them ``(m,)``."""
     return np.hypot(mark[0] - centre[0], mark[1] - centre[1]), centre[2] - mark[2]
 
 
 def build_batch(
     instrument: Instrument, photographs: Sequence[Mapping[str, Photograph]], seeds: Sequence[int]
 ) -> AutographBatch:
-    """Return the instruments of a scenario, one a seed, with their photographs in their drawers."""
+    """Return the instruments of a scenario, one per seed, with their photographs, none mounted."""
     rngs = [np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(INSTRUMENT_STREAM,))) for seed in seeds]
     return AutographBatch(
         VARIANTS[instrument.variant],

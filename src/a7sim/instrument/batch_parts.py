@@ -1,6 +1,6 @@
-"""What the plotters of a fleet are made of, each part held as arrays of all of them: carriages, drums, carriers.
+"""Parts of a batch of plotters as arrays: carriages, drums, carriers.
 
-`who` are the indices ``(m,)`` of the instruments that are worked; what comes in and goes out has them as its last axis.
+`active` are the indices ``(m,)`` of the active instruments; parameters and results have them as their last axis.
 """
 
 import math
@@ -26,9 +26,9 @@ TIE_TOLERANCE = 1e-6
 
 
 def round_like_counter(values: Array, decimals: int) -> Array:
-    """Return values rounded as the counters of one instrument round them: a tie by what the number exactly is.
+    """Return values rounded like the counters of one instrument: a tie by the exact value of the number.
 
-    Wheels turn by thousandths, so that ties are common; numpy scales before it rounds and would take some for halves.
+    Wheels turn by thousandths, so ties are common; numpy scales before it rounds and would take some for halves.
     """
     scaled = values * 10.0**decimals
     nearest = np.rint(scaled)
@@ -42,20 +42,20 @@ def round_like_counter(values: Array, decimals: int) -> Array:
 
 @dataclass(frozen=True)
 class PeriodicErrors:
-    """The errors of screws that repeat with every turn: amplitudes and phases ``(3, instruments)``, lead; mm."""
+    """Periodic errors of screws: amplitudes and phases ``(3, instruments)``, lead; mm."""
 
     amplitude: Array
     lead: float
     phase: Array
 
     def at(self, active: Indices, position: Array) -> Array:
-        """Return by how much the nuts have gone further ``(3, m)`` than the turns say, mm."""
+        """Return the excess travel of the nuts ``(3, m)`` over the turns, mm."""
         turns = 2.0 * math.pi * position / self.lead
         return np.asarray(take(self.amplitude, active) * np.sin(turns + take(self.phase, active)))
 
 
 class Carriages:
-    """The carriages X, Y and Z of every instrument: where their spindles stand and where these bring them with play."""
+    """Carriages X, Y and Z of each instrument: positions of their spindles, and of the carriages with play."""
 
     def __init__(self, variant: Variant, play: Array, runouts: PeriodicErrors | None) -> None:
         self._low, self._high = np.array([variant.carriages[axis] for axis in AXES]).T
@@ -65,12 +65,12 @@ class Carriages:
         self._runouts = runouts
 
     def position(self, active: Indices) -> Array:
-        """Return where they really stand ``(3, m)``."""
+        """Return the true positions ``(3, m)``."""
         position = take(self._shaft, active)
         return position if self._runouts is None else position + self._runouts.at(active, position)
 
     def position_without_periodic_error(self, active: Indices, place: Array) -> Array:
-        """Return where they would stand ``(3, m)`` without the errors that the turns of their screws repeat."""
+        """Return the positions ``(3, m)`` without the periodic errors of the screws."""
         position = place
         if self._runouts is not None:
             for _ in range(APPROXIMATIONS):
@@ -78,21 +78,25 @@ class Carriages:
         return position
 
     def snap_to_end(self, axis: int, places: Array, within: float) -> Array:
-        """Return places ``(m,)`` of a carriage, the end of its range where they are so near it."""
+        """Return positions ``(m,)`` of a carriage, replaced by the end of its range where they are within a distance of
+        it.
+        """
         at_end = np.clip(places, self._low[axis], self._high[axis])
         return np.where(np.abs(at_end - places) <= within, at_end, places)
 
     def within_range(self, axis: int, places: Array) -> BoolArray:
-        """Return to which places ``(m,)`` a carriage can be run."""
+        """Return which positions ``(m,)`` a carriage can reach."""
         return np.asarray((places >= self._low[axis] - 1e-9) & (places <= self._high[axis] + 1e-9))
 
     def range_contains(self, low: Array, high: Array) -> bool:
-        """Return whether the ranges of the first k carriages hold all from the low to the high places ``(k,)``."""
+        """Return whether the ranges of the first k carriages contain all between the low and the high positions
+        ``(k,)``.
+        """
         k = len(low)
         return bool(((low >= self._low[:k]) & (high <= self._high[:k])).all())
 
     def move_to(self, active: Indices, first: int, places: Array) -> None:
-        """Run carriages, from a first one on, to places ``(k, m)`` that they allow."""
+        """Drive carriages, from a first one on, to positions ``(k, m)`` within their ranges."""
         rows = slice(first, first + len(places))
         half = take(self._half_play, active)
         put(places, active, self.at[rows])
@@ -104,7 +108,7 @@ class Carriages:
 
 
 class Drums:
-    """A spindle of every instrument: what the drum shows, where the shaft follows it with play and setting error."""
+    """Spindle of each instrument: the drum reading, and the shaft that follows it with play and setting error."""
 
     def __init__(
         self,
@@ -123,25 +127,25 @@ class Drums:
         self._half_play, self._sigma, self._fault = play / 2.0, sigma, fault
 
     def position(self, active: Indices) -> Array:
-        """Return where the shafts really stand ``(m,)``."""
+        """Return the true positions of the shafts ``(m,)``."""
         return np.asarray(take(self._shaft, active) + take(self._error, active) + take(self._fault, active))
 
     def shown(self, active: Indices) -> Array:
-        """Return what the counters show ``(m,)``."""
+        """Return the counter readings ``(m,)``."""
         shown = round_like_counter(take(self.at, active), COUNTER_DECIMALS)
         return round_like_counter(shown % self.high, COUNTER_DECIMALS) if self.endless else np.asarray(shown + 0.0)
 
     def within_range(self, values: Array) -> BoolArray:
-        """Return which values the drum can be turned to."""
+        """Return to which values the drum can be turned."""
         return np.asarray((values >= self.low - 1e-9) & (values <= self.high + 1e-9))
 
     def value_after_turn(self, active: Indices, amounts: Array) -> Array:
-        """Return to what values ``(m,)`` the drums come when they are turned by so much."""
+        """Return the values ``(m,)`` of the drums after a turn by amounts."""
         values = take(self.at, active) + amounts
         return np.asarray(values % self.high if self.endless else values)
 
     def turn_to(self, active: Indices, values: Array, rngs: Sequence[np.random.Generator] = ()) -> None:
-        """Turn the drums to values ``(m,)`` that they allow; with dice, by their counters (see `Spindle.turn_to`)."""
+        """Turn the drums to values ``(m,)`` within range; with `rngs`, by their counters (see `Spindle.turn_to`)."""
         if self.endless:
             values = values + self.high * np.round((take(self.at, active) - values) / self.high)
         put(values, active, self.at)
@@ -152,7 +156,7 @@ class Drums:
 
 
 class Carriers:
-    """A picture of the same name on a carrier of every instrument, each laid and centred in its own way."""
+    """Picture of the same name on a carrier of each instrument, each with its own placement and centring."""
 
     def __init__(self, photographs: Sequence[Photograph], laid: Array) -> None:
         self.name = photographs[0].name
@@ -167,7 +171,7 @@ class Carriers:
         self.centre(np.arange(laid.shape[1]), self.centring)
 
     def centre(self, active: Indices, values: Array) -> None:
-        """Shift and turn the pictures ``(3, m)``, mm and gon, from where they were laid."""
+        """Shift and rotate the pictures ``(3, m)``, mm and gon, from their initial placement."""
         self.centring[:, active] = values
         dx, dy, turn = self.laid[:, active] + values
         self._turn[:, :, active] = plane_rotation(turn * GON)
@@ -175,14 +179,14 @@ class Carriers:
         self._placed.clear()
 
     def point(self, active: Indices, name: str) -> Array:
-        """Return where an image point lies on the carriers ``(2, m)``, nan where a picture has none such."""
+        """Return the positions of an image point on the carriers ``(2, m)``, nan where a picture does not have it."""
         placed = self._placed.get(name)
         if placed is None:
             placed = self._placed[name] = mxv(self._turn, self._film(name)) + self._shift
         return take(placed, active)
 
     def _film(self, name: str) -> Array:
-        """Return where an image point lies on the films ``(2, instruments)``."""
+        """Return the positions of an image point on the films ``(2, instruments)``."""
         nowhere = np.full((2, len(self.photographs)), np.nan)
         return self._films.get(name, nowhere)
 
@@ -196,12 +200,12 @@ class Carriers:
         return fiducials.names, np.asarray(placed - marks[:, :, None])
 
     def sketch(self, active: Indices) -> dict[str, Array]:
-        """Return the places ``(2, m)`` of points on the paper prints, nan where a print has it not."""
+        """Return the positions ``(2, m)`` of points on the paper prints, nan where a print does not show them."""
         return _places_of([self.photographs[session].sketch for session in active])
 
 
 def _places_of(prints: Sequence[NamedPoints]) -> dict[str, Array]:
-    """Return the places ``(2, m)`` of marks on many photographs by name, nan where one has it not."""
+    """Return the positions ``(2, m)`` of marks on a batch of photographs by name, nan where one does not have it."""
     alike: dict[tuple[str, ...], list[int]] = {}
     for i, each in enumerate(prints):
         alike.setdefault(each.names, []).append(i)

@@ -1,4 +1,4 @@
-"""Picture carriers: a photograph as it lies in a projector."""
+"""Picture carriers: the placement of a photograph in a projector."""
 
 from dataclasses import dataclass
 
@@ -11,18 +11,18 @@ from a7sim.scene.photograph import Photograph
 
 @dataclass
 class Carrier:
-    """A photograph on its carrier: laid by hand, then shifted and turned until it is centred."""
+    """Photograph on its carrier: placed by hand, then shifted and rotated until it is centred."""
 
     photograph: Photograph
     placement: tuple[float, float, float]
-    """dx, dy in mm and dkappa in gon, as it came to lie."""
+    """Initial dx, dy in mm and dkappa in gon."""
     centring: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         self._set()
 
     def centre(self, dx: float, dy: float, dkappa: float) -> None:
-        """Shift (mm) and turn (gon) the picture from where it was laid."""
+        """Shift (mm) and rotate (gon) the picture from its initial placement."""
         self.centring = (dx, dy, dkappa)
         self._set()
 
@@ -32,17 +32,17 @@ class Carrier:
         self._points: dict[str, Array] = {}
 
     def on_carrier(self, film: Array) -> Array:
-        """Return film places ``(2, ...)`` in mm as places on the carrier about its collimating centre."""
+        """Return film positions ``(2, ...)`` in mm as positions on the carrier about its collimating centre."""
         shift = self._shift.reshape((2,) + (1,) * (film.ndim - 1))
         return np.asarray(np.einsum("ij,j...->i...", self._turn, film) + shift)
 
     def on_film(self, carrier: Array) -> Array:
-        """Return places on the carrier ``(2, ...)`` as film places: the inverse of `on_carrier`."""
+        """Return positions on the carrier ``(2, ...)`` as film positions: the inverse of `on_carrier`."""
         shift = self._shift.reshape((2,) + (1,) * (carrier.ndim - 1))
         return np.asarray(np.einsum("ji,j...->i...", self._turn, carrier - shift))
 
     def point(self, name: str) -> Array | None:
-        """Return where an image point lies on the carrier ``(2,)``, None where there is none such; not to write."""
+        """Return the position of an image point on the carrier ``(2,)``, None if there is no such point; read-only."""
         if name not in self._points:
             film = self.photograph.points.get(name)
             if film is None:
@@ -52,7 +52,7 @@ class Carrier:
         return self._points[name]
 
     def fiducial_displacements(self) -> list[tuple[str, float, float]]:
-        """Return name, dx, dy in mm of every fiducial from its collimating mark."""
+        """Return name, dx, dy in mm of each fiducial from its collimating mark."""
         names, calibrated = fiducial_places(self.photograph.camera)
         marks = {name: calibrated[:, i] for i, name in enumerate(names)}
         placed = self.on_carrier(self.photograph.fiducials.xy)

@@ -1,4 +1,4 @@
-"""The state of maintenance of an instrument, drawn by a seed where it is a class (docs/decisions/0006-condition.md)."""
+"""Condition of an instrument, drawn by a seed for a class of maintenance (docs/decisions/0006-condition.md)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,20 +13,20 @@ from a7sim.instrument.local_errors import smooth_local_errors
 from a7sim.scenario.schema import Condition, Instrument, MaintenanceClass, ProjectorCondition
 
 INSTRUMENT_STREAM = 3
-"""Spawn key of the instrument's random numbers; the scene's come before, the operator's after."""
+"""Spawn key of the instrument's random numbers, between those of the scene and the operator."""
 
 _FAULTS = 0
-"""Below it: what is wrong with the instrument, whatever is done with it."""
+"""Spawn key, below it, of the faults of the instrument."""
 
 _PATTERNS = 2**31
 
 
 @dataclass(frozen=True)
 class FaultSigmas:
-    """How large the faults of a class are: standard deviations, but for what is said to be a size."""
+    """Sizes of the faults of a class of maintenance: standard deviations, unless stated as a size."""
 
     local_um: tuple[float, float]
-    """Between which the standard error of a projector's local errors lies."""
+    """Range of the standard error of a projector's local errors."""
     principal_distance_mm: float
     principal_point_um: float
     tilt_zero_gon: float
@@ -107,9 +107,9 @@ FAULT_SIGMAS: Mapping[MaintenanceClass, FaultSigmas] = MappingProxyType(
 
 
 def draw_condition(instrument: Instrument, seed: int) -> Condition:
-    """Return the whole state of the instrument that a scenario describes, every fault as a seed draws it.
+    """Return the complete condition of the instrument of a scenario, with the faults that a seed draws.
 
-    The faults have random numbers of their own: a worn instrument's pictures come to lie as those of a new one.
+    The faults have random numbers of their own: the placement of pictures does not depend on the class of maintenance.
     """
     stated = instrument.condition
     listed = Condition(upkeep=stated) if isinstance(stated, str) else stated
@@ -120,7 +120,7 @@ def draw_condition(instrument: Instrument, seed: int) -> Condition:
 
 
 def zero_error(condition: Condition, name: str) -> float:
-    """Return by how much the shaft of an element stands further than its drum says, mm or gon."""
+    """Return the offset of an element's shaft from its drum reading, mm or gon."""
     if name == "bx":
         return condition.bx_zero_mm
     if name == "common_phi":
@@ -137,7 +137,7 @@ def zero_error(condition: Condition, name: str) -> float:
 
 
 def local_coefficients(projector: ProjectorCondition) -> Array | None:
-    """Return the coefficients ``(2, k)`` in mm of a projector's local errors, or None where it has none."""
+    """Return the coefficients ``(2, k)`` in mm of a projector's local errors, None without any."""
     if not projector.local_um:
         return None
     return 1e-3 * projector.local_um * smooth_local_errors(np.random.default_rng(projector.local_pattern or 0))
@@ -196,7 +196,7 @@ def _drawn(faults: FaultSigmas, rng: np.random.Generator) -> Condition:
 
 
 def _on_top(drawn: Any, listed: Any) -> Any:
-    """Return a table of faults with those of another added to it, number by number."""
+    """Return the sum of two tables of faults."""
     if isinstance(drawn, tuple):
         return tuple(_on_top(*each) for each in zip(drawn, listed, strict=True))
     if isinstance(drawn, msgspec.Struct):

@@ -1,17 +1,17 @@
-"""Why the instrument does not do what it is asked."""
+"""Errors of the instrument."""
 
 
 class AutographError(Exception):
-    """Something the instrument does not do; nothing has moved."""
+    """Action that the instrument cannot execute; nothing has moved."""
 
 
 class OutOfRangeError(AutographError):
-    """Beyond an element's, a carriage's or a space rod's range."""
+    """Beyond the range of an element, a carriage or a space rod."""
 
 
 class SettingsConflictError(AutographError):
-    """Not allowed by the fittings, the base, the pictures mounted or the variant."""
+    """Not allowed by the fittings, the base, the mounted pictures or the variant."""
 
 
 class UnknownNameError(AutographError):
-    """A name that this instrument has no use for."""
+    """Name that this instrument does not know."""

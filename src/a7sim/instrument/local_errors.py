@@ -1,4 +1,4 @@
-"""Local errors of a projector: what rods, rails and gimbals leave in its bundle beyond what a grid test computes."""
+"""Local errors of a projector: errors of rods, rails and gimbals beyond those that a grid test determines."""
 
 import numpy as np
 
@@ -17,8 +17,9 @@ _OF_X, _OF_Y = np.array(_DEGREES).T
 def smooth_local_errors(rng: np.random.Generator) -> Array:
     """Return coefficients ``(2, k)`` of local errors over the picture, polynomials of the fourth degree.
 
-    Drawn alike for every power of x and y in 100 mm; what a grid test computes (shift, principal distance, swing and
-    both tilts) is taken off, and what is left scaled to a standard error of one on the test's 25 crosses.
+    Drawn with equal variance for all powers of x and y in 100 mm; the part that a grid test determines (shift,
+    principal distance, swing and both tilts) is removed, and the rest scaled to a standard error of one on the test's
+    25 crosses.
     """
     powers = powers_at(_GRID_MM)
     coefficients = rng.standard_normal((2, len(_DEGREES)))

@@ -1,10 +1,10 @@
-"""The fittings and what they do to the view and to the handwheels (thesis 3.2.3.6).
+"""Fittings and their effects on the view and on the handwheels (thesis 3.2.3.6).
 
-Nothing here refuses anything: with wrong fittings the observer gets the wrong view.
-The thesis tables which position belongs to which picture and base; what a wrong one does to the view is
-this model's reading of it: a Dove prism with the wrong index leaves the picture mirrored top to bottom, a
-diapositive lever on the wrong side leaves it mirrored left to right, the triangulation lever decides which
-projector the left eye sees, and a collar that does not belong to the picture reverses its handwheel.
+No function here raises an error: with wrong fittings the observer gets the wrong view. The thesis tables the required
+positions for picture and base; the effect of a wrong one is an interpretation of this model: a Dove prism with the
+wrong index leaves the picture mirrored top to bottom, a diapositive lever on the wrong side leaves it mirrored left to
+right, the triangulation lever decides which projector the left eye sees, and a collar that does not belong to the
+picture reverses its handwheel.
 """
 
 from dataclasses import replace
@@ -20,22 +20,22 @@ VIEW_CACHE_SIZE = 64
 
 @lru_cache(maxsize=VIEW_CACHE_SIZE)
 def effective_fittings(fittings: Fittings, polarity: str, base: str, has: tuple[str, ...]) -> Fittings:
-    """Return the fittings of an instrument that has only some: the others are built right for any picture."""
+    """Return the fittings of an instrument that has only some: the others are correct for any picture."""
     right = REQUIRED_FITTINGS[polarity, base].as_words()
     return replace(fittings, **{name: position for name, position in right.items() if name not in has})
 
 
 def projector_in_view(eyepiece: int, fittings: Fittings) -> int:
-    """Return which projector, 1 or 2, an eyepiece shows; eyepiece 1 is the observer's left eye."""
+    """Return the projector, 1 or 2, of an eyepiece; eyepiece 1 is the observer's left eye."""
     straight = fittings.triangulation == "back"
     return eyepiece if straight else 3 - eyepiece
 
 
 @lru_cache(maxsize=VIEW_CACHE_SIZE)
 def view_matrix(fittings: Fittings, polarity: str, base: str, kappa_gon: float) -> Array:
-    """Return the matrix ``(2, 2)`` from displacements on the carrier to those in the eyepiece, in mm; not to write.
+    """Return the matrix ``(2, 2)`` from displacements on the carrier to those in the eyepiece, in mm; read-only.
 
-    The optics stand still while the camera swings, so a swung picture is seen swung.
+    The optics do not rotate with the swing of the camera, so a swung picture is seen swung.
     """
     right = REQUIRED_FITTINGS[polarity, base]
     mirrored = np.array(
@@ -50,7 +50,7 @@ def view_matrix(fittings: Fittings, polarity: str, base: str, kappa_gon: float) 
 
 
 def handwheel_senses(fittings: Fittings, polarity: str) -> dict[str, float]:
-    """Return +1, or -1 where a collar does not belong to the picture, for the X and Y handwheels and the Z disc."""
+    """Return +1, or -1 for a collar that does not belong to the picture, for the X and Y handwheels and the Z disc."""
     right = REQUIRED_FITTINGS[polarity, "inside"]
     return {
         "X": 1.0 if fittings.xcollar == right.xcollar else -1.0,

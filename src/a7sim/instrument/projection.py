@@ -1,4 +1,4 @@
-"""Where projectors stand and where a space rod brings the mark: pure functions, one instrument or many as arrays.
+"""Poses of projectors and projection by the space rod: pure functions of one instrument or of a batch as arrays.
 
 Angles are radians, lengths mm in the instrument frame; vectors have shape ``(3, ...)``.
 """
@@ -13,42 +13,42 @@ from a7sim.instrument.local_errors import local_errors
 
 
 def projection_centre(share: npt.ArrayLike, bx: npt.ArrayLike, by: npt.ArrayLike, bz: npt.ArrayLike) -> Array:
-    """Return where a projection centre stands on the main frame ``(3, ...)``: (share bx, -by, bz) (geometry.md).
+    """Return the position of a projection centre on the main frame ``(3, ...)``: (share bx, -by, bz) (geometry.md).
 
-    `share` tells how the base is laid off: 0 and 1 for the two centres of an A7, -1/2 and 1/2 for those of an A8.
+    `share` gives the layout of the base: 0 and 1 for the two centres of an A7, -1/2 and 1/2 for those of an A8.
     """
     place = np.asarray(share) * np.asarray(bx), -np.asarray(by), np.asarray(bz)
     return np.array(np.broadcast_arrays(*place) if any(each.ndim for each in place) else place, dtype=float)
 
 
 def apply_common_tilt(place: Array, common_phi: npt.ArrayLike) -> Array:
-    """Return places on the main frame ``(3, ...)`` when the frame is turned by the common Phi about the Y axis."""
+    """Return positions on the main frame ``(3, ...)`` after its rotation by the common Phi about the Y axis."""
     return mxv(rotation(0.0, common_phi, 0.0), place)
 
 
 class CameraAttitude(NamedTuple):
-    """A camera turned about its axes, wherever they meet."""
+    """Attitude of a camera rotated about its axes, which need not meet in its centre."""
 
     rotation: Array
     """``(3, 3, ...)``."""
     axis_offset: Array
-    """By how much the axes miss the projection centre, in the camera's axes ``(3, ...)``, mm."""
+    """Distance of the axes from the projection centre, in the camera's axes ``(3, ...)``, mm."""
     rotated_offset: Array
-    """The same in the frame's axes: it goes round with the camera."""
+    """The same in the frame's axes: it rotates with the camera."""
 
 
 def attitude_from_angles(
     omega: npt.ArrayLike, phi: npt.ArrayLike, kappa: npt.ArrayLike, missed: Array
 ) -> CameraAttitude:
-    """Return a camera with these tilts whose axes miss the projection centre by so much ``(3, ...)`` in mm."""
+    """Return a camera with these tilts and this distance ``(3, ...)`` in mm of its axes from the projection centre."""
     turned = rotation(omega, phi, kappa)
     return CameraAttitude(turned, missed, mxv(turned, missed))
 
 
 def pose(camera: CameraAttitude, place: Array, common_phi: npt.ArrayLike | None = None) -> tuple[Array, Array]:
-    """Return centre ``(3, ...)`` and rotation ``(3, 3, ...)`` of a camera whose axes meet at a place of the frame.
+    """Return centre ``(3, ...)`` and rotation ``(3, 3, ...)`` of a camera whose axes meet at a position of the frame.
 
-    The common Phi turns the frame with all that stands on it, `Ry(Phi) R`.
+    The common Phi rotates the frame with all its parts, `Ry(Phi) R`.
     """
     turned = camera.rotation
     centre = place + camera.rotated_offset - camera.axis_offset
@@ -66,10 +66,10 @@ def place_on_carrier(
     local: Array | None = None,
     rod: Array | None = None,
 ) -> Array:
-    """Return the place ``(2, ...)`` on a carrier where the space rod brings a mark ``(3, ...)``.
+    """Return the position ``(2, ...)`` on a carrier to which the space rod projects a mark ``(3, ...)``.
 
-    `principal_point` ``(2, ...)`` is by how much the carrier's centre misses the true one, `local` ``(2, k, ...)`` the
-    coefficients of local errors, `rod` ``(2, ...)`` the eccentricity of the rod in its cardan (`beside_the_centre`).
+    `principal_point` ``(2, ...)`` is the offset of the carrier's centre from the true one, `local` ``(2, k, ...)`` the
+    coefficients of local errors, `rod` ``(2, ...)`` the eccentricity of the rod in its gimbal (`eccentric_offset`).
     """
     direction = mark - centre
     if rod is None:
@@ -85,15 +85,15 @@ def place_on_carrier(
 
 
 def _in_camera(turned: Array, vector: Array) -> Array:
-    """Return vectors ``(3, ...)`` of the frame in the camera's axes; one alone by what is quickest for one."""
+    """Return vectors ``(3, ...)`` of the frame in the camera's axes, with a fast path for one vector."""
     return vector @ turned if vector.ndim == 1 else mxv(transposed(turned), vector)
 
 
 def eccentric_offset(direction: Array, eccentricity: Array) -> Array:
-    """Return by how much ``(3, ...)`` a rod of this direction ``(3, ...)``, downwards, passes beside its cardan.
+    """Return the distance vector ``(3, ...)`` of a rod with direction ``(3, ...)``, downwards, from its gimbal centre.
 
-    The outer axis of the cardan lies along X, the inner one goes round with it; `eccentricity` ``(2, ...)`` lies along
-    the rod's own two axes, which are X and Y for a rod that hangs plumb, and goes with them.
+    The outer axis of the gimbal is along X, the inner one rotates with it; `eccentricity` ``(2, ...)`` is along the
+    rod's own two axes, which are X and Y for a plumb rod, and rotates with them.
     """
     x, y, z = direction / length_of(direction)
     outer = np.hypot(y, z)

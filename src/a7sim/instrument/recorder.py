@@ -1,4 +1,4 @@
-"""The recording device: what the operator registered, numbered, never erased."""
+"""Recording device: registrations of the operator, numbered, never erased."""
 
 from dataclasses import dataclass, field, replace
 
@@ -7,7 +7,7 @@ from a7sim.instrument.errors import OutOfRangeError, SettingsConflictError
 
 @dataclass(frozen=True)
 class Registration:
-    """Counters and elements registered under a point; a struck one stays, marked."""
+    """Counters and elements registered under a point; a struck registration stays, marked."""
 
     number: int
     point: str
@@ -18,11 +18,11 @@ class Registration:
 
 @dataclass
 class Recorder:
-    """The registrations in order, numbered from 1."""
+    """Registrations in order, numbered from 1."""
 
     registrations: list[Registration] = field(default_factory=list)
     changes: list[Registration] = field(default_factory=list)
-    """Every registration as it became, by being made or struck, in order: what has come since some time is a tail."""
+    """Changes of registrations, made or struck, in order: the changes since some time are a tail."""
 
     def register(self, point: str, readings: list[tuple[str, str]]) -> Registration:
         """Add a registration and return it."""
@@ -31,14 +31,14 @@ class Recorder:
         return registration
 
     def apply(self, change: Registration) -> None:
-        """Let a registration stand as it became."""
+        """Apply a recorded change of a registration."""
         self.registrations[change.number - 1 : change.number] = [change]
         self.changes.append(change)
 
     def strike(self, number: int, why: str) -> None:
         """Mark a registration as struck out, once.
 
-        Raises OutOfRange for a number that is not there, SettingsConflict for one that is struck already.
+        Raises OutOfRangeError for an unknown number, SettingsConflictError for one that is already struck.
         """
         registration = self.by_number(number)
         if registration.struck is not None:
@@ -46,7 +46,7 @@ class Recorder:
         self.apply(replace(registration, struck=why))
 
     def by_number(self, number: int) -> Registration:
-        """Return a registration as it stands. Raises OutOfRange for a number that is not there."""
+        """Return a registration. Raises OutOfRangeError for an unknown number."""
         if not 1 <= number <= len(self.registrations):
             raise OutOfRangeError(f"expected a registration 1 to {len(self.registrations)}, got {number}")
         return self.registrations[number - 1]

@@ -1,4 +1,4 @@
-"""Spindles with their drums: what is set, what is read, and what really moves."""
+"""Spindles with their drums: setting, reading and true movement."""
 
 import math
 from dataclasses import dataclass
@@ -9,41 +9,41 @@ from a7sim.instrument.errors import OutOfRangeError
 from a7sim.plotters import COUNTER_DECIMALS, Element
 
 APPROXIMATIONS = 20
-"""Each is better than the last by the slope of the error, some hundredths."""
+"""Number of iterations; each reduces the error by the slope of the periodic error, some hundredths."""
 
 UNITS_A_DRUM = 1.0
-"""Counter units that a turn of the last drum counts, which it carries to the next one as it passes zero."""
+"""Counter units per turn of the last drum, which carries to the next one as it passes zero."""
 
 
 @dataclass(frozen=True, slots=True)
 class PeriodicError:
-    """The error of a screw that repeats with every turn."""
+    """Periodic error of a screw."""
 
     amplitude: float
     """mm."""
     lead: float
-    """mm a turn."""
+    """mm per turn."""
     phase: float = 0.0
     """Radians."""
 
     def at(self, position: float) -> float:
-        """Return by how much the nut has gone further than the turns say, in mm."""
+        """Return the excess travel of the nut over the turns, in mm."""
         return self.amplitude * math.sin(2.0 * math.pi * position / self.lead + self.phase)
 
 
 @dataclass
 class Spindle:
-    """A spindle whose drum is turned by hand and whose shaft follows with play and a setting error."""
+    """Spindle whose drum is turned by hand and whose shaft follows with play and a setting error."""
 
     low: float
     high: float
     at: float
-    """What the drum shows, unrounded."""
+    """Drum reading, unrounded."""
     endless: bool = False
     play: float = 0.0
     setting_sigma: float = 0.0
     zero_error: float = 0.0
-    """Zero error: the shaft stands that much further than the drum says."""
+    """Offset of the shaft from the drum reading."""
     periodic_error: PeriodicError | None = None
 
     def __post_init__(self) -> None:
@@ -56,21 +56,21 @@ class Spindle:
         return cls(element.low, element.high, element.zero, element.endless, play, setting_sigma, fault)
 
     def state(self) -> tuple[float, float, float]:
-        """Return where drum and shaft stand and the setting error, for `restore`."""
+        """Return drum and shaft positions and the setting error, for `restore`."""
         return self.at, self._shaft, self._error
 
     def restore(self, state: tuple[float, float, float]) -> None:
-        """Stand as when the state was taken."""
+        """Restore a state."""
         self.at, self._shaft, self._error = state
 
     @property
     def position(self) -> float:
-        """Where the shaft really stands, in mm or gon."""
+        """True position of the shaft, in mm or gon."""
         position = self._shaft + self._error + self.zero_error
         return position if self.periodic_error is None else position + self.periodic_error.at(position)
 
     def position_without_periodic_error(self, place: float) -> float:
-        """Return where the shaft would stand without the error that its turns repeat, the inverse of it."""
+        """Return the position without the periodic error, the inverse of it."""
         position = place
         if self.periodic_error is not None:
             for _ in range(APPROXIMATIONS):
@@ -79,22 +79,22 @@ class Spindle:
 
     @property
     def shown(self) -> float:
-        """What the counter shows."""
+        """Counter reading."""
         shown = round(self.at, COUNTER_DECIMALS)
         return round(shown % self.high, COUNTER_DECIMALS) if self.endless else shown + 0.0
 
     def within_range(self, value: float) -> bool:
-        """Whether the drum can be turned to a value."""
+        """Return whether the drum can be turned to a value."""
         return self.low - 1e-9 <= value <= self.high + 1e-9
 
     def value_after_turn(self, amount: float) -> float:
-        """Return to what value the drum comes when it is turned by so much."""
+        """Return the drum value after a turn by an amount."""
         return (self.at + amount) % self.high if self.endless else self.at + amount
 
     def turn_to(self, value: float, rng: np.random.Generator | None = None) -> None:
-        """Turn the drum to a value; with dice it is set by its counter, with a new setting error.
+        """Turn the drum to a value; with `rng` it is set by its counter, with a new setting error.
 
-        Raises OutOfRange; then nothing has moved.
+        Raises OutOfRangeError; then nothing has moved.
         """
         if not self.within_range(value):
             raise OutOfRangeError(f"expected {self.low:.2f} to {self.high:.2f}, got {value:.10g}")
@@ -113,29 +113,29 @@ _ROUNDED_TO = tuple(f"z.{decimals}f" for decimals in range(7))
 
 @dataclass
 class Counter:
-    """A counter geared to a carriage: ``reading = offset + units_per_mm * position``."""
+    """Counter geared to a carriage: ``reading = offset + units_per_mm * position``."""
 
     units_per_mm: float = 1.0
     decimals: int = COUNTER_DECIMALS
     offset: float = 0.0
     slip_share: float = 0.0
-    """Of the passes of the last drum over zero, those at which it does not carry the next."""
+    """Share of the passes of the last drum over zero without a carry to the next one."""
 
     def __post_init__(self) -> None:
         self._at_rest = self.offset
 
     def state(self) -> tuple[float, int, float]:
-        """Return units a mm, decimals and offset, for `restore`."""
+        """Return units per mm, decimals and offset, for `restore`."""
         return self.units_per_mm, self.decimals, self.offset
 
     def restore(self, state: tuple[float, int, float]) -> None:
-        """Count as when the state was taken."""
+        """Restore a state."""
         self.units_per_mm, self.decimals, self.offset = state
 
     def advance(self, before: float, after: float, rng: np.random.Generator) -> None:
         """Follow the carriage from one position to another, and slip where a carry fails.
 
-        What is missed once is missing until the counter is preset or cleared.
+        A missed carry stays missing until the counter is preset or cleared.
         """
         if not self.slip_share:
             return
@@ -145,33 +145,36 @@ class Counter:
             self.offset -= math.copysign(missed * UNITS_A_DRUM, last - first)
 
     def reading(self, position: float) -> float:
-        """Return what the counter shows at a carriage position in mm."""
+        """Return the reading at a carriage position in mm."""
         return round(self.offset + self.units_per_mm * position, self.decimals) + 0.0
 
     def text(self, position: float) -> str:
-        """Return what it shows as it is read off, with all its decimals."""
+        """Return the reading with all its decimals."""
         return format(self.offset + self.units_per_mm * position, _ROUNDED_TO[self.decimals])
 
     def position(self, reading: float) -> float:
-        """Return the carriage position in mm where the counter shows a reading, rounded to its last digit."""
+        """Return the carriage position in mm of a reading, rounded to its last digit."""
         return (round(reading, self.decimals) - self.offset) / self.units_per_mm
 
     @property
     def half_count(self) -> float:
-        """Half the last digit, in mm of the carriage: nearer than this the counter shows no difference."""
+        """Half the last digit, in mm of the carriage: the resolution of the counter."""
         return 0.5000001 * 10.0**-self.decimals / self.units_per_mm
 
     def preset(self, reading: float, position: float) -> None:
-        """Make the counter show a reading at the present position."""
+        """Preset the counter to a reading at the present position."""
         self.offset = round(reading, self.decimals) - self.units_per_mm * position
 
     def engage(self, units_per_mm: float, decimals: int, position: float) -> None:
-        """Change the gear; the counter goes on from what it shows."""
+        """Change the gear; the counter continues from its reading."""
         reading = self.offset + self.units_per_mm * position
         self.units_per_mm, self.decimals = units_per_mm, decimals
         self.preset(reading, position)
 
     def clear(self) -> None:
-        """Take off the preset: the counter shows mm of the instrument frame times its gear, and where it has one the
-        reading that stands at the frame's origin."""
+        """Remove the preset:
+
+        the counter shows mm of the instrument frame times its gear, plus its fixed reading at the frame's origin, if
+        any.
+        """
         self.offset = self._at_rest

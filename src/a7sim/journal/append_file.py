@@ -1,4 +1,4 @@
-"""A file that is only added to, a whole line at a time, and is on the disk when it has to be."""
+"""Append-only file of whole lines with controlled flushing to disk."""
 
 import fcntl
 import os
@@ -10,26 +10,25 @@ from typing import Literal, get_args
 from a7sim.errors import A7SimError
 
 Durability = Literal["always", "records", "none"]
-"""When a line is on the disk before anybody goes on: always, where it registers something, or when it pleases the
-operating system."""
+"""Time of flushing a line to disk: always, for registrations only, or when the operating system does it."""
 
 DURABILITIES: tuple[Durability, ...] = get_args(Durability)
 
 SYNCED_WITHIN_S = 0.2
-"""Wall-clock s after which all lines are on the disk, but for 'none'."""
+"""Wall-clock s within which all lines are on disk, except for 'none'."""
 
 _on_disk = getattr(os, "fdatasync", os.fsync)
 
 
 class JournalWriteError(A7SimError):
-    """A journal that can no longer be written, while its session goes on."""
+    """Journal that can no longer be written while its session runs."""
 
 
 class AppendOnlyFile:
-    """A file of lines. What `add` has returned from, the operating system has: no end of this process loses it."""
+    """File of lines. When `add` returns, the operating system has the line: no end of this process loses it."""
 
     def __init__(self, path: Path, durability: Durability = "records", size: int = 0) -> None:
-        """Open a file, new or to go on behind its first `size` bytes. Raises Mistake where it cannot be written."""
+        """Open a file, new or to continue behind its first `size` bytes. Raises A7SimError if it cannot be written."""
         self._path = path
         self._durability = durability
         self._size = size
@@ -50,9 +49,9 @@ class AppendOnlyFile:
             self._syncing.start()
 
     def add(self, line: bytes, at_once: bool = False) -> None:
-        """Add a line, with its end; `at_once` where it is to be on the disk before this returns.
+        """Add a line, with its end; `at_once` flushes it to disk before this returns.
 
-        Raises JournalStopped where that fails: then the line is not there, and no other can be added.
+        Raises JournalWriteError if that fails: then the line is not in the file, and no other can be added.
         """
         if self._error is not None:
             raise self._error
@@ -69,7 +68,7 @@ class AppendOnlyFile:
             raise self._failed(error) from error
 
     def close(self) -> None:
-        """Bring everything to the disk and close the file."""
+        """Flush everything to disk and close the file."""
         self._closing.set()
         self._pending.set()
         if self._syncing.is_alive():
@@ -101,7 +100,7 @@ class AppendOnlyFile:
 
 
 def is_being_written(path: Path) -> bool:
-    """Return whether somebody writes a file of lines now."""
+    """Return whether a process is writing a file of lines."""
     try:
         file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
@@ -116,12 +115,12 @@ def is_being_written(path: Path) -> bool:
 
 
 def write_failure_message(path: Path, error: OSError) -> JournalWriteError:
-    """Return what is said where a file of a journal can no longer be written."""
+    """Return the error for a file of a journal that can no longer be written."""
     return JournalWriteError(f"{path}: it can no longer be written, so the session stops here: {error.strerror}")
 
 
 def _sync_folder(folder: Path) -> None:
-    """Bring the name of a new file to the disk."""
+    """Flush the name of a new file to disk."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

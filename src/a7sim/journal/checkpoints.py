@@ -1,7 +1,7 @@
-"""Checkpoints: the state of an instrument now and then, by which a journal is verified and sought in.
+"""Checkpoints: states of an instrument by which a journal is verified and searched.
 
-States hold what is true of the instrument and nobody at it can see; they stand in a file of their own beside the
-journal, which holds their hashes.
+States contain truth about the instrument that cannot be observed at it; they are in a separate file beside the journal,
+which contains their hashes.
 """
 
 import hashlib
@@ -15,11 +15,11 @@ import msgspec
 from a7sim.instrument.autograph import State
 
 LINES_PER_CHECKPOINT = 2000
-"""Events of the link from checkpoint to checkpoint, where no line waits then."""
+"""Events of the link between checkpoints, made when no line waits."""
 
 
 class Checkpoint(msgspec.Struct, frozen=True):
-    """A state: the line of the journal that has its hash, the simulated time in s, and the state itself."""
+    """State: the line of the journal with its hash, the simulated time in s, and the state itself."""
 
     line: int
     t: float
@@ -38,7 +38,7 @@ def to_lines(checkpoints: Iterable[Checkpoint]) -> bytes:
 
 
 def read_checkpoints(path: Path) -> Iterator[Checkpoint]:
-    """Yield the checkpoints of a file up to the first that is damaged; none where there is no file."""
+    """Yield the checkpoints of a file up to the first damaged one; none without a file."""
     try:
         lines = path.read_bytes().splitlines()
     except OSError:
@@ -55,7 +55,7 @@ def read_checkpoints(path: Path) -> Iterator[Checkpoint]:
 
 @dataclass(frozen=True)
 class StateDifference:
-    """A part of a state that is not as it was: where it stands in it, what it was, and what it is."""
+    """Difference of two states: its path, the previous and the present value."""
 
     part: str
     before: Any

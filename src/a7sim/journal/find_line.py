@@ -1,4 +1,4 @@
-"""Finding a place in a journal: by its line, by the time, by what was noted there."""
+"""Finding a line of a journal: by number, by time, by the text of a note."""
 
 import re
 from bisect import bisect_left
@@ -9,7 +9,7 @@ _TIME = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:\.\d*)?)s?")
 
 
 def find_line(journalled: JournalFile, words: str) -> int | None:
-    """Return the line that @LINE, a time (s, or h:mm:ss) or the text of a note names, None where there is none."""
+    """Return the line of @LINE, of a time (s, or h:mm:ss) or of the text of a note, None if there is none."""
     numbers = range(2, len(journalled) + 1)
     found: int | None = None
     if words.startswith("@") and words[1:].isdecimal():

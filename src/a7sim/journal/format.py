@@ -1,4 +1,4 @@
-"""The lines of a journal: JSON, each with a checksum that follows from all before it; how they are made and read."""
+"""Format of a journal: lines of JSON, each with a checksum over all lines before it."""
 
 import zlib
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ _LENGTH_OF_END = len(_END_OF_LINE % 0)
 
 
 class Event(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What a journal holds of one moment, `t` being the simulated time in s.
+    """Event of a journal; `t` is the simulated time in s.
 
-    Where `kind` is empty, something that happened on the link (`LinkEvent`). Else 'entry', an entry of the
-    observation book; 'strike', the striking out of one; 'state', the hash of the instrument's state as it is then.
+    If `kind` is empty, an event on the link (`LinkEvent`). Otherwise 'entry', an entry of the observation book;
+    'strike', its striking out; 'state', the hash of the instrument's state.
     """
 
     t: float
@@ -44,7 +44,7 @@ class Event(msgspec.Struct, frozen=True, omit_defaults=True):
 
 @dataclass
 class ChecksumChain:
-    """The checksum that goes from line to line: one that is changed, lost or moved breaks it."""
+    """Chain of checksums over lines: a changed, lost or moved line breaks it."""
 
     crc: int = 0
 
@@ -55,7 +55,7 @@ class ChecksumChain:
         return body + _END_OF_LINE % self.crc
 
     def accepts(self, line: bytes) -> bool:
-        """Whether a line is the next one; if so it is counted as that."""
+        """Return whether a line is the next one; if so the chain advances."""
         crc = zlib.crc32(line[:-_LENGTH_OF_END], self.crc)
         if line[-_LENGTH_OF_END:] != _END_OF_LINE % crc:
             return False
@@ -65,7 +65,7 @@ class ChecksumChain:
 
 @dataclass(frozen=True)
 class JournalFile:
-    """What a journal holds: its lines as they stand there, and what of a last one was not written to its end."""
+    """Contents of a journal: its lines, and the truncated last line, if any."""
 
     path: Path
     header: dict[str, Any]
@@ -83,7 +83,7 @@ class JournalFile:
         return _DECODER.decode(self.lines[number - 1])
 
     def location(self, number: int) -> str:
-        """Return the place of a line, for people."""
+        """Return the location of a line as text."""
         return f"{self.path}, line {number}"
 
     @property
@@ -96,9 +96,9 @@ _DECODER = msgspec.json.Decoder(Event)
 
 
 def read_journal(path: Path) -> JournalFile:
-    """Return what a journal holds. Raises Mistake for one that cannot be read, or is damaged, naming the line.
+    """Return the contents of a journal. Raises A7SimError for an unreadable or damaged one, naming the line.
 
-    A last line without an end is torn: it was being written when everything stopped, and nobody was told of it.
+    A last line without an end is truncated: it was being written at a crash, and no client had its reply.
     """
     try:
         data = path.read_bytes()
@@ -120,7 +120,7 @@ def read_journal(path: Path) -> JournalFile:
 
 
 def has_header(path: Path) -> bool:
-    """Return whether there is a journal with a whole line: its header, from which a session goes on."""
+    """Return whether there is a journal with a whole line: its header, from which a session can continue."""
     try:
         with path.open("rb") as file:
             return file.readline().endswith(b"\n")

@@ -1,4 +1,4 @@
-"""A person's chair at an instrument in this process: what is said from it is journalled, and can be gone on with."""
+"""Interactive session at an instrument in this process, journalled and resumable."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,9 +18,9 @@ from a7sim.scene import build_scene
 
 
 class InteractiveSession:
-    """A chair at the instrument of a scenario, which is built when somebody first speaks to it.
+    """Session at the instrument of a scenario, which is built on first use.
 
-    The journal is begun in a new folder of the name `folder`; or it goes on, where `begun` is a session that was left.
+    The journal starts in a new folder of the name `folder`, or continues if `begun` is an earlier session.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class InteractiveSession:
         self._held = False
 
     def open(self) -> Client:
-        """Return a client of the instrument. Raises Mistake where the journal cannot be written or gone on with."""
+        """Return a client of the instrument. Raises A7SimError if the journal cannot be written or continued."""
         if self._instrument is None:
             self._instrument = self._anew() if self.begun is None else self._again(self.begun)
         client = Client(InProcessSerial(instrument=self._instrument, clock=self.clock, timeout=TIMEOUT_S))
@@ -60,7 +60,7 @@ class InteractiveSession:
         return instrument
 
     def history(self) -> Iterator[Event]:
-        """Yield what was said in the session that is gone on with, and what was answered."""
+        """Yield the lines and replies of the resumed session."""
         there = self.begun.journalled if self.begun else None
         for number in range(2, len(there) + 1 if there else 0):
             assert there is not None
@@ -69,6 +69,6 @@ class InteractiveSession:
                 yield event
 
     def close(self) -> None:
-        """End the journal, which can be gone on with. Raises Mistake where it cannot be written to its end."""
+        """Close the journal, which can be resumed. Raises A7SimError if it cannot be completed."""
         if self._instrument is not None:
             self._journal.close(None)

@@ -1,4 +1,4 @@
-"""A film of a session: its journal worked again on a fresh instrument, on and back, for somebody who watches."""
+"""Recording of a session: its journal replayed on a fresh instrument, forwards and backwards, for a viewer."""
 
 import re
 from bisect import bisect_left, bisect_right
@@ -25,45 +25,45 @@ from a7sim.scenario import Scenario
 _SAID = (">", "!")
 
 _DRAWS = re.compile(r"EYEP\w*:PICT\w*\?|COUN\?;:PROJ1:", re.IGNORECASE)
-"""A line by which a screen is drawn: it is said again, and is no step."""
+"""Line that draws a screen: it is replayed, and is not a step."""
 
 _POINT = re.compile(r'(?:EYEP\w*(?::STER\w*)?\?|REC(?:ORD)?)\s+"((?:[^"]|"")+)"', re.IGNORECASE)
 
 MAX_REPLAYED_LINES = 200
-"""Lines that are said again rather than a checkpoint behind them sought."""
+"""Number of lines that are replayed rather than seeking a later checkpoint."""
 
 _LOOKED_BACK = 200
-"""Steps back in which the point is looked for that is worked at."""
+"""Steps searched backwards for the current point."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Where a film stands: steps are the lines that were said, but for those that drew a screen; 0 is before them."""
+    """State of a recording: steps are the lines except those that draw a screen; 0 is before the first."""
 
     step: int
     time: float
     """Simulated s."""
     line: str = ""
-    """Who said something last, and what."""
+    """Last line and its client."""
     point: str | None = None
-    """The point that was last looked at or registered."""
+    """Point that was last viewed or registered."""
     origins: dict[str, float] = field(default_factory=dict)
-    """What each counter shows in the origin of the frame."""
+    """Reading of each counter at the origin of the frame."""
     units: dict[str, float] = field(default_factory=dict)
-    """Units a mm of each counter."""
+    """Units per mm of each counter."""
     error: str = ""
-    """Where what was filmed did not happen again."""
+    """Difference of the replay from the journal, if any."""
 
 
 class Recording:
-    """A session worked again, and an instrument's front at which it is seen.
+    """Replayed session, and a separate front end of the instrument for viewing it.
 
-    The front has a desk of its own, so that who looks is not a client of the session. Whoever runs the film and whoever
-    looks do so one after the other.
+    The front end has a shared instrument of its own, so that a viewer is not a client of the session. Seeking and
+    viewing must not be concurrent.
     """
 
     def __init__(self, journalled: JournalFile, scenario: Scenario | None = None) -> None:
-        """Make the film of a journal, whose scenario stands beside it unless it is given. Raises Mistake."""
+        """Create the recording of a journal; its scenario is beside it unless given. Raises A7SimError."""
         self.journalled = journalled
         self._scenario = scenario
         self._numbers: list[int] = []
@@ -91,15 +91,15 @@ class Recording:
 
     @property
     def steps(self) -> int:
-        """How many lines were said that drew no screen."""
+        """Number of lines that draw no screen."""
         return len(self._numbers)
 
     def open_client(self) -> Client:
-        """Return a client that sees the instrument as it stands in the film."""
+        """Return a client that sees the instrument at the present step."""
         return Client(InProcessSerial(instrument=self._front, timeout=TIMEOUT_S))
 
     def seek(self, step: int) -> Frame:
-        """Run on, or back, until a step is done with all that came of it; 0 is the beginning."""
+        """Move forwards or backwards until a step is complete; 0 is the start."""
         end = self._numbers[step] if step < self.steps else len(self.journalled) + 1
         if self._leaps_to(end):
             self._replay = Replay(self.journalled, self._scenario)
@@ -115,12 +115,12 @@ class Recording:
         return self.frame
 
     def _leaps_to(self, end: int) -> bool:
-        """Whether it is quicker to go on from a checkpoint than from here."""
+        """Return whether continuing from a checkpoint is faster than from here."""
         at = bisect_left(self._checkpoints, end) - 1
         return end < self._next or (at >= 0 and self._checkpoints[at] - self._next > MAX_REPLAYED_LINES)
 
     def advance_until(self, enough: Callable[[], bool]) -> Frame:
-        """Run on, a step at least if there is one, until that is enough."""
+        """Move forwards, at least one step if possible, until the predicate is true."""
         frame = self.frame
         while frame.step < self.steps:
             frame = self.seek(frame.step + 1)
@@ -129,16 +129,16 @@ class Recording:
         return frame
 
     def step_at(self, time: float) -> int:
-        """Return the last step that was done by a simulated time in s."""
+        """Return the last step completed by a simulated time in s."""
         return bisect_right(self._times, time)
 
     def next_record(self, step: int, way: int) -> int | None:
-        """Return the next step, on or back, at which something was registered or struck out; None where none was."""
+        """Return the next step in a direction with a registration or a strike; None if there is none."""
         at = bisect_right(self._records, step) if way > 0 else bisect_left(self._records, step) - 1
         return self._records[at] if 0 <= at < len(self._records) else None
 
     def find_step(self, words: str) -> int:
-        """Return the step that a number, a time, @LINE or the text of a note names. Raises Mistake for another."""
+        """Return the step of a number, a time, @LINE or the text of a note. Raises A7SimError for anything else."""
         if words.isdecimal() and int(words) <= self.steps:
             return int(words)
         line = None if words.isdecimal() else find_line(self.journalled, words)
@@ -175,7 +175,7 @@ class Recording:
 
 
 def open_recording(session: str) -> Recording:
-    """Return the film of a session's folder, of a journal, or of a script as it is played. Raises Mistake."""
+    """Return the recording of a session's folder, of a journal, or of a script as it runs. Raises A7SimError."""
     path = Path(session)
     if path.is_dir():
         return Recording(read_journal(path / JOURNAL))
@@ -185,7 +185,7 @@ def open_recording(session: str) -> Recording:
 
 
 def _played(file: Path) -> Recording:
-    """Return the film of a script that is played up to its end, or to where it and the instrument part."""
+    """Return the recording of a script run to its end, or to its first failed expectation."""
     script = read_script(file)
     heard: list[LinkEvent] = []
     ScriptRunner(script, heard.append).run()

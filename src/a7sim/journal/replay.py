@@ -1,4 +1,4 @@
-"""A journal worked again on a fresh instrument: every reply and every checkpoint compared with what stands there."""
+"""Replay of a journal on a fresh instrument: all replies and checkpoints are compared."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -21,13 +21,13 @@ from a7sim.scenario import Scenario, from_data, hash_scenario
 from a7sim.scene import build_scene
 
 RECORDED = "record"
-"""The command whose journals hold what crossed a line, and nothing of how the instrument waited."""
+"""Command whose journals contain the traffic of a client, and not the waits of the instrument."""
 
 
 def scenario_of_journal(journalled: JournalFile, known: Scenario | None = None) -> tuple[Scenario, int]:
-    """Return the scenario and the seed of a session, the scenario from beside the journal unless it is known.
+    """Return the scenario and the seed of a session; the scenario is beside the journal unless known.
 
-    Raises Mistake where they are not those the session was begun with.
+    Raises A7SimError if they are not those of the session's start.
     """
     header = journalled.header
     if not knows_scenario(journalled):
@@ -48,12 +48,12 @@ def scenario_of_journal(journalled: JournalFile, known: Scenario | None = None) 
 
 
 def knows_scenario(journalled: JournalFile) -> bool:
-    """Whether it is said of what scenario the instrument is."""
+    """Return whether the scenario of the instrument is known."""
     return journalled.header.get("scenario_hash") is not None
 
 
 def _scenario_beside(journalled: JournalFile) -> Scenario:
-    """Return the scenario of a journal, which in version 2 stood in its header. Raises Mistake where there is none."""
+    """Return the scenario of a journal, which in version 2 is in its header. Raises A7SimError if there is none."""
     path, where = journalled.path.with_suffix(SCENARIO_SUFFIX), journalled.location(1)
     data = journalled.header.get("scenario")
     if data is None:
@@ -72,19 +72,19 @@ def _scenario_beside(journalled: JournalFile) -> Scenario:
 
 @dataclass(frozen=True)
 class ReplayDifference:
-    """Where a replay first differs: the line, what the journal has and what the instrument says; '' for nothing."""
+    """First difference of a replay: the line, the journal's text and the instrument's; '' for none."""
 
     line: int
     journalled: str
     replayed: str
     parts: tuple[StateDifference, ...] = ()
-    """Of the state, at the next checkpoint whose state is known."""
+    """Of the state, at the next checkpoint with a known state."""
 
 
 class Replay:
-    """A fresh instrument to which the lines of a journal are said again, from the first or from a checkpoint.
+    """Fresh instrument on which the lines of a journal are replayed, from the first or from a checkpoint.
 
-    Where the journal is not asked what the instrument is, that is handed in.
+    Scenario and seed may be given instead of those of the journal.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class Replay:
         )
         self.time = 0.0
         self.checkpoints: list[Checkpoint] = []
-        """Those passed, their states as they are here."""
+        """Passed checkpoints with their states in the replay."""
         self._clock = Clock() if header.get("command") == RECORDED else None
         self._said: deque[LinkEvent] = deque()
         self._changes = 0
@@ -116,7 +116,7 @@ class Replay:
             self._said.append(event)
 
     def seek(self, line: int) -> int:
-        """Go to the last checkpoint before a line whose state is known; return the line that comes next."""
+        """Move to the last checkpoint before a line with a known state; return the next line."""
         known: list[Checkpoint] = []
         for checkpoint in read_checkpoints(self.journalled.path.with_name(STATES)):
             if checkpoint.line >= line or not self._is_of_the_journal(checkpoint):
@@ -138,7 +138,7 @@ class Replay:
         return 1 < number <= len(self.journalled) and self.journalled.event(number).hash == checkpoint.hash
 
     def apply(self, number: int, event: Event) -> ReplayDifference | None:
-        """Let an event of the journal happen again; return how it differs, if it does."""
+        """Replay an event of the journal; return its difference, if any."""
         self.time = event.t
         if event.kind == "state":
             return self._compared(number, event)
@@ -154,7 +154,7 @@ class Replay:
         return self._expected(number, event)
 
     def _say_as_recorded(self, number: int, event: Event) -> ReplayDifference | None:
-        """Compare replies only, in their order: lines may have been sent before they came."""
+        """Compare replies only, in their order: lines may have been sent before the replies arrived."""
         if event.dir == "<":
             return self._expected(number, event)
         if event.dir == "-":
@@ -163,11 +163,11 @@ class Replay:
         return None
 
     def final_difference(self) -> ReplayDifference | None:
-        """Return what the instrument still says where the journal ends, if it does."""
+        """Return the instrument's further output at the end of the journal, if any."""
         return self._left_over(len(self.journalled) + 1)
 
     def pending_events(self) -> list[LinkEvent]:
-        """Return what the instrument still says where the journal ends: it broke off before that was written."""
+        """Return the instrument's further events at the end of the journal, which stopped before they were written."""
         left = list(self._said)
         self._said.clear()
         return left
@@ -219,7 +219,7 @@ class Replay:
         return ()
 
     def state_differences(self, after: int) -> tuple[StateDifference, ...]:
-        """Return in what the state differs at the first checkpoint after a line, the rest up to there said again."""
+        """Return the differences of the state at the first checkpoint after a line, after replaying up to it."""
         for number in range(after + 1, len(self.journalled) + 1):
             event = self.journalled.event(number)
             if event.kind == "state":
@@ -229,7 +229,7 @@ class Replay:
 
 
 def replay_lines(replay: Replay, first: int = 2) -> Iterator[tuple[int, Event, ReplayDifference | None]]:
-    """Say the lines of a journal again, from a line on; yield each with its number and how it differs."""
+    """Replay the lines of a journal, from a line on; yield each with its number and its difference."""
     for number in range(first, len(replay.journalled) + 1):
         event = replay.journalled.event(number)
         yield number, event, replay.apply(number, event)

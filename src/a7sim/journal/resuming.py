@@ -1,4 +1,4 @@
-"""Going on with a session that was cut off, from what its folder holds."""
+"""Resuming of an interrupted session from its folder."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from a7sim.scenario import Scenario
 
 @dataclass(frozen=True)
 class ResumableSession:
-    """A session that was begun: what its journal holds, and the scenario and the seed that stand there."""
+    """Started session: its journal, and the scenario and the seed in it."""
 
     journalled: JournalFile
     scenario: Scenario
@@ -23,34 +23,32 @@ class ResumableSession:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What was asked for beside the scenario, by name."""
+        """Options beside the scenario, by name."""
         return dict(self.journalled.header["settings"])
 
     def setting(self, name: str) -> Any:
-        """Return what was asked for beside the scenario, None where nothing was said of it."""
+        """Return an option beside the scenario, None if it was not recorded."""
         return self.settings.get(name)
 
 
 def find_resumable(folder: Path, command: str) -> ResumableSession:
-    """Return the session that a command began in a folder. Raises Mistake where that cannot be gone on with."""
+    """Return the session that a command started in a folder. Raises A7SimError if it cannot be resumed."""
     journalled = read_journal(folder / JOURNAL)
     for name, expected in (("command", command), ("software", software_version())):
         got = journalled.header.get(name)
         if got != expected:
-            raise A7SimError(
-                f"{journalled.location(1)}: expected a session of {expected} to go on with, got one of {got}"
-            )
+            raise A7SimError(f"{journalled.location(1)}: expected a session of {expected} to resume, got one of {got}")
     version = journalled.header["schema_version"]
     if version != SCHEMA_VERSION:
         raise A7SimError(
-            f"{journalled.location(1)}: expected schema_version {SCHEMA_VERSION} to go on with, got {version}, "
+            f"{journalled.location(1)}: expected schema_version {SCHEMA_VERSION} to resume, got {version}, "
             "which can be replayed only"
         )
     return ResumableSession(journalled, *scenario_of_journal(journalled))
 
 
 class RestoredInstrument(NamedTuple):
-    """An instrument as a journal leaves it, its clients gone: the desk, the time there in s, and who held the lock."""
+    """Instrument in the state of a journal, without its clients: the time in s, and the holder of the lock."""
 
     instrument: SharedInstrument
     time: float
@@ -58,9 +56,9 @@ class RestoredInstrument(NamedTuple):
 
 
 def restore_instrument(begun: ResumableSession, journal: Journal, from_checkpoint: bool = False) -> RestoredInstrument:
-    """Return an instrument as its journal leaves it; the journal goes on.
+    """Return an instrument in the state of its journal; the journal continues.
 
-    All that it holds happens again, or what stands behind its last checkpoint. Raises Mistake where it does not.
+    All events, or those behind the last checkpoint, are replayed. Raises A7SimError if the replay differs.
     """
     replay = Replay(begun.journalled)
     first = replay.seek(len(begun.journalled) + 1) if from_checkpoint else 2

@@ -1,4 +1,4 @@
-"""A script played: its lines said to a fresh instrument, what it expects compared with what comes."""
+"""Runner of scripts: lines are sent to a fresh instrument, and replies compared with expectations."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from a7sim.scene import build_scene
 
 @dataclass(frozen=True)
 class ExpectationFailed:
-    """Where a script and the instrument part: what was expected there, and what came."""
+    """Failed expectation of a script: the expected and the actual reply."""
 
     place: SourceLocation
     expected: str
@@ -25,7 +25,7 @@ class ExpectationFailed:
 
 
 class ScriptRunner:
-    """The operator of a script, at a fresh instrument or at a desk that is there."""
+    """Runner of a script, at a fresh or a given instrument."""
 
     def __init__(
         self,
@@ -39,7 +39,7 @@ class ScriptRunner:
         self.instrument = instrument or _fresh(script, listener)
 
     def run(self, client: str | None = None) -> ExpectationFailed | None:
-        """Carry out the statements up to the first that fails, and return that; an error not expected is one."""
+        """Run the statements up to the first that fails, and return that; an unexpected error is a failure."""
         engine = self.instrument.open(client, time=self._clock.now)
         for done, after in zip(self._script.statements, [*self._script.statements[1:], None], strict=False):
             failed = self._carry_out(engine, done)
@@ -81,7 +81,7 @@ def _asks_for_errors(statement: Statement | None) -> bool:
 
 
 def _fields(part: Part) -> list[str]:
-    """Return the values of an answer, texts with their quotes."""
+    """Return the values of a reply, texts with their quotes."""
     text, fields, within = part_as_text(part), [""], False
     for character in text:
         within ^= character == '"'

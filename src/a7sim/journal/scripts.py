@@ -1,4 +1,4 @@
-"""Operator scripts (`.a7s`): a session written by hand, a statement a line.
+"""Operator scripts (`.a7s`): a session written by hand, one statement per line.
 
 scenario akwanga seed 7                  # first of all: the instrument and what lies in the drawer
 PHOT1:LOAD "101"                         # any line of the command language
@@ -21,7 +21,7 @@ from a7sim.table_files import read_text
 SUFFIX = ".a7s"
 
 ANYTHING = "*"
-"""Stands for a value that may be any."""
+"""Matches any value."""
 
 _OF_BINARY_FRACTIONS = 1e-9
 
@@ -34,7 +34,7 @@ _VALUES = re.compile(r"\s*(\"(?:[^\"]|\"\")*\"|[^,\"]+?)\s*(?:,|$)")
 
 @dataclass(frozen=True)
 class SourceLocation:
-    """Where in which file something stands."""
+    """File and line of a statement."""
 
     file: Path
     line: int
@@ -45,7 +45,7 @@ class SourceLocation:
 
 @dataclass(frozen=True)
 class SendLine:
-    """A line for the instrument."""
+    """Line for the instrument."""
 
     place: SourceLocation
     text: str
@@ -53,7 +53,7 @@ class SendLine:
 
 @dataclass(frozen=True)
 class Wait:
-    """Simulated s that go by."""
+    """Wait in simulated s."""
 
     place: SourceLocation
     seconds: float
@@ -61,7 +61,7 @@ class Wait:
 
 @dataclass(frozen=True)
 class Expect:
-    """A query and what it is to answer, numbers `within` so much; a value * may be any."""
+    """Query and its expected reply, numbers `within` a tolerance; a value * matches any."""
 
     place: SourceLocation
     query: str
@@ -73,7 +73,7 @@ class Expect:
         return f"{self.query} = {', '.join(self.values)}{tolerance}"
 
     def matches(self, answer: tuple[str, ...]) -> bool:
-        """Whether an answer is the one expected."""
+        """Return whether a reply meets the expectation."""
         return len(answer) == len(self.values) and all(map(self._met, self.values, answer))
 
     def _met(self, expected: str, got: str) -> bool:
@@ -90,7 +90,7 @@ Statement = SendLine | Wait | Expect
 
 @dataclass(frozen=True)
 class Script:
-    """A script with all that it includes: what lies in the drawer, and the statements in their order."""
+    """Script with all its includes: its scenario, and the statements in order."""
 
     file: Path
     scenario: Scenario
@@ -99,7 +99,7 @@ class Script:
 
 
 def find_script(name: str) -> Path:
-    """Return the path of a script, by path or by the bare name of one that comes with a7sim. Raises Mistake."""
+    """Return the path of a script, given as a path or as the name of one that comes with a7sim. Raises A7SimError."""
     path = Path(name)
     if path.is_file():
         return path
@@ -116,7 +116,7 @@ def find_script(name: str) -> Path:
 
 
 def read_script(path: Path) -> Script:
-    """Return a script. Raises Mistake for what is none, naming file and line."""
+    """Return a script. Raises A7SimError with file and line."""
     asked: list[tuple[SourceLocation, str, int | None]] = []
     statements = tuple(_statements(path, (), asked))
     if not asked:

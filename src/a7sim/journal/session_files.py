@@ -1,4 +1,4 @@
-"""The folder that a session leaves."""
+"""Names and writing of the files of a session."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -7,7 +7,7 @@ from a7sim.errors import A7SimError
 
 JOURNAL, STATES, TORN = "session.jsonl", "session.states.jsonl", "session.jsonl.torn"
 SCENARIO_SUFFIX = ".scenario.json"
-"""Of the scenario beside a journal, in place of its own suffix."""
+"""Suffix of the scenario beside a journal, in place of its own suffix."""
 BOOK, MODELS, STRIP, RESULTS = "book.csv", "models.csv", "strip.csv", "results.json"
 CARDS, OUTPUT_CARDS, CARD_KEY = "strip.crd", "strip-output.crd", "strip-numbers.csv"
 STRIPS = "strips.csv"
@@ -38,7 +38,10 @@ FILES = (
 
 
 def prepare_folder(out: Path, force: bool, parts: Iterable[str] = ()) -> None:
-    """Make a folder for a session's files, without any of its parts'. Raises Mistake where it exists, unless forced."""
+    """Create a folder for a session's files, without those of its parts.
+
+    Raises A7SimError if it exists, unless forced.
+    """
     try:
         if out.exists() and not out.is_dir():
             raise A7SimError(f"{out}: expected a folder, got a file")
@@ -55,7 +58,7 @@ def prepare_folder(out: Path, force: bool, parts: Iterable[str] = ()) -> None:
 
 
 def write_atomic(path: Path, text: str) -> None:
-    """Write a file so that it is there whole or not at all."""
+    """Write a file atomically."""
     temporary = path.with_name(path.name + ".part")
     try:
         temporary.write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The shelf of a person's sessions: a folder each, the last to go on with, and room for the next."""
+"""Store of a user's sessions: one folder each, to resume the last one or start a new one."""
 
 import re
 from collections.abc import Iterator
@@ -17,22 +17,22 @@ COMMAND = "console"
 
 @dataclass(frozen=True)
 class SavedSession:
-    """A session that was left or cut off."""
+    """Session that was left or interrupted."""
 
     folder: Path
     begun: ResumableSession | None
     error: str = ""
-    """Why it cannot be gone on with, where `begun` is None."""
+    """Reason why it cannot be resumed, if `begun` is None."""
 
     @property
     def ended_at_s(self) -> float:
-        """The simulated time in s at which it was left."""
+        """Simulated time in s of its end."""
         journalled = self.begun.journalled if self.begun else ()
         return self.begun.journalled.event(len(journalled)).t if self.begun and len(journalled) > 1 else 0.0
 
     @property
     def has_changes(self) -> bool:
-        """Whether anything was done, and not only looked at."""
+        """Return whether anything was changed, and not only viewed."""
         if self.begun is None:
             return False
         there = self.begun.journalled
@@ -41,7 +41,7 @@ class SavedSession:
 
     @property
     def last_activity(self) -> float:
-        """When something was last said, in s of the wall's calendar."""
+        """Wall-clock time of the last event."""
         return (self.folder / JOURNAL).stat().st_mtime
 
 
@@ -50,7 +50,7 @@ def _does(line: str) -> bool:
 
 
 def last_session(folder: Path, scenario: Scenario, seed: int) -> SavedSession | None:
-    """Return the last session of a scenario and a seed in a folder of this name, numbered or not, if there is one."""
+    """Return the last session of a scenario and a seed in a folder of this name, numbered or not, if any."""
     wanted = hash_scenario(scenario), seed
     return next((left for each in _latest_first(folder) if (left := _left_in(each, *wanted)) is not None), None)
 
@@ -68,7 +68,7 @@ def _left_in(folder: Path, scenario_hash: str, seed: int) -> SavedSession | None
     if (header.get("scenario_hash"), header.get("seed")) != (scenario_hash, seed):
         return None
     if is_being_written(folder / JOURNAL):
-        return SavedSession(folder, None, f"{folder}: somebody sits there")
+        return SavedSession(folder, None, f"{folder}: the session is in use")
     try:
         return SavedSession(folder, find_resumable(folder, COMMAND))
     except A7SimError as error:
@@ -76,7 +76,7 @@ def _left_in(folder: Path, scenario_hash: str, seed: int) -> SavedSession | None
 
 
 def new_folder(folder: Path) -> Path:
-    """Make a folder of this name, numbered where there are such, and return it. Raises Mistake where that cannot be."""
+    """Create a folder of this name, numbered if there are others, and return it. Raises A7SimError if that fails."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         for each in _free(folder):
@@ -91,7 +91,7 @@ def new_folder(folder: Path) -> Path:
 
 
 def _numbered(folder: Path) -> dict[int, Path]:
-    """Return what is there of this name, by its number; 1 has none."""
+    """Return the folders of this name by number; number 1 has no suffix."""
     if not folder.parent.is_dir():
         return {}
     found = (

@@ -1,4 +1,4 @@
-"""A session told line by line, for people."""
+"""Transcript of a session, line by line."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from a7sim.instrument.language import LinkEvent, Listener
 from a7sim.journal.format import Event
 
-_IN_WORDS = {"+": "+ comes", "-": "- goes", "~": "~ goes on"}
+_IN_WORDS = {"+": "+ connects", "-": "- disconnects", "~": "~ continues"}
 
 
 def format_event(event: Event) -> str:
-    """Return a line of a journal for people."""
+    """Return an event of a journal as a line of text."""
     if event.kind == "entry":
         words = (event.model, event.form, event.point, event.item, event.reading, event.remark)
         return _line(event.t, "book", f"{event.number}: {', '.join(word for word in words if word)}")
@@ -27,14 +27,14 @@ def _line(time: float, active: str, what: str) -> str:
 
 @dataclass(frozen=True)
 class TranscriptListener:
-    """A listener that tells people what it hears when it is due, and lets another listener hear it first."""
+    """Listener that prints each event when it is due, after another listener has handled it."""
 
     tell: Callable[[str], None]
     until: Callable[[float], None]
     first: Listener
 
     def on_link_event(self, event: LinkEvent) -> None:
-        """Tell what happened on the link."""
+        """Print an event on the link."""
         self.first(event)
         self.until(event.time)
         self.tell(format_event(Event(event.time, event.client, event.direction, event.text)))

@@ -1,4 +1,4 @@
-"""The journal of a session as it is written: what crossed the link and what the operator wrote down, in order."""
+"""Writer of a session's journal: all lines on the link and all entries of the book, in order."""
 
 import re
 from collections.abc import Iterable
@@ -26,25 +26,25 @@ _MAX_SHOWN_LENGTH = 300
 
 
 def is_registration(line: str) -> bool:
-    """Return whether a line registers something or strikes it out."""
+    """Return whether a line registers a reading or strikes it out."""
     return _REGISTERS.search(line) is not None
 
 
 def software_version() -> str:
-    """Return the name and version under which journals are written."""
+    """Return name and version of the software that writes journals."""
     return f"a7sim {a7sim.__version__}"
 
 
 @dataclass(frozen=True)
 class Header:
-    """What a journal says first, and the scenario, which stands in a file of its own since it holds truth."""
+    """Header of a journal, and the scenario, which is in a separate file because it contains truth."""
 
     line: dict[str, Any]
     scenario: Scenario | None = None
 
 
 def make_header(command: str, scenario: Scenario, seed: int, **settings: Any) -> Header:
-    """Return what a journal says first: all that a session follows from, beside what is said in it."""
+    """Return the header of a journal: all that a session depends on except its lines."""
     line = {
         "schema_version": SCHEMA_VERSION,
         "software": software_version(),
@@ -60,36 +60,36 @@ def make_header(command: str, scenario: Scenario, seed: int, **settings: Any) ->
 
 
 def make_header_without_scenario(command: str, **settings: Any) -> Header:
-    """Return what a journal says first where nobody knows what the instrument is of."""
+    """Return the header of a journal for an instrument with an unknown scenario."""
     first = {"schema_version": SCHEMA_VERSION, "software": software_version(), "command": command}
     return Header(first | {"scenario_hash": None, "settings": settings})
 
 
 @dataclass(frozen=True)
 class JournalOptions:
-    """How a session is kept: when its journal is on the disk, and whether it goes on from a journal that is there."""
+    """Options of a journal: its durability, and whether it continues an existing one."""
 
     durability: Durability = "records"
     resumes: bool = False
     states: bool = True
-    """Whether states are kept beside the journal, for seeking in it; they are part of the truth."""
+    """Whether states are written beside the journal, for seeking in it; they are part of the truth."""
 
     def prepare(self, folder: Path | None, force: bool, parts: Iterable[str] = ()) -> None:
-        """See that a session and its parts can be left in a folder, unless it is there already. Raises Mistake."""
+        """Check that a session and its parts can be written to a folder, unless it is resumed. Raises A7SimError."""
         if folder is not None and not self.resumes:
             prepare_folder(folder, force, parts)
 
     def for_part(self, folder: Path | None) -> "JournalOptions":
-        """Return how a session is kept that is part of another, which may have been cut off before this one began."""
+        """Return the options for a part of a session, which may have been interrupted before this part started."""
         begun = folder is not None and has_header(folder / JOURNAL)
         return replace(self, resumes=self.resumes and begun)
 
 
 class Journal:
-    """A journal, which hears from when it is made and writes from when it is opened, as a context.
+    """Journal, a listener from its creation and a writer from its opening as a context.
 
-    A session that is resumed is worked again from its beginning: as long as the journal that is there lasts, what
-    would be written is compared with it; then it is written on.
+    A resumed session runs again from its start: up to the end of the existing journal, its events are compared with it;
+    then writing continues.
     """
 
     def __init__(self, journal_options: JournalOptions | None = None) -> None:
@@ -107,9 +107,9 @@ class Journal:
         self._changes = 0
 
     def recording(self, folder: Path | None, header: Header, instrument: SharedInstrument | None) -> "Journal":
-        """Begin to write, where there is a folder; about a desk, where there is one.
+        """Start writing, if there is a folder; with checkpoints, if there is an instrument.
 
-        A session that is resumed sets aside what is torn of its journal. Raises Mistake where it cannot be written.
+        A resumed session saves the truncated tail of its journal. Raises A7SimError if it cannot be written.
         """
         self._instrument = instrument
         if folder is not None:
@@ -130,7 +130,7 @@ class Journal:
         return self
 
     def resume_at(self, there: JournalFile, instrument: SharedInstrument, checkpoints: list[Checkpoint]) -> "Journal":
-        """Go on behind a journal whose session stands at a desk. Raises Mistake where it cannot be written."""
+        """Continue a journal whose session is restored in an instrument. Raises A7SimError if it cannot be written."""
         save_truncated_tail(there)
         self._instrument = instrument
         self._begin(there.path.parent, there.size, to_lines(checkpoints))
@@ -147,7 +147,7 @@ class Journal:
             self._states.write_bytes(states)
 
     def on_link_event(self, event: LinkEvent) -> None:
-        """Write what happened on the link. Raises JournalStopped where that fails, unless somebody just went."""
+        """Write an event on the link. Raises JournalWriteError if that fails, except for a disconnect."""
         try:
             self._hear(event)
         except JournalWriteError:
@@ -174,7 +174,7 @@ class Journal:
         self._write(Event(event.time, event.client, event.direction, event.text), at_once)
 
     def on_book_entry(self, entry: BookEntry, time: float) -> None:
-        """Write an entry of the observation book, or that it was struck out. Raises Mistake where that fails."""
+        """Write an entry of the observation book, or its striking out. Raises A7SimError if that fails."""
         if self._file is None:
             return
         self._time = time
@@ -197,7 +197,7 @@ class Journal:
             )
 
     def close(self, error: BaseException | None) -> None:
-        """Write nothing more, after a last checkpoint where nothing went wrong. Raises Mistake where that fails."""
+        """Close the journal, with a last checkpoint unless an error occurred. Raises A7SimError if that fails."""
         try:
             if error is None and self._instrument is not None and self._instrument.is_idle and self._since_checkpoint:
                 self._checkpoint(self._time, self._instrument)
@@ -247,7 +247,7 @@ class Journal:
 
 
 def write_header_only(folder: Path, header: Header) -> None:
-    """Leave a journal of nothing but its header: what is worked in a folder's folders. Raises Mistake."""
+    """Write a journal with only a header, for a folder of folders. Raises A7SimError."""
     file = AppendOnlyFile(folder / JOURNAL)
     _leave_scenario(folder, header)
     file.add(ChecksumChain().line(header.line) + b"\n")
@@ -265,7 +265,7 @@ def _leave_scenario(folder: Path, header: Header) -> None:
 
 
 def save_truncated_tail(there: JournalFile) -> None:
-    """Put what is torn of a journal beside it. Raises Mistake where that cannot be written."""
+    """Write the truncated tail of a journal beside it. Raises A7SimError if that fails."""
     if there.truncated_tail:
         try:
             (there.path.parent / TORN).write_bytes(there.truncated_tail)

@@ -1,1 +1,1 @@
-"""The command language over a line: in process so far, any pyserial port for the client."""
+"""The link: the command language over serial lines, in process, TCP, pty and RFC 2217."""

@@ -7,22 +7,22 @@ from dataclasses import dataclass
 
 @dataclass
 class Clock:
-    """Seconds at the instrument since the session began; whoever acts spends them."""
+    """Seconds at the instrument since the start of the session; actions advance it."""
 
     now: float = 0.0
 
     def advance(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the time."""
         self.now += seconds
 
     def advance_to(self, time: float) -> bool:
-        """Let time pass until it is so late, if it is not yet; return whether it is."""
+        """Advance the time to a value if it is earlier; return whether it is reached."""
         self.now = max(self.now, time)
         return True
 
 
 class WallClock:
-    """Simulated time that is the wall's: it goes by itself, on from where it is set when it is made."""
+    """Simulated time equal to wall-clock time, from a start value."""
 
     def __init__(self, wall: Callable[[], float] = time.monotonic, now: float = 0.0) -> None:
         self._wall = wall
@@ -30,9 +30,9 @@ class WallClock:
 
     @property
     def now(self) -> float:
-        """Seconds since the session began."""
+        """Seconds since the start of the session."""
         return self._wall() - self._began
 
     def advance_to(self, time: float) -> bool:
-        """Return whether it is so late; it does not hurry."""
+        """Return whether a time is reached, without advancing."""
         return self.now >= time

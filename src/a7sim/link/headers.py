@@ -1,4 +1,4 @@
-"""What the handles are called in the command language: headers of elements, words of fittings."""
+"""Names of controls in the command language: headers of elements, words of fittings."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -28,7 +28,7 @@ _SHORT: Mapping[str, str] = MappingProxyType({"inside": "IN", "outside": "OUT", 
 
 
 def short_form(position: str) -> str:
-    """Return the short form of a position of a fitting or of the base, as it is said and shown."""
+    """Return the short form of a position of a fitting or of the base."""
     return _SHORT.get(position, position.upper())
 
 
@@ -49,6 +49,6 @@ def registration_word(element: str) -> str:
 
 
 def quote_text(text: str) -> str:
-    """Return a text in the quotes of the language."""
+    """Return a text in quotes of the language."""
     doubled = text.replace('"', '""')
     return f'"{doubled}"'

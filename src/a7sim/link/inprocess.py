@@ -1,4 +1,4 @@
-"""The serial line to an instrument in the same process: a pyserial object without a wire."""
+"""In-process link: a pyserial port of an instrument in the same process."""
 
 import threading
 from typing import Any
@@ -11,12 +11,11 @@ from a7sim.link.simulated_wait import feed_until_idle
 
 
 class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
-    """A pyserial port whose other end is an engine on a desk.
+    """Pyserial port whose other end is an engine of a shared instrument.
 
-    Whatever is written is obeyed before `write` returns; its replies wait to be read. What waits for movement lets
-    simulated time pass on the clock, and nothing blocks. Line settings
-    (baud rate, parity ...) are taken and change nothing. Several ports may share one desk, each the
-    `client` of its name.
+    Written bytes are executed before `write` returns; replies wait to be read. Waiting for movement advances the
+    simulated clock, and nothing blocks. Line settings (baud rate, parity ...) are accepted without effect. Several
+    ports may share one instrument, each as the `client` of its name.
     """
 
     is_open: bool
@@ -46,7 +45,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         return self._instrument
 
     def open(self) -> None:
-        """Open a conversation with the instrument. Raises SerialException if it cannot, or is open."""
+        """Open a session with the instrument. Raises SerialException if it cannot, or is open."""
         if self.port is None:
             raise SerialException("expected a port to open, got none")
         if self.is_open:
@@ -57,9 +56,9 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         self.is_open = True
 
     def close(self) -> None:
-        """End the conversation; a lock that it holds is free again."""
+        """Close the session; its lock is released."""
         if self.is_open and self._engine is not None:
-            self._engine.instrument.close(self._engine.client, self.clock.now)
+            self._connect().close(self._engine.client, self.clock.now)
         self._engine = None
         self.is_open = False
         self.cancel_read()
@@ -70,7 +69,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         return self._engine
 
     def write(self, data: Any) -> int:
-        """Send bytes and return how many."""
+        """Send bytes and return their number."""
         received = to_bytes(data)
         with self._alone:
             engine = self._opened()
@@ -83,7 +82,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         return len(received)
 
     def read(self, size: int = 1) -> bytes:
-        """Return `size` bytes, or those there are when the timeout ends."""
+        """Return `size` bytes, or those available at the timeout."""
         with self._alone:
             start = self._read_up_to
             if size <= len(self._unread) - start and self._engine is not None:
@@ -92,7 +91,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         return self._take(lambda: size if self._left() >= size else None, size)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
-        """Return the bytes up to and with `expected`, at most `size`, or those there are at the timeout."""
+        """Return the bytes up to and including `expected`, at most `size`, or those available at the timeout."""
 
         def length() -> int | None:
             found = self._unread.find(expected, self._read_up_to)
@@ -104,7 +103,7 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
         return self._take(length, size)
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """Return a line with its end, or what there is when the timeout ends."""
+        """Return a line with its end, or the bytes available at the timeout."""
         with self._alone:
             start = self._read_up_to
             end = self._unread.find(b"\n", start) + 1
@@ -135,26 +134,26 @@ class InProcessSerial(SerialBase):  # type: ignore[misc] # pyserial is untyped
 
     @property
     def out_waiting(self) -> int:
-        """Number of bytes written and not yet obeyed: none, ever."""
+        """Number of bytes written and not yet executed: always zero."""
         self._opened()
         return 0
 
     def flush(self) -> None:
-        """Wait until all is obeyed, which it is."""
+        """Wait until all is executed, which it is."""
         self._opened()
 
     def reset_input_buffer(self) -> None:
-        """Forget replies that were not read."""
+        """Discard replies that were not read."""
         with self._arrived:
             self._opened()
             self._read_up_to = len(self._unread)
 
     def reset_output_buffer(self) -> None:
-        """Forget what was not yet sent: nothing."""
+        """Discard bytes not yet sent: there are none."""
         self._opened()
 
     def cancel_read(self) -> None:
-        """Make a waiting read return what there is."""
+        """Make a waiting read return the available bytes."""
         with self._arrived:
             self._cancelled = True
             self._arrived.notify_all()

@@ -1,8 +1,8 @@
-"""`serial.serial_for_url("a7sim://scenarios/akwanga.toml?seed=7")`: an instrument of one's own, in process.
+"""`serial.serial_for_url("a7sim://scenarios/akwanga.toml?seed=7")`: a new instrument in process.
 
-pyserial finds this module by its name; importing a7sim adds its package to
-`serial.protocol_handler_packages`. The path is that of a scenario file, or the bare name of one that comes
-with a7sim; `seed` draws its photographs. A port that is closed and opened again finds its instrument as it was.
+pyserial finds this module by its name; importing a7sim adds its package to `serial.protocol_handler_packages`. The path
+is that of a scenario file, or the bare name of one that comes with a7sim; `seed` draws its photographs. A port that is
+closed and opened again has the same instrument.
 """
 
 import re
@@ -22,7 +22,7 @@ _URL = re.compile(r"a7sim://([^?#]+)(?:\?seed=([0-9]{1,40}))?", re.IGNORECASE)
 
 
 class Serial(InProcessSerial):
-    """A pyserial port to a new instrument that the URL describes. Raises SerialException for a bad URL."""
+    """Pyserial port of a new instrument described by the URL. Raises SerialException for a bad URL."""
 
     _connected_to: str | None = None
 

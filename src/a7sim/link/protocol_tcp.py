@@ -1,7 +1,7 @@
-"""`serial.serial_for_url("tcp://127.0.0.1:5025")`: pyserial's `socket://`, quicker.
+"""`serial.serial_for_url("tcp://127.0.0.1:5025")`: faster than pyserial's `socket://`.
 
-Small lines go out at once (no Nagle) and a reply is read whole, not byte by byte. pyserial finds this module by its
-name, as it finds `a7sim://`.
+Small lines are sent at once (no Nagle) and a reply is read as a whole, not byte by byte. pyserial finds this module by
+its name, as it finds `a7sim://`.
 """
 
 import contextlib
@@ -17,7 +17,7 @@ _AT_ONCE = 65536
 
 
 class Serial(protocol_socket.Serial):  # type: ignore[misc] # pyserial is untyped
-    """A pyserial port over TCP. Raises SerialException where nobody listens."""
+    """Pyserial port over TCP. Raises SerialException if the connection is refused."""
 
     is_open: bool
 
@@ -37,7 +37,7 @@ class Serial(protocol_socket.Serial):  # type: ignore[misc] # pyserial is untype
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def close(self) -> None:
-        """Hang up."""
+        """Disconnect."""
         if self.is_open:
             self.is_open = False
             with contextlib.suppress(OSError):
@@ -45,19 +45,19 @@ class Serial(protocol_socket.Serial):  # type: ignore[misc] # pyserial is untype
             self._socket.close()
 
     def read(self, size: int = 1) -> bytes:
-        """Return `size` bytes, or those there are when the timeout ends."""
+        """Return `size` bytes, or those available at the timeout."""
         self._fill(lambda: len(self._received) >= size)
         return self._take(size)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
-        """Return the bytes up to and with `expected`, at most `size`, or those there are at the timeout."""
+        """Return the bytes up to and including `expected`, at most `size`, or those available at the timeout."""
         most = len(self._received) + _AT_ONCE**2 if size is None else size
         self._fill(lambda: expected in self._received or len(self._received) >= most)
         found = self._received.find(expected)
         return self._take(most if found < 0 else min(most, found + len(expected)))
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """Return a line with its end, or what there is when the timeout ends."""
+        """Return a line with its end, or the bytes available at the timeout."""
         return self.read_until(b"\n", None if size is None or size < 0 else size)
 
     def _take(self, size: int) -> bytes:
@@ -88,10 +88,10 @@ class Serial(protocol_socket.Serial):  # type: ignore[misc] # pyserial is untype
 
     @property
     def in_waiting(self) -> int:
-        """Number of bytes that can be read at once, at least."""
+        """Minimum number of bytes that can be read at once."""
         return len(self._received) + int(super().in_waiting)
 
     def reset_input_buffer(self) -> None:
-        """Forget replies that were not read."""
+        """Discard replies that were not read."""
         self._received.clear()
         super().reset_input_buffer()

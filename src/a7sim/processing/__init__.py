@@ -1,6 +1,6 @@
-"""Reductions of people's files: tables and cards in, documents and files out (files.md).
+"""Reductions of files: tables and cards in, documents and files out (files.md).
 
-The sums themselves are in `a7sim.reduction`.
+The numerical part is in `a7sim.reduction`.
 """
 
 from a7sim.processing.blocks import block

@@ -1,4 +1,4 @@
-"""Blocks of people's models, adjusted to the ground at once."""
+"""Block adjustment of models from files."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -25,13 +25,13 @@ from a7sim.reduction.strips import Model
 from a7sim.result_documents import Document, accuracy_document, document_header, points_as_rows, residuals_document
 
 SIGMAS = ("scale", "turn_X", "turn_Y", "turn_Z", "TX", "TY", "TZ")
-"""Of every model, turns in gon, translation at the model's middle."""
+"""Standard deviations of each model: rotations in gon, translation at the middle of the model."""
 
 
 def block(
     paths: Sequence[Path], ground_path: Path, height_weight: float = 1.0, against: Path | None = None
 ) -> ProcessingResult:
-    """Return the models of all files adjusted to the ground as one block. Raises Mistake."""
+    """Return the models of all files adjusted to the ground as one block. Raises A7SimError."""
     models = read_models(paths)
     ground = read_ground(ground_path)
     with errors_for(short_list(paths), f"ground {ground_path}"):
@@ -104,7 +104,7 @@ def _cards(strip: Sequence[Model], found: BlockAdjustment) -> str:
 
 
 def _strips(models: Sequence[Model]) -> list[list[Model]]:
-    """Return the models of a block in its strips: those that hang together by their projection centres."""
+    """Return the models of a block by strips: models connected by their projection centres."""
     strips: list[list[Model]] = []
     for model in models:
         apart, with_it = [], [model]

@@ -1,4 +1,4 @@
-"""Perspective centres of people's pointings and grid plates."""
+"""Perspective centres from files of pointings and grid-plate readings."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -36,10 +36,10 @@ def centres(
     method: CentreMethod = "two-levels",
     c: float | None = None,
 ) -> ProcessingResult:
-    """Return the perspective centre of a file of pointings; of the A8's base scale, both centres of each model.
+    """Return the perspective centre of a file of pointings; with the base scale of the A8, both centres of each model.
 
-    The levels z1 and z2 are those of two levels only, c the projector's principal distance with a grid plate only.
-    Raises Mistake.
+    The levels z1 and z2 apply to the method of two levels, c, the principal distance of the projector, to a grid plate.
+    Raises A7SimError.
     """
     if method == "a8":
         return _of_base_scale(path)

@@ -1,4 +1,4 @@
-"""Results side by side: several methods on the same observations, and final coordinates against given ones."""
+"""Comparisons of results: several methods on the same observations, and final coordinates with given ones."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,11 +11,11 @@ from a7sim.result_documents import Document, points_as_rows
 from a7sim.table_files import to_csv
 
 Quantities = Mapping[tuple[str, str], Mapping[str, float]]
-"""Values by method, by name and unit of what they are of."""
+"""Values by method, by name and unit of the quantity."""
 
 
 def compare_methods(quantities: Quantities) -> Document:
-    """Return the values of several methods side by side, and by unit the largest difference between any two."""
+    """Return the values of several methods side by side, and the largest difference by unit."""
     rows: list[Document] = []
     most: dict[str, float] = {}
     for (name, unit), values in quantities.items():
@@ -39,7 +39,10 @@ def methods_csv(compared: Document) -> str:
 
 
 def compare_to_reference(path: Path, points: Sequence[str], coordinates: Array) -> Document:
-    """Return how far final coordinates ``(3, n)`` lie from those of a file, computed minus given. Raises Mistake."""
+    """Return the differences of final coordinates ``(3, n)`` from those of a file, computed minus given.
+
+    Raises A7SimError.
+    """
     place = {name: i for i, name in enumerate(points)}
     rows = [row for row in read_points(path, "XYZ", gaps="XYZ") if row.texts["point"] in place]
     if not rows:

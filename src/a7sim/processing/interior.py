@@ -1,4 +1,4 @@
-"""Interior orientation of people's comparator counts."""
+"""Interior orientation of comparator counts from files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ from a7sim.scenario.validation import schema_errors
 from a7sim.table_files import Row, natural_sort_key, read_table, read_toml, to_csv
 
 CORRECTIONS = ("lens", "refraction", "curvature")
-"""Corrections of image coordinates; any of them brings these to the principal point."""
+"""Corrections of image coordinates; each of them refers these to the principal point."""
 
 MAX_FIDUCIAL_MM = 5.0
-"""Film does not displace a fiducial by more; a confused or mirrored one stands further off."""
+"""Maximum displacement of a fiducial by film; a confused or mirrored fiducial deviates more."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class FlightHeights:
 
 @dataclass(frozen=True)
 class _Picture:
-    """A photograph with its fit and its refined points ``(2, n)`` in mm."""
+    """Photograph with its fit and its refined points ``(2, n)`` in mm."""
 
     name: str
     fiducials: tuple[str, ...]
@@ -53,9 +53,9 @@ def interior(
     corrections: Sequence[str] = (),
     flight: FlightHeights | None = None,
 ) -> ProcessingResult:
-    """Return the interior orientation of every photograph in a file of counts, and its image points refined.
+    """Return the interior orientation of each photograph in a file of counts, and its refined image points.
 
-    `count_mm` is the size of a count, by which the change of the film's size is known. Raises Mistake.
+    `count_mm` is the size of a count, which determines the change of the film's size. Raises A7SimError.
     """
     camera = read_camera(camera_path)
     found = group_rows(read_table(path), "photo", "xy")
@@ -81,7 +81,7 @@ def interior(
 
 
 def read_camera(path: Path) -> Camera:
-    """Return the camera of a TOML file, as a scenario gives it: under `[camera]` or at the top. Raises Mistake."""
+    """Return the camera of a TOML file in the form of a scenario: under `[camera]` or at the top. Raises A7SimError."""
     raw = read_toml(path)
     raw = raw.get("camera", raw)
     wrong = next(schema_errors(raw, msgspec.inspect.type_info(Camera), "camera"), None)
@@ -170,7 +170,7 @@ def _of_picture(picture: _Picture, camera: Camera, count_mm: float | None) -> Do
 
 
 def _of_film(fit: PlaneFit, c: float, count_mm: float | None) -> Document:
-    """Return what the fit says of the film at its centre; its size only where that of a count is known."""
+    """Return the film deformation at its centre; its size only if the size of a count is known."""
     jacobian = _at_the_centre(fit.matrix)
     per_x, per_y = np.hypot(*jacobian[:, 0]), np.hypot(*jacobian[:, 1])
     right_angle = np.arcsin(np.clip((jacobian[:, 0] * jacobian[:, 1]).sum() / (per_x * per_y), -1.0, 1.0))
@@ -185,7 +185,7 @@ def _of_film(fit: PlaneFit, c: float, count_mm: float | None) -> Document:
 
 
 def _at_the_centre(matrix: Array) -> Array:
-    """Return the derivatives ``(2, 2)`` of calibrated by measured coordinates where the calibrated ones are zero."""
+    """Return the derivatives ``(2, 2)`` of calibrated by measured coordinates at the calibrated zero."""
     x, y, w = np.linalg.inv(matrix) @ (0.0, 0.0, 1.0)
     return np.asarray(matrix[:2, :2] / (matrix[2] @ (x / w, y / w, 1.0)))
 
@@ -207,7 +207,7 @@ def _residual_rows(pictures: Sequence[_Picture]) -> list[tuple[str, str, float, 
 
 
 def _pair_rows(pictures: Sequence[_Picture]) -> list[tuple[str, str, float, float, float, float]]:
-    """Return the pairs of photographs of neighbouring numbers; the left one has the common points further right."""
+    """Return the pairs of photographs of consecutive numbers; in the left one the common points are further right."""
     rows = []
     for one, other in pairwise(pictures):
         seen, seen_there = _by_point(one), _by_point(other)

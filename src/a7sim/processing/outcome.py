@@ -1,4 +1,4 @@
-"""What a reduction of people's files comes to: a document, and the files that go with it."""
+"""Result of a reduction of files: a document and its files."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -23,7 +23,7 @@ RESIDUAL_COLUMNS = ("point", "role", "X", "Y", "Z")
 
 @dataclass(frozen=True)
 class ProcessingResult:
-    """A document, and the texts of files by name, each made when it is written."""
+    """Document, and the texts of files by name, each made when it is written."""
 
     document: Document
     files: Mapping[str, Callable[[], str]] = field(default_factory=dict)
@@ -31,7 +31,7 @@ class ProcessingResult:
 
 @contextmanager
 def errors_for(path: Path | str, what: str = "") -> Iterator[None]:
-    """Turn what the sums refuse or cannot determine into a mistake of the file; they say so themselves, not numpy."""
+    """Convert errors of a reduction into an error of the file; numpy warnings are suppressed."""
     try:
         with np.errstate(all="ignore"):
             yield
@@ -40,10 +40,10 @@ def errors_for(path: Path | str, what: str = "") -> Iterator[None]:
 
 
 def write_result(outcome: ProcessingResult, folder: Path) -> Document:
-    """Write `results.json` and the files of an outcome into a folder and return the document as written.
+    """Write `results.json` and the files of a result into a folder and return the document as written.
 
-    What does not fit the form of a file (a name of letters on a card) keeps that file from being written, and the
-    document says so under `not_written`. Raises Mistake for a folder that cannot be written.
+    A file whose form cannot hold the data (a name with letters on a card) is not written, and the document lists it
+    under `not_written`. Raises A7SimError for a folder that cannot be written.
     """
     texts, refused = {}, {}
     for name, text in outcome.files.items():
@@ -76,12 +76,12 @@ def residuals_csv(fit: GroundFit) -> str:
 
 
 def free_format(models: Sequence[Model]) -> str:
-    """Return models as PAT-M reads them (see `reduction.cards`)."""
+    """Return models in the free format of PAT-M (see `reduction.cards`)."""
     return _lines(free_format_lines(models))
 
 
 def output_cards(fit: GroundFit, models: Sequence[Model]) -> str:
-    """Return the output cards of a strip's models that lie in the ground system, with their residuals."""
+    """Return the output cards of a strip's models in the ground system, with their residuals."""
     return _lines(output_lines(fit.ground, Strip(tuple(models), ())))
 
 

@@ -1,4 +1,4 @@
-"""Relative orientation of people's pairs."""
+"""Relative orientation of pairs from files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +25,7 @@ RelativeMethod = Literal["coplanarity", "parallax", "schut", "robust", "all"]
 RELATIVE_METHODS: tuple[RelativeMethod, ...] = ("coplanarity", "parallax", "schut", "robust", "all")
 
 ALONG_X = 0.7
-"""Cosine: a base nearer to the left photograph's X axis than this is taken as a plotter takes it."""
+"""Cosine: a base closer to the X axis of the left photograph is oriented as at a plotter."""
 
 
 def relative(
@@ -36,9 +36,9 @@ def relative(
     bx: float,
     method: RelativeMethod = "coplanarity",
 ) -> ProcessingResult:
-    """Return the relative orientation of a pair file; with all methods, by coplanarity and the others beside it.
+    """Return the relative orientation of a pair file; with all methods, coplanarity compared with the others.
 
-    Raises Mistake.
+    Raises A7SimError.
     """
     if method in ("schut", "all") and unknowns != "dependent":
         raise A7SimError(f"--method {method}: expected dependent unknowns, got {unknowns}")
@@ -96,7 +96,7 @@ def pair_document(pair: StereoPair, found: RelativeOrientation | SnoopedOrientat
 def add_centres(
     pair: StereoPair, orientation: RelativeOrientation, c: float, bx: float, photos: tuple[str, str]
 ) -> Model:
-    """Return the model of a pair, its centres among the points."""
+    """Return the model of a pair with its centres as points."""
     points = model_points(pair, orientation, c, bx)
     ends = np.array([np.zeros(3), orientation.base * bx]).T
     names = (*pair.points, *(f"{photo}{CENTRE}" for photo in photos))
@@ -104,9 +104,9 @@ def add_centres(
 
 
 def model_points(pair: StereoPair, orientation: RelativeOrientation, c: float, length: float) -> Array:
-    """Return model points ``(3, n)``: where x-parallax vanishes in the left photograph's frame, Y the rays' mean.
+    """Return model points ``(3, n)``: zero x-parallax in the left photograph's frame, Y the mean of the rays.
 
-    Only a base that points elsewhere than along X is first turned onto it.
+    A base in another direction than X is first rotated onto it.
     """
     if orientation.base[0] < ALONG_X:
         return model_coordinates(pair.left, pair.right, c, c, orientation.rotation, orientation.base, length)[0]
@@ -138,7 +138,7 @@ def _orientation(found: RelativeOrientation | SnoopedOrientation) -> RelativeOri
 
 
 def _of_snooping(found: RelativeOrientation | SnoopedOrientation) -> Document:
-    """Return what data snooping found; nothing of another method."""
+    """Return the results of data snooping; empty for another method."""
     if not isinstance(found, SnoopedOrientation):
         return {}
     return {
@@ -178,7 +178,7 @@ def _compared(
 
 
 def photographs_of_pairs(pairs: Sequence[StereoPair]) -> list[tuple[str, str]]:
-    """Return the photographs of each pair: those in its name (`321-320`), else by its place in the file."""
+    """Return the photographs of each pair: from its name (`321-320`), otherwise from its position in the file."""
     return [
         model_photographs(pair.name) or (f"photo{place}", f"photo{place + 1}")
         for place, pair in enumerate(pairs, start=1)

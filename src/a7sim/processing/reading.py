@@ -1,6 +1,6 @@
-"""People's measurements as the reductions take them.
+"""Reading of measurements from files for the reductions.
 
-Points come in the order of their names, so that the order of a file's rows changes no digit of a result.
+Points are sorted by name, so that the order of rows in a file does not change any digit of a result.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _NEEDED = {"control": "XYZ", "plan": "XY", "height": "Z", "check": ""}
 
 @dataclass(frozen=True)
 class StereoPair:
-    """Image coordinates ``(2, n)`` in mm of points seen in two photographs, about the principal point."""
+    """Image coordinates ``(2, n)`` in mm of points in two photographs, about the principal point."""
 
     name: str
     points: tuple[str, ...]
@@ -32,12 +32,12 @@ class StereoPair:
 
 
 def is_pair_table(table: Table) -> bool:
-    """Tell whether a table holds image coordinates of pairs rather than models."""
+    """Return whether a table holds image coordinates of pairs rather than models."""
     return any(column in table.columns for column in PAIR_COLUMNS)
 
 
 def point_names(rows: Sequence[Row]) -> tuple[str, ...]:
-    """Return the points of rows."""
+    """Return the point names of rows."""
     return tuple(row.texts["point"] for row in rows)
 
 
@@ -47,16 +47,16 @@ def point_columns(rows: Sequence[Row], names: Sequence[str]) -> Array:
 
 
 def read_points(path: Path, numbers: Sequence[str], gaps: Sequence[str] = ()) -> list[Row]:
-    """Return the rows of a file of points, each there once, by their names. Raises Mistake."""
+    """Return the rows of a file of points, sorted by name; each point occurs once. Raises A7SimError."""
     rows = rows_by_key(path, read_table(path).rows(["point"], numbers, gaps), "point").values()
     return sorted(rows, key=lambda row: natural_sort_key(row.texts["point"]))
 
 
 def group_rows(table: Table, group: str, numbers: Sequence[str], may_be_one: bool = False) -> dict[str, list[Row]]:
-    """Return the rows of a table by the text of a column, in which each point is there once. Raises Mistake.
+    """Return the rows of a table by the text of a column; each point occurs once per group. Raises A7SimError.
 
-    Groups come as they first stand in the file, their points by name. A table that `may_be_one` group needs no such
-    column; the group is then named after the file.
+    Groups are in the order of the file, their points sorted by name. A table that `may_be_one` group needs no such
+    column; the group then has the name of the file.
     """
     if may_be_one and group not in table.columns:
         rows = rows_by_key(table.path, table.rows(["point"], numbers), "point").values()
@@ -68,7 +68,7 @@ def group_rows(table: Table, group: str, numbers: Sequence[str], may_be_one: boo
 
 
 def read_pairs(table: Table, principal_point: tuple[float, float], may_be_one: bool = False) -> list[StereoPair]:
-    """Return the pairs of a table as they first stand in it. Raises Mistake."""
+    """Return the pairs of a table in the order of the file. Raises A7SimError."""
     shift = np.array(principal_point)[:, None]
     pairs = []
     for name, rows in group_rows(table, "model", PAIR_COLUMNS, may_be_one).items():
@@ -78,7 +78,7 @@ def read_pairs(table: Table, principal_point: tuple[float, float], may_be_one: b
 
 
 def read_models_table(table: Table, may_be_one: bool = False) -> list[Model]:
-    """Return the models of a table, by name. Raises Mistake."""
+    """Return the models of a table, by name. Raises A7SimError."""
     found = group_rows(table, "model", "XYZ", may_be_one)
     return [
         Model(name, point_names(found[name]), point_columns(found[name], "XYZ"))
@@ -89,7 +89,7 @@ def read_models_table(table: Table, may_be_one: bool = False) -> list[Model]:
 def read_models(paths: Sequence[Path], may_be_one: bool = False) -> list[Model]:
     """Return the models of all files, tables or decks of cards, by name.
 
-    Raises Mistake, also for a model that is in two of them.
+    Raises A7SimError, also for a model that occurs in two files.
     """
     found: dict[str, tuple[Path, Model]] = {}
     for path in paths:
@@ -112,7 +112,7 @@ def short_list(paths: Sequence[Path]) -> str:
 
 
 def read_ground(path: Path) -> Ground:
-    """Return the ground points of a file; cells that a role does not need may be empty. Raises Mistake."""
+    """Return the ground points of a file; cells that a role does not need may be empty. Raises A7SimError."""
     rows = rows_by_key(path, read_table(path).rows(["point", "role"], "XYZ", gaps="XYZ"), "point").values()
     for row in rows:
         role = row.texts["role"]
@@ -131,17 +131,17 @@ def read_ground(path: Path) -> Ground:
 
 
 def model_photographs(model: str) -> tuple[str, str] | None:
-    """Return the photographs that a model is named after (`321-320`), or None."""
+    """Return the photographs in the name of a model (`321-320`), or None."""
     left, dash, right = (part.strip() for part in model.partition("-"))
     return (left, right) if dash and left and right else None
 
 
 def sort_along_strip(models: Sequence[Model]) -> tuple[Model, ...]:
-    """Return models as they follow each other, whatever order they were given in.
+    """Return models in the order of the strip, whatever order they were given in.
 
-    A strip of models named LEFT-RIGHT begins with the one whose left-hand photograph is nobody's right-hand one,
-    another with the end of the lower name; models that share no centre follow each other by name. Raises Mistake as
-    `in_order` does.
+    A strip of models named LEFT-RIGHT starts with the model whose left photograph is no other model's right one,
+    another strip with the end of the lower name; models without a common centre are sorted by name. Raises A7SimError
+    as `in_order` does.
     """
     chain = in_order(sorted(models, key=lambda model: natural_sort_key(model.name)))
     if len(chain) < 2:

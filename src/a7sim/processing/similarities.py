@@ -1,4 +1,4 @@
-"""The similarity of people's common points."""
+"""Similarity transformation of common points from files."""
 
 from pathlib import Path
 from typing import Literal
@@ -21,9 +21,9 @@ _BY = {"iteration": similarity_by_iteration, "quaternion": similarity_by_quatern
 
 
 def similarity(path: Path, method: SimilarityMethod = "iteration") -> ProcessingResult:
-    """Return the similarity of a file of common points; with both methods, by iteration and the other beside it.
+    """Return the similarity of a file of common points; with both methods, iteration compared with the other.
 
-    Raises Mistake.
+    Raises A7SimError.
     """
     rows = read_points(path, ("x", "y", "z", "X", "Y", "Z"))
     points, values = point_names(rows), point_columns(rows, ("x", "y", "z", "X", "Y", "Z"))

@@ -1,4 +1,4 @@
-"""Models joined to strips and brought to the ground, from people's pairs, models or cards."""
+"""Strips from files of pairs, models or cards: joined and oriented to the ground."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ from a7sim.table_files import Table, read_table, read_text
 
 @dataclass(frozen=True)
 class PairCamera:
-    """The camera of pairs: principal distance and principal point in mm, and the bx of every model, if it is given."""
+    """Camera of pairs: principal distance and principal point in mm, and the bx of all models, if given."""
 
     c: float
     principal_point: tuple[float, float] = (0.0, 0.0)
@@ -56,7 +56,7 @@ class PairCamera:
 
 @dataclass(frozen=True)
 class _Input:
-    """What a strip is formed of: models along the strip, what is said of each, ground if it came with them."""
+    """Input of a strip: models in order, their documents, and ground points if included."""
 
     kind: str
     models: tuple[Model, ...]
@@ -65,7 +65,10 @@ class _Input:
 
 
 def connect(paths: Sequence[Path], method: JoinMethod = "points") -> ProcessingResult:
-    """Return the models of all files joined into one, in the system of the first along the strip. Raises Mistake."""
+    """Return the models of all files joined into one, in the system of the first model of the strip.
+
+    Raises A7SimError.
+    """
     models = read_models(paths)
     with errors_for(short_list(paths)):
         if len(models) < 2:
@@ -82,7 +85,7 @@ def connect(paths: Sequence[Path], method: JoinMethod = "points") -> ProcessingR
 
 
 def absolute(path: Path, ground_path: Path, against: Path | None = None) -> ProcessingResult:
-    """Return one model or strip oriented to the ground. Raises Mistake."""
+    """Return one model or strip oriented to the ground. Raises A7SimError."""
     models = read_models([path], may_be_one=True)
     if len(models) > 1:
         raise A7SimError(f"{path}, column model: expected one model, got {len(models)}; `reduce strip` joins them")
@@ -106,8 +109,8 @@ def strip(
 ) -> ProcessingResult:
     """Return the strip of a file of pairs, models or cards with its absolute orientation and adjustment.
 
-    Pairs need the camera; their models have the photo base without a bx. Only cards bring ground with them, which
-    the ground file takes the place of. Raises Mistake.
+    Pairs need the camera; without a bx their models have the photo base. Only cards include ground points, which the
+    ground file replaces. Raises A7SimError.
     """
     own_ground = read_ground(ground_path) if ground_path else None
     given = _strip_input(path, camera)
@@ -138,7 +141,7 @@ def strip(
 
 
 def orientation_document(oriented: AbsoluteOrientation) -> Document:
-    """Return an absolute orientation with the statistics of its seven unknowns where these are all determined."""
+    """Return an absolute orientation with the statistics of its seven unknowns if all are determined."""
     similarity = oriented.similarity
     try:
         adjustment = similarity.adjustment
@@ -166,7 +169,7 @@ def ground_files(models: Sequence[Model], fit: GroundFit) -> dict[str, Callable[
 
 
 def number_models(models: Sequence[Model]) -> list[Model]:
-    """Return models with numbers for names, as cards want them: their own, else their place in the strip."""
+    """Return models with numeric names, as cards require: their own numbers, otherwise their positions in the strip."""
     if all(model.name.isascii() and model.name.isdigit() for model in models):
         return list(models)
     return [Model(str(place), model.points, model.coordinates) for place, model in enumerate(models, start=1)]

@@ -23,11 +23,11 @@ ROLES = ("control", "plan", "height", "check")
 MIN_PLAN = 2
 MIN_HEIGHTS = 3
 NEARLY_IN_A_LINE = 0.05
-"""Breadth of the height control over its length, both as standard deviations, below which it is warned of."""
+"""Ratio of breadth to length of the height control, both as standard deviations, below which a warning is given."""
 MUCH_WORSE = 3.0
-"""Ratio of the misfits with the axes as given and swapped from which swapped axes are suspected."""
+"""Ratio of the misfits with the axes as given and swapped above which swapped axes are suspected."""
 NOTHING = 1e-6
-"""Misfit, as a share of the control's extent, that proves nothing about axes."""
+"""Misfit, as a share of the extent of the control, below which nothing is concluded about axes."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Ground:
         return np.array([plan, plan, height], dtype=float)
 
     def among(self, names: Sequence[str]) -> "Ground":
-        """Return the ground points that are among the names, in the order of their own names."""
+        """Return the ground points with one of the names, in their own order."""
         known = set(names)
         keep = sorted((i for i, name in enumerate(self.points) if name in known), key=lambda i: self.points[i])
         return Ground(
@@ -72,7 +72,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class GroundFit:
-    """How a system of points fits the ground.
+    """Fit of a system of points to the ground.
 
     `residuals` ``(3, m, ...)`` are computed minus given in the unit of the ground, nan where nothing is given.
     """
@@ -120,7 +120,7 @@ def max_abs_residual(residuals: Array) -> Array:
 
 @dataclass(frozen=True)
 class AbsoluteOrientation:
-    """A model or strip in the system of the ground, with what a surveyor should be told (`warnings`)."""
+    """Model or strip in the system of the ground, with warnings for the surveyor (`warnings`)."""
 
     similarity: Similarity
     fit: GroundFit
@@ -131,10 +131,10 @@ class AbsoluteOrientation:
 def absolute_orientation(model: Model | Strip, ground: Ground) -> AbsoluteOrientation:
     """Return the similarity of a model or strip to its ground control by least squares, unit weights.
 
-    Coordinates of the model have shape ``(3, n, ...)``, a batch axis being carried along. Full control gives three
-    equations a point, plan control two, height control one; seven at least, of two points in plan and three in height
-    (S). Warns, in words, of ground axes that look left-handed, of height control nearly in a line and of ground points
-    that the model has not. Raises Undetermined for too little control or control in a line.
+    Coordinates of the model have shape ``(3, n, ...)`` with optional batch axes. Full control gives three equations a
+    point, plan control two, height control one; at least seven, of two points in plan and three in height, are required
+    (S). Warnings are given for ground axes that look left-handed, for height control nearly in a line and for ground
+    points that the model does not contain. Raises Undetermined for too little control or control in a line.
     """
     model = model.as_model if isinstance(model, Strip) else model
     similarity, fit = fitted_to_ground(model, ground)
@@ -149,7 +149,7 @@ def absolute_orientation(model: Model | Strip, ground: Ground) -> AbsoluteOrient
 
 
 def fitted_to_ground(model: Model, ground: Ground) -> tuple[Similarity, GroundFit]:
-    """Return the similarity of a model to its ground control and how it fits, as `absolute_orientation` finds them."""
+    """Return the similarity of a model to its ground control and the fit, as in `absolute_orientation`."""
     known = ground.among(model.points)
     plan, heights = int(known.used[0].sum()), int(known.used[2].sum())
     if plan < MIN_PLAN or heights < MIN_HEIGHTS:
@@ -163,10 +163,10 @@ def fitted_to_ground(model: Model, ground: Ground) -> tuple[Similarity, GroundFi
 
 
 def _fitted(points: Array, given: Array, used: Array) -> Similarity:
-    """Return the similarity on the coordinates that are used.
+    """Return the similarity from the coordinates that are used.
 
     Points of full control, if three are not in a line, start the iteration from any attitude; otherwise the model is
-    taken for nearly level (S).
+    assumed nearly level (S).
     """
     full = used.all(axis=0)
     control = given[:, full].reshape((3, -1, *(1,) * (points.ndim - 2)))
@@ -190,7 +190,7 @@ def _missing(ground: Ground, known: Ground) -> list[str]:
 
 
 def _in_a_line(points: Array, known: Ground) -> list[str]:
-    """Warn of height control that leaves the tilt about its own line nearly open."""
+    """Return warnings about height control that hardly determines the tilt about its own line."""
     used = points[:, known.used[2] > 0.0]
     x, y = used[0] - used[0].mean(axis=0), used[1] - used[1].mean(axis=0)
     xx, yy, xy = (x * x).mean(axis=0), (y * y).mean(axis=0), (x * y).mean(axis=0)
@@ -206,7 +206,7 @@ def _in_a_line(points: Array, known: Ground) -> list[str]:
 
 
 def _left_handed(model: Model, similarity: Similarity, points: Array, fit: GroundFit) -> list[str]:
-    """Warn of axes X north, Y east: with Z up they make a left-handed system, which no rotation can reach."""
+    """Return warnings about axes X north, Y east: with Z up a left-handed system, which no rotation can reach."""
     advice = "X east, Y north and Z up are expected: swap the columns X and Y if X is north"
     known = fit.ground
     said = []
@@ -236,7 +236,7 @@ def _left_handed(model: Model, similarity: Similarity, points: Array, fit: Groun
 
 
 def _upside_down(model: Model, similarity: Similarity) -> npt.NDArray[np.bool_]:
-    """Return where the projection centres, or failing them the model's own Z, come to point downwards."""
+    """Return where the projection centres, or without them the model's own Z, point downwards."""
     centres = [name for name in model.points if is_centre(name)]
     others = [name for name in model.points if not is_centre(name)]
     if centres and others:

@@ -1,4 +1,4 @@
-"""Small turns of both cameras about the axes of the base, for many pairs at once."""
+"""Small rotations of both cameras about the axes of the base, for a batch of pairs."""
 
 from math import prod
 
@@ -8,7 +8,7 @@ from a7sim.geometry import Array
 
 
 class RotationWorkspace:
-    """Arrays of pairs ``(...)`` that are filled anew when cameras are turned."""
+    """Work arrays of pairs ``(...)`` for the rotation of cameras, filled anew in each call."""
 
     def __init__(self, batch: tuple[int, ...]) -> None:
         empty = aligned_array if batch else np.empty
@@ -19,7 +19,7 @@ class RotationWorkspace:
 
 
 def aligned_array(shape: tuple[int, ...]) -> Array:
-    """Return an array that begins at a line of 64 bytes."""
+    """Return an array that starts at a multiple of 64 bytes."""
     size = prod(shape)
     room = np.empty(size + 8)
     first = -room.ctypes.data % 64 // 8
@@ -27,7 +27,7 @@ def aligned_array(shape: tuple[int, ...]) -> Array:
 
 
 def rotate_by(R: Array, turns: Array, work: RotationWorkspace | None = None, level: bool = False) -> Array:
-    """Turn both cameras ``(2, 3, 3, ...)`` about the axes of the base by the unknowns of the equations, radians.
+    """Rotate both cameras ``(2, 3, 3, ...)`` about the axes of the base by the unknowns of the equations, radians.
 
     Only the difference of the omegas is determined; each camera takes half.
     """
@@ -55,7 +55,7 @@ def rotate_by(R: Array, turns: Array, work: RotationWorkspace | None = None, lev
 
 
 def _half_turns() -> Array:
-    """Return, by the five unknowns, the skew matrices of half the turns of both cameras, ``(18, 5)``."""
+    """Return, for the five unknowns, the skew matrices of half the rotations of both cameras, ``(18, 5)``."""
     half = np.zeros((2, 3, 3, 5))
     for camera, axis, unknown, share in (
         (0, 0, 4, -0.25), (0, 1, 0, 0.5), (0, 2, 1, 0.5), (1, 0, 4, 0.25), (1, 1, 2, -0.5), (1, 2, 3, -0.5),
@@ -71,13 +71,13 @@ _HALF_TURNS = _half_turns()
 def rotation_about(turns: Array) -> Array:
     """Return rotations ``(3, 3, ...)`` about axes ``(3, ...)`` whose length is twice the tangent of half the angle.
 
-    For a small turn that is the angle in radians.
+    For a small rotation that is the angle in radians.
     """
     return np.asarray(_turn_by_halves(0.5 * turns[None], np.empty((1, 3, *turns.shape)))[0])
 
 
 def _turn_by_halves(half: Array, turn: Array) -> Array:
-    """Fill rotations ``(k, 3, 3, ...)`` about axes ``(k, 3, ...)`` as long as the tangent of half the angle."""
+    """Fill rotations ``(k, 3, 3, ...)`` about axes ``(k, 3, ...)`` whose length is the tangent of half the angle."""
     np.multiply(half[:, :, None], half[:, None], out=turn)
     square = turn[:, 0, 0] + turn[:, 1, 1] + turn[:, 2, 2]
     share = 2.0 / (1.0 + square)

@@ -1,7 +1,7 @@
-"""Blocks of independent models: a similarity for each and the ground points they share, adjusted together.
+"""Blocks of independent models: one similarity per model and the common ground points, adjusted together.
 
-First the plan with level models, which is linear, then plan and height together by linearised equations
-``s R x + T - P = 0`` for every point of every model, unknown points eliminated by the sparse solution.
+First the plan with level models, which is linear, then plan and height together by linearised equations ``s R x + T - P
+= 0`` for every point of every model; the sparse solution eliminates the unknown points.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ MAX_MODELS = 500
 MAX_ITERATIONS = 30
 CONVERGED = 1e-10
 MIN_PIVOT = 1e-11
-"""Of the scaled normal equations, relative to one: below it a model or a point is open."""
+"""Smallest pivot of the scaled normal equations, relative to one: below it a model or a point is not determined."""
 UNKNOWNS_OF_A_MODEL = 7
 
 
@@ -74,7 +74,7 @@ class BlockAdjustment:
 
 @dataclass(frozen=True)
 class _Equations:
-    """What every row of the block is about: model, point, and which unknown or given ground coordinate."""
+    """Model, point, and unknown or given ground coordinate of each row of the block."""
 
     models: tuple[Model, ...]
     points: tuple[str, ...]
@@ -83,16 +83,17 @@ class _Equations:
     local: Array
     given: Array
     column: npt.NDArray[np.intp]
-    """Shape ``(3, p)``: place of a point's coordinate among the unknown ones, -1 where it is given."""
+    """Shape ``(3, p)``: index of a point's coordinate among the unknown ones, -1 where it is given."""
     unknown: int
 
 
 def block_adjustment(models: Sequence[Model], ground: Ground, height_weight: float = 1.0) -> BlockAdjustment:
     """Return independent models, coordinates ``(3, n)``, joined to each other and to the ground control at once.
 
-    Control is held; points of two or more models and control in one join; others are carried along. Height equations
-    count `height_weight` times those in plan. Models should be nearly level in their own systems, turned as they may
-    be in plan. Raises Mistake for more than 500 models, Undetermined for a block that its ties and control leave open.
+    Control is held; points in two or more models and control in one join; others are transformed. Height equations have
+    `height_weight` times the weight of plan equations. Models should be nearly level in their own systems, with any
+    azimuth. Raises A7SimError for more than 500 models, Undetermined for a block that its ties and control do not
+    determine.
     """
     if not 1 <= len(models) <= MAX_MODELS:
         raise A7SimError(f"expected 1 to {MAX_MODELS} models, got {len(models)}")
@@ -118,7 +119,7 @@ def block_adjustment(models: Sequence[Model], ground: Ground, height_weight: flo
         if max(moves) < CONVERGED:
             return _result(e, ground, (scales, turns, shifts, free), weights, iteration, normal, scale)
     raise Undetermined(
-        f"the block of {pluralize(len(models), 'model')} does not come to rest in {MAX_ITERATIONS} iterations"
+        f"the block of {pluralize(len(models), 'model')} does not converge in {MAX_ITERATIONS} iterations"
     )
 
 
@@ -150,7 +151,7 @@ def _equations(models: tuple[Model, ...], ground: Ground) -> _Equations:
 
 
 def _sparse() -> Any:
-    """Return scipy.sparse, which nothing else needs and which is slow to load."""
+    """Return scipy.sparse; it is slow to import and not needed elsewhere."""
     import_module("scipy.sparse.linalg")
     return import_module("scipy.sparse")
 
@@ -160,7 +161,10 @@ def _middles(models: Sequence[Model]) -> Array:
 
 
 def _level_start(e: _Equations) -> tuple[Array, Array, Array, Array]:
-    """Return scales, turns, shifts and free coordinates of level models: two unknowns for scale and azimuth, linear."""
+    """Return scales, rotations, shifts and free coordinates of level models:
+
+    two unknowns for scale and azimuth, linear.
+    """
     m, rows = len(e.models), e.model_of.size
     if np.isfinite(e.given[0]).sum() < 2:
         raise Undetermined(f"expected two control points in plan, got {int(np.isfinite(e.given[0]).sum())}")
@@ -202,7 +206,7 @@ def _level_start(e: _Equations) -> tuple[Array, Array, Array, Array]:
 
 
 def _level_heights(e: _Equations, z: Array) -> Array:
-    """Return the shifts ``(m,)`` in height that put level models on the mean height of the control."""
+    """Return the shifts ``(m,)`` in height that move level models to the mean height of the control."""
     known = np.isfinite(e.given[2])
     if known.sum() < 3:
         raise Undetermined(f"expected three control points in height, got {int(known.sum())}")
@@ -212,7 +216,7 @@ def _level_heights(e: _Equations, z: Array) -> Array:
 
 
 def _linearised(e: _Equations, scales: Array, turns: Array, shifts: Array, free: Array) -> tuple[Any, Array]:
-    """Return the sparse design ``(3n, 7m + u)`` and what is missing ``(3n,)`` at an approximation."""
+    """Return the sparse design ``(3n, 7m + u)`` and the misclosures ``(3n,)`` at an approximation."""
     rows, m = e.model_of.size, len(e.models)
     turned = np.einsum("ijn,jn->in", turns[:, :, e.model_of], e.local)
     ground = np.where(e.column >= 0, free[e.column] if e.unknown else 0.0, e.given)

@@ -32,14 +32,14 @@ FIELDS = (
     ("Y residual", 46, 54),
     ("Z residual", 55, 63),
 )
-"""Name, first and last column of every field."""
+"""Name, first and last column of each field."""
 
 OUTPUT_COLUMNS = 63
 ENDINGS = (".crd", ".cards")
 _LIKE_A_CARD = re.compile(r"[ 0-9.+-]+")
 
 GROUND, TIES = "-1", "-2"
-"""Control cards: -1 ends the ground control, -2 stands before each set of tie points."""
+"""Control cards: -1 ends the ground control, -2 precedes each set of tie points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class Deck:
 
 
 def is_deck(path: str | Path, text: str) -> bool:
-    """Tell whether a file is a deck of cards: by its ending, else by a first line of blanks and numbers alone."""
+    """Return whether a file is a deck of cards: by its suffix, otherwise by a first line of blanks and numbers only."""
     ending = Path(path).suffix.lower()
     if ending in ENDINGS:
         return True
@@ -70,9 +70,9 @@ def is_deck(path: str | Path, text: str) -> bool:
 
 
 def read_cards(path: str | Path, text: str | None = None) -> Deck:
-    """Return the ground control and the models of a deck of cards, of its text where that has been read already.
+    """Return the ground control and the models of a deck of cards; `text` saves reading the file again.
 
-    Raises Mistake with file, line and column for a card that is no card, one column off, twice there or out of order.
+    Raises A7SimError with file, line and column for a card that is invalid, one column off, repeated or out of order.
     """
     path = Path(path)
     sections = _sections(path, read_text(path) if text is None else text)
@@ -112,16 +112,16 @@ def read_cards(path: str | Path, text: str | None = None) -> Deck:
 
 
 def deck_lines(ground: Ground, models: Sequence[Model], decimals: int = 3) -> list[str]:
-    """Return the cards, one a line, of ground control and models with coordinates ``(3, n)``.
+    """Return the cards, one per line, of ground control and models with coordinates ``(3, n)``.
 
-    Ground points that are checks or have gaps are left out, and so are centres that no neighbour shares, for which
-    the order has no place. Raises Mistake for numbers that do not fit their columns.
+    Ground points that are checks or have gaps are left out, and so are centres that no neighbour shares, for which the
+    order has no place. Raises A7SimError for numbers that do not fit their columns.
     """
     return [_line(card, decimals) if card else control for card, control in _dealt(ground, models)]
 
 
 def output_lines(ground: Ground, strip: Strip, decimals: int = 3) -> list[str]:
-    """Return the output cards of a strip that lies in the ground system: as the input, with three fields more.
+    """Return the output cards of a strip in the ground system: as the input, with three more fields.
 
     Control points carry transformed minus ground, tie points and centres the deviation from the mean.
     """
@@ -144,15 +144,15 @@ def output_lines(ground: Ground, strip: Strip, decimals: int = 3) -> list[str]:
 
 
 def write_cards(path: str | Path, lines: Sequence[str]) -> None:
-    """Write cards, one a line."""
+    """Write cards, one per line."""
     Path(path).write_text("".join(f"{line}\n" for line in lines), encoding="ascii")
 
 
 def free_format_lines(models: Sequence[Model], decimals: int = 4) -> list[str]:
-    """Return models as PAT-M reads them in free format: number, points with X Y Z, -99 after each model.
+    """Return models in the free format of PAT-M: number, points with X Y Z, -99 after each model.
 
-    The layout is general knowledge of the trade, with no manual at hand. Names must be numbers, for which a centre
-    ``<photo>:centre`` takes that of its photograph; a point of the same number in that model is a Mistake.
+    The layout is general knowledge of the trade, with no manual at hand. Names must be numbers; a centre
+    ``<photo>:centre`` has the number of its photograph. Raises A7SimError for a point of the same number in that model.
     """
     lines = []
     for model in models:
@@ -204,7 +204,7 @@ def _check_order(path: Path, number: int, control: str, sections: Sequence[tuple
 
 
 def _checked(path: Path, text: str) -> list[str]:
-    """Return the lines of a deck, found to be printable ASCII."""
+    """Return the lines of a deck. Raises A7SimError unless they are printable ASCII."""
     cards = text.splitlines()
     if not text.strip():
         raise A7SimError(f"{path}: expected cards, got an empty file")
@@ -218,7 +218,7 @@ def _checked(path: Path, text: str) -> list[str]:
 
 
 def _fields(path: Path, number: int, line: str) -> list[str]:
-    """Return the texts of the fields of a card, each found to be right-justified in its columns."""
+    """Return the texts of the fields of a card. Raises A7SimError unless each is right-justified in its columns."""
     if len(line) > OUTPUT_COLUMNS:
         raise A7SimError(
             f"{path}, line {number}, column {OUTPUT_COLUMNS + 1}: expected at most {OUTPUT_COLUMNS} columns, "
@@ -271,7 +271,7 @@ def _value(path: Path, line: int, text: str, field: tuple[str, int, int]) -> flo
 
 
 def _add(path: Path, seen: dict[tuple[str, str], Card], card: Card, name: str, again: bool) -> None:
-    """Note a card. A tie point may come again, for the next neighbour, with the same coordinates."""
+    """Record a card. A tie point may be repeated for the next neighbour with the same coordinates."""
     before = seen.setdefault((card.model, name), card)
     if before is not card and not (again and before.coordinates == card.coordinates):
         of = f"model {card.model}" if card.model else "ground control"
@@ -282,7 +282,7 @@ def _add(path: Path, seen: dict[tuple[str, str], Card], card: Card, name: str, a
 
 
 def _check_pairs(path: Path, ties: Sequence[Sequence[Card]]) -> None:
-    """See that the sets of ties come in pairs of the same centre and points."""
+    """Raise A7SimError unless the sets of ties are pairs of the same centre and points."""
     if len(ties) % 2:
         raise A7SimError(
             f"{path}, line {ties[-1][0].line}: expected the ties of model {ties[-1][0].model} again as the next model "
@@ -313,7 +313,7 @@ def _coordinates(cards: Sequence[Card]) -> Array:
 
 
 def _dealt(ground: Ground, models: Sequence[Model]) -> Iterator[tuple[Card | None, str]]:
-    """Deal coordinate cards (marked `CENTRE` for a centre) and control cards in the order of the program."""
+    """Yield coordinate cards (marked `CENTRE` for a centre) and control cards in the order of the program."""
     chain = in_order(models)
     ties = [sorted(set(a.points) & set(b.points)) for a, b in pairwise(chain)]
     for (a, b), names in zip(pairwise(chain), ties, strict=True):
@@ -369,7 +369,7 @@ def _number(text: str, columns: int, where: str) -> str:
 
 
 def _shared(strip: Strip, model: Model) -> Iterator[tuple[str, Array]]:
-    """Give the deviations ``(3,)`` from the mean of the points that another model of the strip has too."""
+    """Yield the deviations ``(3,)`` from the mean of the points that another model of the strip also contains."""
     count: Mapping[str, int] = {name: sum(name in other.points for other in strip.models) for name in model.points}
     deviations = strip.deviations(model)
     for i, name in enumerate(model.points):

@@ -100,12 +100,12 @@ def perspective_centre_of_levels(pointings: Array, levels: npt.ArrayLike) -> Per
 
 
 def grid_plate_centre(grid: Array, readings: Array, level: npt.ArrayLike, c: npt.ArrayLike) -> Resection:
-    """Return the centre, and the projector's tilts, by resection of a grid plate seen at model scale.
+    """Return the centre, and the projector's tilts, by resection of a grid plate measured at model scale.
 
-    `grid` ``(2, n)`` or ``(2, n, ...)`` are the plate's crosses in mm about the principal point, `readings`
-    ``(2, n, ...)`` the X and Y read at them in mm, `level` the height of each reading in mm, one or ``(n, ...)``;
-    the height counter's units must be turned into mm by the gear. `c` is the projector's principal distance.
-    s0 and residuals are at the plate's scale. Raises Undetermined as `resection` does.
+    `grid` ``(2, n)`` or ``(2, n, ...)`` are the plate's crosses in mm about the principal point, `readings` ``(2, n,
+    ...)`` the X and Y readings at them in mm, `level` the height of each reading in mm, one or ``(n, ...)``; the gear
+    converts the units of the height counter to mm. `c` is the projector's principal distance. s0 and residuals are at
+    the plate's scale. Raises Undetermined as `resection` does.
     """
     grid = np.broadcast_to(grid.reshape((*grid.shape, *(1,) * (readings.ndim - grid.ndim))), readings.shape)
     height = np.broadcast_to(np.asarray(level, dtype=float), readings.shape[1:])

@@ -124,7 +124,7 @@ def relative_orientation(
 
 
 def _why(poses: RelativePoses, n: int) -> str:
-    """Say why the first pair that is not oriented is not."""
+    """Return the reason why the first pair that is not oriented is not."""
     first = int(np.flatnonzero(~poses.converged)[0])
     which = "" if poses.converged.ndim == 0 else f" of pair {first}"
     condition = float(poses.condition.flat[first])
@@ -201,10 +201,10 @@ def finish_orientation(
     converged: npt.NDArray[np.bool_],
     unit: Array | None = None,
 ) -> RelativeOrientation:
-    """Return the orientation that iterations came to, with the statistics of its unknowns.
+    """Return the orientation from the result of the iterations, with the statistics of its unknowns.
 
-    `unit` ``(n, ...)`` is what each condition is divided by; without it that is its steepness, so that all weigh as
-    their image coordinates do. Raises Undetermined for singular normal equations.
+    `unit` ``(n, ...)`` is the divisor of each condition; without it that is its steepness, so that all have the weight
+    of their image coordinates. Raises Undetermined for singular normal equations.
     """
     rotation1, rotation2 = rotations
     condition = coplanarity(rays_of(images[0], c[0]), rays_of(images[1], c[1]), rotation1, rotation2, centre2)
@@ -247,7 +247,7 @@ def finish_orientation(
 
 
 def _axes(angles: Array, m: Array) -> tuple[Array, Array, Array]:
-    """Return the axes ``(3, ...)`` about which omega, phi and kappa of a camera turn it."""
+    """Return the axes ``(3, ...)`` of the rotations omega, phi and kappa of a camera."""
     omega = angles[0]
     zero, one = np.zeros_like(omega), np.ones_like(omega)
     return np.array([one, zero, zero]), np.array([zero, np.cos(omega), np.sin(omega)]), m[:, 2]

@@ -1,6 +1,6 @@
-"""Corrections of measured image coordinates: what lens, air and the earth's curve did is taken off again.
+"""Corrections of measured image coordinates: the effects of lens, air and earth curvature are removed.
 
-In the order principal point, distortion, refraction, curvature: the reverse of that in which they came about.
+The order is principal point, distortion, refraction, curvature, the reverse of the order in which they arise.
 """
 
 from collections.abc import Sequence
@@ -78,10 +78,10 @@ def corrected_image(
     curvature: bool = False,
     rotation: Array | None = None,
 ) -> Array:
-    """Return image points ``(2, ...)`` in mm from the fiducial centre as a faultless camera on a flat earth has them.
+    """Return image points ``(2, ...)`` in mm from the fiducial centre as imaged by a faultless camera on a flat earth.
 
-    Arguments are those of the single corrections. Raises ValueError where refraction or curvature is asked for
-    without a flying height.
+    Parameters are those of the single corrections. Raises ValueError if refraction or curvature is requested without a
+    flying height.
     """
     image = without_distortion(about_principal_point(image, principal_point), distortion)
     if not (refraction or curvature):

@@ -1,7 +1,7 @@
-"""The grid test of a projector: principal distance, principal point and element zeros from a plate seen at levels of Z.
+"""Grid test of a projector: principal distance, principal point and element zeros from a plate at levels of Z.
 
-The plate's crosses lie on the carrier, the mark is set on each at one level of Z or more, and X and Y are read: a space
-resection in readings whose interior orientation is unknown as well. What can be told apart is in docs/grid-test.md.
+The plate's crosses are on the carrier, the mark is set on each at one or more levels of Z, and X and Y are read: a
+space resection in readings with unknown interior orientation. docs/grid-test.md states what can be separated.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from a7sim.reduction.interior import picture_placement
 from a7sim.reduction.least_squares import Adjustment, Undetermined, solve_least_squares
 
 UNKNOWNS = ("c", "x0", "y0", "omega", "phi", "kappa", "bx", "by", "bz")
-"""Order of the unknowns: mm and radians; bx, by and bz place the centre at (bx, -by, bz)."""
+"""Order of the unknowns: mm and radians; bx, by and bz move the centre to (bx, -by, bz)."""
 
 HELD_AT_ONE_LEVEL = ("bx", "by", "bz")
 """At one level a shift of the centre looks like one of the principal point, and its height like c."""
@@ -24,7 +24,7 @@ MIN_CROSSES = 5
 
 MAX_ITERATIONS = 30
 MIN_STEP_MM = 1e-9
-"""On the plate."""
+"""On the plate, mm."""
 
 MAX_CONDITION = 1e5
 """Of the scaled normal equations. At levels 200 and 400 mm below the centre it is some 2e2, at 300 and 310 mm 2e4."""
@@ -32,7 +32,7 @@ MAX_CONDITION = 1e5
 
 @dataclass(frozen=True)
 class Elements:
-    """The elements of a projector ``(...)``: mm, and radians from their counter zeros; x0 = y0 = 0 by rights."""
+    """Elements of a projector ``(...)``: mm, and radians from their counter zeros; nominally x0 = y0 = 0."""
 
     c: npt.ArrayLike
     x0: npt.ArrayLike = 0.0
@@ -47,7 +47,7 @@ class Elements:
 
 @dataclass(frozen=True)
 class PlatePlacement:
-    """How a plate lies on its carrier ``(...)``: shift in mm and turn in radians against the collimating marks."""
+    """Placement of a plate on its carrier ``(...)``: shift in mm and rotation in radians from the collimating marks."""
 
     dx: Array
     dy: Array
@@ -56,16 +56,17 @@ class PlatePlacement:
     sigma_turn: Array
 
     def placed(self, crosses: Array) -> Array:
-        """Return crosses ``(2, n)`` of the plate as places on the carrier ``(2, n, ...)``."""
+        """Return crosses ``(2, n)`` of the plate as positions on the carrier ``(2, n, ...)``."""
         turn = np.asarray(self.turn)
         crosses = crosses.reshape((*crosses.shape, *(1,) * turn.ndim))
         return np.asarray(mxv(plane_rotation(turn)[:, :, None], crosses) + np.array([self.dx, self.dy])[:, None])
 
 
 def plate_placement(displacements: Array, marks: Array) -> PlatePlacement:
-    """Return how a plate lies from displacements ``(2, n, ...)`` of its fiducials at collimating marks ``(2, n)``, mm.
+    """Return the placement of a plate from displacements ``(2, n, ...)`` of its fiducials at collimating marks ``(2,
+    n)``, mm.
 
-    Fiducials registered several times stand there as often. Raises Undetermined for one fiducial.
+    Fiducials registered several times occur as often. Raises Undetermined for one fiducial.
     """
     lie = picture_placement(displacements, marks)
     n = marks.shape[1]
@@ -77,16 +78,16 @@ def plate_placement(displacements: Array, marks: Array) -> PlatePlacement:
 
 @dataclass(frozen=True)
 class ProjectorTest:
-    """What a grid test found of a projector: `errors` and `sigmas` ``(...)`` by names of `UNKNOWNS`, mm and radians.
+    """Result of a grid test: `errors` and `sigmas` ``(...)`` of a projector by names of `UNKNOWNS`, mm and radians.
 
-    An error is what really stands minus what the counter shows. Elements that are held have none.
+    An error is the true value minus the counter reading. Elements that are held have none.
     """
 
     errors: Mapping[str, Array]
     sigmas: Mapping[str, Array]
-    """Of the pointings and of how well the plate's lie is known."""
+    """Standard deviations from the pointings and from the placement of the plate."""
     residuals: Array
-    """Of the crosses ``(2, k, n, ...)`` at every level, computed minus ruled, mm at photo scale."""
+    """Residuals of the crosses ``(2, k, n, ...)`` at each level, computed minus ruled, mm at photo scale."""
     adjustment: Adjustment
     """Its unknowns are those of `errors`, in their order."""
     iterations: int
@@ -103,8 +104,8 @@ def grid_test(
     """Return the errors of a projector from readings ``(2, k, n, ...)`` at n crosses ``(2, n)`` and k levels.
 
     Readings, and heights ``(k,)`` or ``(k, ...)`` of the levels, in mm of the instrument frame, Z up; crosses in mm
-    about the plate's middle, which lies on the carrier as `lie` says. At one level bx, by and bz are held. Raises
-    Undetermined for fewer than five crosses and for crosses or levels that leave something open.
+    about the plate's middle, which is on the carrier as `lie` states. At one level bx, by and bz are held. Raises
+    Undetermined for fewer than five crosses and for crosses or levels that do not determine the unknowns.
     """
     k, n = readings.shape[1:3]
     if n < MIN_CROSSES:
@@ -148,10 +149,10 @@ def _adjusted(seen: Array, mark: Array, start: Array, sought: list[int]) -> tupl
 
 
 def _computed(mark: Array, elements: Array) -> tuple[Array, Array]:
-    """Return where a mark ``(3, k, n, ...)`` comes to lie on the carrier ``(2, k, n, ...)``, and what changes it.
+    """Return the position of a mark ``(3, k, n, ...)`` on the carrier ``(2, k, n, ...)``, and its derivatives.
 
-    The coefficients ``(2kn, 9, ...)`` are those of `UNKNOWNS`. A turn t about an axis moves a point q seen from the
-    camera by ``-R' (t x away)``; then ``dx = -(c dq_x + x dq_z) / q_z``.
+    The derivatives ``(2kn, 9, ...)`` are by `UNKNOWNS`. A rotation t about an axis moves a point q in the camera's
+    frame by ``-R' (t x away)``; then ``dx = -(c dq_x + x dq_z) / q_z``.
     """
     c, x0, y0, omega, phi, kappa, bx, by, bz = elements
     turned = rotation(omega, phi, kappa)

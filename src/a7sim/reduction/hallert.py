@@ -21,10 +21,10 @@ from a7sim.reduction.relative_poses import MAX_ITERATIONS, MIN_POINTS, TOLERANCE
 from a7sim.text import pluralize
 
 Scalars = float | Array
-"""One number, or one for each pair of a batch ``(...)``."""
+"""One number, or one number per pair of a batch ``(...)``."""
 
 REGULAR_POINTS = ((0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.5, 0.5, 0.5), (0.0, 0.0, 1.0, 1.0, -1.0, -1.0, 1.0, 0.0, -1.0))
-"""x in b and y in d of the six, or all nine, points at which parallaxes are measured, in the order asked for."""
+"""x in b and y in d of the six, or all nine, points at which parallaxes are measured, in the order of the parameter."""
 
 
 def six_point_corrections(parallaxes: Array, b: Scalars, d: Scalars, h: Scalars) -> tuple[Mapping[str, Array], Array]:
@@ -115,8 +115,8 @@ def orientation_by_parallaxes(
 ) -> RelativeOrientation:
     """Orient pairs from image points ``(2, n, ...)`` in mm by the y-parallaxes of their model (T 2.33, 2.34).
 
-    As in the plotter, from zero: parallaxes measured in the model, corrections computed and set, until nothing is left
-    to set; all parallaxes of the model have the same weight. Unknowns and errors are those of
+    As in the plotter, from zero: parallaxes measured in the model, corrections computed and set, until no correction
+    remains; all parallaxes of the model have the same weight. Unknowns and errors are those of
     `coplanarity.relative_orientation`; residuals and s0 are in mm of one image coordinate of a vertical pair, by the
     mean scale of the model.
     """

@@ -1,4 +1,4 @@
-"""Interior orientation: how a picture lies on its carrier, and measured image points brought to the calibrated ones."""
+"""Interior orientation: placement of a picture on its carrier, and measured image points in the calibrated system."""
 
 from dataclasses import dataclass
 
@@ -35,11 +35,12 @@ class PicturePlacement:
     dy: Array
     turn: Array
     scale: Array
-    """Relative: 1e-4 for a picture that is too large by as much."""
+    """Relative change: 1e-4 for a picture that is too large by that factor."""
 
 
 def picture_placement(displacements: Array, marks: Array) -> PicturePlacement:
-    """Return how a picture lies from its fiducials' displacements ``(2, n, ...)`` at collimating marks ``(2, n)``, mm.
+    """Return the placement of a picture from its fiducials' displacements ``(2, n, ...)`` at collimating marks ``(2,
+    n)``, mm.
 
     Small-angle similarity ``d = t + (scale, turn) x`` by least squares. Raises Undetermined for one fiducial.
     """
@@ -62,7 +63,7 @@ class PlaneFit:
     matrix: Array
     adjustment: Adjustment
     iterations: Array
-    """Shape ``(...)``: rounds of Gauss-Newton until nothing moved; one for the linear fits."""
+    """Shape ``(...)``: Gauss-Newton iterations until convergence; one for the linear fits."""
 
     @property
     def unknowns(self) -> dict[str, Array]:
@@ -85,7 +86,7 @@ class PlaneFit:
         return _carried(self.matrix, measured)
 
     def measured(self, calibrated: Array) -> Array:
-        """Return where points ``(2, m, ...)`` of the calibrated system lie in the measured one."""
+        """Return points ``(2, m, ...)`` of the calibrated system in the measured system."""
         return _carried(_adjugate(self.matrix), calibrated)
 
     @property
@@ -132,7 +133,10 @@ def plane_fit(measured: Array, calibrated: Array, kind: str = "affine") -> Plane
 
 
 def principal_distance_for_film(c: npt.ArrayLike, fit: PlaneFit) -> Array:
-    """Return the principal distance in mm to set in the plotter: film shrunk by as much shortens the camera's c."""
+    """Return the principal distance in mm to set in the plotter:
+
+    film shrinkage shortens the camera's c by the same factor.
+    """
     return np.asarray(np.asarray(c, dtype=float) * fit.film_scale)
 
 
@@ -157,7 +161,7 @@ def _inverse_of_normalising(scale_and_shift: Array) -> Array:
 
 
 def _basis(kind: str) -> Array:
-    """Return the share ``(3, 3, u)`` of every unknown in the matrix."""
+    """Return the coefficients ``(3, 3, u)`` of the unknowns in the matrix."""
     basis = np.zeros((3, 3, len(UNKNOWNS[kind])))
     for i, name in enumerate(UNKNOWNS[kind]):
         if kind == "conformal" and name in "ab":
@@ -168,7 +172,7 @@ def _basis(kind: str) -> Array:
 
 
 def _picked(kind: str, matrix: Array) -> Array:
-    """Return the unknowns ``(u, ...)`` that a matrix ``(3, 3, ...)`` with a last element of one holds."""
+    """Return the unknowns ``(u, ...)`` of a matrix ``(3, 3, ...)`` with a last element of one."""
     places = [(1, 0) if kind == "conformal" and name == "b" else _PLACES[name] for name in UNKNOWNS[kind]]
     return np.array([matrix[place] for place in places])
 
@@ -196,7 +200,7 @@ def _linear_equations(source: Array, target: Array, basis: Array) -> tuple[Array
 
 
 def _refined(unknowns: Array, source: Array, target: Array, basis: Array) -> tuple[Adjustment, Array]:
-    """Return the projective fit by Gauss-Newton on the places themselves."""
+    """Return the projective fit by Gauss-Newton on the positions themselves."""
     homogeneous = _with_one(source)
     shares = np.einsum("iju,jn...->iun...", basis, homogeneous)
     iterations = np.zeros(source.shape[2:], dtype=int)
@@ -230,7 +234,7 @@ def _in_given_units(
     measured: Array,
     iterations: Array,
 ) -> PlaneFit:
-    """Return the fit between normalised places as one between the given ones, cofactors carried along."""
+    """Return the fit of normalised positions as a fit of the given ones, with transformed cofactors."""
     into = _normalising_matrix(from_measured)
     whole = mxm(to_calibrated, mxm(matrix, into))
     last = whole[2, 2]

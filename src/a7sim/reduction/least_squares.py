@@ -1,7 +1,7 @@
-"""Least squares with its statistics, for one set of observations or a batch of them.
+"""Least squares with its statistics, for one set of observations or a batch.
 
-Everything is component-first: a batch is one more axis at the end, and no set of normal equations is sent to
-LAPACK by itself.
+All arrays are component-first: a batch is one more axis at the end, and no single set of normal equations is sent to
+LAPACK.
 """
 
 from dataclasses import dataclass
@@ -93,7 +93,7 @@ def solve_least_squares(
 def inverse_of_definite(matrix: Array) -> Array:
     """Return the inverses of symmetric positive definite matrices ``(u, u, ...)``, by Cholesky.
 
-    A batch is worked elementwise over its last axes, a single matrix by LAPACK. Where one is not definite its
+    A batch is computed elementwise over its last axes, a single matrix by LAPACK. If a matrix is not definite its
     inverse is infinite, so that its condition shows it.
     """
     if matrix.ndim == 2:

@@ -30,9 +30,9 @@ def model_coordinates(
 def a8_model_coordinates(readings: Array, base: npt.ArrayLike, z_in: float, reference: float = 0.0) -> Array:
     """Return model points ``(3, ...)`` in mm, origin in the left centre, Z up, from readings of an A8 (P 3.1, 3.2).
 
-    `readings` ``(3, ...)`` are those of the X and Y scales (1 unit is 2 mm, base line at Y = 200.00, left centre at
-    X = 200.00 - B/4) and of the height scale in mm, which grows upwards and stands at `reference` where the column
-    stands at `z_in`. `base` is B as set, in mm.
+    `readings` ``(3, ...)`` are those of the X and Y scales (1 unit is 2 mm, base line at Y = 200.00, left centre at X =
+    200.00 - B/4) and of the height scale in mm, which increases upwards and reads `reference` where the column reads
+    `z_in`. `base` is B as set, in mm.
     """
     x, y, height = readings
     return np.array(

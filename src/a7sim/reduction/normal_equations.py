@@ -1,4 +1,4 @@
-"""The normal equations of coplanarity, formed and solved for many pairs in arrays that are filled anew."""
+"""Normal equations of coplanarity, formed and solved for a batch of pairs in reused arrays."""
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +17,9 @@ eigenvalues add up to 5 before they are inverted."""
 
 
 class Workspace(RotationWorkspace):
-    """Arrays that the steps of an iteration fill anew, of pairs ``(...)`` with n points.
+    """Work arrays of the steps of an iteration, of pairs ``(...)`` with n points.
 
-    They begin at lines of the cache: numpy takes half the time for them that it takes for arrays where malloc puts
-    them.
+    They are aligned to cache lines: numpy takes half the time of arrays at arbitrary addresses.
     """
 
     def __init__(self, n: int, batch: tuple[int, ...]) -> None:
@@ -39,19 +38,19 @@ class Workspace(RotationWorkspace):
 
 
 def fast_all(mask: npt.NDArray[np.bool_]) -> bool:
-    """Tell what `mask.all()` does, of a single pair in less time."""
+    """Return `mask.all()`, faster for a single pair."""
     return bool(mask.all() if mask.ndim else mask)
 
 
 def fast_any(mask: npt.NDArray[np.bool_]) -> bool:
-    """Tell what `mask.any()` does, of a single pair in less time."""
+    """Return `mask.any()`, faster for a single pair."""
     return bool(mask.any() if mask.ndim else mask)
 
 
 def condition_numbers(work: Workspace) -> Array:
     """Return the condition numbers ``(...)`` of the scaled normal equations, in the 1-norm, or small bounds of them.
 
-    Their determinant bounds them, so that hardly any inverse is needed.
+    Their determinant bounds them, so that an inverse is rarely needed.
     """
     normal, pivots = work.normal[:5, :5], work.reduced[:5, :5].diagonal().T
     shares = np.divide(pivots, normal.diagonal().T, out=work.shares)
@@ -63,7 +62,7 @@ def condition_numbers(work: Workspace) -> Array:
 
 
 def symmetrize(normal: Array) -> Array:
-    """Return normal equations that stand above the diagonal in full."""
+    """Return the full symmetric normal equations from those on and above the diagonal."""
     full = normal.copy()
     for i in range(len(full) - 1):
         full[i + 1 :, i] = full[i, i + 1 :]
@@ -79,12 +78,12 @@ def _condition(normal: Array) -> Array:
 
 
 def fast_mxv(matrix: Array, vector: Array) -> Array:
-    """Multiply as `mxv` does, in less time for a single matrix."""
+    """Return `mxv`, faster for a single matrix."""
     return np.asarray(matrix @ vector) if matrix.ndim == 2 else mxv(matrix, vector)
 
 
 def rotate_to_base(R: Array, rays: Array) -> Array:
-    """Turn the rays ``(2, 3, n, ...)`` of both cameras by rows of their rotations ``(2, i, 3, ...)``."""
+    """Rotate the rays ``(2, 3, n, ...)`` of both cameras by rows of their rotations ``(2, i, 3, ...)``."""
     return R @ rays if rays.ndim == 3 else np.asarray(np.einsum("kij...,kjn...->kin...", R, rays))
 
 
@@ -94,10 +93,10 @@ def compute_discrepancies(across: Array) -> Array:
 
 
 def form_equations(R: Array, rays: Array, work: Workspace) -> None:
-    """Form the equations in mm of one image coordinate, in `work.rows`, of turned rays.
+    """Form the equations in mm of one image coordinate, in `work.rows`, of rotated rays.
 
-    The left rays are divided by what the four image coordinates change the condition by: that is the whole of
-    ``(0, -z, y)`` of the other ray but for its component along the axis of the camera.
+    The left rays are divided by the change of the condition with the four image coordinates: that is ``(0, -z, y)`` of
+    the other ray without its component along the axis of the camera.
     """
     a, steepness = work.turned, work.steepness
     spare = work.spare.reshape(a.shape)
@@ -125,7 +124,7 @@ def form_equations(R: Array, rays: Array, work: Workspace) -> None:
 
 
 def form_level_equations(rays: Array, work: Workspace) -> None:
-    """Form what `form_equations` does for cameras that stand level."""
+    """Form the equations of `form_equations` for level cameras."""
     work.steepness[:] = np.hypot(rays[0, 2].flat[0], rays[1, 2].flat[0])
     work.turned[:] = rays
     work.turned[0] /= work.steepness
@@ -135,7 +134,7 @@ def form_level_equations(rays: Array, work: Workspace) -> None:
 def _form_rows(a: Array, work: Workspace) -> None:
     """Form the five coefficients and the discrepancy ``(6, n, ...)`` from rays ``(2, 3, n, ...)``.
 
-    Those of the right camera are for turns the other way.
+    The coefficients of the right camera are for the opposite rotations.
     """
     rows, products = work.rows, work.spare[:2]
     (x1, y1, z1), (x2, y2, z2) = a
@@ -159,9 +158,9 @@ def form_products(work: Workspace) -> None:
 
 
 def solve(work: Workspace, stiffness: Array) -> Array:
-    """Return the corrections ``(5, ...)`` of the normal equations, stiffened by a share of their diagonal.
+    """Return the corrections ``(5, ...)`` of the normal equations, damped by a share of their diagonal.
 
-    What elimination leaves stands in `work.reduced`: the pivots and, last of all, the sum of squared residuals.
+    `work.reduced` contains the result of the elimination: the pivots and, last, the sum of squared residuals.
     """
     if work.normal.ndim == 2:
         return _solved_alone(work, float(stiffness))
@@ -185,7 +184,7 @@ def solve(work: Workspace, stiffness: Array) -> Array:
 
 
 def _solved_alone(work: Workspace, stiffness: float) -> Array:
-    """Do what `solved` does for one pair, with the numbers of Python, which are quicker than arrays of one number."""
+    """Return the result of `solve` for one pair with Python numbers, which are faster than arrays of one number."""
     rows = work.normal.tolist()
     for i in range(5):
         rows[i][i] *= 1.0 + stiffness
@@ -209,9 +208,9 @@ def _solved_alone(work: Workspace, stiffness: float) -> Array:
 
 
 def invert(matrix: Array) -> Array:
-    """Return the inverses of positive definite matrices ``(u, u, ...)``; of singular ones, what is not finite.
+    """Return the inverses of positive definite matrices ``(u, u, ...)``; not finite for singular ones.
 
-    A batch is worked elementwise by exchange of one unknown after the other, a single matrix by LAPACK.
+    A batch is computed elementwise by exchange of one unknown after the other, a single matrix by LAPACK.
     """
     if matrix.ndim == 2:
         try:

@@ -11,7 +11,7 @@ from a7sim.reduction.least_squares import Adjustment, solve_least_squares
 
 @dataclass(frozen=True)
 class ProjectorPose:
-    """How a projector stands: centre ``(3, ...)`` in mm, angles omega, phi, kappa ``(3, ...)`` in radians."""
+    """Pose of a projector: centre ``(3, ...)`` in mm, angles omega, phi, kappa ``(3, ...)`` in radians."""
 
     centre: Array
     angles: Array
@@ -20,12 +20,11 @@ class ProjectorPose:
 def element_corrections(
     parallaxes: Array, points: Array, left: ProjectorPose, right: ProjectorPose, unknowns: Sequence[str]
 ) -> Adjustment:
-    """Return the corrections, radians and mm, that make y-parallaxes vanish in the least-squares sense.
+    """Return the corrections, radians and mm, that clear y-parallaxes in the least-squares sense.
 
-    `parallaxes` has shape ``(n, ...)`` in mm, `points` ``(3, n, ...)`` in the frame of the projectors. `unknowns`
-    are names of `PARALLAX_ELEMENTS`, 1 for the left-hand photograph. The coefficients are those of thesis
-    2.32, carried over to the tilts at which the projectors stand. Raises Undetermined for points that do not
-    determine the unknowns.
+    `parallaxes` has shape ``(n, ...)`` in mm, `points` ``(3, n, ...)`` in the frame of the projectors. `unknowns` are
+    names of `PARALLAX_ELEMENTS`, 1 for the left-hand photograph. The coefficients are those of thesis 2.32, generalised
+    to the present tilts of the projectors. Raises Undetermined for points that do not determine the unknowns.
     """
     coefficients = parallax_coefficients(
         points, points, left.centre[:, None], right.centre[:, None], left.angles, right.angles

@@ -39,11 +39,12 @@ class StripAxis:
 
 @dataclass(frozen=True)
 class StripDeformation:
-    """What the polynomial found the strip to be: the ground's shape subtracted, shape ``(...)`` each, at its middle.
+    """Deformation of the strip by the polynomial, after subtraction of the ground's shape, shape ``(...)`` each, at its
+    middle.
 
-    Positive scale drift: the strip grows along its axis. Positive horizontal bow: it turns to the left. Positive
-    vertical bow: its ends lie too high. Positive twist: its left side rises more the farther along. Sags are those of
-    the whole length.
+    Positive scale drift: the strip grows along its axis. Positive horizontal bow: it bends to the left. Positive
+    vertical bow: its ends are too high. Positive twist: its left side rises along the strip. Sags are those of the
+    whole length.
     """
 
     scale_drift: Array
@@ -95,7 +96,9 @@ class StripAdjustment:
 
 
 def strip_axis(model: Model, along: Array | None = None) -> StripAxis:
-    """Return the axis of a strip in the ground system: along its centres, or along its points if it has not two.
+    """Return the axis of a strip in the ground system:
+
+    along its centres, or along its points if there are fewer than two.
 
     `along` ``(2, ...)`` gives another direction in plan. The middle is that of the points' extent along the axis.
     """
@@ -125,9 +128,9 @@ def strip_adjustment(
 ) -> StripAdjustment:
     """Return a strip adjusted to its control by polynomials of the second or third degree.
 
-    The model's coordinates ``(3, n, ...)`` must lie in the system of the ground, as absolute orientation leaves them.
-    In plan three (four) points of control are the fewest, in height five (seven), and the third degree asks for
-    four bands of them. Raises Undetermined for less.
+    The model's coordinates ``(3, n, ...)`` must be in the system of the ground, as after absolute orientation. In plan
+    at least three (four) control points are required, in height five (seven), and for the third degree four bands of
+    them. Raises Undetermined for less.
     """
     if degree not in (2, 3):
         raise A7SimError(f"expected a polynomial of degree 2 or 3, got {degree}")

@@ -1,7 +1,7 @@
-"""Relative orientation of many pairs: iterations from zero, from far, and from quarter turns.
+"""Relative orientation of a batch of pairs: iterations from zero, from far, and from quarter turns.
 
-Cameras are turned by rotations, not by adding to angles (`coplanarity` has the equations). An iteration is one set of
-normal equations, which far from the end is solved for further right-hand sides, too.
+Cameras are rotated by matrices, not by adding to angles (`coplanarity` has the equations). An iteration is one set of
+normal equations, which far from convergence is solved for further right-hand sides, too.
 """
 
 from collections.abc import Mapping
@@ -35,49 +35,55 @@ from a7sim.reduction.normal_equations import (
 MIN_POINTS = 5
 MAX_ITERATIONS = 30
 TOLERANCE = 1e-10
-"""Radians: iterations end when the next correction would be below it: the product of the last one with itself and with
-the rms discrepancy. What is then left of perfect images is below 1e-10, of measured ones below 1e-9."""
+"""Radians:
+
+iterations end when the next correction would be smaller; its estimate is the square of the last one times the rms
+discrepancy. The remaining error of perfect images is below 1e-10, of measured ones below 1e-9.
+"""
 
 NEAR_ITERATIONS = 3
-"""So many are enough for pairs from near; those that need more begin again with the others."""
+"""Iterations sufficient for pairs near zero; pairs that need more start again with the others."""
 
 HOPELESS = 10.0
-"""Pairs whose first equations are worse than that by as much are refused whatever they come to."""
+"""Ratio of the condition of the first equations to the limit above which a pair is rejected at once."""
 
 MAX_S0 = 0.005
-"""Of c: a solution found from quarter turns that leaves more is none."""
+"""Relative to c: a solution from quarter turns with a larger s0 is rejected."""
 
 FAR = 0.055
 FAR_LATER = 0.002
 NEAR = 3e-4
-"""Radians: in pairs whose first correction is larger than FAR, or a later one than FAR_LATER, the same normal equations
-are solved for what is left, too, until corrections are smaller than NEAR."""
+"""Radians:
+
+in pairs whose first correction is larger than FAR, or a later one than FAR_LATER, the same normal equations are also
+solved for the remaining discrepancies until corrections are smaller than NEAR.
+"""
 
 MAX_TURN = 0.4
-"""Radians, in one step: farther away the linear equations say nothing."""
+"""Radians per step: beyond it the linear equations are meaningless."""
 
 DAMPING = 0.5
-"""Share of the mean square discrepancy, in radians squared, that stiffens the normal equations far from the end."""
+"""Share of the mean square discrepancy, in radians squared, that damps the normal equations far from convergence."""
 
 CHORDS = 6
 WEAKNESS = 10.0
-"""By how much the discrepancies are multiplied in the unknowns, for a guess at what is left to correct."""
+"""Factor from discrepancies to unknowns, for an estimate of the remaining corrections."""
 
 STEADY = 0.8
-"""A chord step that is not below this share of the step before it is not taken."""
+"""A chord step is rejected unless it is below this share of the step before it."""
 
 WORKING_SET = 16000
-"""Points worked at a time, so that what is computed of them stays in the cache."""
+"""Points processed at a time, so that their intermediate values stay in the cache."""
 
 QUARTER_TURNS = ((0, 0), (2, 2), (1, 1), (3, 3), (0, 2), (2, 0), (0, 1), (0, 3), (1, 0), (3, 0))
-"""Swings of the two cameras, in quarter turns, from which pairs are tried that do not converge from zero."""
+"""Swings of the two cameras, in quarter turns, that are tried for pairs that do not converge from zero."""
 
 
 @dataclass(frozen=True)
 class RelativePoses:
-    """What relative orientation comes to for each pair of a batch ``(...)``, without the statistics of its unknowns.
+    """Result of relative orientation for each pair of a batch ``(...)``, without the statistics of its unknowns.
 
-    Where `converged` is False the pair is not oriented and its other values mean nothing.
+    Where `converged` is False the pair is not oriented and its other values are meaningless.
     """
 
     rotations: Array
@@ -91,7 +97,7 @@ class RelativePoses:
 
     iterations: npt.NDArray[np.int64]
     converged: npt.NDArray[np.bool_]
-    """Iterations ended by themselves, the condition is sound and all points lie before both cameras."""
+    """The iterations converged, the condition is sound and all points are in front of both cameras."""
 
     @property
     def rotation(self) -> Array:
@@ -105,10 +111,10 @@ class RelativePoses:
 
 
 def relative_poses(image1: Array, image2: Array, c1: float, c2: float, tolerance: float = TOLERANCE) -> RelativePoses:
-    """Orient many pairs from image points ``(2, n, ...)`` in mm, without the statistics of the unknowns.
+    """Orient a batch of pairs from image points ``(2, n, ...)`` in mm, without the statistics of the unknowns.
 
-    Pairs are worked in sets that fit the cache. Those that do not converge from zero are tried again from swings of
-    quarter turns, and their iterations are added up. Raises Undetermined for fewer than five points.
+    Pairs are processed in sets that fit the cache. Those that do not converge from zero are tried again from quarter
+    turns of swing, and their iterations are added. Raises Undetermined for fewer than five points.
     """
     n = image1.shape[1]
     if n < MIN_POINTS:
@@ -150,9 +156,9 @@ _SHAPES: Mapping[str, tuple[tuple[int, ...], type]] = {
 def _oriented_from_near(
     images: tuple[Array, Array], c1: float, c2: float, tolerance: float, work: Workspace
 ) -> RelativePoses:
-    """Orient those of many pairs ``(2, n, ...)`` that are near zero; the others are not `converged`.
+    """Orient the pairs ``(2, n, ...)`` of a batch that are near zero; the others are not `converged`.
 
-    They are worked together to the end: with few iterations, that is faster than to put aside those that are done.
+    All are iterated to the end: with few iterations, that is faster than removing finished pairs.
     """
     rays, state = _loaded(images, c1, c2, work), _start((0, 0), images[0].shape[2:])
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -175,7 +181,7 @@ def _loaded(images: tuple[Array, Array], c1: float, c2: float, work: Workspace) 
 
 
 def _resolved(images: tuple[Array, Array], c1: float, c2: float, tolerance: float, work: Workspace) -> RelativePoses:
-    """Orient pairs ``(2, n, ...)`` from zero, and those that refuse from swings of quarter turns."""
+    """Orient pairs ``(2, n, ...)`` from zero, and those that do not converge from quarter turns of swing."""
     rays = _loaded(images, c1, c2, work)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # singular pairs of a batch
         found = _oriented(rays, (0, 0), tolerance, work)
@@ -185,7 +191,7 @@ def _resolved(images: tuple[Array, Array], c1: float, c2: float, tolerance: floa
 
 
 def _tried_again(found: RelativePoses, rays: Array, tolerance: float) -> RelativePoses:
-    """Try pairs that refused from swings of quarter turns."""
+    """Try pairs that did not converge from quarter turns of swing."""
     for swings in QUARTER_TURNS[1:]:
         open_ = ~found.converged & ~(found.condition >= MAX_CONDITION)
         if not open_.any():
@@ -198,7 +204,7 @@ def _tried_again(found: RelativePoses, rays: Array, tolerance: float) -> Relativ
 
 
 def _replaced(found: RelativePoses, where: npt.NDArray[np.bool_], again: RelativePoses) -> RelativePoses:
-    """Take pairs over from another attempt, adding its iterations to those of the first."""
+    """Replace pairs by those of another attempt, adding its iterations to those of the first."""
     if where.ndim == 0:
         return replace(again, iterations=found.iterations + again.iterations) if again.converged else found
     better = where.copy()
@@ -213,7 +219,7 @@ def _replaced(found: RelativePoses, where: npt.NDArray[np.bool_], again: Relativ
 def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Workspace) -> RelativePoses:
     """Orient pairs of rays ``(2, 3, n, ...)`` in camera frames, from the given quarter turns.
 
-    Of a batch, the pairs that are done are put aside once they are more than half.
+    In a batch, finished pairs are removed once they are more than half.
     """
     batch = rays.shape[3:]
     level = swings == (0, 0)
@@ -245,7 +251,7 @@ def _oriented(rays: Array, swings: tuple[int, int], tolerance: float, work: Work
 
 
 def _swung(swings: tuple[int, int], batch: tuple[int, ...]) -> Array:
-    """Return rotations ``(2, 3, 3, ...)`` of cameras that are level but swung by quarter turns."""
+    """Return rotations ``(2, 3, 3, ...)`` of level cameras with swings of quarter turns."""
     turned = np.eye(3)[None].repeat(2, axis=0)
     for camera, swing in enumerate(swings):
         if swing:
@@ -259,7 +265,10 @@ def _swung(swings: tuple[int, int], batch: tuple[int, ...]) -> Array:
 
 @dataclass(frozen=True)
 class _Iteration:
-    """Where iterations of pairs ``(...)`` stand: rotations, which go on or have come from far, last correction."""
+    """State of the iterations of pairs ``(...)``:
+
+    rotations, masks of active pairs and of pairs from far, last correction.
+    """
 
     rotations: Array
     active: npt.NDArray[np.bool_]
@@ -268,7 +277,7 @@ class _Iteration:
     iterations: npt.NDArray[np.int64]
 
     def of(self, pairs: npt.NDArray[np.int64]) -> "_Iteration":
-        """Return those of some pairs."""
+        """Return the state of selected pairs."""
         return _Iteration(
             self.rotations[..., pairs],
             self.active[pairs],
@@ -279,7 +288,7 @@ class _Iteration:
 
 
 def _start(swings: tuple[int, int], batch: tuple[int, ...]) -> _Iteration:
-    """Return where iterations begin: cameras level but swung by quarter turns."""
+    """Return the start of the iterations: level cameras with swings of quarter turns."""
     zero = np.zeros(batch)
     return _Iteration(_swung(swings, batch), zero == 0.0, zero > 0.0, zero, zero.astype(np.int64))
 
@@ -287,7 +296,7 @@ def _start(swings: tuple[int, int], batch: tuple[int, ...]) -> _Iteration:
 def _iterated(
     state: _Iteration, rays: Array, tolerance: float, work: Workspace, level: bool, chords: bool = True
 ) -> _Iteration:
-    """Do one iteration of Gauss-Newton, leaving in `work` the equations that it solved."""
+    """Do one Gauss-Newton iteration; `work` then contains the equations that it solved."""
     active = state.active
     if level:
         form_level_equations(rays, work)
@@ -315,7 +324,7 @@ def _iterated(
 
 @dataclass(frozen=True)
 class _Chord:
-    """Rays ``(2, 3, n, ...)``, weighted coefficients, inverse and first correction of normal equations used again."""
+    """Rays ``(2, 3, n, ...)``, weighted coefficients, inverse and first correction of reused normal equations."""
 
     rays: Array
     rows: Array
@@ -325,11 +334,11 @@ class _Chord:
 
     @classmethod
     def of_all(cls, rays: Array, work: Workspace, size: Array) -> "_Chord":
-        """Return those of all pairs."""
+        """Return the chord of all pairs."""
         return cls(rays, work.rows[:5], work.steepness, work.normal[:5, :5], size)
 
     def of(self, pairs: npt.NDArray[np.int64]) -> "_Chord":
-        """Return those of some pairs."""
+        """Return the chord of selected pairs."""
         return _Chord(
             self.rays[..., pairs],
             self.rows[..., pairs],
@@ -340,7 +349,7 @@ class _Chord:
 
     @cached_property
     def weighted(self) -> Array:
-        """Coefficients ``(5, n, ...)`` by which unweighted discrepancies are multiplied."""
+        """Coefficients ``(5, n, ...)`` that multiply unweighted discrepancies."""
         return np.asarray(self.rows / self.steepness)
 
     @cached_property
@@ -352,9 +361,9 @@ class _Chord:
 def _chords(
     R: Array, left: Array, last: Array, far: npt.NDArray[np.bool_], equations: _Chord, most: int
 ) -> tuple[Array, Array]:
-    """Go on from a step of Gauss-Newton with the same normal equations, in the pairs where that leads on.
+    """Continue from a Gauss-Newton step with the same normal equations, in the pairs where that converges.
 
-    Returns the rotations and what is left to correct, in radians. Equations that are not formed anew leave the
+    Returns the rotations and the remaining corrections, in radians. Equations that are not formed anew keep the
     discrepancies' share of the first step.
     """
     if 2 * np.count_nonzero(far) < far.size:
@@ -374,7 +383,7 @@ def _chords(
 
 
 def _assessed(state: _Iteration, work: Workspace) -> RelativePoses:
-    """Judge where iterations ended, by the equations of the last one."""
+    """Return the assessment of the final state, by the equations of the last iteration."""
     n = work.shape[0]
     condition = condition_numbers(work)
     squares = work.reduced[5, 5]
@@ -386,9 +395,10 @@ def _assessed(state: _Iteration, work: Workspace) -> RelativePoses:
 
 
 def _all_ahead(work: Workspace) -> bool:
-    """Tell whether all rays ``(2, 3, n, ...)`` of all pairs meet before both cameras.
+    """Return whether all rays ``(2, 3, n, ...)`` of all pairs meet in front of both cameras.
 
-    They do where the planes with the base that hold them have one direction, and the left ray leans further along it.
+    They do if the planes through the base that contain them have one direction, and the left ray leans further along
+    it.
     """
     (x1, y1, z1), (x2, _, _) = work.turned
     together = work.rows[4]
@@ -402,10 +412,10 @@ def _all_ahead(work: Workspace) -> bool:
 
 
 def _facing(R: Array, a: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Return the pose with the points before both cameras, and whether all of them are.
+    """Return the pose with the points in front of both cameras, and whether all of them are.
 
-    The rays ``(2, 3, n, ...)`` of four poses are coplanar: the right camera may be turned over about the base, and
-    the base reversed.
+    The rays ``(2, 3, n, ...)`` of four poses are coplanar: the right camera may be rotated by half a turn about the
+    base, and the base reversed.
     """
     meets = _distances(a) > 0.0
     if meets.all():
@@ -421,7 +431,9 @@ def _facing(R: Array, a: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
 
 
 def _distances(a: Array) -> Array:
-    """Return how far along rays ``(2, 3, n, ...)`` they meet, ``(2, n, ...)``, in an arbitrary positive unit."""
+    """Return the distances along rays ``(2, 3, n, ...)`` to their intersection, ``(2, n, ...)``, in an arbitrary
+    positive unit.
+    """
     (x1, y1, z1), (x2, y2, z2) = a
     normal_y, normal_z = z1 * x2 - x1 * z2, x1 * y2 - y1 * x2
     return np.array([y2 * normal_z - z2 * normal_y, y1 * normal_z - z1 * normal_y])

@@ -25,7 +25,7 @@ MIN_TRIANGLE = 1e-6
 """Height over base of the widest triangle of ground points; below it they count as on a line."""
 
 _SAME_IMAGE = 1e-5
-"""Three points are imaged by several cameras alike; so close, relative to c, their candidates count as equal."""
+"""Three points have the same images in several cameras; candidates closer than this, relative to c, count as equal."""
 
 _ROOT_ROUNDS = 60
 
@@ -41,7 +41,7 @@ class Resection:
     adjustment: Adjustment
     """Unknowns in the order of `ELEMENTS`; observations are all x before all y, in mm."""
     iterations: Array
-    """Shape ``(...)``: rounds of Gauss-Newton until nothing moved."""
+    """Shape ``(...)``: Gauss-Newton iterations until convergence."""
 
     @property
     def residuals(self) -> Array:
@@ -68,10 +68,10 @@ class Resection:
 def resection(image: Array, ground: Array, c: npt.ArrayLike) -> Resection:
     """Return the camera that imaged ground points ``(3, n, ...)`` at ``(2, n, ...)`` with the principal distance c.
 
-    Image and c ``(...)`` in mm, ground in any unit. The start is Grunert's closed solution of the three points
-    that span the widest triangle, the one that fits all points best; of three points alone, which up to four
-    cameras image alike, the most nearly vertical one. Then Gauss-Newton on the collinearity equations. Raises
-    Undetermined for fewer than three points, points on a line and a centre on the points' danger cylinder.
+    Image and c ``(...)`` in mm, ground in any unit. The start is Grunert's closed solution of the three points with the
+    widest triangle, the candidate that fits all points best; for three points alone, which up to four cameras image
+    alike, the most nearly vertical one. Then Gauss-Newton on the collinearity equations. Raises Undetermined for fewer
+    than three points, points on a line and a centre on the points' danger cylinder.
     """
     n = image.shape[1]
     if n < MIN_POINTS:
@@ -122,10 +122,11 @@ def _refined(seen: Array, local: Array, turn: Array, centre: Array) -> tuple[Arr
 
 
 def _coefficients(away: Array, computed: Array, turn: Array) -> Array:
-    """Return how images at c = 1 change ``(2n, 6, ...)`` with small turns about the ground's axes and shifts.
+    """Return the derivatives ``(2n, 6, ...)`` of images at c = 1 by small rotations about the ground's axes and by
+    shifts.
 
-    A turn t of the camera moves a point seen from it by ``-t x away``, a shift by its opposite; then
-    ``dx = -(dq_x + x dq_z) / q_z`` for q in the camera's frame.
+    A rotation t of the camera moves a point in its frame by ``-t x away``, a shift by its opposite; then ``dx = -(dq_x
+    + x dq_z) / q_z`` for q in the camera's frame.
     """
     depth = dots(turn[:, 2, None], away)
     columns = []
@@ -177,7 +178,7 @@ def _with_statistics(
 
 
 def _closed_start(seen: Array, local: Array) -> tuple[Array, Array]:
-    """Return rotation and centre of the camera, from three of the points, that fits all points best."""
+    """Return rotation and centre of the camera, from three of the points, with the best fit to all points."""
     three = _widest_three(local)
     corners = np.take_along_axis(local, np.broadcast_to(three[None], (3, *three.shape)), axis=1)
     rays = np.concatenate([seen, np.full((1, *seen.shape[1:]), -1.0)])
@@ -197,7 +198,7 @@ def _closed_start(seen: Array, local: Array) -> tuple[Array, Array]:
 
 
 def _misfit(seen: Array, local: Array, turns: Array, centres: Array) -> Array:
-    """Return the rms ``(k, ...)`` of the images by k cameras; infinite where one has a point behind it."""
+    """Return the rms ``(k, ...)`` of the images of k cameras; infinite where one has a point behind it."""
     away = local[:, :, None] - centres[:, None]
     q = mxv(transposed(turns)[:, :, None], away)
     off = -q[:2] / q[2] - seen[:, :, None]
@@ -206,7 +207,7 @@ def _misfit(seen: Array, local: Array, turns: Array, centres: Array) -> Array:
 
 
 def _widest_three(local: Array) -> Array:
-    """Return the numbers ``(3, ...)`` of the points farthest from the middle, from that one and from their line."""
+    """Return the indices ``(3, ...)`` of the points farthest from the middle, from that one and from their line."""
 
     def at(i: Array) -> Array:
         return np.take_along_axis(local, np.broadcast_to(i[None, None], (3, 1, *i.shape)), axis=1)

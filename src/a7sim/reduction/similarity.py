@@ -1,6 +1,6 @@
-"""The spatial similarity ``X = s R x + T`` that carries one system of points onto another.
+"""Spatial similarity ``X = s R x + T`` of two systems of points.
 
-Twice on the same points: by iterated linearisation (P 2.1-2.7) and in closed form by the orthogonal 4x4 matrix
+Two solutions on the same points: by iterated linearisation (P 2.1-2.7) and in closed form by the orthogonal 4x4 matrix
 (T 2.35-2.39). Both minimise the same sum of squares, that of ``s R x + T - X``.
 """
 
@@ -25,20 +25,22 @@ SIMILARITY_UNKNOWNS = ("scale", "omega", "phi", "kappa", "TX", "TY", "TZ")
 
 MAX_ITERATIONS = 100
 MAX_TURN = 0.5
-"""Radians a step; the linearised equations know nothing beyond."""
+"""Radians per step; beyond it the linearised equations are meaningless."""
 SCALE_FOLLOWS = 0.1
-"""Radians: while the turns are longer the first scale is kept, for a fit out of turn shrinks it to nothing."""
+"""Radians: while rotations are larger the first scale is kept, because a misaligned fit shrinks it to zero."""
 CONVERGED = 1e-12
 MEMBERS_AT_A_TIME = 8192
-"""Of a batch in closed form, so that the work stays in the cache and memory below some tens of MB."""
+"""Members of a batch in closed form at a time, so that intermediate values stay in the cache and memory below some tens
+of MB.
+"""
 
 
 @dataclass(frozen=True)
 class Similarity:
-    """A similarity ``X = s R x + T`` with the points that gave it.
+    """Similarity ``X = s R x + T`` with the points that determine it.
 
-    Scale ``(...)``, rotation ``(3, 3, ...)``, translation ``(3, ...)``; points and targets ``(3, n, ...)``;
-    weights ``(3, n)`` or None; iterations are zero for the closed form. Statistics are computed when asked for.
+    Scale ``(...)``, rotation ``(3, 3, ...)``, translation ``(3, ...)``; points and targets ``(3, n, ...)``; weights
+    ``(3, n)`` or None; iterations are zero for the closed form. Statistics are computed on demand.
     """
 
     scale: Array
@@ -64,7 +66,7 @@ class Similarity:
 
     @cached_property
     def residuals(self) -> Array:
-        """Residuals ``(3, n, ...)``, computed minus given; nan where nothing was given."""
+        """Residuals ``(3, n, ...)``, computed minus given; nan without a target."""
         return np.asarray(self.applied_to(self.points) - self.targets)
 
     @property
@@ -74,9 +76,9 @@ class Similarity:
 
     @cached_property
     def adjustment(self) -> Adjustment:
-        """The linearised equations at the solution, unknowns `SIMILARITY_UNKNOWNS` ``(7, ...)``.
+        """Linearised equations at the solution, unknowns `SIMILARITY_UNKNOWNS` ``(7, ...)``.
 
-        Raises Undetermined where phi is a right angle, for omega and kappa then turn about the same axis.
+        Raises Undetermined where phi is a right angle, because omega and kappa then rotate about the same axis.
         """
         return _statistics(self)
 
@@ -104,10 +106,10 @@ class Similarity:
 def similarity_by_quaternion(points: Array, targets: Array, weights: Array | None = None) -> Similarity:
     """Return the similarity of points ``(3, n, ...)`` to targets ``(3, n, ...)`` in closed form.
 
-    With both systems moved to their centroids, ``X' q = q x`` is linear in the four elements (d; a, b, c) of the
-    orthogonal matrix (T 2.35-2.39; q as a quaternion); its least-squares solution of unit length is the
-    eigenvector of a symmetric 4x4 matrix. `weights` ``(n,)`` count points. Raises Undetermined for fewer than
-    three points or points in a line.
+    With both systems reduced to their centroids, ``X' q = q x`` is linear in the four elements (d; a, b, c) of the
+    orthogonal matrix (T 2.35-2.39; q as a quaternion); its least-squares solution of unit length is the eigenvector of
+    a symmetric 4x4 matrix. `weights` ``(n,)`` are multiplicities of points. Raises Undetermined for fewer than three
+    points or points in a line.
     """
     points, targets = _of_one_shape(points, targets)
     shape = points.shape[2:]
@@ -133,10 +135,10 @@ def similarity_by_iteration(
 ) -> Similarity:
     """Return the similarity of points ``(3, n, ...)`` to targets ``(3, n, ...)`` by iterated linearisation.
 
-    Seven unknowns, three equations a point (P 2.3-2.4), corrections to the rotation multiplied onto it (S); the
-    first approximation is a turn in plan (P 2.7) unless `start`, a rotation ``(3, 3, ...)``, is given. `weights`
-    ``(n,)`` or ``(3, n)``: a zero leaves the coordinate out, whatever its target. Raises Undetermined when the
-    coordinates do not determine seven unknowns or the iteration does not come to rest.
+    Seven unknowns, three equations a point (P 2.3-2.4), corrections multiplied onto the rotation (S); the first
+    approximation is a rotation in plan (P 2.7) unless `start`, a rotation ``(3, 3, ...)``, is given. `weights` ``(n,)``
+    or ``(3, n)``: a zero leaves the coordinate out, whatever its target. Raises Undetermined when the coordinates do
+    not determine seven unknowns or the iteration does not converge.
     """
     points, targets = _of_one_shape(points, targets)
     n = points.shape[1]
@@ -181,7 +183,7 @@ def similarity_by_iteration(
                 np.where(on_a_saddle, 1.0, 0.0) * np.array([0.3, 0.6, 0.9]).reshape((3, *(1,) * near.ndim))
             )
             turn = mxm(off, turn)
-    raise Undetermined(f"the similarity of {n} points does not come to rest in {MAX_ITERATIONS} iterations")
+    raise Undetermined(f"the similarity of {n} points does not converge in {MAX_ITERATIONS} iterations")
 
 
 def _of_one_shape(points: Array, targets: Array) -> tuple[Array, Array]:
@@ -197,7 +199,7 @@ def _of_one_shape(points: Array, targets: Array) -> tuple[Array, Array]:
 
 
 def _first_approximation(x: Array, X: Array, known: Array, start: Array | None) -> tuple[Array, Array]:
-    """Return the scale and the turn that the plan of the points gives."""
+    """Return the scale and the rotation from the plan of the points."""
     plan = known[0] & known[1]
     count = np.maximum(plan.sum(axis=0), 1)
     px, py, PX, PY = (np.where(plan, a - np.where(plan, a, 0.0).sum(axis=0) / count, 0.0) for a in (*x[:2], *X[:2]))
@@ -234,7 +236,7 @@ def similarity_columns(turned: Array, scale: Array, axes: Array) -> Array:
 
 
 def _rows(columns: Array, keep: npt.NDArray[np.bool_]) -> Array:
-    """Return ``(3, n, u, ...)`` as the rows ``(3n, u, ...)`` that are kept."""
+    """Return ``(3, n, u, ...)`` as the kept rows ``(3n, u, ...)``."""
     flat = columns.reshape((columns.shape[0] * columns.shape[1], *columns.shape[2:]))
     return flat if keep.all() else flat[keep]
 
@@ -259,7 +261,7 @@ def _rotation_of(q: Array) -> Array:
 
 
 def _turned_over(turn: Array, x: Array, X: Array, weights: Array | None) -> Array:
-    """Return where a stationary rotation is no minimum: half a turn about some axis lies nearer."""
+    """Return where a stationary rotation is no minimum: half a turn about some axis is closer."""
     weighted = X if weights is None else X * weights.reshape((*weights.shape, *(1,) * (X.ndim - 2)))
     k = mxm(transposed(turn), np.einsum("in...,jn...->ij...", weighted, x))
     inverse = inverse_of_definite(_curvature(k))
@@ -334,7 +336,7 @@ def _largest_eigenvector(n: Array, h: Array) -> Array:
     """Return the eigenvectors ``(4, ...)`` of the largest eigenvalues of traceless ``(4, 4, ...)``.
 
     A batch by Newton on the characteristic equation, from above the largest root, and by the cofactors; each member
-    stops for itself, so that its digits do not depend on who is beside it.
+    stops separately, so that its digits do not depend on the other members.
     """
     if n.ndim == 2:
         return np.asarray(np.linalg.eigh(n)[1][:, 3])
@@ -388,7 +390,7 @@ def _cofactors_4x4(m: Array) -> Array:
 
 
 def _statistics(found: Similarity) -> Adjustment:
-    """Return the linearised equations at the solution, with the covariance carried to the origin of the points."""
+    """Return the linearised equations at the solution, with the covariance transformed to the origin of the points."""
     n = found.points.shape[1]
     keep = np.ones(3 * n, dtype=bool) if found.weights is None else (found.weights > 0.0).reshape(-1)
     weights = None if found.weights is None else found.weights.reshape(-1)[keep]

@@ -1,4 +1,4 @@
-"""Data snooping: relative orientation that names the point with the blunder and repeats without it."""
+"""Data snooping: relative orientation that identifies the point with the blunder and repeats without it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ STUDENT = {1: 636.6, 2: 31.6, 3: 12.9, 4: 8.61, 5: 6.87, 6: 5.96, 7: 5.41, 8: 5.
 """The same by degrees of freedom, where the standard deviation is estimated from the other observations."""
 
 MIN_CONTROL = 1e-6
-"""Redundancy number below which a residual says nothing."""
+"""Redundancy number below which a residual is meaningless."""
 
 
 @dataclass(frozen=True)
 class Blunder:
-    """A point taken out: its name, its y-parallax error in mm at picture scale, and its standardised residual."""
+    """Removed point: its name, its y-parallax error in mm at picture scale, and its standardised residual."""
 
     point: str
     parallax_mm: float
@@ -33,25 +33,27 @@ class Blunder:
 
 @dataclass(frozen=True)
 class SnoopedOrientation:
-    """An orientation without the blunders, and what they were."""
+    """Orientation without the blunders, and the blunders."""
 
     orientation: RelativeOrientation
     points: tuple[str, ...]
-    """Names of the points that the orientation rests on."""
+    """Names of the points of the orientation."""
 
     blunders: tuple[Blunder, ...]
     standardised: Array
-    """Residuals ``(n,)`` of the points that remain, each divided by its standard deviation."""
+    """Residuals ``(n,)`` of the remaining points, each divided by its standard deviation."""
 
     searchable: bool
-    """False with fewer than seven points: all standardised residuals are then the same, and a blunder has no name."""
+    """False for fewer than seven points: all standardised residuals are then equal, and a blunder cannot be identified.
+    """
 
 
 def standardised_residuals(adjustment: Adjustment, sigma: float | None = None) -> Array:
     """Return residuals ``(n, ...)`` divided by their standard deviations ``sigma sqrt(r)``, r the redundancy number.
 
-    Without `sigma`, that of one observation of weight 1, each is divided by what the others estimate it at, so that it
-    follows Student's distribution with one degree of freedom less than the redundancy. Where r vanishes, so does it.
+    Without `sigma`, the standard deviation of one observation of weight 1, each is divided by its estimate from the
+    other observations, so that it follows Student's distribution with one degree of freedom less than the redundancy.
+    Zero where r is zero.
     """
     share = adjustment.redundancy_numbers
     seen = share > MIN_CONTROL
@@ -76,11 +78,11 @@ def snooped_orientation(
     omega: Literal[1, 2] = 2,
     bx: float = 1.0,
 ) -> SnoopedOrientation:
-    """Orient one pair from image points ``(2, n)`` in mm, taking out one point after the other that does not fit.
+    """Orient one pair from image points ``(2, n)`` in mm, removing one point after the other that does not fit.
 
-    The point with the largest standardised residual goes while that exceeds the critical value (0.1 %) and the
-    redundancy, two at least, still tells points apart. `sigma` is the standard deviation of one image coordinate
-    in mm where it is known; otherwise the other points estimate it. Raises Undetermined as `relative_orientation`.
+    The point with the largest standardised residual is removed while that exceeds the critical value (0.1 %) and the
+    redundancy, at least two, still separates points. `sigma` is the known standard deviation of one image coordinate in
+    mm; without it the other points estimate it. Raises Undetermined as `relative_orientation`.
     """
     names = tuple(points) if points is not None else tuple(str(i + 1) for i in range(image1.shape[1]))
     kept = list(range(image1.shape[1]))
@@ -100,5 +102,5 @@ def snooped_orientation(
 
 
 def _student(freedom: int) -> float:
-    """Return the critical value for degrees of freedom: that of the nearest fewer in the table."""
+    """Return the critical value for degrees of freedom: that of the next smaller number in the table."""
     return STUDENT[max(each for each in STUDENT if each <= freedom)] if freedom > 0 else np.inf

@@ -1,4 +1,4 @@
-"""Strips of independent models: joined one to the next on common points and the common projection centre."""
+"""Strips of independent models: each joined to the previous one on common points and the common projection centre."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ CENTRE = ":centre"
 """Ending of the name of a projection centre: ``<photo>:centre``."""
 
 MIN_COMMON = 3
-"""Points in common, the centre counted, that join two models."""
+"""Common points, including the centre, required to join two models."""
 
 JoinMethod = Literal["points", "centre", "heights"]
-"""How a model is joined to the strip: see `formed_strip`."""
+"""Method of joining a model to the strip: see `formed_strip`."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,10 @@ class Model:
 
 @dataclass(frozen=True)
 class Join:
-    """The connection of a model to the one before it.
+    """Connection of a model to the previous one.
 
-    `differences` ``(3, n, ...)`` are the closing differences at the common points, the new model's coordinates
-    in the strip minus those of the model before, in the unit of the strip.
+    `differences` ``(3, n, ...)`` are the closing differences at the common points, the new model's coordinates in the
+    strip minus those of the previous model, in the unit of the strip.
     """
 
     before: str
@@ -88,7 +88,7 @@ class Join:
 
 @dataclass(frozen=True)
 class Strip:
-    """A strip: its models carried into the system of the first, and the connections that did it."""
+    """Strip: its models transformed into the system of the first, and their joins."""
 
     models: tuple[Model, ...]
     joins: tuple[Join, ...]
@@ -105,7 +105,7 @@ class Strip:
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the points in the order in which they first come."""
+        """Names of the points in order of first occurrence."""
         return self.as_model.points
 
     @property
@@ -114,29 +114,28 @@ class Strip:
         return self.as_model.coordinates
 
     def deviations(self, model: Model) -> Array:
-        """Return how far a model's points ``(3, n, ...)`` lie from the means."""
+        """Return the differences of a model's points ``(3, n, ...)`` from the means."""
         return np.asarray(model.coordinates - self.as_model.at(model.points))
 
     def transformed(self, similarity: Similarity) -> "Strip":
-        """Return the strip carried into another system; joins stay as they were computed."""
+        """Return the strip in another system; joins stay as computed."""
         moved = (Model(m.name, m.points, similarity.applied_to(m.coordinates)) for m in self.models)
         return Strip(tuple(moved), self.joins)
 
 
 def is_centre(name: str) -> bool:
-    """Tell whether a point's name is that of a projection centre."""
+    """Return whether a point's name is that of a projection centre."""
     return name.endswith(CENTRE)
 
 
 def formed_strip(models: Sequence[Model], method: JoinMethod = "points") -> Strip:
     """Return the strip of independent models, in the system of the model at the end that was given first.
 
-    Models may come in any order: they are chained by the centres they share. Methods: ``points``, a similarity
-    on all common points and the common centre alike (P 2.1-2.7); ``centre``, the origins set on the common
-    centre, rotation and scale from the vectors to the common points (T 2.35-2.39); ``heights``, the same with
-    the mean ratio of the common points' heights below the centre for the scale (S). Batch axes of the
-    coordinates are carried along. Raises Mistake for models that make no chain, Undetermined for common points
-    that do not determine a join.
+    Models may be in any order: they are chained by their common centres. Methods: ``points``, a similarity on all
+    common points and the common centre alike (P 2.1-2.7); ``centre``, the origins moved to the common centre, rotation
+    and scale from the vectors to the common points (T 2.35-2.39); ``heights``, the same with the mean ratio of the
+    common points' heights below the centre as scale (S). Batch axes of the coordinates are kept. Raises A7SimError for
+    models that form no chain, Undetermined for common points that do not determine a join.
     """
     chain = in_order(models)
     placed = [chain[0]]
@@ -149,9 +148,9 @@ def formed_strip(models: Sequence[Model], method: JoinMethod = "points") -> Stri
 
 
 def joined(before: Model, new: Model, method: JoinMethod = "points") -> Join:
-    """Return the connection of a model to one that already lies in the strip (see `formed_strip`).
+    """Return the join of a model to a model of the strip (see `formed_strip`).
 
-    Raises Mistake for fewer than three common points, or without a common centre where the method needs it;
+    Raises A7SimError for fewer than three common points, or without a common centre if the method needs it;
     Undetermined for common points in a line.
     """
     there = set(before.points)
@@ -198,10 +197,10 @@ def _on_centre(before: Model, new: Model, common: tuple[str, ...], method: JoinM
 
 
 def in_order(models: Sequence[Model]) -> tuple[Model, ...]:
-    """Return the models as they follow each other in the strip.
+    """Return the models in their order along the strip.
 
-    Neighbours share a projection centre; the strip begins at the end that was given first. Models of which none
-    shares a centre are taken in the order given. Raises Mistake for names given twice, branches, rings and gaps.
+    Neighbours share a projection centre; the strip starts at the end that was given first. Models without any common
+    centre keep the order given. Raises A7SimError for repeated names, branches, rings and gaps.
     """
     if not models:
         raise A7SimError("expected the models of a strip, got none")

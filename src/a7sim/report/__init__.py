@@ -1,1 +1,1 @@
-"""What is made of a session's folder afterwards: the report, printed forms, cards, a film of it, comparisons."""
+"""Outputs from a session's folder: report, forms, cards, asciicast, comparisons."""

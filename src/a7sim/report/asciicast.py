@@ -1,4 +1,4 @@
-"""A session as a film of the terminal: asciicast version 2, with a marker at every model and form."""
+"""Asciicast version 2 of a session, with a marker at each model and form."""
 
 import io
 from collections.abc import Iterator
@@ -21,14 +21,14 @@ from a7sim.session.grid_test import report_tables as of_grid_test
 COLUMNS, LINES = 100, 32
 
 MAX_PAUSE_S = 2.0
-"""A player need not wait longer than this where an operator thinks."""
+"""Maximum pause in s of the playback."""
 
 _NOTE = 'NOTE "'
 
 
 @dataclass(frozen=True)
 class CastLine:
-    """What appears on the terminal at a simulated time, s; a marker where a model or a form begins."""
+    """Output at a simulated time, s; a marker at the start of a model or a form."""
 
     time: float
     text: str
@@ -36,7 +36,7 @@ class CastLine:
 
 
 def make_cast(kept: SessionFolder, speed: float) -> str:
-    """Return the film of a session in which simulated time runs `speed` times as fast. Raises Mistake."""
+    """Return the asciicast of a session with simulated time `speed` times as fast. Raises A7SimError."""
     with kept.reading_results():
         lines = sorted(_lines(kept), key=lambda line: line.time)
     header = {
@@ -78,7 +78,7 @@ def _lines(kept: SessionFolder) -> Iterator[CastLine]:
 
 
 def _notes(kept: SessionFolder) -> Iterator[CastLine]:
-    """Yield what the operator noted in the journal: forms that begin, and remarks."""
+    """Yield the operator's notes in the journal: starts of forms, and remarks."""
     models, forms, remarks = ({getattr(entry, name) for entry in kept.book} for name in ("model", "form", "remark"))
     path = kept.folder / JOURNAL
     if not path.is_file():
@@ -103,7 +103,7 @@ def _clock(seconds: float) -> str:
 
 
 def _end(kept: SessionFolder) -> RenderableType:
-    """Return what the command shows at its end, but for the models, which have been shown when they were done."""
+    """Return the final output of the command without the models, which are already shown."""
     document = kept.document
     if kept.command == "run":
         return session_tables.session_tables({**document, "models": ()})

@@ -1,4 +1,4 @@
-"""The N.R.C. cards of a session's strip: as the folder has them, or made again from what it keeps."""
+"""N.R.C. cards of a session's strip: from the folder, or made from its results."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from a7sim.strip_methods.strip import models_from_documents, orient_strip, strip
 
 
 def strip_deck(kept: SessionFolder, way: str | None = None) -> str:
-    """Return the deck of a session's strip, or of the one measured in a `way`. Raises Mistake where there is none."""
+    """Return the deck of a session's strip, or of the strip by a method. Raises A7SimError if there is none."""
     if way is None and (there := kept.text(CARDS)):
         return there
     with kept.reading_results():
@@ -53,7 +53,7 @@ def _models(kept: SessionFolder, name: str) -> list[Model]:
 
 
 def _ground(kept: SessionFolder, strip: Document, name: str) -> Ground:
-    """Return the given coordinates of the ground points that were measured: computed less their residuals."""
+    """Return the given coordinates of the measured ground points: computed minus residuals."""
     computed = {row["point"]: [float(row[axis]) for axis in "XYZ"] for row in kept.rows(name)}
     residuals = {
         point: each

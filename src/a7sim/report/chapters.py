@@ -1,4 +1,4 @@
-"""The chapters of a report, by what the session was."""
+"""Chapters of a report, by the kind of session."""
 
 import base64
 import html
@@ -35,7 +35,7 @@ Chapters = Iterator[Chapter]
 
 
 def make_chapters(kept: SessionFolder) -> Chapters:
-    """Yield the chapters of what a folder keeps."""
+    """Yield the chapters for the contents of a folder."""
     yield from _OF_COMMAND[kept.command](kept)
     yield from _of_operator(kept)
     yield from _of_forms(kept)
@@ -115,7 +115,7 @@ def _of_compilation(kept: SessionFolder) -> Chapters:
 
 
 def _map(svg: str, title: str) -> PageFigure:
-    """Return a map as a picture of its own, whose styles reach nothing else."""
+    """Return a map as an isolated image, whose styles do not affect the page."""
     data = base64.b64encode(svg.encode()).decode()
     return PageFigure(f'<img src="data:image/svg+xml;base64,{data}" alt="{html.escape(title)}">', title, wide=True)
 

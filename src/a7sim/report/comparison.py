@@ -1,4 +1,4 @@
-"""What differs between sessions: every fact of their results beside each other, as text."""
+"""Comparison of sessions: the values of their results side by side, as text."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -38,32 +38,32 @@ EXCLUDED_KEYS = frozenset(
         "finished_at_s",
     }
 )
-"""Parts of results that are lists of points, matrices, or said in other words elsewhere."""
+"""Parts of results that are lists of points, matrices, or repeated elsewhere."""
 
 _NAMED_BY = ("model", "photo", "models", "name", "number")
-"""Which part of an entry names it in its list."""
+"""Key that names an entry in its list."""
 
 ABSENT = "-"
 
 MIN_WIDTH = 8
-"""Characters of a value on one line of a terminal, however many sessions stand side by side."""
+"""Minimum width of a value on a terminal, for any number of sessions."""
 
 
 @dataclass(frozen=True)
 class FactRow:
-    """A fact by its path in the results, and what each session says of it."""
+    """Value by its path in the results, for each session."""
 
     fact: str
     values: tuple[str, ...]
 
     @property
     def differs(self) -> bool:
-        """Whether the sessions say different things."""
+        """Return whether the sessions differ."""
         return len(set(self.values)) > 1
 
 
 def compare_sessions(sessions: Sequence[SessionFolder], everything: bool = False) -> list[FactRow]:
-    """Return the facts that differ between two sessions or more of one kind, or all of them. Raises Mistake."""
+    """Return the values that differ between sessions of one kind, or all of them. Raises A7SimError."""
     kinds = {kept.command: kept.folder for kept in reversed(sessions)}
     if len(kinds) > 1:
         shown = " and ".join(f"{folder} is of a7sim {command}" for command, folder in kinds.items())
@@ -78,7 +78,7 @@ def compare_sessions(sessions: Sequence[SessionFolder], everything: bool = False
 
 
 def _in_order(facts: Sequence[Mapping[str, str]]) -> list[str]:
-    """Return all names, each after the one that stands before it in the first session that has it."""
+    """Return all names, each after its predecessor in the first session that has it."""
     names: list[str] = []
     for each in facts:
         at = 0
@@ -131,7 +131,7 @@ def comparison_document(sessions: Sequence[SessionFolder], rows: Sequence[FactRo
 
 
 def comparison_table(sessions: Sequence[SessionFolder], rows: Sequence[FactRow], width: int) -> RenderableType:
-    """Return a comparison for a terminal of so many columns."""
+    """Return a comparison for a terminal of a width."""
     if not rows:
         return Text(f"{len(sessions)} sessions of a7sim {sessions[0].command}, all the same")
     leaves = max(len(row.fact.rpartition(".")[2]) for row in rows)

@@ -1,4 +1,4 @@
-"""Drawings by matplotlib as SVG that stands in a page: its colours are the page's, light and dark."""
+"""Drawings by matplotlib as inline SVG in the colours of the page, light and dark."""
 
 import io
 import re
@@ -28,10 +28,10 @@ _VARIABLES = {
     TRUE: "true",
     FILL: "fill",
 }
-"""Colours as they are drawn, each exchanged for the page's variable."""
+"""Drawn colours, each replaced by the page's variable."""
 
 WIDTH_IN, HEIGHT_IN = 4.8, 4.5
-"""Of a figure that has another beside it; small, so that its letters stay large on a small screen."""
+"""Size of a figure beside another one; small, so that its letters stay large on a small screen."""
 
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -55,7 +55,7 @@ _STYLE: dict[Any, Any] = {
 
 
 class FigureBuilder:
-    """A figure under way: its `axes` while the body draws, its `picture` afterwards; a `legend` explains its signs."""
+    """Figure under construction: `axes` in the body, `picture` afterwards; a `legend` explains its signs."""
 
     def __init__(self, name: str, title: str, description: str, wide: bool) -> None:
         self._name, self._title, self._description, self._wide = name, title, description, wide
@@ -64,7 +64,7 @@ class FigureBuilder:
         self.picture: PageFigure
 
     def finish(self, figure: "Figure") -> None:
-        """Make the picture."""
+        """Convert the figure to SVG."""
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
         markup = _inline(text.getvalue(), self._name, self._title, self._description)
@@ -81,9 +81,9 @@ def drawing(
     beside: bool = False,
     wide: bool = False,
 ) -> Iterator[FigureBuilder]:
-    """Let the body draw on the axes of a figure that is called `name` in its page.
+    """Draw in the body on the axes of a figure called `name` in its page.
 
-    Axes stand below each other, or `beside`, in these ratios. Raises Mistake where matplotlib is not installed.
+    Axes are below each other, or `beside`, in these ratios. Raises A7SimError if matplotlib is not installed.
     """
     try:
         import matplotlib  # noqa: PLC0415
@@ -115,14 +115,14 @@ def arrows(
 def scale_arrow(
     axes: "Axes", at: tuple[float, float], length: tuple[float, float], text: str, colour: str, width: float = 0.008
 ) -> None:
-    """Draw the arrow that tells the scale of the others."""
+    """Draw the arrow that shows the scale of the others."""
     (x, y), (dx, dy) = at, length
     arrows(axes, [x], [y], [dx], [dy], colour, width)
     axes.annotate(text, (x + dx, y + dy / 2.0), (8, 0), textcoords="offset points", va="center")
 
 
 def _inline(svg: str, name: str, title: str, description: str) -> str:
-    """Return an SVG without what only a file needs, its names made the page's own, and with an accessible name."""
+    """Return an SVG for inlining, with unique names and an accessible name."""
     svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r' xmlns(:xlink)?="[^"]*"| version="1.1"', "", svg).replace("xlink:href", "href")
     svg = re.sub(r'<g id="[^"]*"', "<g", svg)
@@ -137,7 +137,7 @@ def _inline(svg: str, name: str, title: str, description: str) -> str:
 
 
 def standalone(picture: PageFigure) -> tuple[str, str]:
-    """Return the name of a figure and its SVG as a file of its own: light colours, on a ground of its own."""
+    """Return the name of a figure and its SVG as a separate file: light colours on a background."""
     svg = picture.markup
     for colour, variable in _VARIABLES.items():
         svg = svg.replace(f"var(--{variable})", colour)
@@ -152,6 +152,6 @@ def _safe(text: str) -> str:
 
 
 def nice_number(value: float) -> float:
-    """Return the largest 1, 2 or 5 times a power of ten that is not above a value over zero."""
+    """Return the largest 1, 2 or 5 times a power of ten that does not exceed a positive value."""
     power = 10.0 ** int(f"{value:e}".partition("e")[2])
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))

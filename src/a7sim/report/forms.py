@@ -1,7 +1,7 @@
-"""The observation book on the forms of the thesis (3.2.1): relative orientation, model coordinates, perspective centre.
+"""Observation book on the forms of the thesis (3.2.1): relative orientation, model coordinates, perspective centre.
 
-A form is a table of its own: a line for each point, the readings of an item beside each other with their mean, what was
-set and what was struck out below.
+A form is a table: one line per point, the readings of an item side by side with their mean, settings and struck
+readings below.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ TITLES = {
 EMPIRICAL = "FORM FOR EMPIRICAL RELATIVE ORIENTATION"
 
 REPEATED = {"by1", "by2"}
-"""What is read several times over in numerical relative orientation."""
+"""Items read several times in numerical relative orientation."""
 
 ROMAN = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X")
 
@@ -36,7 +36,7 @@ SIGNS = {"1": "′", "2": "″"}
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a form: what was read, which reading of it, and the texts from the top."""
+    """Column of a form: item, number of the reading, and the texts from the top."""
 
     item: str
     which: str
@@ -44,13 +44,13 @@ class Column:
 
     @property
     def width(self) -> int:
-        """How wide it is in print; what was read may stand over the next readings of it too."""
+        """Width in print; the item's name may extend over its next readings."""
         return max(map(len, [self.which or self.item, *self.cells]))
 
 
 @dataclass(frozen=True)
 class Form:
-    """A filled form: what heads it, its columns, and the lines below."""
+    """Filled form: heading, columns, and the lines below."""
 
     title: str
     caption: str
@@ -74,7 +74,7 @@ class Form:
 
 
 def forms_text(kept: SessionFolder) -> str:
-    """Return all forms of a session as plain text, a page break between them. Raises Mistake without a book."""
+    """Return all forms of a session as plain text, with page breaks. Raises A7SimError without a book."""
     if not kept.book:
         raise A7SimError(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
     with kept.reading_results():
@@ -82,7 +82,7 @@ def forms_text(kept: SessionFolder) -> str:
 
 
 def make_forms(kept: SessionFolder) -> Iterator[Form]:
-    """Yield the forms of a session in the order in which they were filled."""
+    """Yield the forms of a session in their order."""
     for (model, form, number), entries in groupby(kept.book, key=lambda entry: (entry.model, entry.form, entry.round)):
         yield _filled(kept.document, model, form, number, list(entries))
 
@@ -108,7 +108,7 @@ def _clock(seconds: float) -> str:
 
 
 def _parallaxes(model: Document, form: str, number: int) -> dict[str, float]:
-    """Return the parallaxes that came of a round, by point; those of the round after the last are what is left."""
+    """Return the parallaxes of a round, by point; those of the round after the last are the residuals."""
     orientation = model["relative_orientation"]
     if form != "relative orientation" or orientation["procedure"] != "numerical" or orientation["rough_iterations"]:
         return {}
@@ -118,7 +118,7 @@ def _parallaxes(model: Document, form: str, number: int) -> dict[str, float]:
 
 
 def _as_it_went(observed: Sequence[BookEntry]) -> Iterator[Column]:
-    """Yield readings in their order: each is of a model that the one before has changed."""
+    """Yield readings in their order: each refers to a model changed by the previous one."""
     yield Column("point", "", [entry.point for entry in observed])
     yield Column("time", "", [_clock(entry.time) for entry in observed])
     yield Column("item", "", [_shown(entry.item) for entry in observed])
@@ -151,7 +151,7 @@ def valid_readings(entries: Iterable[BookEntry]) -> dict[tuple[str, str], list[s
 
 
 def mean(readings: Sequence[str]) -> float:
-    """Return the mean of readings, one or more."""
+    """Return the mean of one or more readings."""
     return sum(map(float, readings)) / len(readings)
 
 
@@ -160,7 +160,7 @@ def _roman(i: int) -> str:
 
 
 def _shown(item: str) -> str:
-    """Return an item as a form heads it: by1 as by′, `X left at Z 4900.00` as X at 4900.00."""
+    """Return the heading of an item: by1 as by′, `X left at Z 4900.00` as X at 4900.00."""
     for side in ("left", "right"):
         item = item.replace(f" {side} at Z ", " at ")
     symbols = {"kappa": "κ", "phi": "φ", "omega": "ω", "by": "by", "bz": "bz", "c": "c"}
@@ -180,7 +180,7 @@ def _below(entries: Sequence[BookEntry]) -> Iterator[str]:
 
 
 def _result(model: Document | None, form: str) -> Iterator[str]:
-    """Yield the centre that came of a form for it."""
+    """Yield the centre computed from a form."""
     side, _, what = form.partition(" ")
     if model is None or what != "perspective centre":
         return
@@ -191,7 +191,7 @@ def _result(model: Document | None, form: str) -> Iterator[str]:
 
 
 def _lines(columns: Sequence[Column]) -> Iterator[str]:
-    """Yield columns as lines under a heading of two: what was read, and which reading of it."""
+    """Yield columns as lines under a heading of two: item, and number of the reading."""
     groups = [list(group) for _, group in groupby(columns, key=lambda column: column.item)]
     widths = [column.width for column in columns]
     yield "  ".join(_over(group) for group in groups).rstrip()
@@ -209,7 +209,7 @@ def _row(cells: Sequence[str], widths: Sequence[int]) -> str:
 
 
 def _over(group: Sequence[Column]) -> str:
-    """Return what heads all columns of a group, as wide as they are."""
+    """Return the common heading of a group of columns, as wide as they are."""
     width = sum(column.width for column in group) + 2 * len(group) - 2
     item = group[0].item
     return item.ljust(width) if item == "point" else item.center(width)

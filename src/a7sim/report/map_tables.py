@@ -1,4 +1,4 @@
-"""A compiled model as tables for a terminal."""
+"""Compiled model as tables for a terminal."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from a7sim.text_tables import text_table
 
 
 def map_tables(document: dict[str, Any]) -> RenderableType:
-    """Return the lines of a compiled model beside the truth, and what interval its contours are good for."""
+    """Return the lines of a compiled model compared with the truth, and the contour interval that they allow."""
     if document["message"]:
         return Text(f"{document['status']}: {document['message']}", style="bold")
     levelling, expected = document["levelling"], document["expected"]

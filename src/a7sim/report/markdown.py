@@ -1,4 +1,4 @@
-"""A page as Markdown, with its figures as files beside it."""
+"""Page as Markdown, with its figures as separate files."""
 
 from collections.abc import Iterator, Sequence
 from html import escape
@@ -10,9 +10,9 @@ from a7sim.report.page import Chapter, Details, Heading, PageFigure, Paragraph, 
 def markdown(
     title: str, lead: Sequence[Part], chapters: Sequence[Chapter], figures_at: str
 ) -> tuple[str, dict[str, str]]:
-    """Return what `page.page` shows as Markdown, and its figures as SVG that stands alone, by the names of their files.
+    """Return the contents of `page.page` as Markdown, and its figures as standalone SVG, by file name.
 
-    `figures_at` is the address of their folder as the Markdown sees it, with what their names begin with.
+    `figures_at` is the prefix of their addresses in the Markdown.
     """
     figures: dict[str, str] = {}
     blocks = [f"# {title}", *_blocks(lead, figures_at, figures)]

@@ -1,4 +1,4 @@
-"""A page of HTML that needs nothing beside itself: headings, paragraphs, tables and figures."""
+"""Self-contained page of HTML: headings, paragraphs, tables and figures."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -11,14 +11,14 @@ LINE_END = "\n"
 
 @dataclass(frozen=True)
 class Heading:
-    """A heading within a chapter."""
+    """Heading within a chapter."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Text; line ends stay. One that is `loud` must not be overlooked."""
+    """Text with its line ends. A `loud` paragraph is highlighted."""
 
     text: str
     loud: bool = False
@@ -26,7 +26,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class TableBlock:
-    """A table; the first cell of a row names it. Columns in `left` hold words, the others numbers."""
+    """Table; the first cell of a row names it. Columns in `left` contain words, the others numbers."""
 
     caption: str
     columns: Sequence[str]
@@ -36,7 +36,7 @@ class TableBlock:
 
 @dataclass(frozen=True)
 class PageFigure:
-    """A figure: markup of its own, which carries its accessible name, and the caption below."""
+    """Figure: its markup, with an accessible name, and its caption."""
 
     markup: str
     caption: str
@@ -45,7 +45,7 @@ class PageFigure:
 
 @dataclass(frozen=True)
 class Details:
-    """Parts that are shown when asked for, and always in print."""
+    """Parts that are shown on demand, and always in print."""
 
     summary: str
     parts: Sequence["Part"]
@@ -56,7 +56,7 @@ Part = Heading | Paragraph | TableBlock | PageFigure | Details
 
 @dataclass(frozen=True)
 class Chapter:
-    """A chapter of a report."""
+    """Chapter of a report."""
 
     title: str
     parts: list[Part] = field(default_factory=list)
@@ -80,7 +80,7 @@ def _parts(parts: Iterable[Part]) -> str:
 
 
 def _markup(parts: Iterable[Part]) -> Iterator[str]:
-    """Yield the markup of parts; narrow figures that follow each other stand side by side where there is room."""
+    """Yield the markup of parts; consecutive narrow figures are side by side where there is space."""
     together: list[str] = []
     for part in parts:
         if isinstance(part, PageFigure) and not part.wide:

@@ -1,4 +1,4 @@
-"""Where each point's ray comes through the height of a perspective centre, by what the book says."""
+"""Positions of each point's ray at the height of a perspective centre, from the book."""
 
 import math
 import re
@@ -11,14 +11,15 @@ from a7sim.result_documents import Document
 _ITEM = re.compile(r"(?P<axis>[XY]) (left|right) at Z (?P<level>-?[0-9.]+)")
 
 TOLERATED = 2e-3
-"""Counter units within which the rays must give the rms that the results have."""
+"""Tolerance in counter units between the rms of the rays and that of the results."""
 
 
 def pointing_rays(kept: SessionFolder, model: Document, side: str) -> dict[str, tuple[float, float]]:
-    """Return X and Y by point where its pointings at two levels, gone on by T0, come to the centre's height.
+    """Return X and Y by point where the line of its pointings at two levels, extended by T0, reaches the centre's
+    height.
 
-    They are the residuals of the centre's equations, seen from it. None where a centre was found in another way, or
-    where the book alone does not give the rms of the results.
+    They show the residuals of the centre's equations. Empty if a centre was found by another method, or if the book
+    does not give the rms of the results.
     """
     form = f"{side} perspective centre"
     entries = [entry for entry in kept.book if entry.model == model["model"] and entry.form == form]

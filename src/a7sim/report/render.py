@@ -1,4 +1,4 @@
-"""The report of a session as one page."""
+"""Report of a session as one page."""
 
 from a7sim.report.chapters import make_chapters
 from a7sim.report.page import Paragraph, Part, page
@@ -15,7 +15,7 @@ _ENDS = {
 
 
 def render_report(kept: SessionFolder) -> str:
-    """Return a session's report as a page of HTML. Raises Mistake for damaged results or files."""
+    """Return a session's report as a page of HTML. Raises A7SimError for damaged results or files."""
     with kept.reading_results():
         document = kept.document
         title = f"{document['scenario']}: {_TITLES[kept.command]}"

@@ -1,4 +1,4 @@
-"""A session as its folder keeps it."""
+"""Folder of a finished session."""
 
 import csv
 import io
@@ -17,34 +17,34 @@ from a7sim.result_documents import SCHEMA_VERSION, Document
 from a7sim.table_files import read_text
 
 COMMANDS = ("run", "calibrate", "compile", "bridge")
-"""Whose results a session's folder holds."""
+"""Commands whose results a session's folder contains."""
 
 
 @dataclass(frozen=True)
 class SessionFolder:
-    """A folder and its results."""
+    """Folder and its results."""
 
     folder: Path
     document: Document
 
     @property
     def command(self) -> str:
-        """The command that left the folder: one of COMMANDS."""
+        """Command that wrote the folder: one of COMMANDS."""
         return str(self.document["command"])
 
     def text(self, name: str) -> str:
-        """Return the text of a file of the folder, '' where there is none. Raises Mistake where it cannot be read."""
+        """Return the text of a file of the folder, '' if there is none. Raises A7SimError if it cannot be read."""
         path = self.folder / name
         return read_text(path) if path.is_file() else ""
 
     def rows(self, name: str) -> list[dict[str, str]]:
-        """Return the rows of a CSV file of the folder, none where there is no such file."""
+        """Return the rows of a CSV file of the folder, empty if there is none."""
         lines = [line for line in self.text(name).splitlines(keepends=True) if not line.startswith("#")]
         return list(csv.DictReader(io.StringIO("".join(lines))))
 
     @cached_property
     def book(self) -> list[BookEntry]:
-        """The entries of the observation book, none where the session kept no book. Raises Mistake."""
+        """Entries of the observation book, empty without a book. Raises A7SimError."""
         path = self.folder / BOOK
         rows = self.rows(BOOK)
         if rows and tuple(rows[0]) != COLUMNS:
@@ -55,7 +55,7 @@ class SessionFolder:
 
     @contextmanager
     def reading_results(self) -> Iterator[None]:
-        """Blame what the body does not find in the results on their file. Raises Mistake."""
+        """Convert missing keys of the results in the body into an error of their file. Raises A7SimError."""
         try:
             yield
         except (LookupError, TypeError, AttributeError, ValueError) as error:
@@ -80,7 +80,7 @@ def _entry(row: dict[str, str], place: str) -> BookEntry:
 
 
 def read_session(folder: Path) -> SessionFolder:
-    """Return the session that a folder keeps. Raises Mistake for a folder without one and for damaged results."""
+    """Return the session in a folder. Raises A7SimError for a folder without one and for damaged results."""
     if not folder.is_dir():
         came = "a file" if folder.exists() else "none"
         raise A7SimError(f"{folder}: expected the folder of a session, got {came}")

@@ -1,4 +1,4 @@
-"""The results as the thesis prints them, beside the truth, for a terminal."""
+"""Results in the form of the thesis, compared with the truth, for a terminal."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -42,7 +42,7 @@ def session_tables(document: dict[str, Any]) -> RenderableType:
 
 
 def hours_table(operator: dict[str, Any]) -> Text:
-    """Return how long an operator took and for what; of one in a crowd nothing is told of line and book."""
+    """Return the time spent by an operator; for a session of a batch, without lines and book."""
     activities = (f"{name} {hours:.1f}" for name, hours in operator["time_by_activity_h"].items())
     told = [f"{operator['hours']:.1f} hours at the instrument"]
     if "book_entries" in operator:
@@ -55,7 +55,7 @@ def hours_table(operator: dict[str, Any]) -> Text:
 
 
 def strips_table(document: dict[str, Any]) -> RenderableType:
-    """Return the table of all strips that the cases make, with the diagram of the first in words."""
+    """Return the table of the strips of all cases, with the diagram of the first as text."""
     table = text_table("strip", "cases", "join, mm", "control plan", "height", "checks plan", "height")
     for strip in document["strips"]:
         accuracy = strip["accuracy_m"]
@@ -80,7 +80,7 @@ def _worst_join(strip: dict[str, Any]) -> float:
 
 
 def strip_tables(strip: dict[str, Any]) -> Iterator[RenderableType]:
-    """Yield joins, residuals and accuracy of a strip, or why it is not on the ground."""
+    """Yield joins, residuals and accuracy of a strip, or the reason why it is not on the ground."""
     if "message" in strip:
         yield Text(f"No strip on the ground: {strip['message']}")
         return
@@ -148,7 +148,7 @@ def rounds_table(orientation: dict[str, Any]) -> RenderableType:
 
 
 def _cleared_rounds(orientation: dict[str, Any]) -> RenderableType:
-    """Return what was seen at the points before omega was turned, round by round, and how many times it was."""
+    """Return the parallaxes at the points before omega was turned, round by round, and the over-correction."""
     labels = [label for label in POSITIONS if any(label in each["parallax_mm"] for each in orientation["rounds"])]
     table = text_table("iteration", *labels, "rms, mm", "n")
     for number, each in enumerate(orientation["rounds"], start=1):
@@ -162,7 +162,7 @@ def _cleared_rounds(orientation: dict[str, Any]) -> RenderableType:
 
 
 def elements_table(elements: dict[str, float], true: dict[str, float]) -> RenderableType:
-    """Return the elements as the counters show them, the true ones beside."""
+    """Return the elements as counters show them, with the true ones."""
     table = text_table("", "left '", "true", 'right "', "true", "")
 
     def cells(name: str) -> list[str]:
@@ -188,7 +188,7 @@ def _residuals(orientation: dict[str, Any]) -> RenderableType:
 
 
 def centres_table(model: dict[str, Any]) -> RenderableType:
-    """Return both perspective centres with their standard deviations, the true ones beside."""
+    """Return both perspective centres with their standard deviations and true values."""
     table = text_table("", "left", "±", "true", "right", "±", "true")
     sides = ("left", "right")
     centres, truth = model["perspective_centres"], model["truth"]["centres"]
@@ -203,7 +203,7 @@ def centres_table(model: dict[str, Any]) -> RenderableType:
 
 
 def ground_table(found: dict[str, Any]) -> RenderableType:
-    """Return how a model was levelled and scaled at the instrument."""
+    """Return the levelling and scaling of a model at the instrument."""
     table = text_table("round", "heights, rms m", "scale", "along, gon", "across, gon")
     for number, each in enumerate(found["rounds"], start=1):
         tilts = (f"{tilt:+.3f}" for tilt in each["tilts_gon"])
@@ -224,7 +224,7 @@ def ground_table(found: dict[str, Any]) -> RenderableType:
 
 
 def truth_table(truth: dict[str, Any]) -> Text:
-    """Return how far the relative orientation is off."""
+    """Return the differences of the relative orientation from the truth."""
     if "source" not in truth:
         return Text("\nNo true relative orientation is known.")
     return Text(

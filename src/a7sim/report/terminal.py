@@ -1,4 +1,4 @@
-"""What a terminal shows, as parts of a page: the same rows, no table is made twice."""
+"""Conversion of terminal output into parts of a page, so that no table is made twice."""
 
 from collections.abc import Iterator
 
@@ -11,9 +11,9 @@ from a7sim.report.page import Heading, Paragraph, Part, TableBlock
 
 
 def terminal_parts(*shown: RenderableType, caption: str = "") -> Iterator[Part]:
-    """Yield the parts of a page that say what a terminal shows.
+    """Yield the parts of a page with the same contents as terminal output.
 
-    A bold line is the caption of the table after it; a table without one has the last heading's, else `caption`.
+    A bold line is the caption of the next table; a table without one has the last heading's, else `caption`.
     """
     pending = ""
     for each in _flat(shown):

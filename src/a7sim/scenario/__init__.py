@@ -1,4 +1,4 @@
-"""Scenarios: what a file may say about a flight, photographs, an instrument and an operator."""
+"""Scenarios: files that describe a flight, photographs, an instrument and an operator."""
 
 from a7sim.scenario.loading import (
     ScenarioError,

@@ -1,4 +1,4 @@
-"""What the parts of a scenario must agree on, checked on the raw tables so that every mistake is named at once."""
+"""Checks between the parts of a scenario, on the raw tables, so that all errors are reported together."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,17 +9,17 @@ from typing import Any
 from a7sim.standard_points import POSITIONS, determine_orientation
 
 MIN_SEPARATION = 1.0
-"""Counter units between the two levels of a perspective centre."""
+"""Minimum distance of the two levels of a perspective centre, counter units."""
 
 MAX_CROSS_MM = 110.0
-"""Along either axis: the plate is a picture of 230 mm with a margin."""
+"""Maximum along either axis: the plate is a picture of 230 mm with a margin."""
 
 MIN_IN_PLAN, MIN_IN_HEIGHT = 2, 3
-"""Points of control that place a strip on the ground (S)."""
+"""Control points needed to orient a strip on the ground (S)."""
 
 
 def cross_check_errors(raw: Mapping[str, Any], folder: Path) -> Iterator[str]:
-    """Yield a sentence for everything in the tables that does not fit the rest."""
+    """Yield a sentence for each value in the tables that contradicts another."""
     yield from _mistakes_in_names(raw)
     yield from _mistakes_in_camera(_table(raw, "camera"))
     yield from _mistakes_in_photos(raw, folder)
@@ -85,7 +85,7 @@ def _mistakes_in_work(raw: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _mistakes_in_control(raw: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what a strip lacks in control: for absolute orientation by seven equations (S), for its polynomial."""
+    """Yield the control that a strip lacks: for absolute orientation by seven equations (S), and for its polynomial."""
     roles = [point.get("role") for point in _tables(raw, "ground")]
     plan, heights = (sum(role in ("control", which) for role in roles) for which in ("plan", "height"))
     degree = _table(raw, "strip").get("polynomial")

@@ -1,4 +1,4 @@
-"""Reading a scenario from its TOML file."""
+"""Loading of a scenario from its TOML file."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -13,17 +13,17 @@ import msgspec
 from a7sim.bundled import bundled_dirs, bundled_names
 from a7sim.errors import A7SimError
 from a7sim.scenario.cross_checks import cross_check_errors
-from a7sim.scenario.schema import Scenario
+from a7sim.scenario.schema import Scenario, register_loader
 from a7sim.scenario.skills import PROFILES
 from a7sim.scenario.validation import schema_errors
 from a7sim.table_files import describe_missing_file, read_toml
 
 SEARCH_PATH = bundled_dirs("scenarios")
-"""Where the scenarios are that come with a7sim."""
+"""Folders of the scenarios that come with a7sim."""
 
 
 class ScenarioError(A7SimError):
-    """A scenario that cannot be used; `mistakes` names each mistake with its path."""
+    """Invalid scenario; `mistakes` lists each error with its path."""
 
     def __init__(self, source: str, mistakes: Sequence[str]) -> None:
         self.source = source
@@ -32,9 +32,9 @@ class ScenarioError(A7SimError):
 
 
 def find_scenario(name: str | Path) -> Path:
-    """Return the path of a scenario file, by path or by the bare name of one that comes with a7sim.
+    """Return the path of a scenario file, given as a path or as the name of a scenario that comes with a7sim.
 
-    Raises ScenarioError when there is none.
+    Raises ScenarioError if there is none.
     """
     path = Path(name)
     try:
@@ -51,7 +51,10 @@ def find_scenario(name: str | Path) -> Path:
 
 
 def scenario_name(name: str | Path) -> str:
-    """Return what a scenario is called wherever it stands: its bare name if it comes with a7sim, else its file's."""
+    """Return the name of a scenario wherever its file is:
+
+    its bare name if it comes with a7sim, otherwise its file name.
+    """
     path = find_scenario(name).resolve()
     return path.stem if path.parent in [shelf.resolve() for shelf in SEARCH_PATH] else path.name
 
@@ -61,9 +64,7 @@ def load_scenario(
 ) -> Scenario:
     """Return the scenario of a file with overrides such as ``{"plan.case": '"B"'}`` (values in TOML).
 
-    `settings` are the same as values: ``{"plan.case": "B"}``.
-
-    Raises ScenarioError, which names every mistake at once.
+    `settings` are the same as values: ``{"plan.case": "B"}``. Raises ScenarioError with all errors.
     """
     path = find_scenario(name)
     try:
@@ -78,7 +79,7 @@ def load_scenario(
 
 
 def build_scenario(raw: Mapping[str, Any], folder: Path, source: str = "scenario") -> Scenario:
-    """Return the scenario of raw tables whose files stand in `folder`. Raises ScenarioError."""
+    """Return the scenario of raw tables; its files are in `folder`. Raises ScenarioError."""
     if "photos" not in raw and "responses" in raw:
         raise ScenarioError(source, ["expected a scenario, got a study (`a7sim study` takes it)"])
     raw = _with_models(_with_profile(_with_skill_as_table(raw)))
@@ -102,7 +103,7 @@ def build_scenario(raw: Mapping[str, Any], folder: Path, source: str = "scenario
 
 
 def _with_models(raw: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the tables with a model of every photograph and the next where they say nothing of models."""
+    """Return the tables with a model of each photograph and the next if they define no models."""
     photos = raw.get("photos")
     if "models" in raw or not isinstance(photos, list):
         return raw
@@ -112,13 +113,13 @@ def _with_models(raw: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _with_skill_as_table(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables with ``observer = "novice"`` written as a table."""
+    """Return the tables with ``observer = "novice"`` as a table."""
     observer = raw.get("observer")
     return {**raw, "observer": {"skill": observer}} if isinstance(observer, str) and observer in PROFILES else dict(raw)
 
 
 def _with_profile(raw: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the tables with an observer's profile beneath what they say of the observer."""
+    """Return the tables with the profile of the observer completed by the values of the file."""
     observer = raw.get("observer")
     profile = PROFILES.get(str(observer.get("skill"))) if isinstance(observer, Mapping) else None
     return {**raw, "observer": {**profile, **observer}} if profile and isinstance(observer, Mapping) else raw
@@ -139,7 +140,7 @@ def _expected() -> msgspec.inspect.Type:
 
 
 def _value_of(text: str) -> Any:
-    """Return a value as TOML says it, or the text itself."""
+    """Return a value parsed as TOML, or the text itself."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except (tomllib.TOMLDecodeError, RecursionError):
@@ -169,3 +170,6 @@ def _index(text: str) -> int:
     if not text.isdecimal():
         raise ValueError
     return int(text)
+
+
+register_loader(lambda path, settings: load_scenario(path, settings=settings))

@@ -1,4 +1,4 @@
-"""A scenario as somebody asked for it, which no file says."""
+"""Provenance of a scenario: the command and the overrides that chose it."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -12,27 +12,27 @@ NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 class Provenance(Struct, frozen=True):
-    """How somebody asked for a session: the command that gives it again, and what it changed in the scenario's file."""
+    """Provenance of a session: the command that repeats it, and the overrides of the scenario file."""
 
     command_line: str
     settings: dict[str, str]
-    """Changed values by their path."""
+    """Overridden values by their path."""
 
 
 class ScenarioWithProvenance(Scenario, frozen=True, kw_only=True):
-    """A scenario with the request that chose it."""
+    """Scenario with its provenance."""
 
     request: Provenance
 
 
 def with_provenance(scenario: Scenario, request: Provenance) -> ScenarioWithProvenance:
-    """Return a scenario with the request that chose it."""
+    """Return a scenario with its provenance."""
     values = {name: getattr(scenario, name) for name in Scenario.__struct_fields__}
     return ScenarioWithProvenance(**values, request=request)
 
 
 def amend_provenance(scenario: Scenario, words: str, instead: str, settings: Mapping[str, str] = NOTHING) -> Scenario:
-    """Return a scenario whose request, where it has one, says something instead of words and changes more settings."""
+    """Return a scenario whose command line, if any, has other words and whose overrides are extended."""
     if not isinstance(scenario, ScenarioWithProvenance):
         return scenario
     request = scenario.request

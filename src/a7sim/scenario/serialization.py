@@ -1,4 +1,4 @@
-"""A scenario carried about as data: whoever has it needs no scenario file, only the measurements that it names."""
+"""Scenarios as plain data: no scenario file is needed, only the measurements that it names."""
 
 import hashlib
 from pathlib import Path
@@ -13,15 +13,15 @@ from a7sim.scenario.schema import Scenario
 
 
 def to_data(scenario: Scenario) -> dict[str, Any]:
-    """Return a scenario as data for JSON, whole; measurements that come with a7sim are named by their file alone.
+    """Return a complete scenario as data for JSON; measurements that come with a7sim are named by their file name.
 
-    Where somebody asked for it in a certain way, that is carried along.
+    The provenance, if any, is included.
     """
     return _naming(msgspec.to_builtins(scenario), _shelved)
 
 
 def from_data(data: Any) -> Scenario:
-    """Return the scenario that was carried. Raises Mistake for data that is none."""
+    """Return the scenario of serialized data. Raises A7SimError for invalid data."""
     try:
         return msgspec.convert(_naming(data, _found), ScenarioWithProvenance if "request" in data else Scenario)
     except (msgspec.ValidationError, TypeError, AttributeError) as error:
@@ -29,9 +29,9 @@ def from_data(data: Any) -> Scenario:
 
 
 def hash_scenario(scenario: Scenario) -> str:
-    """Return the SHA-256 of a scenario and of the measurements that it names, however it was asked for.
+    """Return the SHA-256 of a scenario and of the measurements that it names, independent of its provenance.
 
-    Raises Mistake where one is missing.
+    Raises A7SimError if a file is missing.
     """
     content = {name: value for name, value in to_data(scenario).items() if name != "request"}
     digest = hashlib.sha256(msgspec.json.encode(content, order="sorted"))

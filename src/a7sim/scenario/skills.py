@@ -1,4 +1,4 @@
-"""Skill profiles: what of an observer differs from one operator to the next (docs/decisions/0008-skill.md)."""
+"""Skill profiles: the values of an observer that differ between operators (docs/decisions/0008-operator-skill.md)."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -87,5 +87,5 @@ PROFILES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 
 
 def observer_of_skill(skill: str, **said: Any) -> Observer:
-    """Return an observer of a skill, with what is said otherwise of this one."""
+    """Return an observer of a skill, with the values stated for this one."""
     return msgspec.convert({"skill": skill, **PROFILES[skill], **said}, Observer)

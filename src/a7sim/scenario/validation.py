@@ -1,4 +1,4 @@
-"""Naming every mistake of a scenario at once, each with its path."""
+"""Validation of a scenario: all errors together, each with its path."""
 
 import math
 import re
@@ -13,7 +13,7 @@ Raw = Any
 
 
 def schema_errors(raw: Raw, expected: inspect.Type, path: str = "") -> Iterator[str]:
-    """Yield a sentence for every value of `raw` that is not of the expected type, range or name."""
+    """Yield a sentence for each value of `raw` that is not of the expected type, range or name."""
     constraint, described = _unwrap(expected)
     if isinstance(constraint, inspect.StructType):
         yield from _mistakes_in_table(raw, constraint, described, path)

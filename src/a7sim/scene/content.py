@@ -1,4 +1,4 @@
-"""What a photograph shows: ground, lines, houses and signals, evaluated where a place's ray meets the ground."""
+"""Content of a photograph: ground, lines, houses and signals where the ray of an image point meets the ground."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _OCTAVES_M = (160.0, 47.0, 13.0, 3.7, 1.1)
 
 
 def ground_texture(east: Array, north: Array) -> Array:
-    """Return grey values 0..1 of the ground in several octaves, the same for every photograph."""
+    """Return grey values 0..1 of the ground in several octaves, the same for all photographs."""
     grey: Array = np.full(np.shape(east), 0.5)
     for octave, length in enumerate(_OCTAVES_M):
         grey += 0.28 * 0.72**octave * value_noise(east / length, north / length, octave)
@@ -35,7 +35,7 @@ def ground_texture(east: Array, north: Array) -> Array:
 
 
 def signals(points: NamedPoints) -> Content:
-    """Return a function that tells, 0..1, how much of picture elements at places ``(2, ...)`` a white cross covers."""
+    """Return a function that gives the share 0..1 of picture elements at ``(2, ...)`` covered by a white cross."""
 
     def covered(xy: Array, element: float) -> Array:
         cover = np.zeros(xy.shape[1:])
@@ -57,26 +57,28 @@ def signals(points: NamedPoints) -> Content:
 
 @dataclass(frozen=True)
 class GroundAppearance:
-    """What stands on the ground and is seen in every photograph of it, whatever its station."""
+    """Objects on the ground, the same in all photographs."""
 
     ground: GroundSurface
     lines: Sequence[GroundLine]
     houses_seed: int | None
-    """Draws the houses along the lines; without it there are none."""
+    """Seed of the houses along the lines; None for no houses."""
 
     @cached_property
     def houses(self) -> Houses:
-        """The houses, laid out when somebody first looks."""
+        """Houses, computed on first use."""
         return NO_HOUSES if self.houses_seed is None else houses_along(self.lines, self.ground, self.houses_seed)
 
     def grey(self, plan: Array, element: float) -> Array:
-        """Return the grey ``(...)`` of places ``(2, ...)`` in m, in picture elements that are so wide on the ground."""
+        """Return the grey ``(...)`` of ground positions ``(2, ...)`` in m for picture elements of this width on the
+        ground.
+        """
         grey = with_lines(self.lines, plan, ground_texture(plan[0], plan[1]), element)
         grey = self.houses.over(plan, grey, element)
         return grey + self._flooded(plan, element) * (WATER_TONE - grey) if self.ground.shores else grey
 
     def _flooded(self, plan: Array, element: float) -> Array:
-        """Return what share 0..1 of picture elements lies in water."""
+        """Return the share 0..1 of picture elements that is water."""
         wet = self.ground.under_water(plan)
         if element <= 0.0:
             return wet.astype(float)
@@ -87,10 +89,10 @@ class GroundAppearance:
 
 @dataclass(frozen=True)
 class GroundImage:
-    """The picture of the ground from a station.
+    """Image of the ground from a station.
 
-    `to_film` is the film's affine deformation ``(2, 2)``, `imaging` what air and lens make of perspective images.
-    Without an emulsion nothing resolves or grains it, and the light is even.
+    `to_film` is the affine deformation ``(2, 2)`` of the film; `imaging` applies air and lens to perspective images.
+    Without an emulsion there is neither blur nor grain, and the light is even.
     """
 
     appearance: GroundAppearance
@@ -111,7 +113,7 @@ class GroundImage:
         return signals(self.points)
 
     def __call__(self, xy: Array, element: float) -> Array:
-        """Return the greys 0..1 ``(...)`` of picture elements at film places ``(2, ...)``, so many mm wide."""
+        """Return the greys 0..1 ``(...)`` of picture elements at film positions ``(2, ...)``, `element` mm wide."""
         edge = self.emulsion.resolved(element) if self.emulsion else element
         perspective = _undone(self.imaging, np.einsum("ij,j...->i...", self._from_film, xy))
         met = self.appearance.ground.intersect(self.centre, ray_of(perspective, self.rotation, self.camera.c))
@@ -125,7 +127,7 @@ class GroundImage:
 
 
 def _undone(imaging: Callable[[Array], Array], imaged: Array) -> Array:
-    """Return the images that `imaging` brings to the given places, by repeated substitution."""
+    """Return the images that `imaging` maps to the given positions, by fixed-point iteration."""
     image = imaged
     for _ in range(4):
         image = image + (imaged - imaging(image))
@@ -133,11 +135,11 @@ def _undone(imaging: Callable[[Array], Array], imaged: Array) -> Array:
 
 
 def marks_image(points: NamedPoints) -> Content:
-    """Return the picture of measured points: signals on grey."""
+    """Return the image of measured points: signals on grey."""
     covered = signals(points)
     return lambda xy, element: np.maximum(0.45, covered(xy, element))
 
 
 def point_sampled(content: Content) -> Content:
-    """Return a picture in elements without width: every edge is sharp, and what is narrow may fall between them."""
+    """Return an image sampled at points: all edges are sharp, and narrow objects may be missed."""
     return lambda xy, _: content(xy, 0.0)

@@ -1,4 +1,4 @@
-"""How much of a picture element is covered by what has an edge."""
+"""Coverage of picture elements by objects with edges."""
 
 import numpy as np
 
@@ -6,9 +6,9 @@ from a7sim.geometry import Array
 
 
 def within_band(offset: Array, half_width: float, element: float) -> Array:
-    """Return what share 0..1 of an element as wide as `element` a band covers whose middle is `offset` away.
+    """Return the share 0..1 of an element of width `element` covered by a band whose middle is `offset` away.
 
-    An element of no width lies in the band or beside it.
+    An element of zero width is inside or outside the band.
     """
     if element <= 0.0:
         return np.asarray(np.abs(offset) <= half_width, dtype=float)

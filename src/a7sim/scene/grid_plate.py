@@ -1,4 +1,4 @@
-"""A grid plate as it lies in the drawer: a picture whose points are its crosses."""
+"""Grid plate: a photograph whose points are crosses."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from a7sim.scene.content import marks_image
 from a7sim.scene.photograph import NamedPoints, Photograph, prick_points
 
 GRID_PLATE_STREAM = 6
-"""Spawn key of a plate's random numbers, under the plate's own seed."""
+"""Spawn key of a plate's random numbers, under the seed of the plate."""
 
 
 def grid_plate(plate: GridPlate, camera: Camera, polarity: str) -> Photograph:
-    """Return a grid plate that fits the collimating marks of a camera's pictures and is laid as these are.
+    """Return a grid plate that fits the collimating marks of a camera's pictures, with their polarity.
 
-    Crosses and fiducial marks are off their nominal places by the plate's accuracy.
+    Crosses and fiducial marks deviate from their nominal positions by the accuracy of the plate.
     """
     rng = np.random.default_rng(np.random.SeedSequence(plate.seed, spawn_key=(GRID_PLATE_STREAM,)))
     certificate = plate.certificate(camera)

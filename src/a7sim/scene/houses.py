@@ -11,22 +11,22 @@ from a7sim.scene.lines import GroundLine
 from a7sim.scene.terrain import GroundSurface
 
 HOUSES_STREAM = 8
-"""Spawn key of the houses' random numbers, under the terrain's own seed."""
+"""Spawn key of the houses' random numbers, under the seed of the terrain."""
 
 HAMLET_EVERY_M, HAMLET_M = 220.0, 45.0
-"""About how far hamlets lie from each other along a line, and how far they spread each way [assumptions]."""
+"""Mean distance of hamlets along a line, and their extent on each side [assumptions]."""
 
 _MIN_HOUSES, _MAX_HOUSES = 3, 7
-"""Houses of a hamlet."""
+"""Number of houses of a hamlet."""
 
 _LONG_M, _DEEP_M = (9.0, 15.0), (8.0, 11.0)
 _SETBACK_M = (7.0, 18.0)
 _SKEWED = 0.12
 _ROOFS = (0.2, 0.34)
-"""Greys of tin and thatch that have weathered: darker than bare ground, and far from a road's."""
+"""Greys of weathered tin and thatch: darker than bare ground and unlike a road."""
 
 _TEXTURE = 0.3
-"""What share of the ground's texture a roof has [assumption]: eyes want something to hold on to there, too."""
+"""Share of the ground's texture on a roof [assumption]: detail for the mark."""
 
 _APART_M = 2.0
 
@@ -42,13 +42,13 @@ class Houses:
 
     @property
     def reach(self) -> Array:
-        """How far corners lie from the middle ``(n,)``, m."""
+        """Distance of corners from the middle ``(n,)``, m."""
         return length_of(self.half)
 
     def over(self, plan: Array, grey: Array, element: float) -> Array:
-        """Return the grey ``(...)`` of ground places ``(2, ...)`` with roofs laid over it.
+        """Return the grey ``(...)`` of ground positions ``(2, ...)`` with roofs drawn over it.
 
-        Edges are as wide as a picture element is on the ground, in m.
+        Edges are as wide as a picture element on the ground, in m.
         """
         places = plan.reshape(2, -1)
         reach = self.reach + element
@@ -71,7 +71,7 @@ NO_HOUSES = Houses(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros((2, 0)), np.zero
 
 
 def houses_along(lines: Iterable[GroundLine], ground: GroundSurface, seed: int) -> Houses:
-    """Return the houses along lines, which stand on dry ground, beside every line and clear of each other.
+    """Return the houses along lines: on dry ground, beside all lines and apart from each other.
 
     The same lines on the same terrain have the same houses.
     """

@@ -1,4 +1,4 @@
-"""Lines on the ground: roads and tracks, smooth in plan, lighter than what lies beside them."""
+"""Lines on the ground: roads and tracks, smooth in plan, lighter than their surroundings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,19 +11,18 @@ from a7sim.scenario.schema import LinePlan
 from a7sim.scene.coverage import within_band
 
 TONE, TEXTURE = 0.85, 0.3
-"""Mean grey of a road, where bare ground has 0.5 on the average, and what share of the ground's texture it has
-[assumptions]."""
+"""Mean grey of a road (bare ground has a mean of 0.5), and its share of the ground's texture [assumptions]."""
 
 _PIECES = 24
-"""Straight pieces of a line between two of its vertices."""
+"""Number of straight pieces of a line between two vertices."""
 
 _POINT_M2 = 1e-12
-"""Square of the length of a piece that is no more than a point."""
+"""Squared length below which a piece counts as a point."""
 
 
 @dataclass(frozen=True)
 class GroundLine:
-    """A line in plan: its middle as a chain of places ``(2, n)`` and its width, all in m."""
+    """Line in plan: its middle as a polyline ``(2, n)`` and its width, all in m."""
 
     name: str
     kind: str
@@ -31,15 +30,18 @@ class GroundLine:
     middle: Array
 
     def distance(self, plan: Array, within: float | None = None) -> Array:
-        """Return how far places ``(2, ...)`` lie from the middle, in m; infinity where it may be more than `within`.
+        """Return the distance of positions ``(2, ...)`` from the middle, in m; infinity where it may exceed `within`.
 
-        Where nothing else is said that is the width.
+        The default of `within` is the width.
         """
         return distance_from(self.middle, plan, self.width if within is None else within)
 
 
 def distance_from(chain: Array, plan: Array, within: float) -> Array:
-    """Return how far places ``(2, ...)`` lie from a chain ``(2, n)``; infinity where it may be more than `within`."""
+    """Return the distance of positions ``(2, ...)`` from a polyline ``(2, n)``.
+
+    Infinity where it may exceed `within`.
+    """
     places = plan.reshape(2, -1)
     low, high = places.min(axis=1)[:, None] - within, places.max(axis=1)[:, None] + within
     begins, ends = chain[:, :-1], chain[:, 1:]
@@ -54,7 +56,7 @@ def distance_from(chain: Array, plan: Array, within: float) -> Array:
 
 
 def make_lines(lines: Sequence[LinePlan]) -> dict[str, GroundLine]:
-    """Return the lines of a scenario by name. Raises Mistake when two have the same name."""
+    """Return the lines of a scenario by name. Raises A7SimError if two have the same name."""
     found: dict[str, GroundLine] = {}
     for line in lines:
         if line.name in found:
@@ -64,7 +66,7 @@ def make_lines(lines: Sequence[LinePlan]) -> dict[str, GroundLine]:
 
 
 def _smooth(vertices: Array) -> Array:
-    """Return the chain ``(2, n)`` of a Catmull-Rom curve through vertices ``(2, m)``."""
+    """Return the polyline ``(2, n)`` of a Catmull-Rom curve through vertices ``(2, m)``."""
     before = np.concatenate([2.0 * vertices[:, :1] - vertices[:, 1:2], vertices], axis=1)
     points = np.concatenate([before, 2.0 * vertices[:, -1:] - vertices[:, -2:-1]], axis=1)
     t = np.arange(_PIECES) / _PIECES
@@ -76,9 +78,9 @@ def _smooth(vertices: Array) -> Array:
 
 
 def with_lines(lines: Sequence[GroundLine], plan: Array, grey: Array, element: float) -> Array:
-    """Return the grey ``(...)`` of ground places ``(2, ...)`` with the lines laid over it.
+    """Return the grey ``(...)`` of ground positions ``(2, ...)`` with the lines drawn over it.
 
-    Edges are as wide as a picture element is on the ground, in m.
+    Edges are as wide as a picture element on the ground, in m.
     """
     for line in lines:
         distance = line.distance(plan, line.width + element)

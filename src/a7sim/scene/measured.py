@@ -1,4 +1,4 @@
-"""Photographs known only by image coordinates that somebody measured."""
+"""Photographs known only by measured image coordinates."""
 
 import re
 from collections.abc import Callable
@@ -16,15 +16,15 @@ from a7sim.table_files import read_rows, rows_by_key
 MIN_FIDUCIALS = 3
 
 MAX_FIDUCIAL_MM = 5.0
-"""Film and a badly known count do not displace a fiducial by more; a confused one stands further off."""
+"""Maximum displacement of a fiducial by film and an uncertain count; a confused fiducial deviates more."""
 
 
 def measured_marks(measured: Measured, name: str, camera: Camera) -> tuple[NamedPoints, NamedPoints]:
     """Return fiducials and points of a photograph from its file, in mm on film.
 
-    Coordinates in mm are taken as refined to the calibrated fiducials. Counts are brought to mm by the
-    size of a count and laid over the fiducials without stretching, so that film shrinkage stays in them.
-    Raises Mistake with file, line and column.
+    Coordinates in mm are refined to the calibrated fiducials. Counts are multiplied by the size of a count and fitted
+    to the fiducials without scaling, so that film shrinkage remains in them. Raises A7SimError with file, line and
+    column.
     """
     path = Path(measured.file)
     if measured.side:
@@ -80,7 +80,7 @@ def _from_counts(
 
 
 def _laid_over(counts: Array, places: Array, count_mm: float | None) -> Callable[[Array], Array]:
-    """Return the similarity, mirrored where the comparator counts so, that lays counts over the fiducials."""
+    """Return the similarity without scale, mirrored if the comparator counts so, that fits counts to the fiducials."""
     from_mean = counts.mean(axis=1, keepdims=True)
     to_mean = places.mean(axis=1, keepdims=True)
     u, v = counts - from_mean, places - to_mean

@@ -1,4 +1,4 @@
-"""The scene of a scenario: the ground, the stations, the photographs, and the truth about them."""
+"""Scene of a scenario: ground, stations, photographs, and their true values."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,16 +19,18 @@ from a7sim.scene.terrain import BoolArray, GroundSurface
 from a7sim.standard_points import PLACES
 
 FILM_STREAM, SKETCH_STREAM = 1, 2
-"""Spawn keys of the scene's random numbers; the instrument's and the operator's follow."""
+"""Spawn keys of the scene's random numbers; the keys of instrument and operator follow."""
 
 PICTURES = 2
-"""Which pictures the photographs show. Those of 1 had sharp edges, even light, no houses and no grain: sessions that
-were worked with them are said again with them."""
+"""Versions of image content.
+
+Version 1 had sharp edges, even light, no houses and no grain; sessions recorded with it are replayed with it.
+"""
 
 
 @dataclass(frozen=True)
 class ExposureStation:
-    """Where a photograph was taken from: centre ``(3,)`` in m, rotation ``(3, 3)`` of camera vectors to the ground."""
+    """Exposure station: centre ``(3,)`` in m, rotation ``(3, 3)`` of camera vectors to the ground."""
 
     centre: Array
     rotation: Array
@@ -36,7 +38,7 @@ class ExposureStation:
 
 @dataclass(frozen=True)
 class RelativeTruth:
-    """The orientation of the right photograph relative to the left: rotation ``(3, 3)`` and base ``(3,)``."""
+    """Orientation of the right photograph relative to the left: rotation ``(3, 3)`` and base ``(3,)``."""
 
     rotation: Array
     base: Array
@@ -45,13 +47,13 @@ class RelativeTruth:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that is true of a scenario and that no operator is told."""
+    """All true values of a scenario; no operator has access to them."""
 
     photographs: dict[str, Photograph]
     stations: dict[str, ExposureStation]
     ground_points: dict[str, Array]
     standard_points: dict[str, dict[str, str]]
-    """Model name to position to point name; where a position lies in water there is none."""
+    """Model name to position to point name; a position in water has no point."""
     other_points: tuple[str, ...]
     """Names of the signalised and the measured points that a job sheet lists beside the standard points."""
     published: dict[str, RelativeTruth]
@@ -62,11 +64,11 @@ class Scene:
 
     @property
     def mountable(self) -> dict[str, Photograph]:
-        """All that can be put on a carrier: the photographs and the grid plate."""
+        """Photographs and grid plate that can be mounted on a carrier."""
         return self.photographs | {self.grid_plate.name: self.grid_plate}
 
     def relative_truth(self, model: ModelPlan) -> RelativeTruth | None:
-        """Return the true (flown) or published relative orientation of a model, if any is known."""
+        """Return the true (flown) or published relative orientation of a model, None if unknown."""
         if model.left in self.stations and model.right in self.stations:
             left, right = self.stations[model.left], self.stations[model.right]
             to_left = transposed(left.rotation)
@@ -79,27 +81,30 @@ class Scene:
 
 
 def build_scene(scenario: Scenario, seed: int, pictures: int = PICTURES) -> Scene:
-    """Return the scene of a scenario; the seed draws the film and the pricking. Raises Mistake for bad files."""
+    """Return the scene of a scenario; the seed draws film and pricking. Raises A7SimError for invalid files."""
     return SharedScene.of(scenario, pictures).scene(seed)
 
 
 @dataclass(frozen=True)
 class _Exposure:
-    """A photograph before chance has its way with the film."""
+    """Photograph without the random effects of the film."""
 
     photo: Photo
     index: int
     fiducials: NamedPoints
     points: NamedPoints
-    """Where perfect film would show them; of measured photographs what was measured."""
+    """Image positions on perfect film; the measured positions of measured photographs."""
     visible: BoolArray
     picture: Callable[[Array, NamedPoints, Emulsion | None], Content] | None
-    """Of the ground, from the film's affine deformation, the points on it and its emulsion; none where measured."""
+    """Image of the ground as a function of the film's affine deformation, the points on it and its emulsion;
+
+    None for measured photographs.
+    """
 
 
 @dataclass(frozen=True)
 class SharedScene:
-    """What of a scenario's scenes no seed draws, and all of them share."""
+    """Part of a scenario's scenes that does not depend on the seed."""
 
     scenario: Scenario
     pictures: int
@@ -115,7 +120,7 @@ class SharedScene:
 
     @classmethod
     def of(cls, scenario: Scenario, pictures: int = PICTURES) -> "SharedScene":
-        """Return what the scenes of a scenario share. Raises Mistake for bad files."""
+        """Return the shared part of the scenes of a scenario. Raises A7SimError for invalid files."""
         ground, lines = GroundSurface.of(scenario.terrain), make_lines(scenario.lines)
         depicted = GroundAppearance(ground, tuple(lines.values()), None if pictures < 2 else scenario.terrain.seed)
         stations = {
@@ -161,7 +166,7 @@ class SharedScene:
         )
 
     def scene(self, seed: int) -> Scene:
-        """Return the scene that a seed draws."""
+        """Return the scene of a seed."""
         return Scene(
             {each.photo.name: _sharp_before_2(self._developed(each, seed), self.pictures) for each in self.exposures},
             self.stations,
@@ -249,7 +254,7 @@ def _lay_out_standard_points(
 
 
 def _standard_name(model: ModelPlan, label: str) -> str:
-    """Return a point's name: a pass point is numbered by the photograph in whose nadir line it lies."""
+    """Return the name of a standard point: number of the photograph in whose nadir line it lies, and its position."""
     if label in "135":
         return f"{model.left}{label}"
     if label in "246":
@@ -296,7 +301,7 @@ def _imaged(scenario: Scenario, station: ExposureStation, imaging: Callable[[Arr
 
 
 def _imaging(scenario: Scenario, station: ExposureStation, ground: GroundSurface) -> Callable[[Array], Array]:
-    """Return what air and lens make of perspective images ``(2, ...)``, in mm from the fiducial centre."""
+    """Return the effect of air and lens on perspective images ``(2, ...)``, in mm from the fiducial centre."""
 
     def imaged(image: Array) -> Array:
         if scenario.air.refraction:

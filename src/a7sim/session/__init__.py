@@ -1,6 +1,6 @@
-"""A session: an operator at work, what was journalled, what was found, and the truth beside it.
+"""Sessions: an operator with an instrument, a journal, results, and their comparison with the truth.
 
-What it gives is imported when it is asked for, so that a command line can say its options without it.
+The names are imported on first use, so that the command line lists its options without them.
 """
 
 from importlib import import_module

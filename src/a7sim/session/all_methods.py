@@ -1,4 +1,4 @@
-"""Every way in which a scenario asks for its strip: at the plotter, bridged there, by comparator, on an A8 (P)."""
+"""All methods by which a scenario measures its strip: at the plotter, bridging, comparator, A8 (P)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -29,12 +29,11 @@ def run_all_methods(
     port_adapter: PortAdapter = direct,
     journal_options: JournalOptions | None = None,
 ) -> Document:
-    """Measure the strip of a scenario in every way it asks for and return the document of results.
+    """Measure the strip of a scenario by all its methods and return the document of results.
 
-    A plotter is worked by an operator over the link (`run`). What the comparator gives, and readings of an A8 simulated
-    as arrays, its elements standing where a hand leaves them and not on counts, stands under `ways`, as does a strip
-    that was bridged over the link (`a7sim bridge` also leaves the journal and the book of bridging).
-    Raises Mistake for what does not make a strip.
+    At the plotter the operator works over the link (`run`). The strips of the comparator, of an A8 simulated as arrays,
+    with elements between counts, and of bridging over the link are under `ways` (`a7sim bridge` also writes the journal
+    and the book of bridging). Raises A7SimError for measurements that form no strip.
     """
     if "plotter" in scenario.work:
         document = run(scenario, seed, out, watcher, force, port_adapter, journal_options)
@@ -55,10 +54,10 @@ def run_all_methods(
 def run_all_methods_batch(
     scenario: Scenario, seeds: Sequence[int], strips: bool = True, whole: bool = True
 ) -> list[Document]:
-    """Return what `run_all_ways` says of each seed, all sessions at once, without what is told of line and book.
+    """Return the results of `run_all_methods` for each seed as a batch, without lines and book.
 
-    Without `strips` nothing is said of the strip on the ground that was measured at the plotter; where they are not
-    `whole`, of its models only what the responses of a study that have names are read from.
+    Without `strips` the strip on the ground measured at the plotter is left out; unless `whole`, the models contain
+    only the values of named responses of a study.
     """
     if "plotter" in scenario.work:
         documents = open_batch(scenario, seeds).run(strips, whole)
@@ -74,7 +73,7 @@ def run_all_methods_batch(
 
 
 def _add(document: Document, strips: Mapping[str, StripResult], bridging: BridgeResult | None) -> None:
-    """Add to a document what the ways beside the plotter came to."""
+    """Add to a document the results of the methods other than the plotter."""
     if strips:
         document["ways"] = {name: oriented_strip_document(each.strip) for name, each in strips.items()}
     if bridging is not None:
@@ -90,7 +89,7 @@ def _add(document: Document, strips: Mapping[str, StripResult], bridging: Bridge
 def _measured(
     scenario: Scenario, scene: Scene, seed: int, bridge: Callable[[Scenario, int], BridgeResult]
 ) -> tuple[dict[str, StripResult], BridgeResult | None]:
-    """Return the strips of all ways but the plotter's, by their names, and how bridging went where it is asked for."""
+    """Return the strips of all methods but the plotter's, by name, and the result of bridging if requested."""
     ways = {}
     bridging = None
     try:

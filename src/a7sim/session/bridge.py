@@ -1,4 +1,4 @@
-"""A strip bridged at the instrument beside the same strip of independent models, both on the ground."""
+"""Strip bridged at the instrument and the same strip of independent models, both on the ground."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -40,12 +40,14 @@ def run_bridge(
     force: bool = False,
     journal_options: JournalOptions | None = None,
 ) -> Document:
-    """Bridge a strip, work the same models independently, and return both on the ground; with `out`, leave the files.
+    """Bridge a strip, measure the same models independently, and return both on the ground;
 
-    There the files of bridging are those of `run`, and the independent models have a folder of their own.
-    `status` is 'complete', or 'does not fit' with the `message` of the operator who gave up; in the folder it is
-    'interrupted' until the independent models are worked, too. Raises Mistake for a plotter that cannot bridge, and for
-    a folder that cannot be used, before anything is written.
+    with `out`, write the files.
+
+    The files of bridging are those of `run`, and the independent models have a folder of their own. `status` is
+    'complete', or 'does not fit' with the `message` of the operator who gave up; in the folder it is 'interrupted'
+    until the independent models are measured, too. Raises A7SimError for a plotter that cannot bridge, and for a folder
+    that cannot be used, before anything is written.
     """
     watcher = watcher or ProgressCallbacks()
     journal_options = journal_options or JournalOptions()
@@ -100,7 +102,7 @@ def _leave(document: Document, out: Path | None) -> None:
 
 @dataclass(frozen=True)
 class BridgeResult:
-    """What came of bridging a strip: the strip, or why there is none, and where the hours went."""
+    """Result of bridging: the strip, or the reason why there is none, and the hours."""
 
     result: StripResult | None
     message: str
@@ -122,7 +124,7 @@ def bridge_over_link(scenario: Scenario, seed: int) -> BridgeResult:
 
 
 def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[BridgeResult]:
-    """Bridge the strip once a seed, all sessions at once, each to the digit what `bridged_alone` gives."""
+    """Bridge the strip for each seed as a batch, equal to the digit to `bridge_over_link`."""
     batch = open_batch(scenario, seeds)
     models: list[list[Model]] = [[] for _ in seeds]
     for each in bridge_strip_batch(batch.workstation):
@@ -163,12 +165,12 @@ def _as_model(name: str, places: Places) -> Model:
 
 
 def average_points(models: Iterable[Model]) -> Model:
-    """Return all points of the models of a bridged strip, those of several models averaged."""
+    """Return all points of the models of a bridged strip, averaged over models."""
     return strip_points([dict(zip(each.points, each.coordinates.T.tolist(), strict=True)) for each in models])
 
 
 def strip_points(places: Iterable[Places]) -> Model:
-    """Return all points of a bridged strip in mm, those of several models averaged."""
+    """Return all points of a bridged strip in mm, averaged over models."""
     found: dict[str, list[tuple[float, float, float]]] = {}
     for model in places:
         for name, place in model.items():

@@ -1,4 +1,4 @@
-"""Strips of every case of one model with every case of the next, for many sessions at once on arrays (thesis 4.3)."""
+"""Strips of each case of one model with each case of the next, for a batch of sessions as arrays (thesis 4.3)."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,27 +15,27 @@ from a7sim.scenario.schema import StripPlan
 from a7sim.strip_methods.strip import models_from_documents, orient_strip, oriented_strip_document
 
 CHUNK_SIZE = 64
-"""Replicates on one array, so that memory stays small."""
+"""Replicates per array, a limit of memory."""
 
 Replicate = Mapping[str, Document]
-"""The documents of the sessions of one seed, by case."""
+"""Documents of the sessions of one seed, by case."""
 Cases = tuple[str, ...]
 """Of a strip's models."""
 
 
 def cases_of_strips(cases: Sequence[str], models: int) -> list[Cases]:
-    """Return the cases of the models of every strip, in the order in which `combinations` numbers them."""
+    """Return the cases of the models of each strip, in the order of `combinations`."""
     return list(product(cases, repeat=models))
 
 
 def combine_strips(
     replicates: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan
 ) -> Iterator[list[Document]]:
-    """Yield a document for each strip of each replicate, as if one session had worked its models in these cases.
+    """Yield a document for each strip of each replicate, as if one session had measured its models in these cases.
 
-    It holds models, hours, and the strip with its joins and accuracy; its `status` is that of the session that gave up,
-    if a model is of such a one. No digit of a replicate depends on those beside it. Raises Mistake for models that make
-    no strip.
+    It contains models, hours, and the strip with its joins and accuracy; its `status` is that of the session that gave
+    up, if a model is of one. No digit of a replicate depends on the others. Raises A7SimError for models that form no
+    strip.
     """
     for first in range(0, len(replicates), CHUNK_SIZE):
         some = replicates[first : first + CHUNK_SIZE]
@@ -50,7 +50,7 @@ def combine_strips(
 def _on_arrays(
     some: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan
 ) -> dict[tuple[int, Cases], Document]:
-    """Return the strips of replicates of which every session has the same points and the control is full."""
+    """Return the strips of replicates whose sessions all have the same points and full control."""
     groups: dict[tuple[Cases, ...], list[tuple[int, dict[str, list[Model]]]]] = defaultdict(list)
     for i, replicate in enumerate(some):
         if plan.polynomial is None and all(each["status"] == "complete" for each in replicate.values()):
@@ -89,7 +89,7 @@ def _full_control(models: Sequence[Model], ground: Ground) -> bool:
 
 
 def _documents(strip: Strip, fit: GroundFit) -> Iterator[Document]:
-    """Yield a document a member of a batch: what `of_grounded` says of joins and accuracy, without single points."""
+    """Yield one document per member of a batch with joins and accuracy of the strip, without single points."""
     joins = [(join.before, join.after, join.scale.tolist(), join.max_residual.tolist()) for join in strip.joins]
     on = {
         which: _accuracy(residuals)
@@ -141,6 +141,6 @@ def _document(replicate: Replicate, cases: Cases, strip: Document) -> Document:
 
 
 def _seconds(models: Sequence[Document], place: int) -> float:
-    """Return how long a model took in its session, s."""
+    """Return the duration of a model in its session, s."""
     before = models[place - 1]["finished_at_s"] if place else 0.0
     return float(models[place]["finished_at_s"] - before)

@@ -1,4 +1,4 @@
-"""Compiling a model: an operator draws contours and lines, and the session lays them beside the true ground."""
+"""Compilation of a model: the operator draws contours and lines, and the session compares them with the true ground."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -27,12 +27,12 @@ from a7sim.session.running import ProgressCallbacks, Session, open_session
 from a7sim.strip_methods.strip import given_control
 
 OLD_MAP_M = 5.0
-"""What an operator is told of a line comes from an old map, to the nearest so many metres."""
+"""Rounding in m of the line data that an operator gets from an old map."""
 
 _FURTHER_ON_M = 40.0
 
 WITHIN_HALF = 3.29
-"""A contour interval is good for a standard error if 90 % of the heights lie within half of it: 2 x 1.645 of them."""
+"""A contour interval fits a standard error if 90 % of the heights are within half of it: 2 x 1.645 standard errors."""
 
 USUAL_C_FACTORS = (900.0, 2200.0)
 """From conventional plotters to analytical ones; general knowledge of the trade, no source at hand."""
@@ -40,7 +40,7 @@ USUAL_C_FACTORS = (900.0, 2200.0)
 
 @dataclass(frozen=True)
 class CompilationRequest:
-    """What a user asks to be compiled."""
+    """Requested compilation."""
 
     model: str
     contours: tuple[float, ...] = ()
@@ -51,7 +51,7 @@ class CompilationRequest:
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any]) -> "CompilationRequest":
-        """Return what the settings of a journal ask for."""
+        """Return the request in the settings of a journal."""
         return msgspec.convert(dict(settings), cls)
 
 
@@ -64,9 +64,10 @@ def compile_model(
     force: bool = False,
     journal_options: JournalOptions | None = None,
 ) -> Document:
-    """Let the operator compile a model and return the document of results; with `out`, leave map and files there.
+    """Compile a model with the virtual operator and return the document of results; with `out`, write map and files.
 
-    `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for what cannot be compiled.
+    `status` is 'complete', or 'does not fit' with the operator's `message`. Raises A7SimError for an impossible
+    request.
     """
     watcher = watcher or ProgressCallbacks()
     journal_options = journal_options or JournalOptions()
@@ -128,7 +129,7 @@ def _order(wanted: CompilationRequest, scenario: Scenario, scene: Scene) -> MapR
 
 
 def _errand(scene: Scene, name: str) -> LineTarget:
-    """Return what an old map tells of a line: its two ends and which way it sets out, to some metres."""
+    """Return the data of a line on an old map: its two ends and its initial direction, rounded to some metres."""
     line = scene.lines[name]
     along = np.concatenate([[0.0], np.cumsum(length_of(np.diff(line.middle, axis=1)))])
     further = line.middle[:, int(np.searchsorted(along, min(_FURTHER_ON_M, along[-1])))]
@@ -185,7 +186,9 @@ def _of_sheet(sheet: CompiledMap, scene: Scene, scenario: Scenario) -> Document:
 
 
 def _accuracy(errors: Array, sheet: CompiledMap) -> Document:
-    """Return rms height error of contours, the interval it is good for, and the flying height by that (C-factor)."""
+    """Return rms height error of contours, the interval that it allows, and the flying height divided by that
+    (C-factor).
+    """
     rms = float(np.sqrt((errors**2).mean()))
     interval = WITHIN_HALF * rms
     return {
@@ -220,7 +223,7 @@ def _of_line(traced: TracedLine, sheet: CompiledMap, scene: Scene) -> Document:
 
 
 def _height_errors(traced: TracedLine, sheet: CompiledMap, scene: Scene) -> Array:
-    """Return by how much a line is too high at its vertices ``(n,)``, m."""
+    """Return the height errors of a line at its vertices ``(n,)``, m; positive if too high."""
     east, north, height = sheet.model.on_ground(traced.readings)
     drawn = height if traced.height is None else np.full_like(height, traced.height)
     return np.asarray(drawn - scene.ground.height(east, north))

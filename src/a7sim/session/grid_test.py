@@ -1,4 +1,4 @@
-"""Running a grid test, and the sheet of it: what was found of both projectors, the truth beside."""
+"""Grid test of both projectors and its report with the true errors."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,10 +42,10 @@ def run_grid_test(
     force: bool = False,
     journal_options: JournalOptions | None = None,
 ) -> Document:
-    """Test both projectors of a scenario's instrument and return the document; with `out`, leave the files there.
+    """Test both projectors of a scenario's instrument and return the document; with `out`, write the files.
 
-    `status` is 'complete', or 'does not fit' with the operator's `message`. Raises Mistake for an order that the plate
-    or the instrument cannot fill and for a folder that cannot be used, before anything is written.
+    `status` is 'complete', or 'does not fit' with the operator's `message`. Raises A7SimError for a plan that the plate
+    or the instrument does not allow and for a folder that cannot be used, before anything is written.
     """
     watcher = watcher or ProgressCallbacks()
     journal_options = journal_options or JournalOptions()
@@ -92,7 +92,7 @@ def _header(scenario: Scenario, seed: int, order: GridTestPlan, autograph: Autog
 
 
 def projector_document(sheet: ProjectorReadings, truth: Document) -> Document:
-    """Return a projector's sheet of one session, um at photo scale, with the truth and what is left of it."""
+    """Return the results of a projector, um at photo scale, with the true errors and the differences."""
     test = sheet.test
     found = _found(sheet)
     residuals = 1e3 * test.residuals[..., 0]
@@ -120,7 +120,7 @@ def projector_document(sheet: ProjectorReadings, truth: Document) -> Document:
 
 
 def _of_one(sheet: ProjectorReadings) -> Adjustment:
-    """Return the adjustment without its axis of sessions."""
+    """Return the adjustment without its batch axis."""
     every = sheet.test.adjustment
     unknowns, cofactors, residuals, s0, condition, design = (
         each[..., 0]
@@ -166,10 +166,10 @@ def _residual_rows(sheets: list[ProjectorReadings]) -> Iterator[tuple[str, ...]]
 
 
 def true_errors(autograph: Autograph, condition: Condition, projector: int) -> Document:
-    """Return what a grid test should find of a projector as it stands, mm and gon, and what of it the carriages do.
+    """Return the errors of a projector that a grid test should find, mm and gon, and the part caused by the carriages.
 
-    Scales and skews of the carriages look like errors of the projector: X = (1 + sx) Xr + xy Yr + xz Zr and so on make
-    of c c (1 + (sx + sy)/2 - sz), of the principal point -c (xz, yz), of kappa xy / 2.
+    Scales and skews of the carriages look like errors of the projector: X = (1 + sx) Xr + xy Yr + xz Zr and so on
+    change c by c ((sx + sy)/2 - sz), the principal point by -c (xz, yz), kappa by xy / 2.
     """
     centre, turned = autograph.pose(projector)
     omega, phi, kappa = (float(angle) / GON for angle in angles_of(turned))
@@ -207,7 +207,7 @@ def true_errors(autograph: Autograph, condition: Condition, projector: int) -> D
 
 
 def report_tables(document: Document) -> RenderableType:
-    """Return the sheet that a service engineer would file."""
+    """Return the report of the grid test as tables."""
     parts: list[RenderableType] = [
         Text(f"Grid test of Wild {document['variant']} no. {document['serial']}", style="bold"),
         Text(

@@ -1,4 +1,4 @@
-"""A session from sitting down to the files it leaves, whatever is done in it."""
+"""Lifecycle of a recorded session: start, end, and its files."""
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -17,7 +17,7 @@ from a7sim.session.results import operator_document, slips_document
 
 
 class SeatedOperator(Protocol):
-    """An operator at the desk of an instrument."""
+    """Operator at a shared instrument."""
 
     person: Person
     instrument: SharedInstrument
@@ -33,11 +33,11 @@ def recorded_session(
     leaves: Callable[[], Mapping[str, str]] = dict,
     called: str = "session",
 ) -> Iterator[None]:
-    """Let an operator work in the body, and say in the document how it ended and what the operator did.
+    """Record the session of an operator in the body, and write its end and its acts into the document.
 
-    `status` becomes 'complete', 'does not fit' with the operator's `message`, 'interrupted', or 'failed' for what else
-    the body raises; only that it does not fit goes no further. However it ends, with `out` the journal, the book, what
-    `leaves` returns by file name, and the results are left there, whole.
+    `status` becomes 'complete', 'does not fit' with the operator's `message`, 'interrupted', or 'failed' for any other
+    exception of the body; only OperatorGaveUp is not raised again. However it ends, with `out` the journal, the book,
+    the files returned by `leaves`, and the results are written completely.
     """
     document |= {"status": "failed", "message": ""}
     person = seated.person
@@ -64,7 +64,7 @@ def recorded_session(
 
 
 def _leave(out: Path, files: Mapping[str, str]) -> None:
-    """Leave files in a folder; where that cannot be and something went wrong before, the latter is what is said."""
+    """Write files into a folder; if that fails after an earlier error, the earlier error is raised."""
     wrong_before = sys.exception()
     try:
         for name, text in files.items():

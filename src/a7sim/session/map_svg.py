@@ -1,4 +1,4 @@
-"""A compiled model as a map: GeoJSON in ground coordinates, and the sheet on the plotting table as SVG in mm."""
+"""Compiled model as a map: GeoJSON in ground coordinates, and the map on the plotting table as SVG in mm."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from a7sim.operator.mapping.map_lines import CONTOUR, TracedLine
 from a7sim.operator.mapping.plotting import CompiledMap
 
 INDEX_EVERY = 5
-"""Every so manieth contour of an equal interval is drawn heavier and has its height written on it."""
+"""Every n-th contour of an equal interval is an index contour: heavier, and labelled with its height."""
 
 _ROUND = (1.0, 2.0, 5.0)
 _MARGIN_MM, _HEAD_MM, _FOOT_MM = 12.0, 16.0, 24.0
@@ -103,12 +103,12 @@ def _metres(place: Array) -> list[float]:
 
 @dataclass(frozen=True)
 class _Paper:
-    """Where things stand on the paper: mm from its upper left corner, y downward."""
+    """Positions on the paper: mm from its upper left corner, y downward."""
 
     sheet: CompiledMap
     low: Array
     high: Array
-    """Of what is drawn, on the table ``(2,)``, mm."""
+    """Upper limit of the drawing, on the table ``(2,)``, mm."""
 
     @classmethod
     def of(cls, sheet: CompiledMap) -> "_Paper":
@@ -122,12 +122,12 @@ class _Paper:
         return float(width) + 2.0 * _MARGIN_MM, float(height) + _HEAD_MM + _FOOT_MM
 
     def drawn(self, readings: Array) -> Array:
-        """Return places on the paper ``(2, n)`` of readings ``(2 or 3, n)``, as the table's pencil draws them."""
+        """Return positions on the paper ``(2, n)`` of readings ``(2 or 3, n)``, as the table's pencil draws them."""
         x, y = self.sheet.on_table(readings)
         return np.array([x - self.low[0] + _MARGIN_MM, self.high[1] - y + _HEAD_MM])
 
     def of_ground(self, ground: Array) -> Array:
-        """Return places on the paper ``(2, n)`` of ground coordinates ``(3, n)``."""
+        """Return positions on the paper ``(2, n)`` of ground coordinates ``(3, n)``."""
         return self.drawn(self.sheet.model.readings_of(ground))
 
 
@@ -137,7 +137,7 @@ def _corners(sheet: CompiledMap) -> Array:
 
 
 def to_svg(sheet: CompiledMap, title: str) -> str:
-    """Return the sheet in mm at map scale, with neat line, grid, contours, lines, control, scale bar and north."""
+    """Return the map in mm at map scale, with neat line, grid, contours, lines, control, scale bar and north."""
     paper = _Paper.of(sheet)
     width, height = paper.size
     name = f"{title}, model {sheet.record.model.name}"
@@ -181,7 +181,7 @@ def _points(places: Array) -> str:
 
 
 def index_contours(heights: Sequence[float]) -> set[float]:
-    """Return which contours are drawn heavier: every fifth of their interval; all where there is no interval."""
+    """Return the index contours: every fifth of their interval; all without an interval."""
     if len(heights) < 2:
         return set(heights)
     interval = min(np.diff(heights))
@@ -210,7 +210,7 @@ def _contours(paper: _Paper) -> Iterator[str]:
 
 
 def _label(places: Array, text: str) -> list[str]:
-    """Return a height written along the middle of a line that is long enough for it."""
+    """Return a height label along the middle of a line that is long enough for it."""
     along = np.concatenate([[0.0], np.cumsum(length_of(np.diff(places, axis=1)))])
     if along[-1] < _LABEL_MM:
         return []
@@ -266,7 +266,7 @@ def _controls(paper: _Paper) -> Iterator[str]:
 
 
 def _grid(paper: _Paper) -> Iterator[str]:
-    """Draw crosses of the ground's own system, about a decimetre apart, with their coordinates on the neat line."""
+    """Draw grid crosses of the ground's own system, about a decimetre apart, with coordinates on the neat line."""
     spacing = _round_below(0.1 * paper.sheet.map_scale)
     level = float(np.mean(paper.sheet.spots.range))
     (x0, y0), (x1, y1) = paper.sheet.area.low, paper.sheet.area.high
@@ -360,6 +360,6 @@ def _scale_bar(paper: _Paper, y: float) -> Iterator[str]:
 
 
 def _round_below(metres: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20 ... that is not larger."""
+    """Return the largest of 1, 2, 5, 10, 20 ... that does not exceed a value."""
     decade = 10.0 ** math.floor(math.log10(metres))
     return max(each * decade for each in _ROUND if each * decade <= metres * (1.0 + 1e-9))

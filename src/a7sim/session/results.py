@@ -1,4 +1,4 @@
-"""What a session found, as one document for machines and as model files."""
+"""Results of a session as one document and as model files."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ _CENTRE_FIELDS = ("X0", "Y0", "Z0", "T0", "sigma_X0", "sigma_Y0", "sigma_Z0", "s
 
 
 def results_header(scenario: Scenario, seed: int) -> dict[str, Any]:
-    """Return what a document of results says first."""
+    """Return the first keys of a document of results."""
     plan = scenario.plotting
     return (
         document_header("run")
@@ -41,14 +41,14 @@ def results_header(scenario: Scenario, seed: int) -> dict[str, Any]:
 
 
 def request_document(scenario: Scenario) -> dict[str, Any]:
-    """Return the command that gives a session again, and what it changed in the scenario's file."""
+    """Return the command that repeats a session, and its changes to the scenario file."""
     return msgspec.structs.asdict(scenario.request) if isinstance(scenario, ScenarioWithProvenance) else {}
 
 
 def model_document(
     record: ModelRecord, beside: TruthComparison, member: int = 0, published: Published | None = None
 ) -> dict[str, Any]:
-    """Return the results of a model beside the truth, of which this session's is that of a member."""
+    """Return the results of a model with the truth, of which this session is one member."""
     orientation = record.orientation
     model = record.model
     found = {hand: _centre(centre) for hand, centre in record.centres.items()}
@@ -93,7 +93,7 @@ def model_document(
 
 
 def brief_model_document(record: ModelRecord, beside: TruthComparison, member: int) -> dict[str, Any]:
-    """Return of the results of a model what its strip and the responses of a study that have names are read from."""
+    """Return the results of a model needed by its strip and by the named responses of a study."""
     orientation = record.orientation
     found = {hand: _centre(centre, _CENTRE_FIELDS[:3]) for hand, centre in record.centres.items()}
     return {
@@ -126,7 +126,7 @@ def _points(record: ModelRecord) -> dict[str, dict[str, float]]:
 
 
 def operator_document(person: Person, lines: int) -> dict[str, Any]:
-    """Return what an operator wrote and where the time went, hours."""
+    """Return the entries of an operator and the time spent, hours."""
     book = person.book
     return hours_document(person.clock.now, person.timesheet) | {
         "lines_over_the_link": lines,
@@ -137,7 +137,7 @@ def operator_document(person: Person, lines: int) -> dict[str, Any]:
 
 
 def hours_document(seconds: float, timesheet: Timesheet, session: int = 0) -> dict[str, Any]:
-    """Return how long a session took and where the time went, hours."""
+    """Return the duration of a session and the time spent, hours."""
     return {
         "hours": round(seconds / 3600.0, 3),
         "time_by_activity_h": _hours(timesheet.activities_of(session)),
@@ -146,7 +146,7 @@ def hours_document(seconds: float, timesheet: Timesheet, session: int = 0) -> di
 
 
 def slips_document(person: Person) -> list[dict[str, Any]]:
-    """Return what an operator did wrongly without knowing it, beside what was right."""
+    """Return the slips of an operator with the right values."""
     struck = {entry.number for entry in person.book.entries if entry.struck}
     return [
         {
@@ -233,7 +233,7 @@ def _beside_truth(
 
 
 def _differences(beside: TruthComparison, member: int, found: dict[int, dict[str, float]]) -> dict[str, Any]:
-    """Return by how much what was found differs from the truth, in single numbers."""
+    """Return the differences of the results from the truth as single numbers."""
     document: dict[str, Any] = {
         "centre_differences": {
             SIDES[hand]: {
@@ -281,7 +281,7 @@ def _named(model: Model) -> Iterator[tuple[str, list[float]]]:
 
 
 def strips_csv(strips: Sequence[Document]) -> str:
-    """Return the accuracies of all strips in m, one a line."""
+    """Return the accuracies of all strips in m, one per line."""
     header = ("strip", "cases", "scale", "max_join_mm", *(f"{on}_{what}_m" for on in ON for what in WHAT))
     return to_csv(header, (_strip_row(strip) for strip in strips))
 

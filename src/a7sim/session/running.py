@@ -1,4 +1,4 @@
-"""Running a scenario: a scene, an instrument, a line, and an operator who works it."""
+"""Running of a scenario: scene, instrument, link and operator."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -41,17 +41,17 @@ from a7sim.strip_methods.strip import (
 from a7sim.table_files import to_csv
 
 PortAdapter = Callable[[InProcessSerial], Port]
-"""What lies between instrument and operator: it takes the instrument's end and returns the operator's."""
+"""Function between instrument and operator: it takes the instrument's port and returns the operator's."""
 
 
 def direct(port: InProcessSerial) -> Port:
-    """Return the instrument's end itself: a cable without length."""
+    """Return the instrument's port unchanged."""
     return port
 
 
 @dataclass
 class Session:
-    """An operator at an instrument with the photographs of a scenario in the drawer."""
+    """Operator at an instrument with the photographs of a scenario."""
 
     scenario: Scenario
     seed: int
@@ -62,14 +62,14 @@ class Session:
 
     @cached_property
     def job(self) -> Job:
-        """The job sheet. Raises Mistake where the scenario has no settings of a plotter."""
+        """Job sheet. Raises A7SimError if the scenario has no settings of a plotter."""
         return make_job(self.scenario, self.scene)
 
 
 def open_session(
     scenario: Scenario, seed: int, listener: Listener | None = None, port_adapter: PortAdapter = direct
 ) -> Session:
-    """Return a session ready to begin. Raises Mistake when a file of measurements is bad."""
+    """Return a session ready to start. Raises A7SimError for an invalid file of measurements."""
     scene = build_scene(scenario, seed)
     autograph = build_autograph(scenario.instrument, scene.mountable, seed)
     clock = Clock()
@@ -80,7 +80,7 @@ def open_session(
 
 
 def make_job(scenario: Scenario, scene: Scene) -> Job:
-    """Return the job sheet: what of a scenario an operator is told."""
+    """Return the job sheet: the data of a scenario that an operator may know."""
     models = tuple(
         ModelJob(
             model.name,
@@ -104,7 +104,7 @@ def _control_of(scenario: Scenario, scene: Scene) -> dict[str, tuple[float, floa
 
 @dataclass(frozen=True)
 class ProgressCallbacks:
-    """Who is told how a session goes on: an activity begins, a point is done."""
+    """Callbacks of a session's progress: start of an activity, end of a point."""
 
     on_activity: Callable[[str], None] = lambda _: None
     on_point: Callable[[], None] = lambda: None
@@ -119,13 +119,12 @@ def run(
     port_adapter: PortAdapter = direct,
     journal_options: JournalOptions | None = None,
 ) -> Document:
-    """Work through a scenario up to its strip and return the document of results; with `out`, leave the files there.
+    """Run a scenario up to its strip and return the document of results; with `out`, write the files.
 
-    `status` in the document is 'complete', or 'does not fit' with the operator's `message`. An interrupted
-    session (KeyboardInterrupt) leaves whole files and goes on up. Raises Mistake for a bad file of
-    measurements or a folder that cannot be used, before anything is written.
-
-    A session that `keeping` resumes works on in its folder, and leaves there what one without interruption leaves.
+    `status` in the document is 'complete', or 'does not fit' with the operator's `message`. An interrupted session
+    (KeyboardInterrupt) writes complete files and raises. Raises A7SimError for an invalid file of measurements or a
+    folder that cannot be used, before anything is written. A resumed session continues in its folder, and writes the
+    files of an uninterrupted one.
     """
     watcher = watcher or ProgressCallbacks()
     journal_options = journal_options or JournalOptions()
@@ -149,7 +148,7 @@ def run(
 
 
 def _concluded(session: Session, document: Document, out: Path | None) -> Document:
-    """Return the document of a session, with the strip on the ground if the session did not stop early."""
+    """Return the document of a session, with the strip on the ground if the session is complete."""
     if document["status"] != "complete":
         return document
     ground = ground_control(session.scenario, session.scene)
@@ -165,7 +164,7 @@ def _concluded(session: Session, document: Document, out: Path | None) -> Docume
 def strip_document(
     scenario: Scenario, ground: Ground, models: Sequence[Document]
 ) -> tuple[Document, OrientedStrip | None]:
-    """Return the strip that the models of a document make on the ground, or why they make none in its `message`."""
+    """Return the strip on the ground of the models of a document, or the reason why there is none in its `message`."""
     try:
         if not ground.used.any():
             raise A7SimError("the scenario has no ground control")

@@ -1,4 +1,4 @@
-"""The twenty-five strips of the thesis: every case of one model with every case of the next (thesis 4.3)."""
+"""The twenty-five strips of the thesis: each case of one model with each case of the next (thesis 4.3)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ FOLDER_OF_CASE = "case-{}"
 
 @dataclass(frozen=True)
 class Combination:
-    """A strip of models each oriented on the points of a case of its own, numbered as in the thesis."""
+    """Strip of models each oriented on the points of a case of its own, numbered as in the thesis."""
 
     number: int
     cases: tuple[str, ...]
@@ -44,10 +44,10 @@ def run_combinations(
     force: bool = False,
     journal_options: JournalOptions | None = None,
 ) -> Document:
-    """Work through a scenario once in every case and return the document of all strips that the models make.
+    """Run a scenario in each case and return the document of all strips that the models form.
 
-    The sessions are those that `run` gives for each case; with `out`, their folders are there. The first session that
-    does not fit ends the work. Raises Mistake for a scenario without ground control or of too many models.
+    The sessions are those of `run` for each case; with `out`, their folders are written. The first session that does
+    not fit ends the run. Raises A7SimError for a scenario without ground control or with too many models.
     """
     watcher = watcher or ProgressCallbacks()
     check_strips_possible(scenario)
@@ -85,7 +85,7 @@ def with_case(scenario: Scenario, case: str) -> Scenario:
 
 
 def check_strips_possible(scenario: Scenario) -> None:
-    """Raise Mistake for a scenario of too many models or without ground control."""
+    """Raise A7SimError for a scenario with too many models or without ground control."""
     strips = len(CASES) ** len(scenario.models)
     if strips > MAX_STRIPS:
         raise A7SimError(
@@ -103,7 +103,7 @@ def _strips(scenario: Scenario, seed: int, sessions: Mapping[str, Document]) -> 
 
 
 def combinations(by_case: Mapping[str, Sequence[Model]]) -> Iterator[Combination]:
-    """Yield every combination of the models' cases: A with A first, E with E last."""
+    """Yield each combination of the models' cases: A with A first, E with E last."""
     models = len(next(iter(by_case.values())))
     for number, cases in enumerate(product(by_case, repeat=models), start=1):
         yield Combination(number, cases, tuple(by_case[case][i] for i, case in enumerate(cases)))
@@ -122,7 +122,7 @@ def _of_combination(combination: Combination, jobs: Sequence[ModelJob], ground: 
 
 
 def describe(combination: Combination, jobs: Sequence[ModelJob]) -> str:
-    """Return what the diagram of a strip shows (thesis fig. 4.3), in words."""
+    """Return the diagram of a strip (thesis fig. 4.3) as text."""
     parts = [
         f"model {job.name} ({job.left} and {job.right}) case {case}, oriented on {' '.join(job.points_of_case(case))}"
         for job, case in zip(jobs, combination.cases, strict=True)

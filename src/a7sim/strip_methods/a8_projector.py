@@ -1,4 +1,4 @@
-"""Projectors of an A8 as the last adjustment left them: c, principal point and local errors of the projected bundle."""
+"""Projectors of an A8 after its last adjustment: c, principal point and local errors of the projected bundle."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from a7sim.scenario import GridTest
 
 @dataclass(frozen=True)
 class Projector:
-    """A projector as the last adjustment left it, mm in the plane of the picture."""
+    """Projector after the last adjustment, mm in the plane of the picture."""
 
     principal_distance_error: float
     principal_point: Array
@@ -21,7 +21,7 @@ class Projector:
 
     @classmethod
     def sample(cls, test: GridTest, rng: np.random.Generator) -> "Projector":
-        """Return a projector of an instrument whose grid tests come out like this."""
+        """Draw a projector of an instrument with these results of grid tests."""
         c, *point = rng.standard_normal(3) * [
             test.principal_distance_mm, test.principal_point_mm, test.principal_point_mm,
         ]  # fmt: skip
@@ -35,6 +35,6 @@ class Projector:
         )
 
     def project(self, image: Array, rng: np.random.Generator) -> Array:
-        """Return image points ``(2, n)`` about the principal point as this projector projects them."""
+        """Return image points ``(2, n)`` about the principal point as projected by this projector."""
         scatter = self.scattered * rng.standard_normal(image.shape)
         return np.asarray(image + self.principal_point[:, None] + local_errors(self.local, image) + scatter)

@@ -1,4 +1,4 @@
-"""A strip on the Wild A8, on arrays: what P's chain reads there (P 3.1, 3.2).
+"""Strip on the Wild A8 as arrays: the measuring chain of P (P 3.1, 3.2).
 
 Errors and their sources: docs/decisions/0005-a8-strip.md.
 """
@@ -31,16 +31,16 @@ from a7sim.strip_methods.comparator import (
 from a7sim.strip_methods.parallax_clearing import ClearedPair, clear_parallaxes
 
 POINTINGS = 2
-"""Of every model point (thesis 3.5)."""
+"""Of each model point (thesis 3.5)."""
 
 SCALE_STEP = 0.01
 """Least count of the X and Y scales in their units of 2 mm, and of the glass scale of heights in mm."""
 
 COLUMN_MM = 300.0
-"""Zin, to which P ties the glass scale (P 3.2)."""
+"""Zin, to which P refers the glass scale (P 3.2)."""
 
 REFERENCE_MM = 400.0
-"""What the glass scale shows there [assumption: an integer in its middle]."""
+"""Reading of the glass scale there [assumption: an integer in its middle]."""
 
 C_STEP_MM = 0.01
 """Least count of the principal distance."""
@@ -48,7 +48,7 @@ C_STEP_MM = 0.01
 
 @dataclass(frozen=True)
 class CentredPhoto:
-    """A photograph on its carrier: image points ``(2, n)`` about the principal point, and the c set for its film."""
+    """Photograph on its carrier: image points ``(2, n)`` about the principal point, and the c set for its film."""
 
     image: Array
     c: float
@@ -57,7 +57,7 @@ class CentredPhoto:
 def centre_photo(
     photograph: Photograph, names: tuple[str, ...], observer: Observer, rng: np.random.Generator
 ) -> CentredPhoto:
-    """Centre a photograph by its fiducials and set the principal distance for the size its film has."""
+    """Centre a photograph by its fiducials and set the principal distance for the size of its film."""
     camera = photograph.camera
     marks = calibrated_fiducials(photograph)
     seen = photograph.fiducials.xy + 1e-3 * observer.fiducial_um * rng.standard_normal(marks.shape)
@@ -69,7 +69,7 @@ def centre_photo(
 
 @dataclass(frozen=True)
 class A8Setup:
-    """An A8 and the person in its chair, for one session."""
+    """A8 and its operator for one session."""
 
     projectors: tuple[Projector, Projector]
     observer: Observer
@@ -80,7 +80,7 @@ class A8Setup:
     def set_up(
         self, model: ModelPlan, scene: Scene, wanted: frozenset[str], standard: frozenset[str]
     ) -> "ProjectedPair":
-        """Lay the photographs of a model on their carriers; draw how they are shown, and all that is seen wrongly."""
+        """Mount the photographs of a model; draw the errors of projection and observation."""
         photographs = scene.photographs[model.left], scene.photographs[model.right]
         names = common_points(photographs[0].points, photographs[1].points, wanted)
         pictures = tuple(centre_photo(each, names, self.observer, self.rng) for each in photographs)
@@ -99,7 +99,7 @@ class A8Setup:
         return ProjectedPair(model, names, left, right, (c[0], c[1]), oriented_on, errors, pointing)
 
     def cleared(self, models: Sequence["ProjectedPair"]) -> list[ClearedPair]:
-        """Clear the parallaxes of models, all at once where they have as many points to do it on."""
+        """Clear the parallaxes of models, together for models with the same number of orientation points."""
         if len({len(each.oriented_on) for each in models}) == 1:
             left, right = (np.stack([each.at_standard_points[side] for each in models], axis=-1) for side in range(2))
             c1, c2 = np.array([each.c for each in models]).T
@@ -125,7 +125,7 @@ class A8Setup:
         return add_centres(shown.model, shown.names, points, ends)
 
     def _read(self, points: Array, stand: ClearedPair, pointing: Array) -> Array:
-        """Return the scales' readings ``(3, n)`` for points ``(3, n)`` from the left centre, as pointed at."""
+        """Return the scale readings ``(3, n)`` of points ``(3, n)`` from the left centre, with pointing errors."""
         observer = self.observer
         enlargement = -points[2] / stand.c[0]
         plan = 1e-3 * observer.stereo_um * enlargement
@@ -137,7 +137,7 @@ class A8Setup:
 
 @dataclass(frozen=True)
 class ProjectedPair:
-    """A model's photographs as the projectors show them, and how wrongly they are going to be seen."""
+    """Photographs of a model as projected, and the errors of their observation."""
 
     model: ModelPlan
     names: tuple[str, ...]
@@ -146,9 +146,9 @@ class ProjectedPair:
     """Image points ``(2, n)`` about the principal points, mm."""
     c: tuple[float, float]
     oriented_on: list[int]
-    """The standard points among them."""
+    """Standard points among them."""
     errors: Array
-    """With which their parallaxes are cleared, mm in the picture."""
+    """Errors of clearing their parallaxes, mm in the picture."""
     pointing: Array
     """Errors ``(3, n, pointings)`` in units of their standard deviations."""
 
@@ -161,9 +161,9 @@ class ProjectedPair:
 def strip_on_a8(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
     """Set up and measure all models of a scenario on an A8 and return the strip, on the ground.
 
-    The same ground control and checks, the same points and the same connection as `strip_by_comparator`; c is set for
-    the film's mean size, affine shrinkage and lens distortion stay in. Raises Mistake where the scenario has no plan,
-    Undetermined or Mistake for what does not make a strip.
+    Ground control, checks, points and joins are those of `strip_by_comparator`; c is set for the film's mean size,
+    affine shrinkage and lens distortion remain. Raises A7SimError if the scenario has no plan, Undetermined or
+    A7SimError for measurements that form no strip.
     """
     plan = scenario.plan
     faults, person = (

@@ -1,4 +1,4 @@
-"""The same strip by comparator and on the A8, over many flights: what both leave at the checks (P, Table 1)."""
+"""The same strip by comparator and on the A8, over many flights: residuals at the checks (P, Table 1)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from a7sim.strip_methods.comparator import StripResult, strip_by_comparator
 
 @dataclass(frozen=True)
 class Residuals:
-    """Residuals of strips at their check points in X, Y, Z ``(3, seeds)``, m, and how their models closed."""
+    """Residuals of strips at their checks in X, Y, Z ``(3, seeds)``, m, and closing differences of their models."""
 
     rms: Array
     largest: Array
@@ -36,7 +36,10 @@ class StripComparison:
 
 
 def compare_a8_to_comparator(scenario: Scenario, seeds: Iterable[int]) -> StripComparison:
-    """Return what both ways leave at the check points, over seeds, each seed a flight's film, an A8 and two people."""
+    """Return the residuals of both methods at the check points, over seeds;
+
+    each seed has its own film, A8 and observers.
+    """
     seeds = tuple(seeds)
     both: list[tuple[StripResult, StripResult]] = []
     for seed in seeds:
@@ -67,7 +70,7 @@ def _fit(result: StripResult) -> GroundFit:
 
 
 def _closing(result: StripResult, c: float) -> tuple[float, float]:
-    """Return the rms closing differences in plan and height, brought to the scale of the picture by the first model."""
+    """Return the rms closing differences in plan and height, at the scale of the picture by the first model."""
     first = result.models[0]
     heights = first.at([name for name in first.points if not is_centre(name)])[2]
     reduction = c / float(np.abs(heights).mean())

@@ -1,4 +1,4 @@
-"""The analytical way: photographs measured in a comparator, models computed, a strip formed (P 1-2; fragment S)."""
+"""Analytical method: photographs measured in a comparator, models computed, a strip formed (P 1-2; fragment S)."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -30,14 +30,14 @@ COMPARATOR_STREAM = 5
 """Spawn key of the comparator's random numbers, after those of scene, instrument and operator."""
 
 STAGE_MM = 120.0
-"""About where a photograph's middle lies on the stage; the fiducials take it out again."""
+"""Approximate position of a photograph's middle on the stage; the fiducials eliminate it."""
 STAGE_TURN = 0.005
-"""Radians within which a photograph is laid straight."""
+"""Maximum rotation of a photograph on the stage, radians."""
 
 
 @dataclass(frozen=True)
 class StripResult:
-    """A strip as it was measured: its independent models, and what they came to on the ground."""
+    """Strip as measured: its independent models, and its orientation to the ground."""
 
     models: tuple[Model, ...]
     strip: OrientedStrip
@@ -45,7 +45,7 @@ class StripResult:
 
 @dataclass(frozen=True)
 class ImagePair:
-    """The images ``(2, n)`` of points that a model's photographs have in common, mm in the system of the fiducials."""
+    """Images ``(2, n)`` of the common points of a model's photographs, mm in the system of the fiducials."""
 
     model: ModelPlan
     points: tuple[str, ...]
@@ -60,9 +60,9 @@ class ImagePair:
 def strip_by_comparator(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
     """Measure all photographs of a scenario in the comparator and return the strip, on the ground.
 
-    What goes in is what was measured, the camera's certificate and the list of ground control. Refraction and the
-    earth's curve, where the scenario has them, are taken off with the heights of a first strip computed without.
-    Raises Undetermined or Mistake for what does not make a strip.
+    Input are the measurements, the camera's certificate and the list of ground control. Refraction and earth curvature,
+    if in the scenario, are corrected with the heights of a first strip computed without. Raises Undetermined or
+    A7SimError for measurements that form no strip.
     """
     wanted = measured_points(scenario, scene, scenario.comparator.case)
     pairs = _in_pairs(scenario, scene, wanted, seed)
@@ -82,7 +82,7 @@ def strip_by_comparator(scenario: Scenario, scene: Scene, seed: int) -> StripRes
 
 
 def measured_points(scenario: Scenario, scene: Scene, case: str) -> frozenset[str]:
-    """Return the names on the list of points to measure: standard points of a case, ground points, points of files."""
+    """Return the names of the points to measure: standard points of a case, ground points, points of files."""
     standard = (scene.standard_points[model.name] for model in scenario.models)
     return frozenset(scene.other_points) | {
         positions[label] for positions in standard for label in CASES[case] if label in positions
@@ -147,7 +147,7 @@ def _measured_in_stereo(
 
 @dataclass(frozen=True)
 class _Stage:
-    """A photograph on a stage of the comparator, and the fit of its fiducials to the calibrated ones."""
+    """Photograph on a stage of the comparator, and the fit of its fiducials to the calibrated ones."""
 
     turn: Array
     shift: Array
@@ -168,7 +168,7 @@ class _Stage:
         return cls(turn, shift, step, plane_fit(read, calibrated_fiducials(photograph), comparator.fit))
 
     def at(self, film: Array) -> Array:
-        """Return where places ``(2, n)`` on film lie on the stage."""
+        """Return positions on the stage of positions ``(2, n)`` on film."""
         return np.asarray(self.turn @ film + self.shift[:, None])
 
     def read(self, seen: Array) -> Array:
@@ -177,7 +177,7 @@ class _Stage:
 
 
 def calibrated_fiducials(photograph: Photograph) -> Array:
-    """Return the calibrated places ``(2, n)`` of a photograph's fiducials."""
+    """Return the calibrated positions ``(2, n)`` of a photograph's fiducials."""
     calibrated = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in photograph.camera.fiducials}
     return np.array([calibrated[name] for name in photograph.fiducials.names]).T
 
@@ -185,32 +185,32 @@ def calibrated_fiducials(photograph: Photograph) -> Array:
 def simulate_pointings(
     places: Array, sigma: Array | float, share: float, pointings: int, rng: np.random.Generator
 ) -> Array:
-    """Return places ``(k, n)`` as pointed at so many times ``(k, n, pointings)``.
+    """Return positions ``(k, n)`` with the errors of repeated pointings ``(k, n, pointings)``.
 
-    `share` of the error is new when the pointing is repeated at once; the rest is how the point itself is seen.
+    `share` of the error is new when the pointing is repeated at once; the rest is the appearance of the point itself.
     """
     sigmas = np.broadcast_to(sigma, places.shape)[..., None]
     return np.asarray(places[..., None] + sigmas * pointing_errors(places.shape, share, pointings, rng))
 
 
 def pointing_errors(shape: tuple[int, ...], share: float, pointings: int, rng: np.random.Generator) -> Array:
-    """Return the errors ``(*shape, pointings)`` of `pointed_at` in units of their standard deviations."""
+    """Return the errors ``(*shape, pointings)`` of `simulate_pointings` in units of their standard deviations."""
     seen = np.sqrt(1.0 - share**2) * rng.standard_normal(shape)
     return np.asarray(seen[..., None] + share * rng.standard_normal((*shape, pointings)))
 
 
 def round_to_count(values: Array, least_count: float) -> Array:
-    """Return readings as a scale of this least count shows them; zero for one without steps."""
+    """Return readings rounded to a least count; unchanged for a least count of zero."""
     return np.asarray(np.round(values / least_count) * least_count) if least_count else values
 
 
 def common_points(left: NamedPoints, right: NamedPoints, wanted: frozenset[str]) -> tuple[str, ...]:
-    """Return the names, in order, of the wanted points that both photographs have."""
+    """Return the names, in order, of the wanted points in both photographs."""
     return tuple(sorted(wanted.intersection(left.names) & wanted.intersection(right.names)))
 
 
 def mark_coordinates(marks: NamedPoints, names: Sequence[str]) -> Array:
-    """Return the places ``(2, len(names))`` of named marks."""
+    """Return the positions ``(2, len(names))`` of named marks."""
     place = {name: i for i, name in enumerate(marks.names)}
     return marks.xy[:, [place[name] for name in names]]
 
@@ -244,7 +244,7 @@ def _strip_of(pairs: Sequence[ImagePair], scenario: Scenario, scene: Scene) -> S
 
 
 def orient_measured_strip(models: tuple[Model, ...], scenario: Scenario, scene: Scene) -> StripResult:
-    """Return the strip of a scenario's models, joined and adjusted as it asks for."""
+    """Return the strip of a scenario's models, joined and adjusted by its plan."""
     plan = scenario.strip
     return StripResult(models, orient_strip(models, ground_control(scenario, scene), plan.join, plan.polynomial))
 
@@ -260,7 +260,7 @@ def _computed(pair: ImagePair, c: float, way: str) -> Model:
 
 @contextmanager
 def errors_for_model(name: str) -> Iterator[None]:
-    """Name the model in what its points leave undetermined."""
+    """Add the name of the model to errors about its points."""
     try:
         yield
     except Undetermined as undetermined:

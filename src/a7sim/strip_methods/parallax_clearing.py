@@ -1,4 +1,4 @@
-"""Relative orientation by y-parallaxes on arrays: what a plotter without by and bz comes to, point by point."""
+"""Relative orientation by y-parallaxes as arrays: the result of a plotter without by and bz, point by point."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,12 @@ UNKNOWNS = ("kappa1", "kappa2", "phi1", "phi2", "omega2")
 
 MAX_ROUNDS = 20
 CONVERGED_MM = 1e-10
-"""Radians: the rounds end when every correction is smaller."""
+"""Radians: the rounds end when all corrections are smaller."""
 
 
 @dataclass(frozen=True)
 class ClearedPair:
-    """Two projectors as they stand when the parallaxes are cleared: images about the principal points, base along X."""
+    """Two projectors with cleared parallaxes: images about the principal points, base along X."""
 
     c: tuple[float | Array, float | Array]
     angles: tuple[Array, Array]
@@ -33,7 +33,7 @@ class ClearedPair:
 
     @property
     def rotation(self) -> Array:
-        """The rotation ``(3, 3)`` that takes the right photograph's vectors into the left photograph's frame."""
+        """Rotation ``(3, 3)`` of the right photograph's vectors into the left photograph's frame."""
         left, right = self.rotations
         return mxm(transposed(left), right)
 
@@ -43,12 +43,14 @@ class ClearedPair:
         return mxv(transposed(self.rotations[0]), np.array([1.0, 0.0, 0.0]))
 
     def of(self, model: int) -> "ClearedPair":
-        """Return one of several models that were cleared at once."""
+        """Return one of several models cleared together."""
         c = float(np.ravel(self.c[0])[model]), float(np.ravel(self.c[1])[model])
         return ClearedPair(c, (self.angles[0][:, model], self.angles[1][:, model]), self.bx, self.rounds)
 
     def model_points(self, left: Array, right: Array) -> tuple[Array, Array]:
-        """Return where x-parallax vanishes ``(3, n, ...)``, from the left centre, and y-parallaxes ``(n, ...)``, mm."""
+        """Return the points of zero x-parallax ``(3, n, ...)``, from the left centre, and y-parallaxes ``(n, ...)``,
+        mm.
+        """
         rays = [
             ray_of(image, turned[:, :, None], c)
             for image, turned, c in zip((left, right), self.rotations, self.c, strict=True)
@@ -61,12 +63,12 @@ class ClearedPair:
 def clear_parallaxes(
     left: Array, right: Array, c: tuple[float | Array, float | Array], bx: float, errors_mm: Array | float = 0.0
 ) -> ClearedPair:
-    """Clear the y-parallaxes of image points ``(2, n, ...)`` in mm, in rounds of seeing, computing and setting.
+    """Clear the y-parallaxes of image points ``(2, n, ...)`` in mm, in rounds of observing, computing and setting.
 
-    `c` are the principal distances ``(...)`` of both. `errors_mm` ``(n, ...)`` are those with which each one is seen
-    to vanish, at the scale of the pictures. Elements are set as they come, without a counter: that is how a parallax is
-    cleared. The pictures are first laid with their swings along the base. Raises Undetermined for points that do not
-    determine the five elements or parallaxes that do not vanish; of several models at once, for any of them.
+    `c` are the principal distances ``(...)`` of both. `errors_mm` ``(n, ...)`` are the errors of observing zero
+    parallax, at the scale of the pictures. Elements are set continuously, not by counters. The pictures first get their
+    swings along the base. Raises Undetermined for points that do not determine the five elements or parallaxes that do
+    not vanish; of several models, for any of them.
     """
     if left.shape[1] < len(UNKNOWNS):
         raise Undetermined(f"expected at least {len(UNKNOWNS)} points to orient a model, got {left.shape[1]}")

@@ -1,4 +1,4 @@
-"""The strip that a session's models make, on the ground (thesis 4.3): one, or all combinations of cases."""
+"""Strip of a session's models on the ground (thesis 4.3): one, or all combinations of cases."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ MAX_CARD_NUMBER_LENGTH = 5
 
 @dataclass(frozen=True)
 class StripCards:
-    """A strip on cards: the deck, the output, and which number stands for which point."""
+    """Strip on cards: the deck, the output, and the number of each point."""
 
     deck: list[str]
     output: list[str]
@@ -39,7 +39,7 @@ class StripCards:
 
 @dataclass(frozen=True)
 class OrientedStrip:
-    """A strip, its absolute orientation and, where asked for, its adjustment by polynomials."""
+    """Strip, its absolute orientation and, if requested, its adjustment by polynomials."""
 
     formed: Strip
     oriented: AbsoluteOrientation
@@ -47,24 +47,24 @@ class OrientedStrip:
 
     @property
     def points(self) -> Model:
-        """All points on the ground, as adjusted last."""
+        """All points on the ground, after the last adjustment."""
         return (self.adjusted or self.oriented).model
 
     @property
     def on_ground(self) -> Strip:
-        """The strip in the system of the ground, each model with its own coordinates."""
+        """Strip in the system of the ground, each model with its own coordinates."""
         return self.formed.transformed(self.oriented.similarity)
 
 
 def ground_control(scenario: Scenario, scene: Scene) -> Ground:
-    """Return the list of ground control and checks that the computing room has."""
+    """Return the list of ground control and checks for the computation."""
     names = tuple(point.point for point in scenario.ground)
     coordinates = np.array([scene.ground_points[name] for name in names]).reshape(-1, 3).T
     return Ground(names, coordinates, tuple(point.role for point in scenario.ground))
 
 
 def given_control(scenario: Scenario, scene: Scene) -> Ground:
-    """Return the ground control as an operator is given it: no checks, and nan for what a point's role leaves out."""
+    """Return the ground control for the operator: no checks, and nan for coordinates that a point's role leaves out."""
     ground = ground_control(scenario, scene)
     known = np.where(ground.used > 0.0, ground.coordinates, np.nan)
     given = np.flatnonzero(ground.used.any(axis=0))
@@ -74,7 +74,10 @@ def given_control(scenario: Scenario, scene: Scene) -> Ground:
 def orient_strip(
     models: Sequence[Model], ground: Ground, method: JoinMethod = "points", degree: Degree | None = None
 ) -> OrientedStrip:
-    """Return the strip of models on its control. Raises Undetermined or Mistake for models or control too few."""
+    """Return the strip of models on its control.
+
+    Raises Undetermined or A7SimError for too few models or control points.
+    """
     formed = formed_strip(models, method)
     oriented = absolute_orientation(formed, ground)
     return OrientedStrip(formed, oriented, strip_adjustment(oriented.model, ground, degree) if degree else None)
@@ -101,9 +104,10 @@ def _model(document: Document) -> Model:
 
 
 def strip_cards(strip: OrientedStrip, models: Sequence[Model], ground: Ground) -> StripCards:
-    """Return the N.R.C. cards of a strip: the deck that goes in, and the output with residuals and deviations.
+    """Return the N.R.C. cards of a strip: the input deck, and the output with residuals and deviations.
 
-    Names that are no numbers of five digits get one. Raises Mistake for coordinates that do not fit nine columns.
+    Names that are not numbers of up to five digits get one. Raises A7SimError for coordinates that do not fit nine
+    columns.
     """
     key = card_numbers([*ground.points, *(name for model in models for name in model.points)])
     numbered_ground = Ground(tuple(key[name] for name in ground.points), ground.coordinates, ground.roles)
@@ -114,7 +118,7 @@ def strip_cards(strip: OrientedStrip, models: Sequence[Model], ground: Ground) -
 
 
 def card_numbers(names: Iterable[str]) -> dict[str, str]:
-    """Return the names of points as cards can hold them; `<photo>:centre` keeps its photograph."""
+    """Return the names of points for cards; `<photo>:centre` keeps its photograph."""
     unique = dict.fromkeys(names)
     taken = {name.removesuffix(CENTRE) for name in unique}
     free = (str(number) for number in range(FIRST_FREE_NUMBER, 100_000) if str(number) not in taken)
@@ -131,7 +135,7 @@ def _numbered(model: Model, key: Mapping[str, str]) -> Model:
 
 
 def _fitting(lines_of: Callable[[int], list[str]]) -> list[str]:
-    """Return cards with as many decimals as nine columns hold, three at most."""
+    """Return cards with as many decimals as nine columns allow, three at most."""
     for decimals in (3, 2):
         try:
             return lines_of(decimals)

@@ -1,1 +1,1 @@
-"""Studies: a scenario worked as often as a question needs, factor by factor, and what comes of it in numbers."""
+"""Monte Carlo studies: a scenario is run for many seeds and factor levels; the results are statistics."""

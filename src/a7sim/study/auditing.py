@@ -1,4 +1,4 @@
-"""An audit: replicates picked from a study are worked again on both benches, and must be the same in all they leave."""
+"""Audit of a study: selected replicates are run again in a batch and over the link, and must agree."""
 
 import math
 from collections import defaultdict
@@ -14,24 +14,24 @@ from a7sim.study.simulating import replicate_seed
 from a7sim.study.tally import Tally
 
 _STREAM = 11
-"""Spawns the picks."""
+"""Spawn key of the random selection."""
 _AS_NOTHING = 1e-9
-"""What is left where two sums cancel; a least count is far above."""
+"""Tolerance for sums that cancel; a least count is far larger."""
 
 
 @dataclass(frozen=True)
 class AuditDifference:
-    """What is not the same over the link in a session: the first of it."""
+    """First difference of a session between batch and link."""
 
     cell: int
     replicate: int
     seed: int
     place: str
-    """A response, or the path of a value in the results."""
+    """Name of a response, or path of a value in the results."""
     batch_value: Any
     link_value: Any
     others: int = 0
-    """How many values more are not the same."""
+    """Number of further values that differ."""
 
     def __str__(self) -> str:
         more = f" ({self.others} values more differ)" if self.others else ""
@@ -44,11 +44,13 @@ class AuditDifference:
 def audit_study(
     loaded: LoadedStudy, tally: Tally, picks: int, tick: Callable[[], None] = lambda: None
 ) -> list[AuditDifference]:
-    """Work so many picked replicates on both benches and return a difference for every one that is not the same.
+    """Run `picks` selected replicates in a batch and over the link;
 
-    Over the link a replicate must give the responses that the tally holds, to the last digit, and all values of the
-    results that the batch bench gives: settings, readings, centres, model coordinates, strip. The picks follow from the
-    study's seed, each another replicate; fewer where the study has fewer.
+    return one difference for each session that disagrees.
+
+    Over the link a replicate must give the responses in the tally, to the last digit, and all values in the batch
+    results: settings, readings, centres, model coordinates, strip. The selection follows from the seed of the study;
+    each replicate is selected once at most.
     """
     picked = _picked(loaded, tally, picks)
     found = []
@@ -71,7 +73,7 @@ def audit_study(
 
 
 def _picked(loaded: LoadedStudy, tally: Tally, picks: int) -> Mapping[int, list[int]]:
-    """Return the picked replicates by the place of their cell."""
+    """Return the selected replicates by the index of their cell."""
     there = [(i, replicate) for i in range(len(loaded.cells)) for replicate in range(tally.sample(i).shape[1])]
     rng = np.random.default_rng(np.random.SeedSequence(loaded.study.seed, spawn_key=(_STREAM,)))
     picked = defaultdict(list)
@@ -86,7 +88,7 @@ def _off(one: float, other: float) -> bool:
 
 
 def _different(bench: Any, link: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield place and values of whatever of the batch bench's results is not so over the link, which tell more."""
+    """Yield path and both values where the batch results differ from the link results, which contain more keys."""
     if isinstance(bench, Mapping) and isinstance(link, Mapping):
         for name, value in bench.items():
             yield from _different(value, link.get(name), f"{place}.{name}".lstrip("."))

@@ -1,4 +1,4 @@
-"""Where the levels of a factor stand on an axis, if they are numbers or stand for one."""
+"""Positions of factor levels on an axis, if they are numbers or stand for numbers."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from a7sim.study.schema import Factor
 
 
 def axis_positions(loaded: LoadedStudy) -> dict[str, Document]:
-    """Return by factor what its axis counts and the place of every level; nothing of a factor that has no axis."""
+    """Return for each factor the axis label and the position of each level; a factor without an axis is left out."""
     own = {factor.name: factor for factor in loaded.study.factor}
     found = {}
     for name, levels in loaded.factors.items():

@@ -1,4 +1,4 @@
-"""The cells of a study: every combination of levels that its design asks for."""
+"""Cells of a study: the combinations of factor levels of its design."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from typing import Any
 from a7sim.errors import A7SimError
 from a7sim.session.combination_batch import cases_of_strips
 from a7sim.standard_points import CASES
-from a7sim.study.schema import MAX_CELLS, Factor, Settings, Study
+from a7sim.study.schema import MAX_CELLS, Factor, Settings, StudyDefinition
 
 
 @dataclass(frozen=True)
 class Level:
-    """A level of a factor: how it is called, and what it sets."""
+    """Level of a factor: its label and the settings it makes."""
 
     label: str
     settings: Settings
@@ -21,7 +21,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Cell:
-    """A combination of levels, by the names of their factors."""
+    """Combination of levels, by the names of their factors."""
 
     number: int
     levels: Mapping[str, str]
@@ -29,12 +29,12 @@ class Cell:
 
     @property
     def label(self) -> str:
-        """Its levels in words."""
+        """Levels as text."""
         return ", ".join(f"{factor} {level}" for factor, level in self.levels.items()) or "as it stands"
 
 
-def make_cells(study: Study) -> list[Cell]:
-    """Return the cells of a study, numbered from 1. Raises Mistake for factors that do not make a design."""
+def make_cells(study: StudyDefinition) -> list[Cell]:
+    """Return the cells of a study, numbered from 1. Raises A7SimError for factors that do not make a design."""
     for factor in study.factor:
         _see_that_it_varies(factor, study.design)
     rows = _hypercube(study) if study.design == "latin-hypercube" else _rows(study)
@@ -52,7 +52,7 @@ def make_cells(study: Study) -> list[Cell]:
 
 
 def make_strip_cells(cells: Sequence[Cell], models: Sequence[str]) -> list[Cell]:
-    """Return cells of which each stands for all strips that its models, each in every case, make; numbered anew."""
+    """Return one cell for each strip of all combinations of cases of the models, numbered anew."""
     combinations = cases_of_strips(tuple(CASES), len(models))
     if len(cells) * len(combinations) > MAX_CELLS:
         raise A7SimError(f"strips: expected at most {MAX_CELLS} cells, got {len(cells) * len(combinations)}")
@@ -75,7 +75,7 @@ def factor_levels(factor: Factor) -> list[Level]:
 
 
 def value_label(value: Any) -> str:
-    """Return a value as a label: lists with dashes, numbers as short as they are."""
+    """Return a value as a label: lists joined by dashes, numbers in their shortest form."""
     if isinstance(value, list):
         return " - ".join(value_label(each) for each in value)
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -99,7 +99,7 @@ def _see_that_it_varies(factor: Factor, design: str) -> None:
         raise A7SimError(f"{where}: expected two different levels or more, got {', '.join(labels) or 'none'}")
 
 
-def _rows(study: Study) -> Sequence[tuple[Level, ...]]:
+def _rows(study: StudyDefinition) -> Sequence[tuple[Level, ...]]:
     choices = [factor_levels(factor) for factor in study.factor]
     if study.design == "full":
         return list(product(*choices))
@@ -110,7 +110,7 @@ def _rows(study: Study) -> Sequence[tuple[Level, ...]]:
     return [first, *others]
 
 
-def _hypercube(study: Study) -> Sequence[tuple[Level, ...]]:
+def _hypercube(study: StudyDefinition) -> Sequence[tuple[Level, ...]]:
     from scipy.stats import qmc  # noqa: PLC0415
 
     if study.samples is None or not study.factor:
@@ -120,7 +120,7 @@ def _hypercube(study: Study) -> Sequence[tuple[Level, ...]]:
 
 
 def _at(factor: Factor, place: float) -> Level:
-    """Return the level of a factor at a place from 0 to 1."""
+    """Return the level of a factor at a position from 0 to 1."""
     if factor.range is None:
         levels = factor_levels(factor)
         return levels[int(place * len(levels))]

@@ -1,4 +1,4 @@
-"""Checkpoints of a study: all of its tally as Parquet where pyarrow is installed, otherwise as NPZ."""
+"""Checkpoints of a study: the whole tally as Parquet if pyarrow is installed, otherwise as NPZ."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,17 +21,20 @@ from a7sim.study.tally import Tally
 PARQUET, NPZ = "checkpoint.parquet", "checkpoint.npz"
 KINDS = (PARQUET, NPZ)
 
+RESUME_HINT = "the same command continues from the checkpoint (--out)"
+"""Advice for a study that ended early."""
+
 _NUMBERS = ("count", "origin", "total", "squares", "low", "high")
 _WHOSE = ("software", "identity")
 
 
 @dataclass(frozen=True)
 class _Ragged:
-    """Lists of numbers, one a row, behind each other."""
+    """Lists of numbers of different lengths, one list per row, in one array."""
 
     values: Array
     ends: Counts
-    """Where each list begins, and the end of the last ``(rows + 1,)``."""
+    """Start of each list, and the end of the last ``(rows + 1,)``."""
 
     @classmethod
     def of(cls, lists: Sequence[Array], kind: type) -> "_Ragged":
@@ -46,18 +49,18 @@ _Columns = Mapping[str, Any]
 
 
 def checkpoint_path(folder: Path) -> Path:
-    """Return where a study leaves its checkpoint in a folder, by what is installed."""
+    """Return the path of the checkpoint in a folder; the format depends on the installed libraries."""
     return folder / (NPZ if find_spec("pyarrow") is None else PARQUET)
 
 
 def newest_checkpoint(folder: Path) -> Path | None:
-    """Return the last checkpoint of any kind in a folder, if there is one."""
+    """Return the newest checkpoint of any format in a folder; None if there is none."""
     there = [folder / name for name in KINDS if (folder / name).exists()]
     return max(there, key=lambda path: path.stat().st_mtime_ns, default=None)
 
 
 def save(tally: Tally, path: Path, identity: str) -> None:
-    """Write all of a tally so that the file is there whole or not at all, in place of any other kind.
+    """Write a tally atomically and remove checkpoints of other formats.
 
     The same tally gives the same bytes.
     """
@@ -72,7 +75,10 @@ def save(tally: Tally, path: Path, identity: str) -> None:
 
 
 def load(path: Path, identity: str) -> Tally:
-    """Return what `save` wrote. Raises Mistake for a damaged file, or one of another study or version."""
+    """Return the tally written by `save`.
+
+    Raises A7SimError if the file is damaged or is of another study or version.
+    """
     if path.suffix == ".parquet" and find_spec("pyarrow") is None:
         raise A7SimError(f"{path}: expected pyarrow to read it (pip install 'a7sim[parquet]'; --force begins anew)")
     try:
@@ -90,7 +96,7 @@ def load(path: Path, identity: str) -> Tally:
 
 
 def _columns(tally: Tally) -> _Columns:
-    """Return a tally as columns of a table with a row for every cell and response."""
+    """Return a tally as columns of a table with one row per cell and response."""
     cells, responses = tally.count.shape
     sketches = [sketch for row in tally.sketches for sketch in row]
     return {

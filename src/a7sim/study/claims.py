@@ -1,4 +1,4 @@
-"""Claims tested: whether what somebody holds to be so is, by how much, and how sure that is."""
+"""Tests of hypotheses: verdict, size of the effect and its uncertainty."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,13 +11,13 @@ from a7sim.errors import A7SimError
 from a7sim.geometry import Array
 from a7sim.result_documents import Document
 from a7sim.study.cells import Cell
-from a7sim.study.schema import Hypothesis, Study
+from a7sim.study.schema import Hypothesis, StudyDefinition
 from a7sim.study.statistics import CONFIDENCE, binned, compare_cells, holm, regress_on
 
 SMALL_EFFECT = 0.2
-"""Standard deviations of one replicate: a difference below is too small to matter (Cohen)."""
+"""In standard deviations of one replicate: a smaller difference is too small to matter (Cohen)."""
 SMALL_CORRELATION = 0.1
-"""Below, one response explains less than a hundredth of the other's variance (Cohen)."""
+"""Below this, one response explains less than a hundredth of the variance of the other (Cohen)."""
 
 Verdict = str
 MATTERS, LITTLE, NOTHING, OPEN = "matters", "matters little", "does not matter", "is left open"
@@ -26,8 +26,8 @@ Values = Callable[[str], Array]
 """Replicates ``(cells, n)`` of a response."""
 
 
-def validate_claims(study: Study, cells: Sequence[Cell]) -> None:
-    """Raise Mistake for a claim about factors, levels or responses that the study has not."""
+def validate_claims(study: StudyDefinition, cells: Sequence[Cell]) -> None:
+    """Raise A7SimError for a hypothesis about factors, levels or responses that the study does not have."""
     for number, claim in enumerate(study.claim, start=1):
         where = f"claim {number}"
         kinds = [each for each in ("differ", "alike", "depends_on") if getattr(claim, each) is not None]
@@ -63,7 +63,7 @@ def _levels(claim: Hypothesis) -> list[str]:
 def test_claims(
     claims: Sequence[Hypothesis], cells: Sequence[Cell], responses: Mapping[str, Document], values: Values
 ) -> list[Document]:
-    """Return claims with their tests, adjusted for the number of all of them, verdicts and answers in words."""
+    """Return the hypotheses with tests, verdicts and answers; p values are adjusted for the number of all tests."""
     tests = [list(_tests(claim, cells, values)) for claim in claims]
     together = [each for of_claim in tests for each in of_claim]
     for each, p in zip(together, holm([each["p"] for each in together]), strict=True):
@@ -89,7 +89,7 @@ def _tests(claim: Hypothesis, cells: Sequence[Cell], values: Values) -> Iterator
 
 
 def _pairs(claim: Hypothesis) -> Iterator[tuple[Sequence[str], Sequence[str]]]:
-    """Yield the groups of levels of which the second is compared with the first."""
+    """Yield pairs of groups of levels; the second group is compared with the first."""
     if claim.differ is not None:
         yield claim.differ[0], claim.differ[1]
     for one, other in combinations(claim.alike or [], 2):
@@ -126,12 +126,12 @@ def _document(claim: Hypothesis, tests: Sequence[Document], responses: Mapping[s
 
 
 def _overall(verdicts: Sequence[Verdict]) -> Verdict:
-    """Return the strongest that was found; that something does not matter needs every test to say so."""
+    """Return the strongest verdict; "too small to matter" requires that all tests agree."""
     return next((each for each in (MATTERS, OPEN, LITTLE) if each in verdicts), NOTHING)
 
 
 def _in_brackets(tests: Sequence[Document]) -> str:
-    """Return in short the test with the largest effect."""
+    """Return a short text of the test with the largest effect."""
     most = max(tests, key=_size)
     response = most["response"]
     if "on" in most:
@@ -181,12 +181,12 @@ def _said(test: Document) -> str:
         MATTERS: "it matters",
         LITTLE: "there is a difference, too small to matter" if "on" not in test else "a dependence too weak to matter",
         NOTHING: "it does not matter",
-        OPEN: "left open by so many replicates",
+        OPEN: "left open by this number of replicates",
     }[test["verdict"]]
 
 
 def format_probability(p: float) -> str:
-    """Return a probability as it is printed."""
+    """Return a probability as printed text."""
     if math.isnan(p):
         return "p unknown"
     return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"

@@ -1,4 +1,4 @@
-"""Chunks of a study worked by dask: by the workers of a scheduler, or by processes on this computer."""
+"""Chunks of a study on dask: on the workers of a scheduler, or in processes of this computer."""
 
 import logging
 import re
@@ -12,10 +12,10 @@ from typing import Any
 
 import a7sim
 from a7sim.errors import A7SimError
-from a7sim.study.executors import RESUME_HINT
+from a7sim.study.checkpoint import RESUME_HINT
 
 WORKER_TIMEOUT_S = 5.0
-"""How long a scheduler has to answer, and to have a worker."""
+"""Time limit in seconds for a scheduler to answer and to have a worker."""
 
 _URL = re.compile(r"(tcp|tls|ws|wss|ucx)://[^/\s]+:\d+/?")
 _RETRIES = 3
@@ -23,11 +23,13 @@ _RETRIES = 3
 
 @contextmanager
 def open_dask_executor(scheduler: str | None, workers: int) -> Iterator[tuple[Executor, int]]:
-    """Yield an executor of dask and how many chunks its workers work at once; a lost worker's are worked by another.
+    """Yield a dask executor and the number of chunks that its workers run at once.
 
-    Without the URL of a scheduler, so many processes of this computer work, which end with this one.
-    Raises Mistake without dask, for a scheduler that does not answer, has no workers or those of another a7sim, and in
-    the body once the scheduler, or worker after worker, is lost.
+    The chunks of a lost worker run again.
+
+    Without the URL of a scheduler, `workers` processes of this computer run the chunks and end with this process.
+    Raises A7SimError if dask is missing, if the scheduler does not answer, has no workers or workers with another
+    version of a7sim, and in the body if the scheduler or one worker after another is lost.
     """
     try:
         distributed = import_module("distributed")
@@ -64,7 +66,7 @@ def open_dask_executor(scheduler: str | None, workers: int) -> Iterator[tuple[Ex
 
 
 def dask_setup(worker: object) -> None:
-    """Let the process that asked decide what an interrupt ends; dask calls this in the workers of this computer."""
+    """Ignore interrupts in a worker: the parent process handles them. dask calls this function in local workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -75,7 +77,10 @@ def _checked(scheduler: str) -> str:
 
 
 def _at_once(client: Any, scheduler: str | None) -> int:
-    """Return how many chunks a cluster works at once, having seen that all its workers have the a7sim that asks."""
+    """Return the number of chunks that a cluster runs at once.
+
+    Raises A7SimError unless all workers have this version.
+    """
     try:
         client.wait_for_workers(1, timeout=WORKER_TIMEOUT_S)
     except TimeoutError as error:
@@ -93,7 +98,7 @@ def _at_once(client: Any, scheduler: str | None) -> int:
 
 
 def _say_nothing() -> None:
-    """Keep what dask logs about lost connections from the terminal: what matters is said in a sentence."""
+    """Silence the log messages of dask about lost connections; errors are raised as one sentence."""
     for name in list(logging.root.manager.loggerDict):
         if name.split(".")[0] in ("distributed", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)

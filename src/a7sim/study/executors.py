@@ -1,4 +1,4 @@
-"""Who works the chunks of a study: this process, a pool of others, dask or MPI, behind one interface."""
+"""Executors of the chunks of a study behind one interface: this process, a pool, dask or MPI."""
 
 import os
 import signal
@@ -11,12 +11,10 @@ from threading import Thread
 from typing import Any, Literal, ParamSpec, TypeVar, get_args
 
 from a7sim.errors import A7SimError
+from a7sim.study.checkpoint import RESUME_HINT
 
 Kind = Literal["process", "pool", "dask", "mpi"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-
-RESUME_HINT = "the same command goes on where a checkpoint was left (--out)"
-"""What to do about a study that ended too early."""
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -25,10 +23,10 @@ T = TypeVar("T")
 
 
 class InProcess(Executor):
-    """An executor that does at once what is submitted."""
+    """Executor that runs each submitted call at once."""
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Return a future that is done. An interrupt goes on up."""
+        """Return a finished future. An interrupt propagates."""
         future: Future[T] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
@@ -41,10 +39,10 @@ class InProcess(Executor):
 def open_executor(
     kind: Kind, workers: int | None = None, scheduler: str | None = None
 ) -> Iterator[tuple[Executor, int]]:
-    """Yield an executor and how many chunks it works at once; what was not begun is dropped in the end.
+    """Yield an executor and the number of chunks it runs at once; chunks not started are dropped at the end.
 
-    `workers` are of the pool, or of the cluster that dask makes on this computer where no `scheduler` is given.
-    Raises Mistake for what is not installed or does not answer, and where a worker is lost in the body.
+    `workers` is the size of the pool, or of dask's local cluster if no `scheduler` is given. Raises A7SimError if a
+    library is missing or a scheduler does not answer, and in the body if a worker is lost.
     """
     if scheduler is not None and kind != "dask":
         raise A7SimError(f"--scheduler: expected it beside --executor dask, got --executor {kind}")
@@ -87,7 +85,7 @@ def _pool(workers: int) -> Iterator[Executor]:
 
 
 def _as_a_worker(asker: "Connection[Any, Any]") -> None:
-    """Let the process that asked decide what an interrupt ends, and end once it lets go, or ends in whatever way."""
+    """Ignore interrupts, which the parent process handles, and end when the parent closes the connection or ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with, args=(asker,), daemon=True).start()
 
@@ -99,7 +97,7 @@ def _end_with(asker: "Connection[Any, Any]") -> None:
 
 @contextmanager
 def _environment(values: dict[str, str]) -> Iterator[None]:
-    """Have processes that are started in the body see these values; numpy reads them when it is imported."""
+    """Set environment variables for processes started in the body; numpy reads them when it is imported."""
     before: dict[str, Any] = {name: os.environ.get(name) for name in values}
     os.environ.update(values)
     try:

@@ -1,4 +1,4 @@
-"""Figures of a study from its document: intervals, densities, heat maps, accuracy against places, claims."""
+"""Figures of a study from its document: intervals, densities, heat maps, accuracy against factor values, hypotheses."""
 
 from collections.abc import Iterator, Sequence
 from math import isfinite
@@ -15,19 +15,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 WIDTH_IN = 9.0
-"""Of all figures, so that their letters are equally large on a page."""
+"""Width of all figures in inches, so that letters have equal size on a page."""
 _INCHES_A_ROW, _INCHES_BESIDE, _INCHES_HIGH = 0.36, 1.2, 3.9
 _SIGNS = ((LEFT, "-"), (RIGHT, "-"), (TRUE, "-"), (LEFT, "--"), (RIGHT, "--"), (TRUE, "--"), (SOFT, "-"), (SOFT, "--"))
 MAX_CELLS_DRAWN = 60
-"""More than these cannot be told apart in a figure; tables have all."""
+"""Maximum number of cells in a figure; tables list all cells."""
 _STEEP = 10.0
-"""Ratio of the farthest places from which an axis is logarithmic."""
+"""Ratio of the outermost positions from which an axis is logarithmic."""
 _UNITS = ("m", "mm", "gon")
 _MAX_IN_A_MAP, _MAX_BESIDE = 10, 3
 
 
 def response_figures(document: Document, response: Document) -> Iterator[PageFigure]:
-    """Yield what there is to draw of a response. Raises Mistake where matplotlib is not installed."""
+    """Yield the figures of a response. Raises A7SimError if matplotlib is not installed."""
     name = response["name"]
     cells = [cell for cell in document["cells"] if cell["responses"][name]["count"]]
     if _is_a_map(document, cells):
@@ -41,7 +41,7 @@ def response_figures(document: Document, response: Document) -> Iterator[PageFig
 
 
 def claim_figures(document: Document) -> Iterator[PageFigure]:
-    """Yield effects with their intervals, and how responses go with those on which they are said to depend."""
+    """Yield figures of effects with their intervals, and of responses against the responses on which they depend."""
     tests = [(claim, test) for claim in document["claims"] for test in claim["tests"]]
     effects = [(c, t) for c, t in tests if "on" not in t and isfinite(t["effect_interval"][0])]
     if effects:
@@ -53,7 +53,7 @@ def claim_figures(document: Document) -> Iterator[PageFigure]:
 
 
 def axis_label(response: Document) -> str:
-    """Return the label of an axis: the name of a response in words, and its unit."""
+    """Return the label of an axis: the name of a response and its unit."""
     unit = response["unit"]
     name, at, model = response["name"].partition(OF_MODEL)
     words = name.removesuffix(f"_{unit}").replace("_", " ") + (f", model {model}" if at else "")
@@ -90,7 +90,7 @@ def intervals(cells: Sequence[Document], response: Document) -> PageFigure:
 
 
 def density_figure(curves: Sequence[Document], response: Document) -> PageFigure:
-    """Return kernel densities of a response, an axes for each factor and a curve for each of its levels."""
+    """Return kernel densities of a response: axes for each factor, a curve for each of its levels."""
     factors = " and ".join(each["factor"] for each in curves)
     size = (WIDTH_IN if len(curves) > 1 else 0.75 * WIDTH_IN, _INCHES_HIGH)
     title = f"{capitalize(axis_label(response))}: densities by {factors}"
@@ -155,7 +155,7 @@ def _levels(document: Document, response: str, factor: str) -> list[Document]:
 
 
 def axis_figure(document: Document, response: Document, factors: Sequence[str]) -> PageFigure:
-    """Return means against what the levels of factors count: points, or how far levels lie apart."""
+    """Return means against the values of factors: number of points, or distance of levels."""
     size = (WIDTH_IN if len(factors) > 1 else 0.75 * WIDTH_IN, _INCHES_HIGH)
     counts = [document["places"][factor]["counts"] for factor in factors]
     title = f"{capitalize(axis_label(response))} against {' and '.join(counts)}"
@@ -202,7 +202,7 @@ def _forest(tests: Sequence[tuple[Document, Document]], size_of: str, small: flo
     rows = [_row(claim, test) for claim, test in tests]
     size = (WIDTH_IN, _INCHES_BESIDE + _INCHES_A_ROW * len(tests))
     text = "; ".join(f"{row} {test[size_of]:.2f}" for row, (_, test) in zip(rows, tests, strict=True))
-    with drawing(f"claims-{size_of}", f"What the claims come to: {label}", f"{text}.", size, wide=True) as drawn:
+    with drawing(f"claims-{size_of}", f"Tests of the claims: {label}", f"{text}.", size, wide=True) as drawn:
         (axes,) = drawn.axes
         axes.axvspan(-small, small, color=FILL, alpha=0.3, linewidth=0)
         axes.axvline(0.0, color=SOFT, linewidth=0.8)
@@ -234,7 +234,7 @@ def _in_words(name: str) -> str:
 
 
 def _dependences(document: Document, tests: Sequence[Document]) -> Iterator[PageFigure]:
-    """Yield for every response its means against those on which it is said to depend."""
+    """Yield for each response its means against the means of the responses on which it depends."""
     responses = {each["name"]: each for each in document["responses"]}
     for name in dict.fromkeys(test["response"] for test in tests):
         of = [test for test in tests if test["response"] == name][:_MAX_BESIDE]
@@ -259,5 +259,5 @@ def _dependences(document: Document, tests: Sequence[Document]) -> Iterator[Page
 
 
 def capitalize(words: str) -> str:
-    """Return words with a capital at their beginning."""
+    """Return a text with a capital first letter."""
     return words[:1].upper() + words[1:]

@@ -1,4 +1,4 @@
-"""What a study found, as one document: its cells, their comparisons, variance by factor, and the answer in words."""
+"""Results of a study as one document: cells, comparisons, variance by factor, and a summary sentence."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -33,7 +33,7 @@ from a7sim.study.theory import theory_comparison, theory_sentence
 
 SIGNIFICANT = 1.0 - CONFIDENCE
 MAX_DENSITIES = 8
-"""Levels of a factor whose curves can be told apart."""
+"""Maximum number of density curves that a figure can show."""
 
 
 def findings_document(loaded: LoadedStudy, tally: Tally) -> Document:
@@ -102,14 +102,17 @@ def _spread(loaded: LoadedStudy, tally: Tally, at: tuple[int, int], sample: Arra
 
 
 def _theory(loaded: LoadedStudy, at: tuple[int, int], mean: float, sd: float) -> Document:
-    """Return what theory says of a response in a cell; nothing of strips, whose models differ in their plans."""
+    """Return the theoretical precision of a response in a cell.
+
+    Empty for strips, whose models differ in their plans.
+    """
     if loaded.study.strips is not None:
         return {}
     return theory_comparison(loaded.scenarios[at[0]], loaded.responses[at[1]].name, mean, sd)
 
 
 def _comparisons(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
-    """Yield every other cell beside the first, response by response, adjusted for as many comparisons."""
+    """Yield each further cell compared with the first, response by response, adjusted for the number of comparisons."""
     first = tally.sample(0)
     others = [tally.sample(i) for i in range(1, len(loaded.cells))]
     for j, response in enumerate(loaded.responses):
@@ -139,7 +142,7 @@ def _variance(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
 
 
 def _analyses(loaded: LoadedStudy, tally: Tally, response: int) -> Iterator[Sequence[Effect]]:
-    """Yield one analysis of a full factorial, one a factor where factors were varied one at a time, none else."""
+    """Yield one analysis for a full factorial, one per factor for one-at-a-time designs, none otherwise."""
     factors, design = loaded.factors, loaded.study.design
     if not factors or design == "latin-hypercube":
         return
@@ -156,7 +159,7 @@ def _analyses(loaded: LoadedStudy, tally: Tally, response: int) -> Iterator[Sequ
 
 
 def _main_effects(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
-    """Yield what the factors of a Latin hypercube weigh, response by response; nothing of another design."""
+    """Yield the main effects of the factors of a Latin hypercube, response by response; none for another design."""
     if loaded.study.design != "latin-hypercube":
         return
     values = {
@@ -177,7 +180,7 @@ def _main_effects(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
 
 
 def _replicates(loaded: LoadedStudy, tally: Tally, response: int) -> Array:
-    """Return the replicates ``(cells, n)`` of a response that every cell has."""
+    """Return the replicates ``(cells, n)`` of a response that all cells have."""
     samples = [tally.sample(i)[response] for i in range(len(loaded.cells))]
     n = min(each.size for each in samples)
     return np.array([each[:n] for each in samples])
@@ -192,7 +195,7 @@ def _claims(loaded: LoadedStudy, tally: Tally, document: Document) -> list[Docum
 
 
 def _levels(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
-    """Yield the mean of every level of a factor, replicate by replicate that of all its cells."""
+    """Yield the mean of each level of a factor: the mean over its cells, replicate by replicate."""
     for j, response in enumerate(loaded.responses):
         values = _replicates(loaded, tally, j)
         for factor, levels in loaded.factors.items():
@@ -207,7 +210,7 @@ def _levels(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
 
 
 def _densities(loaded: LoadedStudy, tally: Tally) -> Iterator[Document]:
-    """Yield how a response is distributed at each level of a factor, whatever those of the others."""
+    """Yield the distribution of a response at each level of a factor over all levels of the other factors."""
     for j, response in enumerate(loaded.responses):
         values = _replicates(loaded, tally, j)
         for factor, levels in loaded.factors.items():
@@ -235,7 +238,7 @@ def _effect(effect: Effect) -> Document:
 
 
 def summary_sentence(document: Document) -> str:
-    """Return the answer to the question of a study in one sentence: of its claims, or of its first response."""
+    """Return the answer to the question of a study as one sentence: of its hypotheses, or of its first response."""
     if document["claims"]:
         parts = "; ".join(each["short"] for each in document["claims"])
         return f"{parts[0].upper()}{parts[1:]}."
@@ -243,7 +246,7 @@ def summary_sentence(document: Document) -> str:
 
 
 def _answer(document: Document) -> Iterator[str]:
-    """Yield a sentence a response: what it comes to, and which factors it depends on by how much."""
+    """Yield one sentence per response: its mean and the factors on which it depends."""
     for response in document["responses"]:
         means = [
             (cell["responses"][response["name"]]["mean"], cell)
@@ -270,7 +273,7 @@ def _range(means: Sequence[tuple[float, Any]], unit: str) -> str:
 
 
 def cell_label(cell: Document) -> str:
-    """Return the levels of a cell of a document in words."""
+    """Return the levels of a cell of a document as text."""
     return ", ".join(f"{factor} {level}" for factor, level in cell["levels"].items()) or "as it stands"
 
 
@@ -295,7 +298,7 @@ def _dependence(document: Document, response: str) -> str:
 
 
 def _weighed(factors: Sequence[Document]) -> str:
-    """Return which factors of a Latin hypercube matter, the heaviest first, and which way."""
+    """Return the factors of a Latin hypercube that matter, the largest share first, with their signs."""
     matters = sorted((each for each in factors if each["p"] < SIGNIFICANT), key=lambda each: -each["share"])
     if not matters:
         return "; no factor was seen to matter"

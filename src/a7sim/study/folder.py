@@ -1,4 +1,4 @@
-"""The folder that a study leaves, and in which one that was cut off goes on."""
+"""Folder of a study: results, tables, page and checkpoint, from which an interrupted study continues."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,9 +24,9 @@ FILES = (*checkpoint.KINDS, CELLS, COMPARISONS, REPLICATES, PAGE, RESULTS)
 
 
 def open_tally(loaded: LoadedStudy, out: Path | None, force: bool) -> Tally:
-    """Return the tally of a study as its folder holds it, or an empty one, and make the folder.
+    """Create the folder and return the tally stored in it, or an empty tally.
 
-    Raises Mistake for a folder that holds something else, unless forced to begin anew.
+    Raises A7SimError if the folder contains something else, unless `force` discards it.
     """
     empty = Tally.empty(len(loaded.cells), len(loaded.responses))
     if out is None:
@@ -59,12 +59,12 @@ def _see_that_it_can_be_written(folder: Path) -> None:
 def _not_beyond(tally: Tally, loaded: LoadedStudy, path: Path) -> Tally:
     done = int(tally.done.max())
     if done > loaded.replicates:
-        raise A7SimError(f"{path}: expected {done} replicates or more, since so many are done, got {loaded.replicates}")
+        raise A7SimError(f"{path}: expected at least the {done} replicates already done, got {loaded.replicates}")
     return tally
 
 
 def write_results(out: Path, loaded: LoadedStudy, tally: Tally, document: Document) -> None:
-    """Leave results and tables in a folder."""
+    """Write results and tables into a folder."""
     write_atomic(out / CELLS, _cells_csv(document))
     write_atomic(out / COMPARISONS, _comparisons_csv(document))
     write_atomic(out / REPLICATES, _replicates_csv(loaded, tally))
@@ -72,7 +72,7 @@ def write_results(out: Path, loaded: LoadedStudy, tally: Tally, document: Docume
 
 
 def write_page(out: Path, document: Document) -> None:
-    """Leave the page in a folder. Raises Mistake where matplotlib is not installed."""
+    """Write the page into a folder. Raises A7SimError if matplotlib is not installed."""
     write_atomic(out / PAGE, study_page(document))
 
 
@@ -115,7 +115,7 @@ def _comparisons_csv(document: Document) -> str:
 
 
 def _replicates_csv(loaded: LoadedStudy, tally: Tally) -> str:
-    """Return the sample, a replicate a line; nan is a session that gave up."""
+    """Return the sample as CSV, one replicate per line; nan marks a session that gave up."""
     rows = (
         (
             str(cell.number),

@@ -1,4 +1,4 @@
-"""Reading a study: every mistake in one sentence, before anything is worked."""
+"""Loading of studies: all errors of a study file are reported before any session runs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from a7sim.session.strip_combinations import check_strips_possible
 from a7sim.study.cells import Cell, make_cells, make_strip_cells
 from a7sim.study.claims import validate_claims
 from a7sim.study.responses import Response, find_response
-from a7sim.study.schema import Study
+from a7sim.study.schema import StudyDefinition
 from a7sim.study.setting_limits import settings_out_of_range
 from a7sim.study.simulating import Task
 from a7sim.table_files import describe_missing_file, read_toml
 
 SEARCH_PATH = bundled_dirs("studies")
-"""Where the studies are that come with a7sim."""
+"""Folders of the studies that come with a7sim."""
 
 
 class StudyError(A7SimError):
-    """A study that cannot be used; every line names a mistake and where it stands."""
+    """Invalid study; each line states one error and its place."""
 
     def __init__(self, source: str, mistakes: Sequence[str]) -> None:
         super().__init__("\n".join(f"{source}: {mistake}" for mistake in mistakes))
@@ -36,12 +36,12 @@ class StudyError(A7SimError):
 
 @dataclass(frozen=True)
 class LoadedStudy:
-    """A study with its cells, the scenarios that give their numbers, and its responses, ready to be worked.
+    """Study with its cells, their scenarios and its responses, ready to run.
 
-    A scenario gives those of one cell, or of as many that follow each other as its `Task` says.
+    One scenario gives the numbers of one cell, or of as many consecutive cells as its `Task` states.
     """
 
-    study: Study
+    study: StudyDefinition
     cells: tuple[Cell, ...]
     scenarios: tuple[Scenario, ...]
     responses: tuple[Response, ...]
@@ -49,30 +49,30 @@ class LoadedStudy:
 
     @property
     def replicates(self) -> int:
-        """How many replicates a cell has, at most."""
+        """Maximum number of replicates per cell."""
         if self.study.replicates is None:
             raise StudyError(self.source, ["replicates: expected how often each cell is worked, got nothing"])
         return self.study.replicates
 
     @cached_property
     def tasks(self) -> tuple[Task, ...]:
-        """What workers do: a task a scenario, in the order of the cells."""
+        """Tasks for the workers: one per scenario, in the order of the cells."""
         responses = tuple(self.study.responses)
         return tuple(Task(each, responses, self.study.strips is not None) for each in self.scenarios)
 
     def task_of(self, cell: int) -> tuple[Task, int]:
-        """Return the task that gives a cell, counted from 0, its numbers, and the cell's place in it."""
+        """Return the task of a cell, counted from 0, and the index of the cell within that task."""
         task, place = divmod(cell, self.tasks[0].cells)
         return self.tasks[task], place
 
     @property
     def factors(self) -> dict[str, list[str]]:
-        """The levels that cells have, by factor, in the order of the cells."""
+        """Levels by factor, in the order of the cells."""
         return {name: list(dict.fromkeys(cell.levels[name] for cell in self.cells)) for name in self.cells[0].levels}
 
     @property
     def identity(self) -> str:
-        """A hash of all that decides what a replicate gives; words, and how many are worked, do not."""
+        """Hash of all that determines a replicate; titles and the number of replicates do not change it."""
         asked = msgspec.structs.replace(
             self.study, title="study", question="", claim=[], replicates=None, precision=None
         )
@@ -80,7 +80,7 @@ class LoadedStudy:
 
 
 def find_study(name: str | Path) -> Path:
-    """Return the path of a study's file, by path or by the bare name of one that comes with a7sim.
+    """Return the path of a study file, given as a path or as the name of a study that comes with a7sim.
 
     Raises StudyError.
     """
@@ -98,7 +98,7 @@ def find_study(name: str | Path) -> Path:
 
 
 def load_study(name: str | Path, replicates: int | None = None) -> LoadedStudy:
-    """Return a study ready to be worked, with other replicates if given. Raises Mistake."""
+    """Return a study ready to run, with another number of replicates if given. Raises A7SimError."""
     path = find_study(name)
     raw = read_toml(path)
     if replicates is not None:
@@ -107,13 +107,13 @@ def load_study(name: str | Path, replicates: int | None = None) -> LoadedStudy:
 
 
 def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> LoadedStudy:
-    """Return the study of raw tables whose scenario stands in `folder`, or comes with a7sim. Raises StudyError."""
+    """Return the study of raw tables; its scenario is in `folder` or comes with a7sim. Raises StudyError."""
     if "scenario" not in raw and "photos" in raw:
         raise StudyError(source, ["expected a study, got a scenario (`a7sim run` takes it)"])
     mistakes = [error.replace("the scenario", "the study") for error in schema_errors(raw, _expected())]
     if mistakes:
         raise StudyError(source, mistakes)
-    study = msgspec.convert(raw, Study)
+    study = msgspec.convert(raw, StudyDefinition)
     try:
         cells, responses = make_cells(study), [find_response(name) for name in study.responses]
     except A7SimError as error:
@@ -131,7 +131,7 @@ def build_study(raw: Mapping[str, Any], folder: Path, source: str = "study") -> 
     return LoadedStudy(study, tuple(cells), scenarios, tuple(responses), source)
 
 
-def _mistakes_between(study: Study) -> list[str]:
+def _mistakes_between(study: StudyDefinition) -> list[str]:
     mistakes = []
     names = [factor.name for factor in study.factor]
     if len(set(names)) < len(names):
@@ -146,8 +146,8 @@ def _mistakes_between(study: Study) -> list[str]:
     return mistakes
 
 
-def _models_of_strips(study: Study, scenarios: Sequence[Scenario]) -> list[str]:
-    """Return the names of the models whose cases are combined. Raises Mistake where that cannot be done."""
+def _models_of_strips(study: StudyDefinition, scenarios: Sequence[Scenario]) -> list[str]:
+    """Return the names of the models whose cases are combined. Raises A7SimError if they cannot be combined."""
     paths = [*study.settings, *(path for cell in make_cells(study) for path in cell.settings)]
     if "plan.case" in paths or study.design != "full":
         raise A7SimError("strips = 'all': expected a full design without plan.case, since every case is worked")
@@ -159,8 +159,8 @@ def _models_of_strips(study: Study, scenarios: Sequence[Scenario]) -> list[str]:
     return list(names.pop())
 
 
-def _scenarios(study: Study, cells: Sequence[Cell], folder: Path, source: str) -> tuple[Scenario, ...]:
-    """Return the scenario of every cell. Raises StudyError with what is wrong in the first cell that cannot be."""
+def _scenarios(study: StudyDefinition, cells: Sequence[Cell], folder: Path, source: str) -> tuple[Scenario, ...]:
+    """Return the scenario of each cell. Raises StudyError with the errors of the first invalid cell."""
     beside = folder / study.scenario
     name = beside if beside.is_file() else study.scenario
     scenarios = []
@@ -179,4 +179,4 @@ def _scenarios(study: Study, cells: Sequence[Cell], folder: Path, source: str) -
 
 @cache
 def _expected() -> msgspec.inspect.Type:
-    return msgspec.inspect.type_info(Study)
+    return msgspec.inspect.type_info(StudyDefinition)

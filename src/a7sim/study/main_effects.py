@@ -1,9 +1,9 @@
-"""What the factors of a Latin hypercube weigh: their shares of the variance between its cells, and which way they go.
+"""Main effects of the factors of a Latin hypercube: shares of the variance between cells, and signs.
 
-Every cell has values of its own of every factor, so that nothing repeats and no analysis of variance is possible.
-Instead a curve for every factor is fitted to the means of the cells, all together: polynomials along a range, steps
-of levels. The share of a factor is the variance of its curve (its main effect, or first-order index). What the shares
-leave is interactions, what is too crooked for the curves, and chance.
+Each cell has its own values of all factors, so nothing repeats and an analysis of variance is not possible. Instead one
+curve per factor is fitted jointly to the means of the cells: a polynomial for a range, steps for levels. The share of a
+factor is the variance of its curve (main effect, first-order index). The remainder is interactions, deviations from the
+curves, and noise.
 """
 
 import math
@@ -18,35 +18,35 @@ from a7sim.geometry import Array
 from a7sim.study.statistics import CONFIDENCE, Interval
 
 MIN_CELLS = 10
-"""Fewer are not taken apart."""
+"""Minimum number of cells for this analysis."""
 
 MAX_DEGREES = 8
 CELLS_A_COEFFICIENT = 5
-"""Polynomials have as many degrees as leave so many cells for each coefficient."""
+"""The degree of a polynomial leaves this number of cells per coefficient."""
 
 _UNKNOWN = (math.nan, math.nan)
 
 
 @dataclass(frozen=True)
 class MainEffect:
-    """What a factor alone tells of the means of cells."""
+    """Effect of one factor alone on the means of cells."""
 
     factor: str
     share: float
-    """Of the variance between cells, 0 to 1, what chance adds to a curve taken off."""
+    """Share of the variance between cells, 0 to 1, corrected for the noise that a curve absorbs."""
     interval: Interval
     p: float
-    """Of no effect, by the F test of its curve."""
+    """Probability of no effect, by the F test of the curve."""
     slope: float
-    """Standardised coefficient of its ranks among the ranks of all factors, -1 to 1; nan for one without order."""
+    """Standardised coefficient of its ranks among the ranks of all factors, -1 to 1; nan for a factor without order."""
     slope_interval: Interval
 
 
 def main_effects(means: Array, factors: Mapping[str, Array | Sequence[str]]) -> list[MainEffect]:
-    """Return the main effect of every factor on means ``(cells,)``; nothing for too few cells or equal means.
+    """Return the main effect of each factor on means ``(cells,)``; empty for too few cells or equal means.
 
-    Values of factors by name: numbers ``(cells,)`` of a range, or labels of levels. Cells whose mean is nan are left
-    out. Intervals are by the jackknife over cells.
+    Factor values by name are numbers ``(cells,)`` of a range, or labels of levels. Cells with a nan mean are left out.
+    Intervals are jackknife intervals over cells.
     """
     known = np.isfinite(means)
     means = means[known]
@@ -84,10 +84,9 @@ def main_effects(means: Array, factors: Mapping[str, Array | Sequence[str]]) -> 
 
 
 def noise_share(values: Array) -> float:
-    """Return which share of the variance between the means of cells is chance, from values ``(cells, replicates)``.
+    """Return the share of noise in the variance between the means of cells, from values ``(cells, replicates)``.
 
-    Replicates are blocks: what they have in common in all cells moves no cell against another. nan where it is
-    unknown.
+    Replicates are blocks: what they share in all cells changes no difference between cells. nan if unknown.
     """
     values = values[np.isfinite(values).any(axis=1)]
     values = values[:, np.isfinite(values).all(axis=0)]
@@ -102,7 +101,7 @@ def noise_share(values: Array) -> float:
 
 
 class _Fit:
-    """A least-squares fit ``(cells, coefficients)``, and the same without each cell in turn."""
+    """Least-squares fit ``(cells, coefficients)`` and the fits without each cell in turn."""
 
     def __init__(self, design: Array, means: Array) -> None:
         self.design, self.means = design, means
@@ -119,7 +118,7 @@ class _Fit:
         return np.asarray(self.found - moved[:, None] * (self.design @ self.cofactors))
 
     def share(self, of: slice) -> tuple[float, Array]:
-        """Return the share of some coefficients in the variance of the means, and that without each cell."""
+        """Return the share of some coefficients in the variance of the means, and the same without each cell."""
         centred = self.design[:, of] - self.design[:, of].mean(axis=0)
         spread = centred.T @ centred / self.means.size
         chance = float((self.residuals**2).sum()) / self.freedom * float(np.trace(spread @ self.cofactors[of, of]))
@@ -144,7 +143,7 @@ def _is_range(values: npt.NDArray[np.generic]) -> bool:
 
 
 def _curve(values: npt.NDArray[np.generic], degrees: int) -> Array:
-    """Return the columns of a factor's curve: polynomials along a range, a step for every level but the first."""
+    """Return the columns of the curve of a factor: powers for a range, a step for each level but the first."""
     if not _is_range(values):
         return np.array([values == level for level in np.unique(values)[1:]], dtype=float).reshape(-1, values.size).T
     numbers = values.astype(float)
@@ -161,7 +160,7 @@ def _standardised(values: Array) -> Array:
 
 
 def _interval(found: float, without: Array, least: float) -> Interval:
-    """Return the jackknife interval of what is `found` in all cells, between `least` and 1."""
+    """Return the jackknife interval of the estimate from all cells, limited to `least` and 1."""
     from scipy.stats import t  # noqa: PLC0415
 
     n = without.size

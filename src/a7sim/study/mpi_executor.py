@@ -1,4 +1,4 @@
-"""Chunks of a study worked over MPI: the first process asks, the others work."""
+"""Chunks of a study over MPI: the first process distributes, the others run."""
 
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
@@ -8,16 +8,16 @@ from importlib import import_module
 from a7sim.errors import A7SimError
 
 MPI_COMMAND = "mpiexec -n 5 a7sim study ... --executor mpi"
-"""How four workers and the one that asks are started."""
+"""Command that starts one distributing process and four workers."""
 
 
 @contextmanager
 def open_mpi_executor(environment: Mapping[str, str]) -> Iterator[tuple[Executor, int]]:
-    """Yield, in the first process of all that mpiexec started, an executor of the others and how many they are.
+    """In the first process, yield an executor of the other processes and their number.
 
-    Another process that comes here works until the first one is done, and ends. `environment` is set in the others
-    where `python -m mpi4py.futures` started them. A process that is lost takes all down, as MPI has it.
-    Raises Mistake without MPI, or in a process that was started alone.
+    Any other process runs chunks until the first process is done, and then exits. `environment` is set in the other
+    processes if `python -m mpi4py.futures` started them. A lost process ends all, as MPI prescribes. Raises A7SimError
+    without MPI, or if only one process was started.
     """
     try:
         MPI, futures = import_module("mpi4py.MPI"), import_module("mpi4py.futures")

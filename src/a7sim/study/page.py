@@ -1,4 +1,4 @@
-"""A study on one page: what was asked, how, the answer in words, and every response in figures and tables."""
+"""Page of a study: question, method, answer, and figures and tables of each response."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -10,20 +10,21 @@ from a7sim.study import figures
 from a7sim.study.findings import cell_label
 
 _MAX_OPEN = 12
-"""Cells beyond which their table is folded."""
+"""Above this number of cells their table is folded."""
 _MAX_QUOTED = 3
-"""Responses with figures in a short form, where no claim names any."""
+"""Number of responses with figures in the short form if no hypothesis names any."""
 
 
 def study_page(document: Document) -> str:
-    """Return the page of a study's document as HTML. Raises Mistake where matplotlib is not installed."""
+    """Return the page of a study document as HTML. Raises A7SimError if matplotlib is not installed."""
     return page(document["study"], _lead(document), _chapters(document, document["responses"]))
 
 
 def study_markdown(document: Document, figures_at: str) -> tuple[str, dict[str, str]]:
-    """Return the short form of the page as Markdown, and its figures as SVG by the names of their files.
+    """Return the short form of the page as Markdown, and its figures as SVG by file name.
 
-    Of the responses it shows those that claims name, or the first. `figures_at` is where the Markdown finds them.
+    It shows the responses that hypotheses name, or the first ones. `figures_at` is the path prefix of the figures in
+    the Markdown.
     """
     named = {name for claim in document["claims"] for test in claim["tests"] for name in (test["response"],)}
     shown = [each for each in document["responses"] if each["name"] in named] or document["responses"][:_MAX_QUOTED]

@@ -1,4 +1,4 @@
-"""Quantiles of any number of values from a few thousand of them, with a bound on how wrong a rank can be."""
+"""Quantiles of any number of values from a few thousand stored values, with a bound on the rank error (KLL sketch)."""
 
 from dataclasses import dataclass, field
 
@@ -8,26 +8,25 @@ import numpy.typing as npt
 from a7sim.geometry import Array
 
 CAPACITY = 2048
-"""Values that a level holds before it is halved; even."""
+"""Number of values of a level before it is halved; even."""
 
 Counts = npt.NDArray[np.int64]
 
 
 @dataclass
 class QuantileSketch:
-    """Values in levels, each of which stands for ``2**level`` of those that were added.
+    """Values in levels; a value of a level stands for ``2**level`` added values.
 
-    A level that is full is put in order, and every second value goes one level up: the first, third ... and the next
-    time the second, fourth ..., so that what this does to a rank cancels as far as it can. The same values in the same
-    order give the same sketch, however many were added at once.
+    A full level is sorted and each second value moves one level up: alternately the odd and the even ones, so that rank
+    errors cancel. The same values in the same order give the same sketch, whatever the sizes of the added arrays.
     """
 
     levels: list[Array] = field(default_factory=list)
     halved: list[int] = field(default_factory=list)
-    """How often each level was."""
+    """Number of halvings of each level."""
 
     def add(self, values: Array) -> None:
-        """Add numbers ``(n,)``, none of them nan."""
+        """Add numbers ``(n,)`` without nan."""
         while values.size:
             room = CAPACITY - self.levels[0].size if self.levels else CAPACITY
             self._put(0, values[:room])
@@ -48,19 +47,19 @@ class QuantileSketch:
 
     @property
     def values(self) -> Array:
-        """Values kept ``(n,)``, in no order."""
+        """Stored values ``(n,)`` in no order."""
         return np.concatenate([np.zeros(0), *self.levels])
 
     @property
     def counts(self) -> Counts:
-        """For how many values each one that is kept stands ``(n,)``; their sum is how many were added."""
+        """Number of added values that each stored value stands for ``(n,)``; the sum is the number of added values."""
         return np.repeat(2 ** np.arange(len(self.levels), dtype=np.int64), [level.size for level in self.levels])
 
     @property
     def rank_error(self) -> int:
-        """Return by how many values the rank of any number can be wrong, at most.
+        """Return the maximum error of the rank of any number, in values.
 
-        Halving a level moves a rank by ``2**level`` or not at all, up and down by turns. Of a million values it is less
-        than 0.25 %.
+        Halving a level moves a rank by ``2**level`` or not at all, alternately up and down. For a million values the
+        error is below 0.25 %.
         """
         return sum((times + 1) // 2 * 2**level for level, times in enumerate(self.halved))

@@ -1,4 +1,4 @@
-"""What a study reads from the document of results of every replicate: one number a response."""
+"""Responses of a study: one number each, read from the results of every replicate."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,30 +13,30 @@ from a7sim.result_documents import Document
 Reader = Callable[[Document], float]
 
 SIGNIFICANT = 10
-"""Digits of a response; the last bits of a sum depend on who sits beside a session."""
+"""Significant digits of a response; the last bits of a sum depend on the batch of a session."""
 
 OF_MODEL = "@"
-"""Before the number of a model, of which alone a response is read."""
+"""Prefix of the number of a model, if a response is read from one model."""
 OF_ALL = (", rms of the models", " of the models", ", rms of all")
-"""Ends of the meaning of a response that is of all models."""
+"""Endings of the meaning of a response over all models."""
 
 BRANCHES = ("models", "strip", "ways", "operator", "a8_minus_comparator_m")
-"""Where the paths of responses begin."""
+"""Keys at which the paths of responses start."""
 
 
 @dataclass(frozen=True)
 class Response:
-    """A number of a session: its name, its unit, what it is, and how it is read from the results."""
+    """Number of a session: name, unit, meaning, and how it is read from the results."""
 
     name: str
     unit: str
     meaning: str
     read: Reader
     model: int | None = None
-    """The one it is read in, counted from 1; where there is none, it may be read anywhere in the results."""
+    """Number of its model, counted from 1; None if it may be read anywhere in the results."""
 
     def of_all(self, documents: Sequence[Document]) -> list[float]:
-        """Return the responses of sessions, read once of those that share the model in which it is read."""
+        """Return the responses of sessions; sessions that share the model of a response are read once."""
         if self.model is None:
             return [self.of(each) for each in documents]
         found: dict[object, float] = {}
@@ -47,15 +47,15 @@ class Response:
         return [found[self._source(each)] for each in documents]
 
     def _source(self, document: Document) -> tuple[str, int]:
-        """Return what tells which model it is read in of a document that is kept."""
+        """Return the key that identifies the model of a stored document."""
         models = document.get("models", ())
         shared = models[self.model - 1] if self.model is not None and len(models) >= self.model else document
         return document["status"], id(shared)
 
     def of(self, document: Document) -> float:
-        """Return the response of a session to ten digits, nan if it gave up.
+        """Return the response of a session to ten digits; nan if the operator gave up.
 
-        Raises Mistake where a complete session has none.
+        Raises A7SimError if a complete session has no such response.
         """
         if document["status"] != "complete":
             return math.nan
@@ -70,7 +70,7 @@ class Response:
 def find_response(name: str) -> Response:
     """Return a response by its name, its name in one model such as `base_error_gon@2`, or its path.
 
-    Raises Mistake for none of these.
+    Raises A7SimError for anything else.
     """
     if name in RESPONSES:
         return RESPONSES[name]
@@ -91,12 +91,15 @@ def needs_strip(name: str) -> bool:
 
 
 def is_path(name: str) -> bool:
-    """Return whether a response is read by its path, wherever in the results that leads."""
+    """Return whether a response is read by its path, wherever in the results it leads."""
     return "." in name
 
 
 def _in_one_model(response: Response, model: int) -> Response:
-    """Return a response of the models read in one of them, counted from 1. Raises Mistake for one of the strip."""
+    """Return a response of all models read in one model, counted from 1.
+
+    Raises A7SimError for a response of the strip.
+    """
     of_all = next((each for each in OF_ALL if response.meaning.endswith(each)), None)
     if of_all is None:
         raise A7SimError(f"responses: expected a response of models before {OF_MODEL}, got {response.name!r}")
@@ -150,7 +153,7 @@ def _accuracy(on: str, what: str) -> Reader:
 
 
 def _only_strip(document: Document) -> Document:
-    """Return the strip of a session, or of the first of its ways."""
+    """Return the strip of a session, or of the first of its methods."""
     strip: Document = document["strip"] if "strip" in document else next(iter(document["ways"].values()))
     if "message" in strip:
         raise ValueError(strip["message"])
@@ -215,4 +218,4 @@ _LISTED = (
 )
 
 RESPONSES: Mapping[str, Response] = MappingProxyType({each.name: each for each in _LISTED})
-"""Responses by their short names."""
+"""Responses by short name."""

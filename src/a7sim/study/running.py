@@ -1,4 +1,4 @@
-"""Working a study: chunks of replicates, the same result however they are cut and whoever works them."""
+"""Running of a study in chunks of replicates; the result does not depend on chunk sizes or executors."""
 
 import time
 from collections import deque
@@ -16,7 +16,7 @@ from a7sim.study.simulating import Task, replicate_seed
 from a7sim.study.tally import Tally
 
 STEP = 100
-"""Replicates of every cell between two looks at a precision to be reached."""
+"""Replicates per cell between two checks of a required precision."""
 
 _TWO_SIDED_95 = 1.959964
 _FIRST_CHUNK, _FASTEST_GROWTH = 8, 4.0
@@ -24,19 +24,19 @@ _FIRST_CHUNK, _FASTEST_GROWTH = 8, 4.0
 
 @dataclass(frozen=True)
 class ChunkPolicy:
-    """How a study is cut in chunks; what comes of it does not depend on this."""
+    """Policy of chunk sizes; it does not change the results."""
 
     chunk_seconds: float = 20.0
-    """About how long a chunk takes that is quick to open."""
+    """Approximate duration in seconds of a chunk that opens quickly."""
     times_opening: float = 9.0
-    """So many times as long as it takes to open a chunk, it is worked."""
+    """Minimum duration of a chunk as a multiple of its opening time."""
     save_seconds: float = 5.0
-    """A checkpoint is written no more often than this."""
+    """Minimum interval in seconds between two checkpoints."""
     largest_chunk: int = 5000
 
 
 class _Size:
-    """How many replicates a chunk has, from the seconds that chunks of other sizes took."""
+    """Size of a chunk in replicates, estimated from the seconds of chunks of other sizes."""
 
     def __init__(self, pace: ChunkPolicy) -> None:
         self._pace = pace
@@ -44,16 +44,16 @@ class _Size:
         self.best = min(_FIRST_CHUNK, pace.largest_chunk)
 
     def learn(self, replicates: int, seconds: float) -> None:
-        """Hear how long a chunk took."""
+        """Record the duration of a chunk."""
         self._seconds[replicates] = seconds
         opening, each = self._line()
         grown = max(self._pace.chunk_seconds, self._pace.times_opening * opening) / each
         self.best = max(1, min(int(grown), int(_FASTEST_GROWTH * replicates), self._pace.largest_chunk))
 
     def _line(self) -> tuple[float, float]:
-        """Return the seconds of opening a chunk and of each replicate, by the smallest and the largest known.
+        """Return the seconds for opening a chunk and for one replicate, from the smallest and the largest known chunk.
 
-        Of chunks of one size it cannot be told, and most of the time is taken for that of opening.
+        Chunks of one size do not determine them; then most of the time counts as opening time.
         """
         few, many = min(self._seconds), max(self._seconds)
         slowest = max(self._seconds[many] / many, 1e-6)
@@ -66,9 +66,9 @@ class _Size:
 @dataclass(frozen=True)
 class _Chunk:
     cells: range
-    """That its task gives numbers of."""
+    """Cells whose numbers its task gives."""
     first: int
-    """Its first replicate."""
+    """First replicate of the chunk."""
     seeds: tuple[int, ...]
 
 
@@ -81,10 +81,10 @@ def run_study(
     tick: Callable[[int], None] = lambda _: None,
     pace: ChunkPolicy | None = None,
 ) -> None:
-    """Work a study on from where its tally stands until all replicates are done or its precision is reached.
+    """Continue a study from its tally until all replicates are done or its precision is reached.
 
-    `at_once` chunks are under way beside as many that wait; results are added in the order in which they were asked
-    for. However it ends, the checkpoint holds what was added.
+    `at_once` chunks run while as many wait; results are added in the order of submission. Whatever ends the run, the
+    checkpoint contains all that was added.
     """
     pace = pace or ChunkPolicy()
     saved_at = -np.inf
@@ -102,7 +102,7 @@ def run_study(
 
 
 def precision_reached(loaded: LoadedStudy, tally: Tally) -> bool:
-    """Return whether the mean that a study wants to know is known well enough in every cell."""
+    """Return whether the mean of the response of the required precision is known well enough in all cells."""
     wanted = loaded.study.precision
     if wanted is None or int(tally.done.min()) == 0:
         return False
@@ -123,12 +123,12 @@ def _results(
 
 
 def _on_a_step(tally: Tally) -> bool:
-    """Return whether a study stands where it looks, also if it was not cut off before."""
+    """Return whether the tally is at a checking step, also if the study was never interrupted."""
     return bool((tally.done == tally.done[0]).all()) and int(tally.done[0]) % STEP == 0
 
 
 def _stops(loaded: LoadedStudy) -> Iterator[int]:
-    """Yield the numbers of replicates that every cell must have before the study looks whether that is enough."""
+    """Yield the numbers of replicates after which the precision is checked."""
     if loaded.study.precision is not None:
         yield from range(STEP, loaded.replicates, STEP)
     yield loaded.replicates
@@ -162,6 +162,6 @@ def _up_to(
 
 
 def _timed(task: Task, seeds: Sequence[int]) -> tuple[Array, float]:
-    """Return the responses ``(cells, responses, seeds)`` of replicates and the seconds that a processor took."""
+    """Return the responses ``(cells, responses, seeds)`` of replicates and the CPU seconds they took."""
     began = time.process_time()
     return task.run_batch(seeds), time.process_time() - began

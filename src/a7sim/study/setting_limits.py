@@ -1,4 +1,4 @@
-"""Whether the plan of a scenario lies within what its plotter can do, before anybody sits down."""
+"""Check of the plan of a scenario against the ranges of its plotter before a session starts."""
 
 from collections.abc import Iterator
 
@@ -14,7 +14,7 @@ from a7sim.session.truth import RelativePose, true_elements
 
 
 def settings_out_of_range(scenario: Scenario) -> Iterator[str]:
-    """Yield a sentence for every planned setting outside the range of its element or carriage."""
+    """Yield a sentence for each planned setting outside the range of its element or carriage."""
     if not {"plotter", "bridge"} & {*scenario.work} or scenario.plotting is None:
         return
     variant, plan = VARIANTS[scenario.instrument.variant], scenario.plan
@@ -51,7 +51,7 @@ def _levels_beyond_reach(plan: Plan, variant: Variant) -> Iterator[str]:
 def _orientation_beyond_reach(
     model: ModelPlan, left: Photo, right: Photo, plan: Plan, variant: Variant
 ) -> Iterator[str]:
-    """Yield a sentence for every element that the photographs as they were flown would take beyond its range."""
+    """Yield a sentence for each element that the true orientation of the photographs moves outside its range."""
     if left.position is None or right.position is None or "upside down" in (left.laid, right.laid):
         return
     counters = {name: element.zero for name, element in variant.elements.items()} | {"bx": plan.bx}

@@ -1,4 +1,4 @@
-"""Working replicates of a cell together on the batch bench."""
+"""Simulation of the replicates of a cell as a batch of sessions."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -17,48 +17,48 @@ from a7sim.strip_methods.strip import ground_control
 from a7sim.study.responses import find_response, is_path, needs_strip
 
 _STREAM = 9
-"""Spawns the seeds of a study's replicates."""
+"""Spawn key of the seeds of a study's replicates."""
 
 
 def replicate_seed(study_seed: int, replicate: int) -> int:
-    """Return the seed of a replicate, the same in every cell; `a7sim run --seed` takes it."""
+    """Return the seed of a replicate, the same in all cells and valid for `a7sim run --seed`."""
     state = np.random.SeedSequence(study_seed, spawn_key=(_STREAM, replicate)).generate_state(1, np.uint64)
     return int(state[0] >> np.uint64(11))
 
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker does with some seeds: sessions of a scenario that give the numbers of one cell, or of several."""
+    """Work of a worker for some seeds: sessions of a scenario that give the numbers of one or several cells."""
 
     scenario: Scenario
     responses: tuple[str, ...]
     strips: bool = False
-    """Sessions are worked in every case, and cells are the strips of all combinations of their models."""
+    """Sessions are run in all cases, and cells are the strips of all combinations of their models."""
 
     @property
     def cells(self) -> int:
-        """How many cells get their numbers from it."""
+        """Number of cells whose numbers it gives."""
         return len(cases_of_strips(tuple(CASES), len(self.scenario.models))) if self.strips else 1
 
     def run_batch(self, seeds: Sequence[int]) -> Array:
-        """Return responses ``(cells, responses, seeds)`` of sessions worked at once; nan where one gave up.
+        """Return responses ``(cells, responses, seeds)`` of a batch of sessions; nan where the operator gave up.
 
-        Raises Mistake for a response that the results do not have.
+        Raises A7SimError for a response that the results do not have.
         """
         strips, whole = any(map(needs_strip, self.responses)), any(map(is_path, self.responses))
         return self._values(self._crowded(seeds, tuple(CASES), strips, whole))
 
     def run_single(self, cell: int, seed: int) -> Array:
-        """Return responses ``(responses,)`` of one cell, its sessions worked over the link as `a7sim run` does."""
+        """Return responses ``(responses,)`` of one cell; its sessions run over the link as in `a7sim run`."""
         return np.asarray(self._values([[self.link_document(cell, seed)]])[0, :, 0])
 
     def batch_documents(self, cell: int, seeds: Sequence[int]) -> list[Document]:
-        """Return documents of one cell by seed, of sessions worked at once."""
+        """Return the documents of one cell by seed, of a batch of sessions."""
         cases, place = self._cases_of(cell)
         return [each[place] for each in self._crowded(seeds, cases, strips=True, whole=True)]
 
     def link_document(self, cell: int, seed: int) -> Document:
-        """Return the document of one cell, of sessions worked over the link."""
+        """Return the document of one cell, of sessions over the link."""
         if not self.strips:
             return run_all_methods(self.scenario, seed)
         cases, place = self._cases_of(cell)
@@ -68,7 +68,9 @@ class Task:
         return strips[place]
 
     def _cases_of(self, cell: int) -> tuple[Cases, int]:
-        """Return the cases of the models of a cell, each once, and its place among all strips of these cases alone."""
+        """Return the cases of the models of a cell, each once, and the index of the cell among all strips of these
+        cases.
+        """
         if not self.strips:
             return (), 0
         models = len(self.scenario.models)

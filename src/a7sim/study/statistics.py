@@ -1,7 +1,7 @@
-"""Statistics of a study: spreads with their intervals, cells compared in pairs, variance by factor.
+"""Statistics of a study: spreads with intervals, paired comparisons of cells, variance by factor.
 
-Replicates with the same number share their random numbers in every cell, so that cells are compared replicate by
-replicate and replicates are the blocks of the analysis of variance.
+Replicates with the same number share their random numbers in all cells. Cells are therefore compared replicate by
+replicate, and replicates are the blocks of the analysis of variance.
 """
 
 import math
@@ -22,7 +22,7 @@ _DRAWN_AT_ONCE = 1_000_000
 _NOTHING = 1e-24
 _PLACES, _MAX_IN_A_DENSITY = 121, 20_000
 _STREAM = 10
-"""Spawns the resamples of the bootstrap."""
+"""Spawn key of the bootstrap resamples."""
 
 Interval = tuple[float, float]
 _UNKNOWN = (math.nan, math.nan)
@@ -39,7 +39,7 @@ def mean_interval(mean: float, sd: float, count: int) -> Interval:
 
 
 def sd_interval(values: Array, seed: int, key: Sequence[int]) -> Interval:
-    """Return the bootstrap interval of the standard deviation of values ``(n,)``; the same seed and key, the same."""
+    """Return the bootstrap interval of the standard deviation of values ``(n,)``; seed and key determine it."""
     if values.size < 2:
         return _UNKNOWN
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM, *key)))
@@ -56,10 +56,10 @@ def sd_interval(values: Array, seed: int, key: Sequence[int]) -> Interval:
 def quantile_with_interval(
     values: Array, share: float, counts: npt.NDArray[np.int64] | None = None
 ) -> tuple[float, Interval]:
-    """Return a quantile of values ``(n,)`` and its bootstrap interval, that of infinitely many resamples.
+    """Return a quantile of values ``(n,)`` and its bootstrap interval for infinitely many resamples.
 
-    Each value stands for as many as `counts` says ``(n,)``, otherwise for itself. The k-th of n in order is in a
-    resample the value at place n B, where B is Beta(k, n - k + 1).
+    Each value stands for `counts` ``(n,)`` values, or for itself. The k-th of n ordered values is in a resample the
+    value at position n B, where B is Beta(k, n - k + 1).
     """
     if values.size == 0:
         return math.nan, _UNKNOWN
@@ -79,9 +79,9 @@ def quantile_with_interval(
 
 
 def densities(values: Mapping[str, Array]) -> dict[str, Any]:
-    """Return Gaussian kernel densities of values ``(n,)`` by name on places in common; nothing where none varies.
+    """Return Gaussian kernel densities of values ``(n,)`` by name on common positions; empty if no value varies.
 
-    Bandwidths are Scott's. Places hold all but the outermost 0.2 % on either side.
+    Bandwidths by Scott's rule. The positions contain all but the outermost 0.2 % on either side.
     """
     known = {name: each[np.isfinite(each)] for name, each in values.items()}
     varying = {name: each for name, each in known.items() if each.size > 2 and np.ptp(each) > 0.0}
@@ -105,9 +105,9 @@ def _rounded(values: Array) -> list[float]:
 
 
 def binned(values: Array, on: Array, bins: int = 10) -> dict[str, list[float]]:
-    """Return means of values ``(cells, n)`` and of those that they depend on, by shares of the latter equal in number.
+    """Return means of values ``(cells, n)`` and of the values they depend on, in bins of equal number.
 
-    With the intervals of the means as if values were independent, for a figure.
+    The intervals of the means treat values as independent; they are for a figure.
     """
     both = np.isfinite(values) & np.isfinite(on)
     y, x = values[both], on[both]
@@ -123,25 +123,25 @@ def binned(values: Array, on: Array, bins: int = 10) -> dict[str, list[float]]:
 
 @dataclass(frozen=True)
 class CellComparison:
-    """A cell's replicates minus those of another, pair by pair."""
+    """Replicates of a cell minus the replicates of another cell, in pairs."""
 
     pairs: int
     difference: float
     interval: Interval
     sd: float
-    """Of the differences."""
+    """Standard deviation of the differences."""
     effect: float
-    """The difference in standard deviations of one replicate, both cells pooled (Cohen's d)."""
+    """Difference in standard deviations of one replicate, pooled over both cells (Cohen's d)."""
     effect_interval: Interval
     p: float
-    """Of no difference, by the paired t test."""
+    """Probability of no difference, by the paired t test."""
 
 
 def compare_cells(values: Array, against: Array) -> CellComparison:
-    """Compare replicates ``(n,)`` with those of the same numbers in another cell, or ``(cells, n)`` in several.
+    """Compare replicates ``(n,)`` with the same replicates in another cell, or ``(cells, n)`` in several cells.
 
-    Several cells are averaged replicate by replicate. Who gave up in any is left out. The interval of the effect is by
-    its influence function, replicates being independent: it asks for no normal distribution.
+    Several cells are averaged replicate by replicate. A replicate that gave up in any cell is left out. The interval of
+    the effect is by its influence function for independent replicates and needs no normal distribution.
     """
     values, against = np.atleast_2d(values), np.atleast_2d(against)
     n = min(values.shape[1], against.shape[1])
@@ -166,26 +166,28 @@ def compare_cells(values: Array, against: Array) -> CellComparison:
 
 
 def _squares(values: Array) -> Array:
-    """Return the squared deviations ``(n,)`` of values ``(cells, n)`` from their cells' means, averaged over cells."""
+    """Return the squared deviations ``(n,)`` of values ``(cells, n)`` from the means of their cells, averaged over
+    cells.
+    """
     return np.asarray(((values - values.mean(axis=1, keepdims=True)) ** 2).mean(axis=0))
 
 
 @dataclass(frozen=True)
 class Dependence:
-    """How one response goes with another in the same cells, what differs between cells taken off."""
+    """Relation of two responses in the same cells after removal of the differences between cells."""
 
     replicates: int
     slope: float
-    """Of the first for a unit of the other."""
+    """Change of the first response per unit of the other."""
     interval: Interval
     correlation: float
     correlation_interval: Interval
     p: float
-    """Of no dependence; cells share their replicates, so that these are counted once (cluster-robust)."""
+    """Probability of no relation; cells share replicates, which therefore count once (cluster-robust)."""
 
 
 def regress_on(values: Array, on: Array) -> Dependence:
-    """Regress values ``(cells, n)`` on those of another response ``(cells, n)``.
+    """Regress values ``(cells, n)`` on another response ``(cells, n)``.
 
     The interval of the correlation is by its influence function and Fisher's transformation.
     """
@@ -211,14 +213,14 @@ def regress_on(values: Array, on: Array) -> Dependence:
 
 
 def _ratio(mean: float, sd: float) -> float:
-    """Return how many standard deviations a mean is, also where nothing varies."""
+    """Return a mean in standard deviations, also if nothing varies."""
     if sd > 0.0:
         return mean / sd
     return math.copysign(math.inf, mean) if mean else 0.0
 
 
 def holm(ps: Sequence[float]) -> list[float]:
-    """Return probabilities adjusted for as many comparisons (Holm's step-down method); nan stays and does not count."""
+    """Return probabilities adjusted for their number (Holm's step-down method); nan stays and does not count."""
     known = sorted((p, i) for i, p in enumerate(ps) if not math.isnan(p))
     adjusted = [math.nan] * len(ps)
     highest = 0.0
@@ -230,29 +232,30 @@ def holm(ps: Sequence[float]) -> list[float]:
 
 @dataclass(frozen=True)
 class Effect:
-    """A line of an analysis of variance."""
+    """Line of an analysis of variance."""
 
     source: tuple[str, ...]
-    """The factors, several for an interaction; empty for all that remains."""
+    """Factors, several for an interaction; empty for the remainder."""
     squares: float
     freedom: int
     remaining: float
-    """Squares of its interaction with the replicates, against which it is tested."""
+    """Sum of squares of its interaction with the replicates, against which it is tested."""
     F: float
     p: float
-    """By Greenhouse's and Geisser's freedom, since what replicates add to two levels may be alike or not."""
+    """With Greenhouse-Geisser degrees of freedom, since the replicate effects of two levels may be correlated."""
     epsilon: float
-    """By which both freedoms are multiplied for p."""
+    """Factor by which both degrees of freedom are multiplied for p."""
     partial_eta_squared: float
-    """Its share of its own and its remaining squares."""
+    """Its sum of squares as a share of itself and its remainder."""
 
 
 def variance_by_factor(values: Array, factors: Sequence[str]) -> list[Effect]:
     """Return the analysis of variance of values ``(levels of factor 1, levels of factor 2, ..., replicates)``.
 
-    A fixed-effects full factorial with replicates as blocks (repeated measures): every factor and interaction against
-    its own interaction with the replicates, so that cells that share a session do not count twice; last all that
-    remains. Replicates that lack a value in any cell are left out; nothing is returned where fewer than two are whole.
+    A fixed-effects full factorial with replicates as blocks (repeated measures): each factor and interaction is tested
+    against its own interaction with the replicates, so that cells that share a session do not count twice; the last
+    line is the remainder. Replicates without a value in any cell are left out; the result is empty if fewer than two
+    are complete.
     """
     whole = np.isfinite(values).all(axis=tuple(range(values.ndim - 1)))
     values = values[..., whole]
@@ -269,9 +272,9 @@ def variance_by_factor(values: Array, factors: Sequence[str]) -> list[Effect]:
 
 
 def _effect(source: tuple[str, ...], part: Array, shape: Sequence[int], size_of_all: float) -> Effect:
-    """Return the line of an effect from what it adds to every replicate ``(levels or 1, ..., replicates)``.
+    """Return the line of an effect from its contribution to each replicate ``(levels or 1, ..., replicates)``.
 
-    What is as small as the last bits of all squares `size_of_all` leave it is nothing.
+    A sum of squares at the level of the rounding errors of `size_of_all` counts as zero.
     """
     from scipy.stats import f  # noqa: PLC0415
 
@@ -294,7 +297,9 @@ def _effect(source: tuple[str, ...], part: Array, shape: Sequence[int], size_of_
 
 
 def _parts(values: Array) -> Mapping[tuple[int, ...], Array]:
-    """Return what every factor and interaction adds to every replicate, by its axes, each broadcastable to them all."""
+    """Return the contribution of each factor and interaction to each replicate, by its axes, broadcastable to all
+    values.
+    """
     axes = range(values.ndim - 1)
     parts: dict[tuple[int, ...], Array] = {(): values.mean(axis=tuple(axes), keepdims=True)}
     for order in range(1, len(axes) + 1):

@@ -1,4 +1,4 @@
-"""What a study found, as tables for a terminal."""
+"""Results of a study as tables for a terminal."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,7 @@ from a7sim.text_tables import text_table
 
 
 def study_tables(document: Document) -> RenderableType:
-    """Return the tables of a study's document: cells and variance by response, and the answer."""
+    """Return the tables of a study document: cells and variance by response, and the answer."""
     return Group(*_parts(document))
 
 

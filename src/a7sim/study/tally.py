@@ -1,4 +1,4 @@
-"""What is kept of a study's replicates: moments and quantiles of all, a sample one by one, however they came in."""
+"""Tally of a study's replicates: moments and quantiles of all, and a sample of single replicates."""
 
 from dataclasses import dataclass
 
@@ -8,22 +8,22 @@ from a7sim.geometry import Array
 from a7sim.study.quantile_sketch import Counts, QuantileSketch
 
 SAMPLE = 10_000
-"""Replicates of a cell that are kept one by one: the first, since replicates come in no order."""
+"""Number of replicates of a cell stored one by one: the first ones, since replicates have no order."""
 
 
 @dataclass
 class Tally:
-    """Running moments by cell and response ``(cells, responses)``, the sample of each cell and sketches of the rest.
+    """Running moments by cell and response ``(cells, responses)``, the sample of each cell, and sketches of the rest.
 
-    Replicates of a cell are added in their order one by one, so that no sum depends on how they were cut in chunks.
+    Replicates of a cell are added one by one in their order, so that no sum depends on chunk sizes.
     """
 
     done: Counts
-    """Replicates added, by cell ``(cells,)``."""
+    """Number of added replicates by cell ``(cells,)``."""
     count: Counts
-    """Of them, those with a number: the others gave up."""
+    """Number of replicates with a value; in the others the operator gave up."""
     origin: Array
-    """The first number, from which deviations are taken."""
+    """First value, from which deviations are taken."""
     total: Array
     """Sums of the deviations."""
     squares: Array
@@ -33,11 +33,11 @@ class Tally:
     samples: list[list[Array]]
     """Blocks ``(responses, n)`` of the first replicates, by cell."""
     sketches: list[list[QuantileSketch]]
-    """Of the replicates beyond the sample, by cell and response."""
+    """Sketches of the replicates beyond the sample, by cell and response."""
 
     @classmethod
     def empty(cls, cells: int, responses: int) -> "Tally":
-        """Return a tally of nothing."""
+        """Return an empty tally."""
         shape = (cells, responses)
         return cls(
             np.zeros(cells, dtype=np.int64),
@@ -52,7 +52,7 @@ class Tally:
         )
 
     def add(self, cell: int, values: Array) -> None:
-        """Add the next replicates ``(responses, n)`` of a cell; nan is one that gave up."""
+        """Add the next replicates ``(responses, n)`` of a cell; nan marks a replicate that gave up."""
         if not values.size:
             return
         room = max(0, SAMPLE - int(self.done[cell]))
@@ -77,9 +77,9 @@ class Tally:
         return np.concatenate(blocks, axis=1) if blocks else np.zeros((self.mean.shape[1], 0))
 
     def spread(self, cell: int, response: int) -> tuple[Array, Counts]:
-        """Return numbers of a response ``(n,)``, in no order, and for how many replicates each stands.
+        """Return values of a response ``(n,)``, in no order, and the number of replicates that each stands for.
 
-        Up to `SAMPLE` replicates all, each for itself; of what is beyond, a rank is off by its sketch's `rank_error`.
+        Up to `SAMPLE` replicates each value stands for itself; beyond, a rank has the `rank_error` of its sketch.
         """
         first = self.sample(cell)[response]
         first = first[np.isfinite(first)]
@@ -89,12 +89,12 @@ class Tally:
 
     @property
     def mean(self) -> Array:
-        """Means ``(cells, responses)``, 0 of no numbers."""
+        """Means ``(cells, responses)``, 0 without values."""
         return np.asarray(self.origin + self.total / np.maximum(self.count, 1))
 
     @property
     def sd(self) -> Array:
-        """Standard deviations ``(cells, responses)``, nan for fewer than two numbers."""
+        """Standard deviations ``(cells, responses)``, nan for fewer than two values."""
         about_the_mean = self.squares - self.total**2 / np.maximum(self.count, 1)
         freedom = np.where(self.count > 1, self.count - 1, np.nan)
         return np.asarray(np.sqrt(np.maximum(about_the_mean, 0.0) / freedom))

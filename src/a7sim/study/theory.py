@@ -1,9 +1,9 @@
-"""What theory says of a session before it is worked: standard deviations of elements and of perspective centres.
+"""Theoretical precision of a session: standard deviations of elements and of perspective centres.
 
-Numerical relative orientation is propagated as it is worked at the plotter, with n points at the places of the plan:
-least squares of parallaxes that have the errors of their readings, of film and of interior orientation; every element
-set to its count; the mean parallax that is then left set on by. A centre from two levels has the errors of its
-pointings, enlarged by T0 (thesis 2.4).
+Errors are propagated through numerical relative orientation at the plotter with n points at the positions of the plan:
+least squares of parallaxes with the errors of readings, film and interior orientation; rounding of each element to its
+count; the remaining mean parallax set on by. A centre from two levels has the errors of its pointings, enlarged by T0
+(thesis 2.4).
 """
 
 import math
@@ -27,10 +27,10 @@ from a7sim.session.truth import RelativePose, true_elements
 from a7sim.standard_points import CASES, PLACES
 
 ROUNDING = LEAST_COUNT / math.sqrt(12.0)
-"""Standard deviation of what a counter rounds away where it may stand anywhere between two counts."""
+"""Standard deviation of the rounding error of a counter, uniform between two counts."""
 
 _COUNTS = np.arange(-8, 9)
-"""Counts about a true element that are looked at; errors larger than one count fall anywhere."""
+"""Number of counts around a true element that are evaluated; larger errors are uniform."""
 
 _ELEMENT = re.compile(r"models\.(\d+)\.truth\.element_differences\.(\w+)")
 _CENTRE = re.compile(r"models\.\d+\.truth\.centre_differences\.(?:left|right)\.([XYZ])0|centre_([XYZ])_error")
@@ -38,13 +38,13 @@ _CENTRE = re.compile(r"models\.\d+\.truth\.centre_differences\.(?:left|right)\.(
 
 @dataclass(frozen=True)
 class PropagatedErrors:
-    """The elements that a procedure turns, and the covariance ``(5, 5)`` of their errors, gon and mm."""
+    """Elements that a procedure sets, and the covariance ``(5, 5)`` of their errors, gon and mm."""
 
     names: tuple[str, ...]
     covariance: Array
 
     def sd(self, name: str) -> float | None:
-        """Return the standard deviation of an element, None for one that is not turned."""
+        """Return the standard deviation of an element, None for an element that is not set."""
         if name not in self.names:
             return None
         place = self.names.index(name)
@@ -52,10 +52,10 @@ class PropagatedErrors:
 
 
 def predicted_sd(scenario: Scenario, response: str) -> float | None:
-    """Return the standard deviation that theory gives a response, None where it has nothing to say.
+    """Return the theoretical standard deviation of a response, None without a theory.
 
-    Of `models.N.truth.element_differences.NAME`, of `models.N.truth.centre_differences.SIDE.X0`, and of
-    `centre_X_error`, which as an rms has it for its quadratic mean.
+    Theory covers `models.N.truth.element_differences.NAME`, `models.N.truth.centre_differences.SIDE.X0`, and
+    `centre_X_error`, an rms, for its quadratic mean.
     """
     plan = scenario.plotting
     if plan is None or "plotter" not in scenario.work or not VARIANTS[scenario.instrument.variant].elements.get("by1"):
@@ -69,7 +69,7 @@ def predicted_sd(scenario: Scenario, response: str) -> float | None:
 
 
 def theory_limits(scenario: Scenario) -> Sequence[str]:
-    """Return what of a scenario the theory of it leaves out, in words; nothing where it should hold."""
+    """Return the parts of a scenario that the theory leaves out, as text; empty if the theory is complete."""
     film, observer = scenario.film, scenario.observer
     left_out = {
         "film that shrinks unevenly": film.shrinkage_sigma_ppm or film.shear_sigma_ppm,
@@ -81,7 +81,10 @@ def theory_limits(scenario: Scenario) -> Sequence[str]:
 
 
 def theory_comparison(scenario: Scenario, response: str, mean: float, sd: float) -> Document:
-    """Return what theory says of a response, and how many times as much was simulated; nothing where it is silent."""
+    """Return the theoretical precision of a response and the ratio of the simulated one to it.
+
+    Empty without a theory.
+    """
     predicted = predicted_sd(scenario, response)
     if predicted is None:
         return {}
@@ -90,7 +93,7 @@ def theory_comparison(scenario: Scenario, response: str, mean: float, sd: float)
 
 
 def theory_sentence(document: Document, scenarios: Sequence[Scenario]) -> Document:
-    """Return the sentence on the theory that stands in a study's document; nothing where it stands nowhere."""
+    """Return the sentence on theory in a study's document; empty without a theory."""
     if not any("theory" in each for cell in document["cells"] for each in cell["responses"].values()):
         return {}
     left_out = dict.fromkeys(name for scenario in scenarios for name in theory_limits(scenario))
@@ -102,11 +105,11 @@ def theory_sentence(document: Document, scenarios: Sequence[Scenario]) -> Docume
 
 
 def element_errors(scenario: Scenario, number: int) -> PropagatedErrors:
-    """Return how well the elements of a model are found by the procedure of the plan, and set.
+    """Return the precision of the elements of a model after the procedure of the plan, as set.
 
-    In the first model it is known where between two counts a true element lies, and so how often it is set to which;
-    elsewhere, and for what the mean parallax may take on, anywhere is as likely. Raises Undetermined as
-    `element_corrections` does.
+    In the first model the position of a true element between two counts is known, and so the probability of each
+    setting; elsewhere, and for elements that may take up the mean parallax, the position is uniform. Raises
+    Undetermined as `element_corrections` does.
     """
     plan = scenario.plan
     scene = build_scene(scenario, scenario.seed)
@@ -129,7 +132,7 @@ def element_errors(scenario: Scenario, number: int) -> PropagatedErrors:
 
 
 def _set_to_counts(sds: Array, fractions: Array) -> Array:
-    """Return the gains and the variances of what counts add ``(2, m)``; nan is a fraction that may be any."""
+    """Return the gains and the variances ``(2, m)`` due to counts; nan marks an unknown fraction."""
     found = [
         (1.0, ROUNDING**2) if math.isnan(f) else quantised_error(f, sd) for f, sd in zip(fractions, sds, strict=True)
     ]
@@ -137,10 +140,10 @@ def _set_to_counts(sds: Array, fractions: Array) -> Array:
 
 
 def quantised_error(fraction: float, sd: float) -> tuple[float, float]:
-    """Return what becomes of the error of an element that truly lies at a fraction of a count when it is set to one.
+    """Return gain and added variance of the error of an element that is set to a count.
 
-    The error is taken so many times, and to that comes something of this variance which goes with the error of no
-    element (Bussgang). The fraction counts from the count below; `sd` is that of the error.
+    The error is multiplied by the gain, and an error with the added variance, uncorrelated with all others, is added
+    (Bussgang). The fraction counts from the count below the true element; `sd` is the standard deviation of the error.
     """
     if sd > LEAST_COUNT:
         return 1.0, ROUNDING**2
@@ -155,7 +158,7 @@ def quantised_error(fraction: float, sd: float) -> tuple[float, float]:
 
 
 def reading_sd(scenario: Scenario) -> float:
-    """Return the standard deviation in mm of the mean of the readings of one y-parallax, their counter included."""
+    """Return the standard deviation in mm of the mean of the readings of one y-parallax, including their counter."""
     plan = scenario.plan
     readings = plan.parallax_readings * (2 if plan.measure_with == "both" else 1)
     enlargement = 1e-3 * plan.projection_height / scenario.camera.c
@@ -163,9 +166,9 @@ def reading_sd(scenario: Scenario) -> float:
 
 
 def _lasting(scenario: Scenario) -> Array:
-    """Return the covariance ``(n, n)`` in mm^2 of what is wrong with parallaxes however often they are measured.
+    """Return the covariance ``(n, n)`` in mm^2 of the parallax errors that repeated readings do not reduce.
 
-    Film at the points, and how pictures were centred, swung and enlarged by their fiducials.
+    Its sources are the film at the points, and centring, swing and scale of the pictures by their fiducials.
     """
     plan, film, camera = scenario.plan, scenario.film, scenario.camera
     x, y, z = _places(scenario)
@@ -198,7 +201,7 @@ def _design(scenario: Scenario, model: ModelJob, names: Sequence[str]) -> Array:
 
 
 def _fractions(scenario: Scenario, scene: Scene, number: int, names: Sequence[str], to_mean: Array) -> Array:
-    """Return at which fraction of a count each true element lies, nan where that depends on what was set before."""
+    """Return the fraction of a count at each true element, nan if it depends on earlier settings."""
     truth = scene.relative_truth(scenario.models[number])
     if truth is None or number > 0:
         return np.full(len(names), np.nan)
@@ -217,8 +220,8 @@ def _fractions(scenario: Scenario, scene: Scene, number: int, names: Sequence[st
 def centre_sds(scenario: Scenario) -> tuple[float, float, float]:
     """Return the standard deviations of X0, Y0 and Z0 from two levels, in counter units.
 
-    Every pointing has the observer's error and that of its counter; an equation of thesis 2.4 has them T0 and T0 - 1
-    times.
+    Each pointing has the error of the observer and of its counter; an equation of thesis 2.4 contains them multiplied
+    by T0 and T0 - 1.
     """
     plan = scenario.plan
     variant = VARIANTS[scenario.instrument.variant]

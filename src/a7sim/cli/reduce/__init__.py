@@ -1,4 +1,4 @@
-"""`a7sim reduce`: the computing room on anyone's files."""
+"""`a7sim reduce`: reductions of measurements from files."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,8 +8,9 @@ import click
 from rich.console import Console
 
 from a7sim import processing
-from a7sim.cli.options import FILE, HEIGHT, Number, principal_distance
+from a7sim.cli.options import FILE, HEIGHT, NumberType, principal_distance
 from a7sim.cli.reduce import options, tables
+from a7sim.cli.renamed import command_with_renamed_options
 from a7sim.errors import A7SimError
 from a7sim.processing import ProcessingResult
 from a7sim.processing.interior import FlightHeights
@@ -18,16 +19,19 @@ from a7sim.reduction.strips import JoinMethod
 from a7sim.result_documents import Document, as_json
 
 MIN_WIDTH = 80
-"""Columns that every table fits."""
+"""Width in columns that all tables fit."""
+
+
+_WITH_REFERENCE = command_with_renamed_options({"--against": "--reference"})
 
 
 @click.group("reduce")
 def command() -> None:
     """Compute orientations, centres, strips and blocks from files of measurements.
 
-    Tables are CSV with a header line, or TOML with the columns as keys of an array of tables [[rows]]; decimal
-    points, UTF-8, # begins a comment. Strips are read from N.R.C. cards too (.crd, .cards, or by their look).
-    With --out DIR the results go to results.json and CSV files there.
+    Tables are CSV with a header line, or TOML with the columns as keys of an array of tables [[rows]]; decimal points,
+    UTF-8, comments after #. Strips are also read from N.R.C. cards (.crd, .cards, or recognised by content). With --out
+    DIR the results are written to results.json and CSV files.
 
     Example: a7sim reduce relative scenarios/dewitt-pair.csv --c 152.113
     """
@@ -51,7 +55,7 @@ def command() -> None:
 )
 @click.option(
     "--count-mm",
-    type=Number(min=0.0, min_open=True, max=10.0),
+    type=NumberType(min=0.0, min_open=True, max=10.0),
     help="Size of a count, mm (1 for counts in mm): tells how the film has shrunk, and the principal distance to set.",
 )
 @click.option(
@@ -60,8 +64,10 @@ def command() -> None:
     multiple=True,
     help="Correct the points and bring them to the principal point; may be given several times.",
 )
-@click.option("--flying-height", type=Number(1.0, 30000.0), help="Of the camera above the sea, m.")
-@click.option("--ground-height", type=Number(-500.0, 9000.0), default=0.0, show_default=True, help="Above the sea, m.")
+@click.option("--flying-height", type=NumberType(1.0, 30000.0), help="Of the camera above the sea, m.")
+@click.option(
+    "--ground-height", type=NumberType(-500.0, 9000.0), default=0.0, show_default=True, help="Above the sea, m."
+)
 @options.documented
 def interior(
     counts: Path,
@@ -76,7 +82,7 @@ def interior(
 ) -> None:
     """Refine comparator COUNTS (photo,point,x,y) to mm by the fiducials, named as in the camera.
 
-    Writes image.csv (photo,point,x,y) and, of photographs of neighbouring numbers, pairs.csv for `reduce strip`.
+    Writes image.csv (photo,point,x,y) and, for photographs of consecutive numbers, pairs.csv for `reduce strip`.
 
     Example: a7sim reduce interior counts.csv --camera scenarios/akwanga.toml --out refined
     """
@@ -122,7 +128,8 @@ def relative(
 ) -> None:
     """Orient the two photographs of PAIR (point,xl,yl,xr,yr) to each other.
 
-    Writes the model with its centres to models.csv for `reduce connect`; a column model names it, best LEFT-RIGHT.
+    Writes the model with its centres to models.csv for `reduce connect`; a column `model` names it, preferably
+    LEFT-RIGHT.
 
     Example: a7sim reduce relative scenarios/dewitt-pair.csv --c 152.113
     """
@@ -185,14 +192,14 @@ def similarity(common: Path, method: processing.SimilarityMethod, out: Path | No
 def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_document: bool) -> None:
     """Join two or more MODELS (model,point,X,Y,Z; or one deck of cards) in the system of the first.
 
-    Neighbours share a projection centre, a point named PHOTO:centre; without centres they follow by name.
+    Neighbours share a projection centre, a point named PHOTO:centre; without centres the models are sorted by name.
 
     Example: a7sim reduce connect models.csv --method centre
     """
     _deliver(processing.connect(models, method), as_document, out, tables.connection_tables)
 
 
-@command.command("strip")
+@command.command("strip", cls=_WITH_REFERENCE)
 @click.argument("file", type=FILE)
 @principal_distance(required=False)
 @options.principal_point
@@ -200,7 +207,7 @@ def connect(models: tuple[Path, ...], method: JoinMethod, out: Path | None, as_d
 @options.ground(required=False)
 @options.join_method
 @click.option("--polynomial", type=click.Choice(["2", "3"]), help="Adjust the strip by polynomials of this degree.")
-@options.against
+@options.reference
 @options.documented
 def strip(
     file: Path,
@@ -233,10 +240,10 @@ def strip(
     _deliver(outcome, as_document, out, tables.strip_tables)
 
 
-@command.command("absolute")
+@command.command("absolute", cls=_WITH_REFERENCE)
 @click.argument("model", type=FILE)
 @options.ground(required=True)
-@options.against
+@options.reference
 @options.documented
 def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, as_document: bool) -> None:
     """Orient one MODEL or strip (point,X,Y,Z) to the ground.
@@ -246,17 +253,17 @@ def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, 
     _deliver(processing.absolute(model, ground, against), as_document, out, tables.absolute_tables)
 
 
-@command.command("block")
+@command.command("block", cls=_WITH_REFERENCE)
 @click.argument("models", type=FILE, nargs=-1, required=True)
 @options.ground(required=True)
 @click.option(
     "--height-weight",
-    type=Number(min=1e-6, max=1e6),
+    type=NumberType(min=1e-6, max=1e6),
     default=1.0,
     show_default=True,
     help="Weight of equations in height against those in plan.",
 )
-@options.against
+@options.reference
 @options.documented
 def block(
     models: tuple[Path, ...],
@@ -266,9 +273,9 @@ def block(
     out: Path | None,
     as_document: bool,
 ) -> None:
-    """Adjust MODELS (model,point,X,Y,Z) of one strip or several to the ground at once, 500 at the most.
+    """Adjust MODELS (model,point,X,Y,Z) of one or several strips to the ground at once, 500 at most.
 
-    Models should be nearly level; --out writes output cards of every strip (strip-1.crd ...).
+    Models should be nearly level; --out writes output cards of each strip (strip-1.crd ...).
 
     Example: a7sim reduce block strip1.csv strip2.csv --ground ground.csv
     """
@@ -278,7 +285,7 @@ def block(
 def _deliver(
     outcome: ProcessingResult, as_document: bool, out: Path | None, shown: Callable[[Document], list[Any]]
 ) -> None:
-    """Write an outcome where it is wanted and print it, as JSON or as the table a surveyor files."""
+    """Write a result to its folder, if any, and print it as JSON or as tables."""
     document = outcome.document if out is None else processing.write_result(outcome, out)
     if as_document:
         click.echo(as_json(document), nl=False)

@@ -1,23 +1,23 @@
-"""Options that several reductions share."""
+"""Options shared by several reductions."""
 
 from typing import Any
 
 import click
 
-from a7sim.cli.options import FILE, Number, Option, as_document, combine_options, option_help, out_folder
+from a7sim.cli.options import FILE, NumberType, Option, as_document, combine_options, option_help, out_folder
 
 documented = combine_options(out_folder("results.json and tables as CSV; may be there already"), as_document)
 
 principal_point = combine_options(
-    click.option("--x0", type=Number(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
-    click.option("--y0", type=Number(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
+    click.option("--x0", type=NumberType(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
+    click.option("--y0", type=NumberType(-1e3, 1e3), default=0.0, show_default=True, help="Principal point, mm."),
 )
 
 
 def base(default: str, length: float | None = None) -> Option[Any]:
-    """Return --bx, which is a length, or what `default` says, where it is left out."""
+    """Return --bx, a length, with its default in words."""
     return click.option(
-        "--bx", type=Number(0.001, 1e6), default=length, help=option_help("Length of the base, mm", default)
+        "--bx", type=NumberType(0.001, 1e6), default=length, help=option_help("Length of the base, mm", default)
     )
 
 
@@ -27,11 +27,12 @@ def ground(required: bool) -> Option[Any]:
     return click.option("--ground", type=FILE, metavar="FILE", required=required, help=words)
 
 
-against = click.option(
-    "--against",
+reference = click.option(
+    "--reference",
+    "against",
     type=FILE,
     metavar="FILE",
-    help="Coordinates (point,X,Y,Z) to table the differences of the results to.",
+    help="Coordinates (point,X,Y,Z) with which the results are compared.",
 )
 
 join_method = click.option(

@@ -1,4 +1,4 @@
-"""Documents of reductions as the tables a surveyor files."""
+"""Documents of reductions as tables."""
 
 from collections.abc import Iterable, Sequence
 from math import isnan
@@ -17,7 +17,7 @@ Tables = list[Any]
 
 
 def interior_tables(document: Document) -> Tables:
-    """Show fits, residuals, and what the film did, photograph by photograph."""
+    """Return fits, residuals, and film deformations, photograph by photograph."""
     camera = document["camera"]
     shown: Tables = [
         f"Interior orientation, {document['method']}, {camera['name']}, c {camera['c_mm']:.3f} mm",
@@ -54,7 +54,7 @@ def _of_film(film: Document) -> list[str]:
 
 
 def relative_tables(document: Document) -> Tables:
-    """Show elements, parallaxes and model coordinates; the blunders found; and the methods side by side."""
+    """Return elements, parallaxes and model coordinates; the blunders; and the methods side by side."""
     elements = [
         (name, "mm" if name.startswith("b") else "gon", each["value"], each["sigma"])
         for name, each in document["elements"].items()
@@ -95,7 +95,7 @@ def _of_blunders(document: Document) -> list[str]:
 
 
 def centres_tables(document: Document) -> Tables:
-    """Show centres with their precision, and the residuals of the points."""
+    """Return centres with their precision, and the residuals of the points."""
     method = document["method"]
     shown: Tables = [f"Perspective centres, {method}", ""]
     if method == "a8":
@@ -120,7 +120,7 @@ def centres_tables(document: Document) -> Tables:
 
 
 def similarity_tables(document: Document) -> Tables:
-    """Show the seven unknowns, the residuals, and the methods side by side."""
+    """Return the seven unknowns, the residuals, and the methods side by side."""
     sigma = document["sigma"]
     values = {"scale": document["scale"]} | {f"{name}, gon": value for name, value in document["angles"].items()}
     values |= dict(zip(SHIFTS, document["translation"], strict=True))
@@ -140,7 +140,7 @@ def similarity_tables(document: Document) -> Tables:
 
 
 def connection_tables(document: Document) -> Tables:
-    """Show the joins with their closing differences, and the points of the whole."""
+    """Return the joins with their closing differences, and the points of the joined model."""
     points = [(point, *place) for point, place in document["points"].items()]
     return [
         f"Models {', '.join(document['models'])} joined on {document['method']}",
@@ -153,7 +153,7 @@ def connection_tables(document: Document) -> Tables:
 
 
 def strip_tables(document: Document) -> Tables:
-    """Show joins, absolute orientation, residuals, and what the polynomials found the strip to be."""
+    """Return joins, absolute orientation, residuals, and the deformation found by the polynomials."""
     shown: Tables = [
         f"Strip of {pluralize(len(document['models']), 'model')} from {document['input']}, "
         f"joined on {document['method']}",
@@ -169,7 +169,7 @@ def strip_tables(document: Document) -> Tables:
 
 
 def absolute_tables(document: Document, title: str = "Absolute orientation") -> Tables:
-    """Show the scale, the residuals at the ground points and the accuracies, and differences to given coordinates."""
+    """Return scale, residuals and accuracies at the ground points, and differences from given coordinates."""
     precision = f", s0 {document['s0_m']:.4f} m" if "s0_m" in document else ""
     return [
         f"{title}: scale {document['absolute']['scale']:.9f}{precision}",
@@ -179,7 +179,7 @@ def absolute_tables(document: Document, title: str = "Absolute orientation") -> 
 
 
 def block_tables(document: Document) -> Tables:
-    """Show the models' scales, the tie residuals, and the residuals and accuracies at the ground points."""
+    """Return the models' scales, the tie residuals, and the residuals and accuracies at the ground points."""
     models = [
         (each["model"], f"{each['scale']:.6f}", *_rms_of(each["residuals_m"].values()), len(each["residuals_m"]))
         for each in document["models"]
@@ -196,7 +196,7 @@ def block_tables(document: Document) -> Tables:
 
 
 def warning_lines(document: Document) -> list[str]:
-    """Return what the surveyor should be told."""
+    """Return the warnings."""
     said = [f"warning: {warning}" for warning in document.get("warnings", [])]
     return said + [f"{name} is not written: {why}" for name, why in document.get("not_written", {}).items()]
 
@@ -286,7 +286,7 @@ def _metres(value: float | None) -> str:
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[Any]], decimals: int = 4) -> Table:
-    """Return a table, its first column to the left, numbers to the right, a dash where nothing is known."""
+    """Return a table, its first column left-aligned, numbers right-aligned, a dash for unknown values."""
     table = text_table(*header, fold=(0,))
     for row in rows:
         table.add_row(*(_cell(value, decimals) for value in row))

@@ -1,4 +1,4 @@
-"""`a7sim train hint`, `answer` and `reset`: what a student does beside the instrument."""
+"""`a7sim train hint`, `answer` and `reset`: actions of a student beside the instrument."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from a7sim.training.catalogue import find_exercise
 @options.as_document
 @student_options
 def hint_(exercise: str | None, as_document: bool, home: Path | None, student: str | None) -> None:
-    """Give the next hint of the attempt under way; it costs points and is recorded.
+    """Print the next hint of the present attempt; it costs points and is recorded.
 
     Example: a7sim train hint 4
     """
@@ -50,7 +50,7 @@ def hint_(exercise: str | None, as_document: bool, home: Path | None, student: s
 def answer_(
     answers: tuple[str, ...], exercise: str | None, as_document: bool, home: Path | None, student: str | None
 ) -> None:
-    """Write answers down beside the journal of the attempt under way; a later one takes the place of an earlier.
+    """Write answers beside the journal of the present attempt; a later answer replaces an earlier one.
 
     Example: a7sim train answer play=0.05
     """
@@ -76,7 +76,7 @@ def answer_(
 @click.argument("exercise", shell_complete=exercise_argument)
 @student_options
 def reset_(exercise: str, home: Path | None, student: str | None) -> None:
-    """Close the attempt under way at EXERCISE; it is kept, and the next start begins anew.
+    """Close the present attempt at EXERCISE; it is kept, and the next start is a new attempt.
 
     Example: a7sim train reset 4
     """

@@ -1,4 +1,4 @@
-"""`a7sim train check` and `new`: for who writes exercises."""
+"""`a7sim train check-exercise` and `new`: for authors of exercises."""
 
 from pathlib import Path
 
@@ -15,15 +15,17 @@ from a7sim.training.template import write_template
 EXIT_FAULTY = 1
 
 
-@click.command("check")
+@click.command("check-exercise")
 @click.argument("exercises", nargs=-1, metavar="[EXERCISE]...", shell_complete=exercise_argument)
 @options.as_document
 def check_(exercises: tuple[str, ...], as_document: bool) -> None:
-    """See that exercises hold: the reference passes, each faulty one fails for its reason, no criterion is dead.
+    """Check that exercises are consistent:
 
-    All that come with a7sim, or those named. Exit code 1 where one does not hold.
+    the reference passes, each faulty run fails for its reason, each criterion counts.
 
-    Example: a7sim train check 4 my-exercises/20-clouds
+    All that come with a7sim, or the named ones. Exit code 1 if one is not consistent.
+
+    Example: a7sim train check-exercise 4 my-exercises/20-clouds
     """
     found = [check_exercise(each) for each in (map(find_exercise, exercises) if exercises else all_exercises())]
     if as_document:
@@ -44,7 +46,7 @@ def check_(exercises: tuple[str, ...], as_document: bool) -> None:
 @click.command("new")
 @click.argument("folder", type=options.PLACE, metavar="NAME")
 def new_(folder: Path) -> None:
-    """Write the skeleton of an exercise into a new folder; check says what is still missing.
+    """Write the template of an exercise into a new folder; check-exercise lists what is missing.
 
     Example: a7sim train new 20-clouds
     """

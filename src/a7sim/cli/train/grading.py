@@ -1,4 +1,4 @@
-"""`a7sim train verify` and `watch`: grades."""
+"""`a7sim train grade` and `watch`: grades."""
 
 import time
 from pathlib import Path
@@ -22,7 +22,7 @@ from a7sim.training.submissions import Submission, find_submissions, grade_submi
 EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
 
 
-@click.command("verify")
+@click.command("grade")
 @click.argument("exercise", required=False, shell_complete=exercise_argument)
 @click.option(
     "--journal",
@@ -35,7 +35,7 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
 @options.seed("that of each attempt handed in")
 @options.as_document
 @student_options
-def verify_(
+def grade_(
     exercise: str | None,
     folders: tuple[Path, ...],
     seed: int | None,
@@ -43,9 +43,9 @@ def verify_(
     home: Path | None,
     student: str | None,
 ) -> None:
-    """Grade the last attempt: its journal is worked again. Points and reasons; an exam is over with its first.
+    """Grade the last attempt by replaying its journal: points and reasons. The first grade ends an exam.
 
-    Example: a7sim train verify 4
+    Example: a7sim train grade 4
     """
     if folders:
         raise click.exceptions.Exit(_tell_of_many(grade_submissions(find_submissions(folders), seed), as_document))
@@ -67,7 +67,7 @@ def verify_(
 
 
 def _tell_of_many(handed_in: list[Submission], as_document: bool) -> int:
-    """Print what came of attempts that were handed in; return the exit code."""
+    """Print the results of attempts that were handed in; return the exit code."""
     if as_document:
         documents = [msgspec.to_builtins(each) for each in handed_in]
         click.echo(as_json(document_header("train verify") | {"handed_in": documents}), nl=False)
@@ -90,7 +90,7 @@ def _graded(progress: Progress, attempt: Attempt) -> Grade:
 @click.argument("exercise", required=False, shell_complete=exercise_argument)
 @click.option(
     "--every",
-    type=options.Number(min=0.1, max=3600.0),
+    type=options.NumberType(min=0.1, max=3600.0),
     default=1.0,
     show_default=True,
     metavar="SECONDS",
@@ -98,7 +98,7 @@ def _graded(progress: Progress, attempt: Attempt) -> Grade:
 )
 @student_options
 def watch_(exercise: str | None, every: float, home: Path | None, student: str | None) -> None:
-    """Grade the attempt under way again whenever its journal has grown, until it passes or Ctrl-C. Not in an exam.
+    """Grade the present attempt again whenever its journal grows, until it passes or Ctrl-C. Not in an exam.
 
     Example: a7sim train watch 4
     """

@@ -1,4 +1,4 @@
-"""The console at an exercise's instrument, its checklist on the screen."""
+"""Console of an exercise's instrument with its checklist."""
 
 import sys
 import time
@@ -18,16 +18,16 @@ from a7sim.training.environment import AttemptEnvironment
 from a7sim.training.exercise import OPENING
 
 GOAL_WIDTH = 64
-"""Columns, so that it has room on every terminal."""
+"""Columns, so that it fits all terminals."""
 
 
 def open_console(environment: AttemptEnvironment, checklist: Checklist, plain: bool) -> None:
-    """Open the console in the room of an attempt, until whoever sits there leaves. Raises Mistake without a terminal.
+    """Open the console in the environment of an attempt until the student quits. Raises A7SimError without a terminal.
 
-    The simulated clock goes with the wall's while somebody sits there.
+    The simulated clock runs with the wall clock while the console is open.
     """
     try:
-        from a7sim.console.app import Console  # only who sits down loads the screen
+        from a7sim.console.app import Console
     except ImportError as error:
         raise A7SimError("start: expected textual to be installed: pip install 'a7sim[console]'") from error
     from a7sim.console.actions.preset_recovery import LoggedLine
@@ -63,7 +63,7 @@ def open_console(environment: AttemptEnvironment, checklist: Checklist, plain: b
 
 
 def _past(checklist: Checklist) -> Iterator[Event]:
-    """Yield what was said and answered in an attempt so far, but for its opening."""
+    """Yield the lines and replies of an attempt so far, without its opening."""
     there = read_journal(checklist.attempt.folder / JOURNAL)
     for number in range(2, len(there) + 1):
         event = there.event(number)

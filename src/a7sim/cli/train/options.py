@@ -1,4 +1,4 @@
-"""What the training verbs share: whose progress it is, and where it is kept."""
+"""Options shared by the training commands: student and folder of the progress."""
 
 import getpass
 import os
@@ -35,12 +35,12 @@ student_options = combine_options(_HOME, _STUDENT)
 
 
 def progress_in(home: Path | None) -> Progress:
-    """Open the progress of a home. Raises Mistake."""
+    """Open the progress in a folder. Raises A7SimError."""
     return Progress(home or data_folder() / "training")
 
 
 def student_name(student: str | None) -> str:
-    """Return the name of a student. Raises Mistake for one that is none."""
+    """Return the name of a student. Raises A7SimError for an invalid one."""
     if student is None:
         try:
             student = getpass.getuser()
@@ -53,5 +53,5 @@ def student_name(student: str | None) -> str:
 
 
 def last_attempt(progress: Progress, student: str, exercise: str | None) -> Attempt:
-    """Return a student's last attempt, at an exercise where one is named. Raises Mistake where there is none."""
+    """Return a student's last attempt, at an exercise if one is named. Raises A7SimError if there is none."""
     return progress.last(student, find_exercise(exercise).name if exercise else None)

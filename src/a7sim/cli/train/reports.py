@@ -1,4 +1,4 @@
-"""`a7sim train list` and `report`: where students stand."""
+"""`a7sim train list` and `report`: progress of students."""
 
 from pathlib import Path
 
@@ -7,6 +7,7 @@ from rich.console import Console
 
 from a7sim.cli import options
 from a7sim.cli.completers import exercise_argument
+from a7sim.cli.renamed import command_with_renamed_options
 from a7sim.cli.train.options import progress_in, student_name, student_options
 from a7sim.errors import A7SimError
 from a7sim.journal.session_files import write_atomic
@@ -23,7 +24,7 @@ from a7sim.training.exports import HOME_PAGE, to_class_document, to_nbgrader, to
 @options.as_document
 @student_options
 def list_(exercise: str | None, as_document: bool, home: Path | None, student: str | None) -> None:
-    """List the exercises and how far they are done; or show what EXERCISE is about.
+    """List the exercises and the progress in them; or show the text of EXERCISE.
 
     Example: a7sim train list 4
     """
@@ -77,26 +78,31 @@ def _shown(exercise_folder: ExerciseFolder) -> str:
     return "\n".join([exercise_folder.text.strip(), "", "To do:", *steps, "", "Graded (points):", *criteria, "", facts])
 
 
-@click.command("report")
-@click.option("--class", "whole_class", is_flag=True, help="Of all students; otherwise of one.")
+@click.command("report", cls=command_with_renamed_options({"--to": "--format"}))
+@click.option("--class", "whole_class", is_flag=True, help="All students instead of one.")
 @click.option(
-    "--to",
+    "--format",
+    "to",
     type=click.Choice(["html", "csv", "json", "xapi"]),
     default="html",
     show_default=True,
     help="A page, nbgrader's table, a document, or statements for a learning record store.",
 )
-@options.out_file("the sheet", "standard output")
+@options.out_file("the page", "standard output")
 @click.option(
-    "--home-page", metavar="URL", default=HOME_PAGE, show_default=True, help="Of the students' accounts, for xapi."
+    "--home-page",
+    metavar="URL",
+    default=HOME_PAGE,
+    show_default=True,
+    help="xapi: home page of the students' accounts.",
 )
 @student_options
 def report_(
     whole_class: bool, to: str, out: Path | None, home_page: str, home: Path | None, student: str | None
 ) -> None:
-    """Write the sheet of a student or of the class: HTML with figures, CSV as nbgrader's, JSON, or xAPI statements.
+    """Write the page of a student or of the class: HTML with figures, CSV as nbgrader's, JSON, or xAPI statements.
 
-    Example: a7sim train report --class --to html --out class.html
+    Example: a7sim train report --class --format html --out class.html
     """
     whose = None if whole_class else student_name(student)
     with progress_in(home) as progress:

@@ -1,4 +1,4 @@
-"""`a7sim train start`: sit down at an exercise, play a script of it, or serve it."""
+"""`a7sim train start`: start an exercise in the console, by a script, or as a server."""
 
 import re
 from contextlib import AbstractContextManager
@@ -8,7 +8,8 @@ import click
 
 from a7sim.cli import options
 from a7sim.cli.completers import exercise_argument
-from a7sim.cli.serve import USUAL, ServedInstrument, StartupMessages, serve
+from a7sim.cli.renamed import command_with_renamed_options
+from a7sim.cli.serve import DEFAULT_ADDRESS, ServedInstrument, StartupMessages, serve
 from a7sim.cli.train.open_console import open_console
 from a7sim.cli.train.options import progress_in, student_name, student_options
 from a7sim.errors import A7SimError
@@ -28,21 +29,21 @@ from a7sim.training.exercise import ExerciseFolder
 from a7sim.training.progress import EXAM, PRACTICE, Attempt, Progress
 
 EXAMINATION = "exam"
-"""The exercise that an exam is about where none is named: a part of the name of its folder."""
+"""Default exercise of an exam: a part of the name of its folder."""
 
 
-@click.command("start")
+@click.command("start", cls=command_with_renamed_options({"--anew": "--new"}))
 @click.argument("exercise", required=False, shell_complete=exercise_argument)
 @click.option(
     "--exam",
     is_flag=True,
-    help="No hints, nothing ticks, one grading; another seed than for practice. Without EXERCISE, the examination.",
+    help="No hints and no ticks, one grading, another seed. Without EXERCISE, the examination.",
 )
-@click.option("--anew", is_flag=True, help="Begin anew where an attempt is under way; that one is kept.")
+@click.option("--new", "anew", is_flag=True, help="Start a new attempt; a present one is closed and kept.")
 @options.seed("your own")
-@click.option("--script", type=options.FILE, help="Do it by a script (.a7s).")
-@click.option("--link", metavar="tcp://HOST:PORT", help="Serve it there for any client instead of opening the console.")
-@click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp://{USUAL}.")
+@click.option("--script", type=options.FILE, help="Run a script (.a7s).")
+@click.option("--link", metavar="tcp://HOST:PORT", help="Serve it at this address instead of opening the console.")
+@click.option("--serve", "serves", is_flag=True, help=f"Serve it at tcp://{DEFAULT_ADDRESS}.")
 @options.plain
 @student_options
 def start_(
@@ -57,7 +58,7 @@ def start_(
     home: Path | None,
     student: str | None,
 ) -> None:
-    """Sit down at EXERCISE, or go on with the attempt under way: its goal, a checklist that ticks itself, the console.
+    """Start EXERCISE, or resume the present attempt: its goal, an automatic checklist, the console.
 
     Example: a7sim train start 4
     """
@@ -67,7 +68,7 @@ def start_(
         )
     if sum((script is not None, link is not None, serves)) > 1:
         raise A7SimError("train start: expected one of --script, --link and --serve, got several")
-    address = _address(link) if link is not None else USUAL if serves else None
+    address = _address(link) if link is not None else DEFAULT_ADDRESS if serves else None
     played = read_script(script) if script is not None else None
     exercise_folder = find_exercise(exercise or EXAMINATION)
     with progress_in(home) as progress:
@@ -86,7 +87,7 @@ def start_(
             _serve(environment, address)
         else:
             open_console(environment, checklist, plain)
-    click.echo(f"a7sim train verify {exercise_folder.exercise.number} grades it; a7sim train start goes on with it")
+    click.echo(f"a7sim train grade {exercise_folder.exercise.number} grades it; a7sim train start resumes it")
 
 
 def _attempt(
@@ -98,7 +99,7 @@ def _attempt(
             return there
         if there.mode == EXAM:
             raise A7SimError(
-                f"{exercise_folder.name}: expected --exam, since an exam is under way (verify ends it, --anew drops it)"
+                f"{exercise_folder.name}: expected --exam, because an exam is open (grade ends it, --new closes it)"
             )
     return progress.begin(student, exercise_folder, mode, seed)
 

@@ -1,16 +1,14 @@
-"""What all deeds have in common: the console they are done at, and readings that somebody types in."""
+"""Base of all actions: the console they belong to, and readings that the user types in."""
 
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
+from a7sim.console.context import ConsoleContext
 from a7sim.console.state.readouts import Readouts
 from a7sim.console.state.selection import ControlSelection
 from a7sim.console.widgets.dialogs import Ask
 from a7sim.plotters import Variant
-
-if TYPE_CHECKING:
-    from a7sim.console.app import Console
 
 PROJECTORS = {1: "left", 2: "right"}
 
@@ -18,11 +16,11 @@ _READING = r"([XYZ])\s*=?\s*([-+]?[0-9]*\.?[0-9]+)"
 
 
 class ActionBase:
-    """Somebody at a console, the only class that has these deeds."""
+    """Base class of the console's actions."""
 
     @property
-    def _console(self) -> "Console":
-        return cast("Console", self)
+    def _console(self) -> ConsoleContext:
+        return cast("ConsoleContext", self)
 
     def _at(self) -> tuple[Variant, Readouts]:
         console = self._console

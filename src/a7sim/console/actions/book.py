@@ -1,4 +1,4 @@
-"""What is written down: readings recorded and struck out, remarks."""
+"""Actions of the book: readings recorded and struck out, remarks."""
 
 from a7sim.console.actions.base import ActionBase
 from a7sim.console.widgets.book import RecordedEntry, record
@@ -9,10 +9,10 @@ STRIKE_REASON = "struck out at the console"
 
 
 class BookActions(ActionBase):
-    """The deeds of the book."""
+    """Actions of the book."""
 
     def do_record(self) -> None:
-        """Record a reading of the point gone to, or ask for its name."""
+        """Record a reading of the current point, or ask for its name."""
         console = self._console
         if console.point is not None:
             self._record(console.point)
@@ -20,7 +20,7 @@ class BookActions(ActionBase):
             self.do_record_as()
 
     def do_record_as(self) -> None:
-        """Record a reading of a point that is named."""
+        """Record a reading of a named point."""
         self._console.push_screen(Ask("record: name of the point"), self._record)
 
     def _record(self, point: str | None) -> None:
@@ -38,7 +38,7 @@ class BookActions(ActionBase):
             console.refresh_panels()
 
     def do_strike(self) -> None:
-        """Strike the last reading out that is not struck yet, once all that was ordered before is in the book."""
+        """Strike out the last valid reading, once all earlier requests are in the book."""
         self._console.call_after_orders(self._strike_last)
 
     def _strike_last(self) -> None:

@@ -1,4 +1,4 @@
-"""What the hands do: they turn wheels and drums, and run them to readings that somebody types in."""
+"""Actions of the controls: turning wheels and drums, and driving them to typed readings."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from a7sim.link.headers import header
 
 
 class ControlActions(ActionBase):
-    """The deeds of the hands."""
+    """Actions of the controls."""
 
     def move(self, axis: str, way: int) -> None:
         """Turn a handwheel or the foot disc by a step."""
@@ -23,7 +23,7 @@ class ControlActions(ActionBase):
         console.thread.submit(order)
 
     def take_up(self, name: str) -> None:
-        """Take up an element, if the plotter has it."""
+        """Select an element, if the plotter has it."""
         console = self._console
         variant, _ = self._at()
         taken = replace(console.selection, name=name)
@@ -33,11 +33,11 @@ class ControlActions(ActionBase):
         self._hold(taken)
 
     def do_left_side(self) -> None:
-        """Take the left projector's."""
+        """Select the left projector's element."""
         self._hold(replace(self._console.selection, side=1))
 
     def do_right_side(self) -> None:
-        """Take the right projector's."""
+        """Select the right projector's element."""
         self._hold(replace(self._console.selection, side=2))
 
     def do_finer(self) -> None:
@@ -49,15 +49,15 @@ class ControlActions(ActionBase):
         self._hold(self._console.selection.stepping(1))
 
     def do_turn_up(self) -> None:
-        """Turn the element in hand forward."""
+        """Turn the selected element forward."""
         self._console.thread.send(self._console.selection.turned(1))
 
     def do_turn_down(self) -> None:
-        """Turn the element in hand back."""
+        """Turn the selected element back."""
         self._console.thread.send(self._console.selection.turned(-1))
 
     def wheel(self, drum: str, way: int) -> None:
-        """Turn the drum under the mouse; an element is taken up by it."""
+        """Turn the drum under the mouse and select its element."""
         console = self._console
         if console.dials is None:
             return
@@ -76,7 +76,7 @@ class ControlActions(ActionBase):
             console.thread.send(console.selection.turned(way))
 
     def do_free_hand(self) -> None:
-        """Let X and Y go free of the wheels, or take the wheels again."""
+        """Disengage X and Y from the wheels, or engage them again."""
         console = self._console
         free = not console.selection.free
         self._hold(replace(console.selection, free=free))
@@ -87,7 +87,7 @@ class ControlActions(ActionBase):
         )
 
     def clicked(self, across: int, up: int) -> None:
-        """In free hand, bring a place of the left eyepiece's picture under the mark."""
+        """In free hand, move a position of the left eyepiece's picture under the mark."""
         console = self._console
         sight, selection = console.sight, console.selection
         if not selection.free or sight is None or not sight.look.columns:
@@ -102,7 +102,7 @@ class ControlActions(ActionBase):
         console.thread.send(f"DRIV:X {dials.counter('X') + x:.2f};Y {dials.counter('Y') + y:.2f}")
 
     def do_set(self) -> None:
-        """Set the element in hand to a reading."""
+        """Set the selected element to a reading."""
         console = self._console
         variant, dials = self._at()
         element = console.selection.element
@@ -113,7 +113,7 @@ class ControlActions(ActionBase):
         )
 
     def do_drive(self) -> None:
-        """Run carriages to readings."""
+        """Drive carriages to readings."""
         self._ask_axes("run to readings", "such as: X 97.5 Y -12 Z -325.71", self._drive)
 
     def _drive(self, readings: list[tuple[str, str]]) -> None:

@@ -1,4 +1,4 @@
-"""What the station tells, and what becomes of it: what the console knows, the banner, the book, the first keys."""
+"""Handlers of messages from the instrument thread: state of the console, banner, book, early keys."""
 
 from collections.abc import Callable
 from functools import partial
@@ -19,7 +19,7 @@ from a7sim.link.client.client import Client
 
 
 class StationUpdate(Message):
-    """The station tells something."""
+    """Update from the instrument thread."""
 
     def __init__(self, news: StationMessage) -> None:
         super().__init__()
@@ -27,7 +27,7 @@ class StationUpdate(Message):
 
 
 class AnswerReady(Message):
-    """Something that was asked has been answered: what is to be done with it."""
+    """Answer to a request, with its callback."""
 
     def __init__(self, then: Callable[[], None]) -> None:
         super().__init__()
@@ -35,10 +35,10 @@ class AnswerReady(Message):
 
 
 class MessageHandlers(ActionBase):
-    """What is asked of the station, and told by it."""
+    """Requests to the instrument thread, and handlers of its messages."""
 
     def ask(self, work: Callable[[Client], Any], then: Callable[[Any], None]) -> None:
-        """Have something asked in the station's thread, and go on with the answer in the screen's."""
+        """Run a request in the instrument thread, and call back with the answer in the screen's thread."""
         console = self._console
 
         def order(client: Client) -> None:
@@ -48,19 +48,19 @@ class MessageHandlers(ActionBase):
         console.thread.submit(order)
 
     def call_after_orders(self, then: Callable[[], None]) -> None:
-        """Go on when all that was ordered so far is said, and what came of it is known."""
+        """Call back when all earlier requests are sent and their results shown."""
         self.ask(lambda _: None, lambda _: then())
 
     def _tell(self, news: StationMessage) -> None:
         self._console.post_message(StationUpdate(news))
 
     def on_answer_ready(self, done: AnswerReady) -> None:
-        """Go on with an answer, unless the screen is gone."""
+        """Call back with an answer, unless the screen is closed."""
         if self._console.main.is_there:
             done.then()
 
     def on_station_update(self, told: StationUpdate) -> None:
-        """Show what the station tells, unless the screen is gone."""
+        """Show an update, unless the screen is closed."""
         console = self._console
         if not console.main.is_there:
             return
@@ -93,7 +93,7 @@ class MessageHandlers(ActionBase):
         console.call_after_refresh(console.look)
 
     def _begin(self, met: Connected) -> None:
-        """Take up what was there before anybody sat down here."""
+        """Read the state of the instrument before the console was opened."""
         console = self._console
         past = console.config.history
         watching = console.config.watching
@@ -131,7 +131,7 @@ class MessageHandlers(ActionBase):
             console.press_early_keys()
 
     def _keep_book(self, dials: Readouts) -> None:
-        """Have the book as the recorder has it."""
+        """Update the book from the recorder."""
         console = self._console
         if (dials.records, dials.struck) != (len(console.entries), sum(entry.struck for entry in console.entries)):
             self.ask(partial(read_book, records=dials.records), self._open_book)

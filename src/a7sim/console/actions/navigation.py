@@ -1,7 +1,7 @@
-"""Driving near a point of the sketch, and telling where on the print the mark stands, by what the counters show.
+"""Driving near a point of the sketch, and the position of the mark on the print, by the counters.
 
-A person reads the sketch, the counters and the elements, and knows the plotter from its manual. Counters that
-somebody has preset are read against `Presets`: what they showed in the origin of the frame.
+A user reads the sketch, the counters and the elements, and knows the data of the plotter. Preset counters are read
+relative to `CounterOrigins`: their readings at the origin of the frame.
 """
 
 from collections.abc import Mapping
@@ -17,48 +17,48 @@ from a7sim.link.client.client import Client
 from a7sim.plotters import Variant
 
 SEARCH_STEP_MM, SEARCH_RINGS = 8.0, 2
-"""A point that is not in view is looked for round about, at photo scale."""
+"""Steps and rings of the search for a point that is not in view, at photo scale."""
 
 NEAR_MM = 0.5
-"""How near the eye brings the mark to a point that it sees, at photo scale; the rest is the hands'."""
+"""Distance to which the mark is brought to a visible point, at photo scale; the user does the rest."""
 
 
 @dataclass
 class CounterOrigins:
-    """What each counter shows in the origin of the frame, and its units a mm there."""
+    """Reading of each counter at the origin of the frame, and its units per mm."""
 
     origins: dict[str, float] = field(default_factory=dict)
     units: dict[str, float] = field(default_factory=dict)
 
     def frame(self, variant: Variant, dials: Readouts) -> Array:
-        """Return where the mark stands in the frame ``(3,)``, mm, as the counters show it."""
+        """Return the position of the mark in the frame ``(3,)``, mm, by the counters."""
         return np.array(
             [(dials.counter(axis) - self.origin(variant, axis)) / self.unit(variant, axis) for axis in "XYZ"]
         )
 
     def origin(self, variant: Variant, axis: str) -> float:
-        """Return what a counter shows in the origin."""
+        """Return the reading of a counter at the origin."""
         return self.origins.get(axis, variant.scales[axis].at_origin)
 
     def unit(self, variant: Variant, axis: str) -> float:
-        """Return the units a mm of a counter."""
+        """Return the units per mm of a counter."""
         return self.units.get(axis, variant.scales[axis].units_per_mm)
 
     def preset(self, variant: Variant, dials: Readouts, axis: str, reading: float) -> None:
-        """Take note that a counter is made to show a reading where it stands, if it is one that can be."""
+        """Record that a counter is preset to a reading, if it can be."""
         if not variant.scales[axis].preset:
             return
         self.origins[axis] = self.origin(variant, axis) + reading - dials.counter(axis)
 
     def regeared(self, variant: Variant, dials: Readouts, units: float) -> None:
-        """Take note of another height gear: the Z reading stays as it is and goes on from there."""
+        """Record another height gear: the Z reading is unchanged and continues from there."""
         height = self.frame(variant, dials)[2]
         self.units["Z"] = units
         self.origins["Z"] = dials.counter("Z") - height * units
 
 
 def displayed_pose(variant: Variant, dials: Readouts, projector: int) -> tuple[Array, Array]:
-    """Return centre ``(3,)`` and rotation ``(3, 3)`` of a projector as its counters show them."""
+    """Return centre ``(3,)`` and rotation ``(3, 3)`` of a projector by its counters."""
     show = {name: float(dials.elements.get(name, "0")) for name in (*variant.elements, "by1", "by2", "bz1", "bz2")}
     counts = {name: np.asarray(reading) for name, reading in show.items()}
     turned = rotation(*(tilt * GON for tilt in variant.tilts(counts, projector)))
@@ -72,7 +72,7 @@ def displayed_pose(variant: Variant, dials: Readouts, projector: int) -> tuple[A
 
 
 def print_position(variant: Variant, dials: Readouts, presets: CounterOrigins, projector: int) -> Place:
-    """Return about where on the print in a projector the mark stands, mm."""
+    """Return the approximate position of the mark on the print in a projector, mm."""
     centre, turned = displayed_pose(variant, dials, projector)
     x, y = image_of(presets.frame(variant, dials), centre, turned, dials.element(f"c{projector}"))
     return float(x), float(y)
@@ -81,7 +81,7 @@ def print_position(variant: Variant, dials: Readouts, presets: CounterOrigins, p
 def readings_over(
     variant: Variant, dials: Readouts, presets: CounterOrigins, projector: int, place: Place
 ) -> dict[str, float]:
-    """Return the X and Y readings that bring the mark over a place of the print, at its present height."""
+    """Return the X and Y readings with the mark over a position of the print, at its present height."""
     centre, turned = displayed_pose(variant, dials, projector)
     ray = ray_of(np.array(place), turned, dials.element(f"c{projector}"))
     met = at_level(centre, ray, presets.frame(variant, dials)[2])
@@ -93,7 +93,7 @@ def readings_over(
 
 @dataclass(frozen=True)
 class PointNavigator:
-    """A way to a point of the sketch of what lies in a projector."""
+    """Navigator to a point of the sketch of a projector's picture."""
 
     variant: Variant
     dials: Readouts
@@ -122,7 +122,7 @@ class PointNavigator:
         client.send("DRIV:" + ";".join(f"{axis} {reading:.2f}" for axis, reading in readings.items()))
 
     def _approach(self, client: Client, point: str, seen: tuple[float, float]) -> None:
-        """Turn both wheels as far as the eye sees the point beside the mark, to within `NEAR_MM`."""
+        """Turn both wheels until the point is within `NEAR_MM` of the mark."""
         for _ in range(3):
             if max(map(abs, seen)) <= 1e3 * NEAR_MM:
                 return
@@ -140,14 +140,14 @@ class PointNavigator:
 
 
 def _outward() -> list[Place]:
-    """Return where to look for a point: in the middle, then round about, nearest first."""
+    """Return the positions to search: the middle, then rings, nearest first."""
     span = range(-SEARCH_RINGS, SEARCH_RINGS + 1)
     places = [(SEARCH_STEP_MM * i, SEARCH_STEP_MM * j) for i in span for j in span]
     return sorted(places, key=lambda place: place[0] ** 2 + place[1] ** 2)
 
 
 def fetch_sketch(projector: int, picture: str, client: Client) -> dict[str, Place]:
-    """Ask for the points that are pricked on the print in a projector."""
+    """Query the points that are pricked on the print in a projector."""
     if not picture:
         return {}
     fields = client.fields(f"PHOT{projector}:SKET?")

@@ -1,4 +1,4 @@
-"""What who watches does: plays what was done, or looks on; hands are off."""
+"""Playback actions: replay a recording or follow a live instrument. Moving the instrument is disabled."""
 
 from typing import TYPE_CHECKING
 
@@ -17,23 +17,23 @@ _LOOKED = {deed.name for deed in actions_for(watching=True) if deed.group in VIE
 
 
 class PlaybackActions(ActionBase):
-    """The deeds of who watches."""
+    """Actions of playback."""
 
     def reject_if_watching(self, deed: str = "") -> bool:
-        """Return whether a deed is not for who watches, and say so."""
+        """Return whether an action is disabled while watching, with a message."""
         console = self._console
         if not console.config.watching or deed in _LOOKED or (console.playback is not None and deed in _PLAYED):
             return False
         if console.playback is None:
             why = "there is nothing to play" if deed in _PLAYED else "hands are off"
-            console.say(f"{why}: you watch what somebody else does at {console.config.where} now", refused=True)
+            console.say(f"{why}: this console only watches {console.config.where}", refused=True)
         else:
             keys = key_labels(console.config.keymap, not console.utf8)
             console.say(f"hands are off: what you watch has been done; {keys['play']} plays and pauses", refused=True)
         return True
 
     def show_frame(self, frame: "Frame") -> None:
-        """Show how far the film is, and take from it what a person there would know."""
+        """Show the present step, and update the state of the console from it."""
         console = self._console
         playback = self._playback()
         console.presets = CounterOrigins(dict(frame.origins), dict(frame.units))
@@ -63,25 +63,25 @@ class PlaybackActions(ActionBase):
         self._progress()
 
     def do_step_on(self) -> None:
-        """Run on by a line that was said."""
+        """Move forwards by a line."""
         self._playback().go_by(1)
 
     def do_step_back(self) -> None:
-        """Run back by a line that was said."""
+        """Move backwards by a line."""
         self._playback().go_by(-1)
 
     def do_next_record(self) -> None:
-        """Run on to the next registration."""
+        """Move forwards to the next registration."""
         if not self._playback().go_to_record(1):
             self._console.say("nothing more is registered")
 
     def do_last_record(self) -> None:
-        """Run back to the registration before."""
+        """Move backwards to the previous registration."""
         if not self._playback().go_to_record(-1):
             self._console.say("nothing is registered before")
 
     def do_jump(self) -> None:
-        """Ask for a place in the session and run to it."""
+        """Ask for a position in the session and move to it."""
         console = self._console
 
         def answered(words: str | None) -> None:
@@ -99,5 +99,5 @@ class PlaybackActions(ActionBase):
 
     def _playback(self) -> Playback:
         playback = self._console.playback
-        assert playback is not None, "only where there is a film these deeds are done"
+        assert playback is not None, "playback actions need a recording"
         return playback

@@ -1,4 +1,4 @@
-"""What a person who sits down again still knows of the session: what they preset, from what was said then."""
+"""Recovery of counter presets from the lines of an earlier session."""
 
 import re
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ from a7sim.plotters import Variant
 
 @dataclass(frozen=True)
 class LoggedLine:
-    """A line as it crossed the link, to the instrument or from it."""
+    """Line on the link, to the instrument or from it."""
 
     text: str
     answers: bool = False
@@ -23,10 +23,9 @@ _GEARED = re.compile(r":?GEAR:HEIG(?:HT)? (.+)", re.IGNORECASE)
 
 
 def recover_presets(variant: Variant, past: Iterable[LoggedLine], gear: str = "") -> CounterOrigins:
-    """Return the presets that were made before, by what this console said and what it was told of the counters.
+    """Return the presets of an earlier session, from its lines and its counter readings.
 
-    `gear` is the height gear that is engaged now. Where nobody is known to have engaged it, the counter of Z is taken
-    to have stood at its zero then.
+    `gear` is the engaged height gear. If no line engaged it, the Z counter is assumed at its zero then.
     """
     presets = CounterOrigins()
     dials: Readouts | None = None
@@ -44,13 +43,13 @@ def recover_presets(variant: Variant, past: Iterable[LoggedLine], gear: str = ""
 
 
 def gear_units(variant: Variant, gear: str) -> float:
-    """Return the units a mm that a height gear gives."""
+    """Return the units per mm of a height gear."""
     known = variant.height_gears.get(gear)
     return known.units_per_mm if known else float(gear)
 
 
 def update_presets(presets: CounterOrigins, variant: Variant, dials: Readouts, line: str) -> None:
-    """Take note of what a line presets or engages, where that is what it does; the dials are those before it."""
+    """Record the effect of a line that presets a counter or engages a gear; the readouts are those before it."""
     for unit in line.split(";"):
         if preset := _PRESET.fullmatch(unit):
             presets.preset(variant, dials, preset[1].upper(), float(preset[2]))

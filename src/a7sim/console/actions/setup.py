@@ -1,4 +1,4 @@
-"""What is done at the bench rather than at the wheels: pictures, levers, gears, presets; chosen from a list."""
+"""Setup actions, chosen from a list: pictures, fittings, gears, presets."""
 
 from collections.abc import Callable
 from functools import partial
@@ -14,10 +14,10 @@ from a7sim.plotters import POSITIONS_OF
 
 
 class SetupActions(ActionBase):
-    """The deeds of the bench."""
+    """Actions of the setup."""
 
     def do_bench(self) -> None:
-        """Offer all that is done at the bench rather than at the wheels."""
+        """Offer all setup actions."""
         self._console.ask(lambda client: client.fields("PHOT:CAT?"), self._bench)
 
     def _bench(self, catalogue: list[str]) -> None:

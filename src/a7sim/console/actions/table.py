@@ -1,4 +1,4 @@
-"""What every key does: a method a deed, each one order to the station or one change of the view."""
+"""Table of actions: one method per action, which sends a request or changes the view."""
 
 from functools import partial
 from typing import Any
@@ -26,10 +26,10 @@ ACTIONS_WHILE_DISCONNECTED = ("quit", "help")
 
 
 class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackActions):
-    """The deeds of a console."""
+    """All actions of a console."""
 
     def run_by_name(self, name: str) -> None:
-        """Do what a key or the palette asks for."""
+        """Run the action of a key or of the palette."""
         if (self._console.dials is None and name not in ACTIONS_WHILE_DISCONNECTED) or self.reject_if_watching(name):
             return
         if name in _TURNS:
@@ -59,7 +59,7 @@ class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackAc
         console.push_screen(Choose("drive near a point", choices), chosen)
 
     def approach_point(self, projector: int, point: str) -> None:
-        """Drive near a point of the sketch of what lies in a projector."""
+        """Drive near a point of the sketch of a projector's picture."""
         console = self._console
         variant, dials = self._at()
         reach = PointNavigator(variant, dials, console.presets, projector, console.sketches[projector])
@@ -77,7 +77,7 @@ class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackAc
         console.ask(partial(reach.drive_near, point=point), arrived)
 
     def do_say(self) -> None:
-        """Say a line of the command language."""
+        """Send a line of the command language."""
         self._console.push_screen(Ask("say", note="a line of the command language"), self._said)
 
     def _said(self, line: str | None) -> None:
@@ -108,5 +108,5 @@ class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackAc
         )
 
     def do_quit(self) -> None:
-        """Leave; everything is in the book and the journal."""
+        """Quit; everything is in the book and the journal."""
         self._console.exit()

@@ -1,4 +1,4 @@
-"""What the eyes do: magnify, open and close, and how the pictures are drawn for them."""
+"""View actions: magnification, open eyepieces, and drawing mode."""
 
 from typing import Any
 
@@ -14,15 +14,15 @@ MERGED = ("side by side", "anaglyph", "flicker")
 
 
 class ViewActions(ActionBase):
-    """The deeds of the eyes."""
+    """Actions of the view."""
 
     @property
     def view(self) -> ViewSettings:
-        """How the eyepieces show what they see."""
+        """Settings of the eyepieces."""
         return self._console.binocular.view
 
     def look(self) -> None:
-        """Ask for the pictures that the eyepieces have room for."""
+        """Request pictures of the size of the eyepieces."""
         console = self._console
         if console.met is None or not console.main.is_there:
             return
@@ -30,7 +30,7 @@ class ViewActions(ActionBase):
         console.call_after_refresh(lambda: console.thread.look(console.binocular.look(console.point)))
 
     def draw(self) -> None:
-        """Draw what the eyes see."""
+        """Draw the pictures."""
         console = self._console
         if console.sight is None or not console.main.is_there:
             return
@@ -53,7 +53,7 @@ class ViewActions(ActionBase):
         console.say(f"{point}: {describe_parallax(both, acuity)}")
 
     def set_view(self, **changes: Any) -> None:
-        """Change how the eyepieces show what they see."""
+        """Change the settings of the eyepieces."""
         console = self._console
         console.binocular.set_view(**changes)
         self.look()
@@ -73,17 +73,17 @@ class ViewActions(ActionBase):
         self.set_view(magnification=MAGNIFICATIONS[min(max(at, 0), len(MAGNIFICATIONS) - 1)])
 
     def do_eyes(self) -> None:
-        """Open both eyes, the left, the right."""
+        """Open both eyepieces, the left, the right."""
         self.set_view(eyes=_next(EYES, self.view.eyes))
 
     def do_merge(self) -> None:
-        """See side by side, as an anaglyph, or in turns."""
+        """Show the pictures side by side, as an anaglyph, or alternating."""
         console = self._console
         self.set_view(merged=_next(MERGED, self.view.merged))
         console.say(self.view.merged)
 
     def do_drawing(self) -> None:
-        """Draw the pictures another way."""
+        """Change the drawing mode."""
         console = self._console
         ways = tuple(DrawingMode) if console.utf8 else (DrawingMode.ASCII, DrawingMode.WORDS)
         self.set_view(drawing=_next(ways, self.view.drawing))

@@ -1,19 +1,19 @@
-"""What an eye would say of an image beside the mark, for screen readers and for `--plain`; refusals in words."""
+"""Descriptions in words of an image beside the mark, for screen readers and for `--plain`; errors in words."""
 
 import re
 
 ACUITY_UM = 10.0
-"""What the eye tells apart, um at photo scale, unless somebody says otherwise."""
+"""Default acuity of the eye, um at photo scale."""
 
 
 def estimate(distance: float, acuity: float) -> float:
-    """Return a distance in um as an eye estimates it: to its acuity, and to no more than two figures."""
+    """Return a distance in um as estimated by an eye: rounded to its acuity, and to two figures."""
     size = max(acuity, 10.0 ** (len(str(int(abs(distance)))) - 2), 1.0)
     return round(distance / size) * size
 
 
 def describe_image(seen: tuple[float, float] | None, acuity: float = ACUITY_UM) -> str:
-    """Return where an image stands from the mark: dx, dy in um, +x right, +y up; None where it is not in view."""
+    """Return the position of an image relative to the mark: dx, dy in um, +x right, +y up; None if not in view."""
     if seen is None:
         return "image not in the field of view"
     across, up = (estimate(each, acuity) for each in seen)
@@ -25,7 +25,7 @@ def describe_image(seen: tuple[float, float] | None, acuity: float = ACUITY_UM) 
 
 
 def describe_parallax(parallax: tuple[float, float] | None, acuity: float = ACUITY_UM) -> str:
-    """Return how the two images disagree: px, py in um, left eye minus right eye."""
+    """Return the disagreement of the two images: px, py in um, left eye minus right eye."""
     if parallax is None:
         return "the two images cannot be compared"
     across, up = (estimate(each, acuity) for each in parallax)
@@ -37,12 +37,12 @@ def describe_parallax(parallax: tuple[float, float] | None, acuity: float = ACUI
 
 
 def format_length(um: float) -> str:
-    """Return a length for people, in um or mm."""
+    """Return a length in um or mm as text."""
     return f"{um / 1e3:.2g} mm" if abs(um) >= 1000.0 else f"{um:.0f} um"
 
 
 def describe_error(error: str) -> str:
-    """Return an entry of the instrument's error queue as people read it, without number and header."""
+    """Return an entry of the instrument's error queue without number and header."""
     _, _, text = error.partition(",")
     message, _, detail = text.strip().strip('"').partition(";")
     return re.sub(r"^[A-Z]+[A-Z0-9:?]*( \S+)?: ", "", detail) or message

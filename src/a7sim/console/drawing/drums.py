@@ -1,13 +1,13 @@
-"""Drums: counters whose digits roll, and bars that show where in its range an element stands."""
+"""Drums: counters with rolling digits, and bars for positions within a range."""
 
 ROLLING_FRAMES = 3
-"""A turned digit passes through its neighbours in so many frames, then stands still."""
+"""Frames of a rolling digit."""
 
 
 def rolling_frame(before: str, after: str, frame: int) -> str:
-    """Return what a drum shows so many frames after it was turned from one reading to another.
+    """Return the reading of a drum in a frame of its movement between two readings.
 
-    Every digit goes the short way round; signs and points change at once, and so do drums of another length.
+    Each digit moves the short way round; signs and points change at once, and so do drums of another length.
     """
     if frame >= ROLLING_FRAMES or len(before) != len(after):
         return after
@@ -22,12 +22,12 @@ def _passing(old: str, new: str, frame: int) -> str:
 
 
 def digit_windows(reading: str, digits: int) -> str:
-    """Return a reading set into so many windows before its decimals, padded at the left."""
+    """Return a reading with a fixed number of windows before its decimals, padded at the left."""
     return reading.rjust(digits)
 
 
 def bar(value: float, low: float, high: float, width: int, line: str = "─", here: str = "┃") -> str:
-    """Return a bar of so many characters that shows where a value stands between the ends of its range."""
+    """Return a bar of `width` characters with the position of a value within its range."""
     share = min(max((value - low) / (high - low), 0.0), 1.0)
     at = round(share * (width - 1))
     return line * at + here + line * (width - 1 - at)

@@ -1,4 +1,4 @@
-"""What a person who sits down has been given on paper: the job's title and the camera's certificate."""
+"""Job sheet of a user: the job's title and the camera's certificate."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from a7sim.link.client.client import Client
 from a7sim.scenario import Camera
 
 TURNED_MM = 50.0
-"""Beyond this a fiducial is not beside its collimating mark, but somewhere else."""
+"""Beyond this displacement a fiducial is misplaced rather than off its collimating mark."""
 
 
 @dataclass(frozen=True)
 class JobSheet:
-    """Title and camera certificate; no certificate where only the address of an instrument is known."""
+    """Title and camera certificate; no certificate if only the address of an instrument is known."""
 
     title: str = ""
     certificate: Camera | None = None
@@ -22,16 +22,16 @@ class JobSheet:
 
 @dataclass(frozen=True)
 class CentringResult:
-    """How a picture came to lie: what is said of it, and the principal distance that belongs to its film."""
+    """Placement of a picture: a description, and the principal distance for its film."""
 
     words: str
     principal_distance: float | None = None
 
 
 def centre_picture(client: Client, projector: int, sheet: JobSheet) -> CentringResult:
-    """Centre what lies in a projector on its collimating marks, as the fiducials show it, in two rounds.
+    """Centre the picture in a projector on its collimating marks by the fiducials, in two rounds.
 
-    Without a certificate the marks' places are not known, and the picture is shifted only.
+    Without a certificate the positions of the marks are unknown, and the picture is shifted only.
     """
     lie = CentringResult("")
     for _ in range(2):

@@ -1,4 +1,4 @@
-"""Grey bytes of an eyepiece as characters of a terminal: pure functions on arrays."""
+"""Grey values of an eyepiece as characters of a terminal: pure functions on arrays."""
 
 from enum import StrEnum
 from functools import lru_cache
@@ -11,24 +11,24 @@ Greys = npt.NDArray[np.uint8]
 """Grey values 0..255, rows from the top."""
 
 LEVELS = 32
-"""Greys that half-blocks show."""
+"""Grey levels of half-blocks."""
 
 COLOUR_LEVELS = 16
 """Levels of each eye in an anaglyph."""
 
 MARK = -1
-"""The ink of the floating mark."""
+"""Colour of the floating mark."""
 
 _SHADES = " ░▒▓█"
 _ASCII = " .:-=+*#%@"
 _BAYER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16.0 + 1.0 / 32.0
 _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 _CORNER = 0.45
-"""Share of the light that an eyepiece loses in the corners of its window."""
+"""Share of the light lost in the corners of an eyepiece's window."""
 
 
 class DrawingMode(StrEnum):
-    """Ways to draw grey on a terminal."""
+    """Drawing modes of grey values in a terminal."""
 
     HALVES = "halves"
     SHADES = "shades"
@@ -46,7 +46,7 @@ _CELLS = {
 
 
 class Run(NamedTuple):
-    """Neighbouring cells of a row that look alike: text, level of the ink and of the paper (or None, the screen's)."""
+    """Adjacent cells of a row with the same style: text, level of the foreground and of the background (or None)."""
 
     text: str
     ink: int | None = None
@@ -54,18 +54,18 @@ class Run(NamedTuple):
 
 
 def window(width: int, height: int) -> tuple[int, int]:
-    """Return columns and rows of the cells drawn in a room of so many cells: odd, so that the mark has the middle."""
+    """Return columns and rows of the picture cells within a size: odd, so that the mark is in the middle."""
     return max(1, width - (width + 1) % 2), max(1, height - (height + 1) % 2)
 
 
 def picture_size(drawing: DrawingMode, columns: int, rows: int) -> tuple[int, int]:
-    """Return columns and rows of the picture that fills so many cells; (0, 0) where nothing is drawn."""
+    """Return columns and rows of the picture that fills a number of cells; (0, 0) if nothing is drawn."""
     across, down = _CELLS.get(drawing, (0, 0))
     return columns * across, rows * down
 
 
 def is_drawn_as(drawing: DrawingMode, greys: Greys) -> bool:
-    """Return whether a picture fills whole cells in a drawing, as one that was asked for another way may not."""
+    """Return whether a picture has the shape of a drawing mode; one requested for another mode may not."""
     (rows, columns), (across, down) = greys.shape, _CELLS[drawing]
     return bool(columns % across == 0 and rows % down == 0)
 
@@ -77,17 +77,17 @@ def _vignette(rows: int, columns: int) -> npt.NDArray[np.float32]:
 
 
 def apply_vignette(greys: Greys) -> Greys:
-    """Return a picture ``(rows, columns)`` as the eyepiece shows it, darker towards the corners."""
+    """Return a picture ``(rows, columns)`` darkened towards the corners."""
     return (greys * _vignette(*greys.shape)).astype(np.uint8)
 
 
 def levels(greys: Greys, count: int = LEVELS) -> Greys:
-    """Return which of so many levels each grey is shown as."""
+    """Return the level of each grey value, of `count` levels."""
     return (greys.astype(np.uint16) * count >> 8).astype(np.uint8)
 
 
 def half_blocks(greys: Greys) -> list[list[Run]]:
-    """Return the rows of runs that show a picture ``(2 rows, columns)`` in half-blocks at 32 greys."""
+    """Return the rows of runs of a picture ``(2 rows, columns)`` in half-blocks with 32 grey levels."""
     shown = levels(greys)
     return [_runs_of_halves(upper, lower) for upper, lower in zip(shown[0::2], shown[1::2], strict=True)]
 
@@ -112,7 +112,7 @@ def _runs_of_halves(
 
 
 def shades(greys: Greys, ramp: str = _SHADES) -> list[list[Run]]:
-    """Return the runs of a picture ``(2 rows, columns)`` in shades that need no colour, light as ink."""
+    """Return the runs of a picture ``(2 rows, columns)`` in shades without colours, light as foreground."""
     cells = (greys[0::2].astype(float) + greys[1::2]) / 512.0 * (len(ramp) - 1)
     dither = np.tile(_BAYER, (cells.shape[0] // 4 + 1, cells.shape[1] // 4 + 1))[: cells.shape[0], : cells.shape[1]]
     steps = np.clip(np.floor(cells + dither).astype(int), 0, len(ramp) - 1)
@@ -125,7 +125,7 @@ def ascii_shades(greys: Greys) -> list[list[Run]]:
 
 
 def braille(greys: Greys) -> list[list[Run]]:
-    """Return the runs of a picture ``(4 rows, 2 columns)`` in dots, light as ink."""
+    """Return the runs of a picture ``(4 rows, 2 columns)`` in dots, light as foreground."""
     rows, columns = greys.shape
     dither = np.tile(_BAYER, (rows // 4 + 1, columns // 4 + 1))[:rows, :columns]
     lit = greys / 256.0 > dither
@@ -135,7 +135,7 @@ def braille(greys: Greys) -> list[list[Run]]:
 
 
 def render(drawing: DrawingMode, greys: Greys) -> list[list[Run]]:
-    """Return the rows of runs that show a picture of `picture_size`."""
+    """Return the rows of runs of a picture of `picture_size`."""
     if drawing is DrawingMode.HALVES:
         return half_blocks(greys)
     if drawing is DrawingMode.BRAILLE:
@@ -144,7 +144,7 @@ def render(drawing: DrawingMode, greys: Greys) -> list[list[Run]]:
 
 
 def overlay_mark(rows: list[list[Run]], mark: str) -> list[list[Run]]:
-    """Return the rows with the floating mark in the middle cell, on the paper that lies about it."""
+    """Return the rows with the floating mark in the middle cell, on the background around it."""
     middle = len(rows) // 2
     row = rows[middle]
     left = sum(len(run.text) for run in row) // 2

@@ -1,10 +1,10 @@
-"""The sketch of a photograph: its pricked points and where the mark stands, in characters."""
+"""Sketch of a photograph in characters: its pricked points and the mark."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 HALF_MM = 120.0
-"""Half the side of what a sketch shows, a little more than half the photograph's."""
+"""Half the side of a sketch, a little more than half the photograph's."""
 
 Place = tuple[float, float]
 """x, y on the print, mm."""
@@ -15,14 +15,14 @@ Cell = tuple[int, int]
 
 @dataclass(frozen=True)
 class SketchGrid:
-    """Rows of characters, and in which cells stand the mark (None where it is off the print) and the points."""
+    """Rows of characters, and the cells of the mark (None if off the print) and the points."""
 
     rows: list[str]
     mark: Cell | None
     points: dict[str, Cell]
 
     def nearest(self, column: int, row: int) -> str | None:
-        """Return the name of the point nearest to a cell, None where there is no point at all."""
+        """Return the name of the point nearest to a cell, None without points."""
         return min(
             self.points,
             key=lambda name: abs(self.points[name][0] - column) + 2 * abs(self.points[name][1] - row),
@@ -31,9 +31,9 @@ class SketchGrid:
 
 
 def draw_points(points: Mapping[str, Place], width: int, height: int, dot: str = "·") -> SketchGrid:
-    """Return the sketch of named places in so many columns and rows, without the mark.
+    """Return the sketch of named positions with a number of columns and rows, without the mark.
 
-    Names are written where there is room.
+    Names are written where there is space.
     """
     rows = [[" "] * width for _ in range(height)]
     cells = {name: cell for name, place in points.items() if (cell := _cell(place, width, height)) is not None}
@@ -45,7 +45,7 @@ def draw_points(points: Mapping[str, Place], width: int, height: int, dot: str =
 
 
 def overlay_mark(sketch: SketchGrid, mark: Place | None, width: int, height: int) -> SketchGrid:
-    """Return a sketch of so many columns and rows with the mark on it."""
+    """Return a sketch with the mark."""
     at = _cell(mark, width, height) if mark is not None else None
     if at is None:
         return sketch

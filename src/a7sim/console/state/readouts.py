@@ -1,4 +1,4 @@
-"""What the screen knows of an instrument: its dials as they stand, asked in one line."""
+"""Readouts: the displayed state of an instrument, queried with one line."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from a7sim.plotters import POSITIONS_OF, Variant
 
 @dataclass(frozen=True)
 class Readouts:
-    """Everything that can be read at the instrument, as it shows it."""
+    """All readings of the instrument."""
 
     counters: Mapping[str, str]
     elements: Mapping[str, str]
@@ -20,13 +20,13 @@ class Readouts:
     height_gear: str
     plan_gear: str
     pictures: tuple[str, str]
-    """Names of what lies in the left and the right projector, empty where nothing does."""
+    """Names of the pictures in the left and the right projector, empty without one."""
     records: int
-    """Registrations in the recorder."""
+    """Number of registrations in the recorder."""
     struck: int
-    """Those of them that are struck out."""
+    """Number of struck registrations."""
     errors: int
-    """Errors that the instrument has to tell."""
+    """Number of errors in the queue."""
 
     def element(self, name: str) -> float:
         """Return the reading of an element."""
@@ -38,7 +38,7 @@ class Readouts:
 
 
 def readouts_query(variant: Variant) -> str:
-    """Return the line that asks for all dials of a plotter."""
+    """Return the line that queries all readouts of a plotter."""
     return ";:".join(
         [
             "COUN?",
@@ -50,7 +50,7 @@ def readouts_query(variant: Variant) -> str:
 
 
 def parse_readouts(variant: Variant, reply: Sequence[Part]) -> Readouts:
-    """Return the dials that a reply to `question` shows. Raises ValueError for a reply to something else."""
+    """Return the readouts of a reply to `readouts_query`. Raises ValueError for another reply."""
     texts = [part if isinstance(part, str) else "" for part in reply]
     counters, *rest = texts
     elements, rest = rest[: len(variant.elements)], rest[len(variant.elements) :]

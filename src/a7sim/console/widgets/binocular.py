@@ -1,4 +1,4 @@
-"""The binocular: both eyepieces, how they show what they see, and what is drawn in them."""
+"""Binocular: both eyepieces, their settings, and their pictures."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -26,7 +26,7 @@ NAMES = {1: "left eye", 2: "right eye"}
 
 @dataclass(frozen=True)
 class ViewSettings:
-    """How the eyepieces show what they see."""
+    """Settings of the eyepieces."""
 
     drawing: DrawingMode
     magnification: float = 8.0
@@ -35,7 +35,7 @@ class ViewSettings:
 
     @property
     def is_merged(self) -> bool:
-        """Whether both pictures are shown in one eyepiece."""
+        """Return whether both pictures are shown in one eyepiece."""
         return self.merged != "side by side" and self.drawing is DrawingMode.HALVES
 
 
@@ -52,16 +52,16 @@ class Binocular(Horizontal):
         self._flicker_eye = 1
 
     def compose(self) -> ComposeResult:
-        """Lay the eyepieces side by side."""
+        """Place the eyepieces side by side."""
         yield from self._eyes.values()
 
     @property
     def is_there(self) -> bool:
-        """Whether the eyepieces are there, and not yet gone."""
+        """Return whether the eyepieces are mounted."""
         return all(each.is_attached for each in self._eyes.values())
 
     def set_view(self, **changes: Any) -> None:
-        """Change how the eyepieces show what they see."""
+        """Change the settings of the eyepieces."""
         self.view = replace(self.view, **changes)
         if self._flicker is not None:
             self._flicker.stop()
@@ -70,7 +70,7 @@ class Binocular(Horizontal):
             self._flicker = self.set_interval(FLICKER_S, self._other_eye)
 
     def lay(self) -> None:
-        """Open and close the eyepieces as the view has them."""
+        """Open and close the eyepieces by the settings."""
         view = self.view
         for eye, eyepiece in self._eyes.items():
             closed = eye == 2 if view.is_merged else eye not in view.eyes
@@ -79,7 +79,7 @@ class Binocular(Horizontal):
             eyepiece.border_subtitle = f"x{view.magnification:g}"
 
     def look(self, point: str | None) -> ViewRequest:
-        """Return what the open eyepieces have room for; of a point where the view is in words."""
+        """Return a view request for the sizes of the open eyepieces; with a point for a view in words."""
         view = self.view
         open_ones = [each for each in self._eyes.values() if not each.has_class("-closed")]
         cells = min((each.cells for each in open_ones), default=(0, 0))
@@ -90,7 +90,7 @@ class Binocular(Horizontal):
         )
 
     def draw(self, sight: ViewResult) -> None:
-        """Draw the pictures that the eyes see, unless they were asked for before the drawing was another."""
+        """Draw the pictures, unless they were requested for another drawing mode."""
         self._sight = sight
         view = self.view
         fitting = {eye: greys for eye, greys in sight.pictures.items() if is_drawn_as(view.drawing, greys)}
@@ -105,7 +105,7 @@ class Binocular(Horizontal):
             self._eyes[eye].show(overlay_mark(render(view.drawing, greys), self._mark))
 
     def say(self, words: dict[int, str]) -> None:
-        """Say to each eye in words what it sees."""
+        """Show the view of each eye in words."""
         for eye, said in words.items():
             self._eyes[eye].say(said)
 

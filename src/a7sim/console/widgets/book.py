@@ -1,4 +1,4 @@
-"""The book of whoever sits there: what was recorded, in order, struck out or not."""
+"""Book of the user: registrations in order, struck out or not."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,30 +13,30 @@ from a7sim.plotters import VARIANTS
 ELEMENTS = tuple(dict.fromkeys(name for variant in VARIANTS.values() for name in variant.elements))
 
 COUNTERS = 5
-"""Values of a registration before its elements: number, point, X, Y, Z."""
+"""Number of values of a registration before its elements: number, point, X, Y, Z."""
 
 
 @dataclass(frozen=True)
 class RecordedEntry:
-    """A registration as the recorder keeps it."""
+    """Registration of the recorder."""
 
     number: int
     point: str
     counters: tuple[str, ...]
     elements: tuple[tuple[str, str], ...] = ()
-    """Element as the field writes it, such as by', and its reading."""
+    """Element in the notation of the field, such as by', and its reading."""
     struck: bool = False
 
     @classmethod
     def read(cls, values: Sequence[str]) -> "RecordedEntry":
-        """Return the entry that the values of `REC:LAST?` show."""
+        """Return the entry of the values of `REC:LAST?`."""
         number, point, *counters = values[:COUNTERS]
         rest = [each for each in values[COUNTERS:] if not each.startswith("struck:")]
         elements = tuple((_title(word), reading) for word, reading in zip(rest[0::2], rest[1::2], strict=True))
         return cls(int(number), point, tuple(counters), elements, len(rest) < len(values) - COUNTERS)
 
     def as_line(self) -> str:
-        """Return the entry for people; an x stands before one that is struck out."""
+        """Return the entry as a line; an x marks a struck one."""
         readings = "".join(f"{reading:>8}" for reading in self.counters)
         elements = "".join(f"  {word} {reading}" for word, reading in self.elements)
         return f"{'x' if self.struck else ' '}{self.number:>3} {self.point:<5}{readings}{elements}"
@@ -47,11 +47,11 @@ class RecordedEntry:
 
 
 BATCH_SIZE = 40
-"""Registrations that are asked for in a line."""
+"""Number of registrations queried in one line."""
 
 
 def read_book(client: Client, records: int) -> tuple[RecordedEntry, ...]:
-    """Return so many registrations of the recorder, from the first, as they stand now."""
+    """Return the first `records` registrations of the recorder."""
     entries: list[RecordedEntry] = []
     for first in range(1, records + 1, BATCH_SIZE):
         numbers = range(first, min(first + BATCH_SIZE, records + 1))
@@ -65,7 +65,7 @@ def _title(word: str) -> str:
 
 
 def record(client: Client, point: str, elements: Sequence[str]) -> RecordedEntry | None:
-    """Register the counters and elements under a point; return the entry, None where the instrument refused."""
+    """Register the counters and elements under a point; return the entry, None if the instrument rejected it."""
     words = "".join(f",{word}" for word in elements)
     before, after = client.numbers(f"REC:COUN?;:REC {quote_text(point)}{words};:REC:COUN?")
     return RecordedEntry.read(client.fields("REC:LAST?")) if after > before else None

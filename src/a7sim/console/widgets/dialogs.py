@@ -1,4 +1,4 @@
-"""What comes up over the screen: a question, a choice, and help."""
+"""Dialogs over the screen: a question, a choice, and help."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -17,7 +17,7 @@ _LEAVING: list[BindingType] = [("escape", "leave", "back")]
 
 
 class Ask(ModalScreen[str | None]):
-    """A question with a line to answer it; escape leaves without an answer."""
+    """Question with an input line; escape cancels."""
 
     BINDINGS: ClassVar[list[BindingType]] = _LEAVING
 
@@ -26,23 +26,23 @@ class Ask(ModalScreen[str | None]):
         self._question, self._answer, self._note = question, answer, note
 
     def compose(self) -> ComposeResult:
-        """Lay out the question."""
+        """Compose the question."""
         with Vertical(id="dialog") as dialog:
             dialog.border_title = self._question
             yield Input(self._answer, compact=True)
             yield Static(self._note or "Enter does it, Esc leaves it", classes="note", markup=False)
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Give the answer."""
+        """Return the answer."""
         self.dismiss(event.value.strip() or None)
 
     def action_leave(self) -> None:
-        """Give none."""
+        """Cancel."""
         self.dismiss(None)
 
 
 class Choose(ModalScreen[str | None]):
-    """A choice among named things; escape leaves without one."""
+    """Choice of named items; escape cancels."""
 
     BINDINGS: ClassVar[list[BindingType]] = _LEAVING
 
@@ -51,7 +51,7 @@ class Choose(ModalScreen[str | None]):
         self._question, self._choices, self._note = question, choices, note
 
     def compose(self) -> ComposeResult:
-        """Lay out the choices: pairs of what is returned and how it reads."""
+        """Compose the choices: pairs of returned value and text."""
         with Vertical(id="dialog") as dialog:
             dialog.border_title = self._question
             if self._note:
@@ -59,16 +59,16 @@ class Choose(ModalScreen[str | None]):
             yield OptionList(*(Option(Text(words), id=name) for name, words in self._choices))
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Return what is chosen."""
+        """Return the chosen value."""
         self.dismiss(event.option.id)
 
     def action_leave(self) -> None:
-        """Return nothing."""
+        """Cancel."""
         self.dismiss(None)
 
 
 class HelpPage(ModalScreen[None]):
-    """All keys, by what they are for."""
+    """Help: all keys, by group."""
 
     BINDINGS: ClassVar[list[BindingType]] = [*_LEAVING, ("q", "leave", "back"), ("question_mark", "leave", "back")]
 
@@ -77,13 +77,13 @@ class HelpPage(ModalScreen[None]):
         self._text = help_text(keymap, plain, watching, film)
 
     def compose(self) -> ComposeResult:
-        """Lay out the page."""
+        """Compose the page."""
         with VerticalScroll(id="dialog") as dialog:
             dialog.border_title = "help"
             yield Static(self._text, markup=False)
 
     def action_leave(self) -> None:
-        """Go back."""
+        """Close."""
         self.dismiss(None)
 
 
@@ -109,13 +109,13 @@ drum. Ctrl+P lists everything by name, themes too; Ctrl+Q leaves.
 
 
 _HOW_TO_WATCH = """\
-You watch somebody at work: what they see in both eyepieces, their
-counters, elements and book. Your hands are off; your eyes are your own.
+Playback: you see both eyepieces, the counters, the elements and the book
+of the session. Moving the instrument is disabled; the view is your own.
 """
 
 
 def help_text(keymap: Keymap, plain: bool, watching: bool = False, film: bool = True) -> str:
-    """Return the page of help."""
+    """Return the help text."""
     lines = [_HOW_TO_WATCH if watching else _HOW_TO]
     actions = actions_for(watching, film)
     for group in dict.fromkeys(action.group for action in actions):

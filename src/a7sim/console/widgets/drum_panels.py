@@ -1,4 +1,4 @@
-"""The panels of what is turned: counters and elements as drums, under the mouse too."""
+"""Panels of counters and elements as drums, also operated by the mouse."""
 
 from collections.abc import Mapping
 from time import monotonic
@@ -17,14 +17,14 @@ from a7sim.console.widgets.panels import Panel
 from a7sim.plotters import Variant
 
 ROLLING_S = 0.04
-"""Between two frames of a drum that rolls."""
+"""Interval between two frames of a rolling drum."""
 
 HURRIED_S = 0.15
-"""A drum that is turned again so soon does not roll."""
+"""A drum that is turned again within this time does not roll."""
 
 
 class DrumScrolled(Message):
-    """The mouse wheel was turned over a drum: of an element or of X, Y, Z; forward or back."""
+    """Turn of the mouse wheel over a drum: an element or X, Y, Z; forward or back."""
 
     def __init__(self, drum: str, way: int) -> None:
         super().__init__()
@@ -33,7 +33,7 @@ class DrumScrolled(Message):
 
 
 class CounterPanel(Panel):
-    """X, Y or Z as drum digits that roll."""
+    """X, Y or Z as rolling drum digits."""
 
     def __init__(self, axis: str) -> None:
         super().__init__(id=f"counter{axis}")
@@ -46,7 +46,7 @@ class CounterPanel(Panel):
         self._next: Timer | None = None
 
     def turn_to(self, reading: str) -> None:
-        """Show another reading; a drum that is turned on and on does not roll, but goes straight on to it."""
+        """Show another reading; a continuously turned drum does not roll."""
         if reading != self._to:
             now, before = monotonic(), self._turned_at
             rolls = self.rolling and self._to and now - before >= HURRIED_S
@@ -88,7 +88,7 @@ ROWS = ("kappa", "phi", "omega", "by", "bz", "c", "bx", "common_phi")
 
 
 class ElementsPanel(Panel):
-    """The elements of both projectors as drums; the one in hand is lit."""
+    """Elements of both projectors as drums; the selected one is highlighted."""
 
     def __init__(self) -> None:
         super().__init__(id="elements", classes="-chosen")
@@ -100,7 +100,7 @@ class ElementsPanel(Panel):
         self._selection: ControlSelection | None = None
 
     def show(self, variant: Variant, readings: Mapping[str, str], selection: ControlSelection | None) -> None:
-        """Show readings, and what is in hand, None where hands are off."""
+        """Show readings and the selection, None while watching."""
         if (variant, readings, selection) != (self._variant, self._readings, self._selection):
             anew = self._variant is not variant
             self._variant, self._readings, self._selection = variant, readings, selection
@@ -114,7 +114,7 @@ class ElementsPanel(Panel):
         return [name for name in ROWS if name in elements or f"{name}1" in elements]
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        """Return a row for the heads and one for each element."""
+        """Return one row for the headings and one for each element."""
         return 1 + len(self._names)
 
     def render(self) -> Text:
@@ -167,7 +167,7 @@ class ElementsPanel(Panel):
         self._wheeled(event, -1)
 
     def on_click(self, event: events.Click) -> None:
-        """Take up the element under the mouse."""
+        """Select the element under the mouse."""
         self._wheeled(event, 0)
 
     def _wheeled(self, event: events.MouseEvent, way: int) -> None:

@@ -1,4 +1,4 @@
-"""The window of an eyepiece on the screen: runs of grey as a widget."""
+"""Widget of an eyepiece: runs of grey."""
 
 from functools import lru_cache
 from textwrap import wrap
@@ -56,15 +56,15 @@ def _strip_of(row: list[Run], width: int, in_colours: bool, dark: Style, mark: S
 
 
 class EyepieceWidget(Widget):
-    """What one eye sees: the picture about the floating mark, which never leaves the middle."""
+    """View of one eye: the picture around the floating mark, which is always in the middle."""
 
     COMPONENT_CLASSES: ClassVar[set[str]] = {"eyepiece--mark"}
 
     class Resized(Message):
-        """There is another room for the picture."""
+        """The size of the picture has changed."""
 
     class Clicked(Message):
-        """A place of the picture was clicked: cells to the right of the mark and above it."""
+        """A position of the picture was clicked: cells to the right of the mark and above it."""
 
         def __init__(self, across: int, up: int) -> None:
             super().__init__()
@@ -84,7 +84,7 @@ class EyepieceWidget(Widget):
         self._styles_now: tuple[Style, Style] | None = None
 
     def notify_style_update(self) -> None:
-        """Forget what is drawn in the colours of another theme."""
+        """Discard rows drawn in the colours of another theme."""
         super().notify_style_update()
         self._styles_now = None
         self._strips = []
@@ -95,14 +95,14 @@ class EyepieceWidget(Widget):
         return window(self.content_size.width, self.content_size.height)
 
     def show(self, rows: list[list[Run]], in_colours: bool = False) -> None:
-        """Draw rows of runs, if they are not those that are shown."""
+        """Draw rows of runs if they differ from the shown ones."""
         if rows == self._rows and in_colours == self._in_colours and self._strips:
             return
         self._rows, self._in_colours, self._strips = rows, in_colours, []
         self.refresh()
 
     def say(self, words: str) -> None:
-        """Show words instead of a picture, wrapped to the room."""
+        """Show words instead of a picture, wrapped to the size."""
         lines = wrap(words, max(8, self.content_size.width))
         self.show([[Run(line)] for line in lines])
 
@@ -113,7 +113,7 @@ class EyepieceWidget(Widget):
         return [_strip_of(row, width, self._in_colours, *self._styles_now) for row in self._rows]
 
     def render_line(self, y: int) -> Strip:
-        """Return a line of the picture on the dark of the eyepiece."""
+        """Return a line of the picture on the dark background."""
         if len(self._strips) != len(self._rows):
             self._strips = self._drawn()
         if y < len(self._strips):
@@ -121,11 +121,11 @@ class EyepieceWidget(Widget):
         return Strip.blank(self.content_size.width, self.rich_style)
 
     def on_resize(self) -> None:
-        """Ask for a picture of the new size."""
+        """Request a picture of the new size."""
         self.post_message(self.Resized())
 
     def on_click(self, event: events.Click) -> None:
-        """Tell which place of the picture was clicked."""
+        """Report the clicked position of the picture."""
         columns, rows = self.cells
         offset = event.get_content_offset(self)
         if offset is not None:

@@ -1,4 +1,4 @@
-"""What stands above and below the panels: the masthead, and which keys do something now."""
+"""Header and footer: state of the instrument, and the keys that are available."""
 
 from collections.abc import Iterable, Mapping
 
@@ -10,14 +10,14 @@ from a7sim.console.state.selection import ControlSelection, element_label
 from a7sim.link.client.client import Identity
 
 WIDE_COLUMNS = 100
-"""Columns from which the masthead says all."""
+"""Columns from which the header is complete."""
 
 Hints = tuple[tuple[str, str], ...]
-"""Keys as help writes them, and what they do."""
+"""Keys as in help, and their descriptions."""
 
 
 def header_text(identity: Identity, dials: Readouts | None, job: str, seconds: float, width: int) -> str:
-    """Return the line that says which instrument this is, what lies in it, and how late it is there."""
+    """Return the header: instrument, pictures, job and time."""
     parts = [
         f"Wild {identity.model}  no. {identity.serial}",
         job,
@@ -36,7 +36,7 @@ def format_elapsed(seconds: float) -> str:
 
 
 def key_labels(keymap: Keymap, plain: bool) -> Mapping[str, str]:
-    """Return the first key of every deed as help writes it."""
+    """Return the first key of each action as in help."""
     return {name: key_display(keys[0], plain) for name, keys in keymap.items()}
 
 
@@ -48,7 +48,7 @@ def hints(
     pricked: bool,
     unstruck: bool,
 ) -> Hints:
-    """Return the keys that do something now: `pricked` where there is a sketch, `unstruck` where there is a reading."""
+    """Return the available keys: `pricked` with a sketch, `unstruck` with a valid reading."""
     arrows = keys["x_down"] + keys["x_up"] + keys["y_down"] + keys["y_up"]
     offered = (
         (True, keys["help"], "help"),
@@ -67,7 +67,7 @@ def hints(
 
 
 def hints_to_watch(keys: Mapping[str, str], magnification: float, playing: bool | None) -> Hints:
-    """Return the keys that do something while one watches; `playing` is None where there is no film."""
+    """Return the available keys while watching; `playing` is None without a recording."""
     film = (
         (keys["play"], "pause" if playing else "play"),
         (f"{keys['step_back']} {keys['step_on']}", "step"),

@@ -1,4 +1,4 @@
-"""The front of the instrument: the main screen, its panels and where they stand."""
+"""Main screen: its panels and their layout."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -27,14 +27,14 @@ Arrows and PgUp PgDn move it; y, then + and -: by'.
 l lays pictures, g goes to a point, Enter records."""
 
 PANELS = ("elements", "fittings", "side1", "side2")
-"""What a narrow screen shows at its right, one at a time."""
+"""Panels of a narrow screen, one at a time at its right."""
 
 
 class MainScreen(Screen[None]):
-    """The main screen; every key goes to the hands."""
+    """Main screen; all keys are passed to the console."""
 
     class Laid(Message):
-        """All panels are there."""
+        """All panels are mounted."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class MainScreen(Screen[None]):
         self._hinted: Hints = ()
 
     def compose(self) -> ComposeResult:
-        """Lay out the screen."""
+        """Compose the screen."""
         yield Static(id="masthead", markup=False)
         with Horizontal(id="upper"):
             with Vertical(id="left"):
@@ -94,7 +94,7 @@ class MainScreen(Screen[None]):
             self.query_one("#tasks", Static).update("\n".join(self._tasks()))
 
     def on_key(self, event: events.Key) -> None:
-        """Do what the keymap says."""
+        """Run the action of the keymap."""
         if self._welcome:
             self._welcome = ""
             self.query_one("#welcome").remove()
@@ -104,7 +104,7 @@ class MainScreen(Screen[None]):
 
     @property
     def is_there(self) -> bool:
-        """Whether the panels are there, and not yet gone."""
+        """Return whether the panels are mounted."""
         return self.app.is_running and self._counters[0].is_attached and self._binocular.is_there
 
     # --- lines ----------------------------------------------------------------------------------------
@@ -122,19 +122,19 @@ class MainScreen(Screen[None]):
         banner.set_class(words is not None, "-shown")
 
     def progress(self, words: str) -> None:
-        """Show how far a film is."""
+        """Show the progress of a recording."""
         progress = self.query_one("#progress", Static)
         progress.update(words)
         progress.set_class(True, "-shown")
 
     def show_header(self, words: str) -> None:
-        """Show the masthead."""
+        """Show the header."""
         masthead = self.query_one("#masthead", Static)
         if str(masthead.content) != words:
             masthead.update(words)
 
     def show_hints(self, hints: Hints) -> None:
-        """Show which keys do something now."""
+        """Show the available keys."""
         if hints != self._hinted:
             self._hinted = hints
             self.query_one("#hints", Static).update(hints_line(hints))
@@ -150,7 +150,7 @@ class MainScreen(Screen[None]):
     def show(
         self, variant: Variant, dials: Readouts, selection: ControlSelection | None, entries: tuple[RecordedEntry, ...]
     ) -> None:
-        """Show the dials, the hands unless they are off, and the book."""
+        """Show readouts, selection (None while watching), and book."""
         for counter in self._counters:
             counter.turn_to(dials.counters[counter.axis])
         self.query_one(ElementsPanel).show(variant, dials.elements, selection)
@@ -165,7 +165,7 @@ class MainScreen(Screen[None]):
         mark: Callable[[], Place],
         point: str | None,
     ) -> None:
-        """Show the sketch of what lies in a projector, where there is room for it, and where the mark stands."""
+        """Show the sketch of a projector's picture, if there is space for it, with the mark."""
         shown = [each for each in self._sketches if each.projector == projector and each.region]
         stands = mark() if picture and shown else None
         for sketch in shown:

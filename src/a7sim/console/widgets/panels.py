@@ -1,4 +1,4 @@
-"""The panels of the console: each shows what it is given and draws only when that changes."""
+"""Panels of the console; each is redrawn only when its contents change."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -13,7 +13,7 @@ from a7sim.plotters import POSITIONS_OF, Variant
 
 
 class Panel(Widget):
-    """A panel in a frame, with the styles that the drawings are made of."""
+    """Panel in a frame, with the styles of the drawings."""
 
     COMPONENT_CLASSES: ClassVar[set[str]] = {
         "panel--word",
@@ -37,7 +37,7 @@ class Panel(Widget):
         return self._likes[part]
 
     def notify_style_update(self) -> None:
-        """Forget the colours of another theme."""
+        """Discard the colours of another theme."""
         super().notify_style_update()
         self._likes.clear()
 
@@ -52,7 +52,7 @@ FITTING_ROWS = {
 
 
 class FittingsPanel(Panel):
-    """The fittings as levers with their words, the Zeiss parallelogram and the gears."""
+    """Fittings as levers with their positions, the Zeiss parallelogram and the gears."""
 
     def __init__(self) -> None:
         super().__init__(id="fittings")
@@ -62,14 +62,14 @@ class FittingsPanel(Panel):
         self._dials: Readouts | None = None
 
     def show(self, variant: Variant, dials: Readouts) -> None:
-        """Show how everything is fitted."""
+        """Show all fittings."""
         before = self._dials
         self._variant, self._dials = variant, dials
         if before is None or _fitted(before) != _fitted(dials):
             self.refresh()
 
     def render(self) -> Text:
-        """Return a lever a line."""
+        """Return one fitting per line."""
         if self._variant is None or self._dials is None:
             return Text()
         dials = self._dials
@@ -91,7 +91,7 @@ def _fitted(dials: Readouts) -> tuple[object, ...]:
 
 
 class BookPanel(Panel):
-    """The readings that were recorded here, the last at the bottom."""
+    """Recorded readings, the last at the bottom."""
 
     def __init__(self) -> None:
         super().__init__(id="book")
@@ -100,13 +100,13 @@ class BookPanel(Panel):
         self._entries: tuple[RecordedEntry, ...] = ()
 
     def show(self, entries: tuple[RecordedEntry, ...]) -> None:
-        """Show the entries that there is room for."""
+        """Show the entries that fit."""
         if entries != self._entries:
             self._entries = entries
             self.refresh()
 
     def render(self) -> Text:
-        """Return an entry a line."""
+        """Return one entry per line."""
         room = max(1, self.content_size.height)
         if not self._entries:
             return Text("nothing is recorded yet", self.like("faint"))

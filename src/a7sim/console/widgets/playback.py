@@ -1,4 +1,4 @@
-"""A film at its pace: played, paused, stepped through and jumped in, as the wall's clock and the keys have it."""
+"""Playback of a recording: play, pause, step and jump, by the wall clock and by keys."""
 
 import math
 from collections.abc import Callable
@@ -13,24 +13,24 @@ if TYPE_CHECKING:
     from a7sim.journal.recording import Frame, Recording
 
 SPEEDS = (1.0, 10.0, 60.0, math.inf)
-"""How many times as fast as it happened; the last as fast as it can be worked."""
+"""Multiples of the original speed; the last is as fast as possible."""
 
 TICK_S = 0.1
-"""Between two looks at the clock while a film plays."""
+"""Interval between two clock ticks while playing."""
 
 RUN_S = 0.05
-"""How long a film runs on between two pictures where it runs as fast as it can."""
+"""Duration of replay between two pictures at the highest speed."""
 
 
 class RequestRunner(Protocol):
-    """Has work done in the station's thread, and what comes of it taken up in the screen's."""
+    """Protocol: run work in the instrument thread, and call back in the screen's thread."""
 
     def __call__(self, work: "Callable[[Client], Frame]", then: "Callable[[Frame], None]") -> None:
-        """Ask."""
+        """Run the work."""
 
 
 class Playback:
-    """A film, and how it is played. `shown` is called with every frame that it comes to."""
+    """Recording and its playback. `shown` is called with each new frame."""
 
     def __init__(self, recording: "Recording", asks: RequestRunner, shown: "Callable[[Frame], None]") -> None:
         self.recording = recording
@@ -44,31 +44,31 @@ class Playback:
         self._since: tuple[float, float] | None = None
 
     def play_or_pause(self) -> None:
-        """Play, from the beginning where the film is at its end; or pause."""
+        """Play, from the start if at the end; or pause."""
         self.playing = not self.playing
         self._since = None
         if self.playing and self.frame.step >= self.recording.steps:
             self.go_to(0)
 
     def pace(self, way: int) -> None:
-        """Play at the next speed up or down."""
+        """Change the speed."""
         at = SPEEDS.index(self.speed) + way
         self.speed = SPEEDS[min(max(at, 0), len(SPEEDS) - 1)]
         self._since = None
 
     def go_to(self, step: int) -> None:
-        """Run to a step, as far as there is one."""
+        """Move to a step, limited to the existing ones."""
         self._since = None
         aim = self._aim = min(max(step, 0), self.recording.steps)
         self._run(lambda _: self.recording.seek(aim))
 
     def go_by(self, steps: int) -> None:
-        """Pause, and run on or back by so many steps."""
+        """Pause, and move by a number of steps."""
         self.playing = False
         self.go_to(self._aim + steps)
 
     def go_to_record(self, way: int) -> bool:
-        """Pause, and run to the next registration, on or back; return whether there is one."""
+        """Pause, and move to the next registration in a direction; return whether there is one."""
         self.playing = False
         step = self.recording.next_record(self._aim, way)
         if step is not None:
@@ -76,11 +76,11 @@ class Playback:
         return step is not None
 
     def jump(self, words: str) -> None:
-        """Run to the step that a number, a time or the text of a note names. Raises Mistake where there is none."""
+        """Move to the step of a number, a time or the text of a note. Raises A7SimError if there is none."""
         self.go_to(self.recording.find_step(words))
 
     def tick(self) -> None:
-        """Run on by what is due."""
+        """Move by the elapsed time."""
         if not self.playing or self._running:
             return
         if self.frame.step >= self.recording.steps:
@@ -98,7 +98,7 @@ class Playback:
         return self.recording.advance_until(lambda: monotonic() >= until)
 
     def _due(self) -> float:
-        """Return how late it is in the film by the wall's clock, counted from when it was last set going."""
+        """Return the present time of the recording by the wall clock since the last start."""
         if self._since is None:
             self._since = monotonic(), self.frame.time
         wall, filmed = self._since
@@ -116,12 +116,12 @@ class Playback:
         self._shown(frame)
 
     def interrupted(self) -> None:
-        """Forget what was asked of a film that did not answer."""
+        """Discard a request that was not answered."""
         self.playing, self._running = False, 0
 
     @property
     def progress(self) -> str:
-        """How far the film is, and who said what last."""
+        """Progress of the recording, with the last line and its client."""
         frame = self.frame
         pace = "max" if math.isinf(self.speed) else f"{self.speed:g}x"
         state = f"playing {pace}" if self.playing else f"paused ({pace})"
@@ -131,7 +131,7 @@ class Playback:
 
 
 def jump_with_message(playback: Playback, words: str) -> str | None:
-    """Jump, and return what is to be said where there is no such place."""
+    """Jump, and return the error message for an unknown position."""
     try:
         playback.jump(words)
     except A7SimError as error:

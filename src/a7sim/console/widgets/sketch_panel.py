@@ -1,4 +1,4 @@
-"""The panel of a print: the sketch of a photograph, where one clicks to drive near a point."""
+"""Panel of a print: the sketch of a photograph, clickable for driving near a point."""
 
 from collections.abc import Mapping
 
@@ -20,7 +20,7 @@ class PointClicked(Message):
 
 
 class SketchPanel(Panel):
-    """The print of a photograph: pricked points, and the mark."""
+    """Print of a photograph: pricked points, and the mark."""
 
     def __init__(self, projector: int, id: str) -> None:
         super().__init__(id=id)
@@ -35,7 +35,7 @@ class SketchPanel(Panel):
         self._pricked: tuple[object, SketchGrid] = (None, self._sketch)
 
     def show(self, picture: str, points: Mapping[str, Place], mark: Place | None, going_to: str | None) -> None:
-        """Show a print's points, where the mark stands, and which point is worked at."""
+        """Show a print's points, the mark, and the current point."""
         self._given = points, mark
         title = f"sketch {picture}" if picture else "no picture"
         if title != self._title:
@@ -43,7 +43,7 @@ class SketchPanel(Panel):
         self._draw(going_to)
 
     def on_resize(self) -> None:
-        """Draw the print in the new room."""
+        """Redraw the print in the new size."""
         self._draw(self._going_to)
 
     def _draw(self, going_to: str | None) -> None:
@@ -75,7 +75,7 @@ class SketchPanel(Panel):
         return text
 
     def on_click(self, event: events.Click) -> None:
-        """Tell which point was clicked."""
+        """Report the clicked point."""
         offset = event.get_content_offset(self)
         point = self._sketch.nearest(offset.x, offset.y) if offset is not None else None
         if point is not None:

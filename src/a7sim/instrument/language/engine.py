@@ -1,13 +1,14 @@
-"""The language engine of one client: bytes in, bytes out; no I/O, no clock of its own."""
+"""Language engine of one client: bytes in, bytes out; without I/O and without a clock of its own."""
 
 import hmac
 import math
 import re
 import zlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from a7sim.instrument.errors import AutographError, OutOfRangeError, SettingsConflictError, UnknownNameError
 from a7sim.instrument.language.commands import COMMANDS
+from a7sim.instrument.language.context import LockedInstrument
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.program import (
     CachedQuery,
@@ -21,23 +22,20 @@ from a7sim.instrument.language.program import (
 from a7sim.instrument.language.status import OPERATION_COMPLETE, SETTLING, Status
 from a7sim.instrument.language.token_redaction import redact_token
 
-if TYPE_CHECKING:
-    from a7sim.instrument.language.shared_instrument import SharedInstrument
-
 MAX_LINE_LENGTH = 4096
-"""Bytes, its end not counted."""
+"""Bytes, without the line end."""
 
 MAX_REPLY = 4 * 1024 * 1024
 """Bytes of the replies to one line."""
 
 UNITS_AT_ONCE, REPLY_AT_ONCE = 50, 64 * 1024
-"""Units of a line that are obeyed, and bytes that they reply, before other clients may have their turn."""
+"""Units of a line, and bytes of their replies, executed before other clients may have their turn."""
 
 MAX_BUFFERED_BYTES = 64 * 1024
-"""Bytes of input that wait behind a unit that waits for movement."""
+"""Bytes of input buffered behind a unit that waits for movement."""
 
 _MAX_PENDING_LENGTH = MAX_LINE_LENGTH + 2
-"""A line, the CR of its end, and one byte that shows a line to be too long."""
+"""A line, the CR of its end, and one byte that reveals a line as too long."""
 
 _TOO_MUCH = f"expected replies of at most {MAX_REPLY} bytes a line"
 
@@ -49,14 +47,14 @@ _NUMBER_OF = {
 
 
 class Engine:
-    """A client's conversation with the instrument.
+    """Session of one client with the instrument.
 
-    `waits_until` is the simulated time in s up to which the client's input waits for movement to end, None where it
-    does not. Until something is fed at that time or later, be it nothing, input is kept and nothing of it is obeyed.
-    Within a long line it is the present time now and then, so that others may have their turn.
+    `waits_until` is the simulated time in s up to which the client's input waits for movement to end, None without a
+    wait. Until `feed` is called at that time or later, possibly with no bytes, input is buffered and not executed.
+    Within a long line it is now and then the present time, so that other clients may have their turn.
     """
 
-    def __init__(self, instrument: "SharedInstrument", client: str, cr_ends_line: bool = True) -> None:
+    def __init__(self, instrument: LockedInstrument, client: str, cr_ends_line: bool = True) -> None:
         self.instrument = instrument
         self.client = client
         self.waits_until: float | None = None
@@ -77,11 +75,11 @@ class Engine:
         self._overflowed = False
 
     def feed(self, received: bytes, time: float) -> bytes:
-        """Take bytes that arrived at a simulated time in s; return the bytes of the replies."""
+        """Process bytes received at a simulated time in s; return the bytes of the replies."""
         return b"".join(self.feed_with_replies(received, time))
 
     def feed_with_replies(self, received: bytes, time: float) -> list[bytes]:
-        """Take bytes that arrived at a simulated time in s; return the reply to each line that has one."""
+        """Process bytes received at a simulated time in s; return the reply to each line that has one."""
         self._time = time
         if self.waits_until is None and not self._pending and self._admitted and self.instrument.listener is None:
             question = cached_query(received, self._cr_ends_line)
@@ -125,14 +123,14 @@ class Engine:
         self._status.report(error.number, error.detail)
 
     def _one_line(self, received: bytes) -> bool:
-        """Whether there is one whole line, as there mostly is."""
+        """Return whether the input is exactly one line, which is the usual case."""
         length = len(received)
         return received.find(b"\n") == length - 1 <= MAX_LINE_LENGTH and (
             not self._cr_ends_line or b"\r" not in received
         )
 
     def _resume(self, replies: list[bytes]) -> bytes:
-        """Obey the rest of the line that waited; return the input that waited behind it."""
+        """Execute the rest of a line that waited; return the input buffered behind it."""
         self._heard("~", "")
         self.waits_until = None
         self._obey_rest(replies)
@@ -172,7 +170,7 @@ class Engine:
         self.instrument.notify(self._time, self.client, direction, text)
 
     def _obey_rest(self, replies: list[bytes]) -> None:
-        """Obey the units of a line that are left, up to one that waits; at its end, add its reply if it has one."""
+        """Execute the remaining units of a line, up to one that waits; at its end, append its reply if it has one."""
         program = self._rest
         breath = self._reply_size + REPLY_AT_ONCE
         for place, unit in enumerate(program):
@@ -195,7 +193,7 @@ class Engine:
             self._overflowed = False
 
     def _obey(self, unit: ParsedCommand | ParseFailure) -> bool:
-        """Obey a unit; return whether it is done, or is still to come after a wait. Raises LanguageError."""
+        """Execute a unit; return False if it must wait. Raises CommandError."""
         if not self._admitted and (isinstance(unit, ParseFailure) or not unit.command.allowed_before_login):
             raise CommandError(ErrorNumber.COMMAND_PROTECTED, "expected SYSTem:LOGin first")
         if isinstance(unit, ParseFailure):
@@ -222,7 +220,7 @@ class Engine:
         return True
 
     def _has_to_wait(self) -> bool:
-        """Wait for the movement that is going on, and once only: what others begin meanwhile is theirs to wait for."""
+        """Wait for the current movement, once: movements that other clients start meanwhile are not waited for."""
         if self._waited:
             self._waited = False
         elif self._time < self.instrument.busy_until:
@@ -240,7 +238,7 @@ class Engine:
     # --- how the conversation stands ------------------------------------------------------------------
 
     def state(self) -> dict[str, Any]:
-        """Return what the lines so far have made of the conversation, none of them waiting; for `restore`."""
+        """Return the state of the session, without waiting lines; for `restore`."""
         return {
             "status": self._status.state(),
             "admitted": self._admitted,
@@ -249,7 +247,7 @@ class Engine:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from where a state was taken."""
+        """Restore a state."""
         self._status.restore(state["status"])
         self._admitted = state["admitted"]
         self._completes_at = state["completes_at"]
@@ -259,7 +257,7 @@ class Engine:
 
     @property
     def status(self) -> Status:
-        """The client's status as it stands at the time of what is being obeyed."""
+        """Status of the client at the time of execution."""
         instrument, status = self.instrument, self._status
         if self._movement_seen != instrument.busy_since:
             self._movement_seen = instrument.busy_since
@@ -273,16 +271,16 @@ class Engine:
 
     @property
     def headers(self) -> list[str]:
-        """All headers that the engine knows."""
+        """All headers of the engine."""
         return COMMANDS.headers()
 
     @property
     def errors(self) -> tuple[str, ...]:
-        """What is in the error queue, oldest first, left there."""
+        """Entries of the error queue, oldest first, without removing them."""
         return tuple(self._status.errors)
 
     def complete(self) -> None:
-        """Raise the bit of operation complete when the movement that is going on now is done (`*OPC`)."""
+        """Set the bit of operation complete when the current movement is done (`*OPC`)."""
         self._completes_at = self.instrument.busy_until
 
     def clear(self) -> None:
@@ -291,11 +289,11 @@ class Engine:
         self.cancel_completion()
 
     def cancel_completion(self) -> None:
-        """Raise no bit of operation complete that was to be raised."""
+        """Cancel a pending bit of operation complete."""
         self._completes_at = None
 
     def log_in(self, token: str) -> None:
-        """Admit the client to an instrument that asks for a token. Raises LanguageError for a wrong one."""
+        """Log the client in to an instrument with a token. Raises CommandError for a wrong one."""
         expected = self.instrument.token
         if expected is not None and not hmac.compare_digest(token.encode(), expected.encode()):
             raise CommandError(ErrorNumber.COMMAND_PROTECTED, "this is not the token")
@@ -311,7 +309,7 @@ def _as_bytes(reply: str | bytes) -> bytes:
 
 
 def loggable_reply(reply: str | bytes) -> str:
-    """Return what is told to a listener of a reply: of a block its size and checksum only."""
+    """Return a reply as recorded by a listener: size and checksum instead of a block."""
     if isinstance(reply, str):
         return reply
     return f"#block of {len(reply)} bytes, crc32 {zlib.crc32(reply):08x}"

@@ -1,4 +1,4 @@
-"""The error numbers of SCPI-1999 that the language uses."""
+"""Error numbers of SCPI-1999 used by the language."""
 
 from enum import IntEnum
 
@@ -6,7 +6,7 @@ MAX_DETAIL_LENGTH = 180
 
 
 class ErrorNumber(IntEnum):
-    """An error number that carries its message."""
+    """Error number with its message."""
 
     message: str
 
@@ -39,7 +39,7 @@ class ErrorNumber(IntEnum):
 
 
 class CommandError(Exception):
-    """A unit that cannot be obeyed or answered: an entry for the error queue."""
+    """Unit that cannot be executed: an entry for the error queue."""
 
     def __init__(self, number: ErrorNumber, detail: str = "") -> None:
         super().__init__(number, detail)
@@ -48,7 +48,7 @@ class CommandError(Exception):
 
 
 def format_entry(number: ErrorNumber, detail: str = "") -> str:
-    """Return an error as `SYSTem:ERRor?` answers it: number, then message and detail in quotes."""
+    """Return an error in the form of `SYSTem:ERRor?`: number, then message and detail in quotes."""
     printable = "".join(c if " " <= c <= "~" else "?" for c in detail).replace('"', "'")
     text = f"{number.message};{printable[:MAX_DETAIL_LENGTH]}" if printable else number.message
     return f'{int(number)},"{text}"'

@@ -1,4 +1,4 @@
-"""A line taken apart against the command table: what follows from its text alone, kept for when it comes again."""
+"""Lines parsed against the command table; the result depends on the text alone and is cached."""
 
 from functools import lru_cache
 
@@ -10,28 +10,28 @@ from a7sim.instrument.language.syntax import Mnemonic, Parameter, Unit, parse_mn
 from a7sim.instrument.language.table import Call, Command, Handler
 
 MAX_CACHED_LINE = 100
-"""Bytes of a line that is kept taken apart; longer ones seldom come twice."""
+"""Maximum bytes of a cached line; longer ones rarely repeat."""
 
 LINES_KEPT, HEADERS_KEPT = 256, 512
 
 
 class ParsedCommand(Struct, frozen=True):
-    """A unit whose command is known."""
+    """Unit with a known command."""
 
     text: str
     command: Command
     suffix: int
     given: tuple[Parameter, ...]
     bare: Call | None
-    """The call, where it takes no parameter and hence always is the same."""
+    """The call of a command without parameters, which is always the same."""
 
     def call(self, client: object) -> Call:
-        """Return the call that a client makes of the command. Raises LanguageError."""
+        """Return the call of the command for a client. Raises CommandError."""
         return self.bare or self.command.call(self.given, self.suffix, client)
 
 
 class ParseFailure(Struct, frozen=True):
-    """A unit that can be no command's."""
+    """Unit that matches no command."""
 
     number: ErrorNumber
     detail: str
@@ -47,12 +47,12 @@ Path = tuple[Mnemonic, ...]
 
 
 def parse_program(line: bytes) -> Program:
-    """Return the units of a line in order, with or without its line end. Every line begins at the root."""
+    """Return the units of a line in order, with or without its line end. Each line starts at the root."""
     return _kept(line) if len(line) <= MAX_CACHED_LINE else _taken_apart(line)
 
 
 class CachedQuery(Struct, frozen=True):
-    """A line that is nothing but a query, always means the same and need not wait: what a client polls."""
+    """Line with a single query that always has the same meaning and never waits: a client's poll."""
 
     text: str
     handler: Handler
@@ -60,7 +60,7 @@ class CachedQuery(Struct, frozen=True):
 
 
 def cached_query(received: bytes, cr_ends_line: bool) -> CachedQuery | None:
-    """Return the question that what was received is, None where it is anything else."""
+    """Return the cached query of the input, None if the input is anything else."""
     return _kept_question(received, cr_ends_line) if len(received) <= MAX_CACHED_LINE else None
 
 
@@ -90,7 +90,7 @@ def _taken_apart(line: bytes) -> Program:
 
 @lru_cache(maxsize=HEADERS_KEPT)
 def _found(header: str, query: bool, level: Path) -> tuple[Command, int, Path]:
-    """Return the command that a header names below a level, its suffix, and the level of what follows."""
+    """Return the command of a header below a level, its suffix, and the level of the next header."""
     common, rooted = header[0] == "*", header[0] == ":"
     path = parse_mnemonics(header) if common or rooted else level + parse_mnemonics(header)
     command, suffix = COMMANDS.find(path, query)

@@ -1,4 +1,4 @@
-"""The status model of IEEE 488.2 and SCPI-1999, one a client."""
+"""Status model of IEEE 488.2 and SCPI-1999, one per client."""
 
 from collections import deque
 from dataclasses import astuple, dataclass, field
@@ -12,19 +12,19 @@ POWER_ON, COMMAND_ERROR, EXECUTION_ERROR, DEVICE_ERROR, QUERY_ERROR, OPERATION_C
 _ERROR_AVAILABLE, _QUESTIONABLE, _EVENT_SUMMARY, _MASTER_SUMMARY, _OPERATION = 4, 8, 32, 64, 128
 
 SETTLING = 2
-"""Bit 1 of the operation register: something of the instrument is moving."""
+"""Bit 1 of the operation register: a part of the instrument is moving."""
 
 
 @dataclass
 class Register:
-    """A SCPI status register: the condition, the events it has risen to, and what of them is reported."""
+    """SCPI status register: condition, events, and the enabled events."""
 
     condition: int = 0
     event: int = 0
     enable: int = 0
 
     def set_condition(self, condition: int) -> None:
-        """Change the condition; bits that rise become events."""
+        """Change the condition; rising bits become events."""
         self.event |= condition & ~self.condition
         self.condition = condition
 
@@ -52,14 +52,14 @@ class Status:
         return enabled | registers | {"errors": list(self.errors)}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Report as when a state was taken."""
+        """Restore a state."""
         self.event, self.event_enable = state["event"], state["event_enable"]
         self.service_enable = state["service_enable"]
         self.operation, self.questionable = Register(*state["operation"]), Register(*state["questionable"])
         self.errors = deque(state["errors"])
 
     def report(self, number: ErrorNumber, detail: str = "") -> None:
-        """Queue an error and raise its bit; a full queue makes its last entry an overflow."""
+        """Queue an error and set its bit; in a full queue the last entry becomes an overflow."""
         if len(self.errors) < QUEUE_LENGTH:
             self.errors.append(format_entry(number, detail))
         else:
@@ -75,7 +75,7 @@ class Status:
             self.event |= QUERY_ERROR
 
     def next_error(self) -> str:
-        """Return and take off the oldest error."""
+        """Return and remove the oldest error."""
         return self.errors.popleft() if self.errors else format_entry(ErrorNumber.NO_ERROR)
 
     def read_event(self) -> int:

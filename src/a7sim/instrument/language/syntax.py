@@ -1,4 +1,4 @@
-"""Taking a command line apart: units, headers, parameters. Nothing here knows a command."""
+"""Syntax of a command line: units, headers, parameters, independent of any command."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -17,23 +17,23 @@ _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _NEVER = re.compile(r"[^ -~\t]")
 
 Mnemonic = tuple[str, int | None]
-"""In capitals, and its numeric suffix."""
+"""In capitals, with its numeric suffix."""
 
 
 class Text(Struct, frozen=True, gc=False):
-    """A parameter in quotes."""
+    """Quoted parameter."""
 
     value: str
 
 
 class Word(Struct, frozen=True, gc=False):
-    """A parameter of letters and digits, in capitals."""
+    """Parameter of letters and digits, in capitals."""
 
     value: str
 
 
 class Number(Struct, frozen=True, gc=False):
-    """A number with its unit in capitals, '' where none came."""
+    """Number with its unit in capitals, '' without a unit."""
 
     value: float
     unit: str
@@ -43,9 +43,9 @@ Parameter = Text | Word | Number
 
 
 class Unit(Struct, frozen=True, gc=False):
-    """One program message unit: its header as it came, without the question mark, and what follows it.
+    """Program message unit: its header as received, without the question mark, and the rest.
 
-    The parameters stay as they came until the header is known: a header that is none is the first thing wrong.
+    The parameters are parsed only when the header is known: an unknown header is reported first.
     """
 
     header: str
@@ -53,12 +53,12 @@ class Unit(Struct, frozen=True, gc=False):
     data: str
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return the parameters taken apart. Raises LanguageError."""
+        """Return the parsed parameters. Raises CommandError."""
         return tuple(_parameter(each.strip()) for each in _split(self.data, ",")) if self.data else ()
 
 
 def split_units(line: str) -> Iterator[str]:
-    """Yield the texts between the semicolons of a line, quotes protecting, blank ones left out."""
+    """Yield the texts between the semicolons of a line outside quotes, without blank ones."""
     for text in _split(line, ";"):
         unit = text.strip(" \t")
         if unit:
@@ -83,7 +83,7 @@ def _split_outside_quotes(text: str, separator: str) -> Iterator[str]:
 
 
 def parse_unit(text: str) -> Unit:
-    """Return a unit with its header taken apart. Raises LanguageError."""
+    """Return a unit with its parsed header. Raises CommandError."""
     never = _NEVER.search(text)
     if never is not None:
         raise CommandError(ErrorNumber.INVALID_CHARACTER, f"character number {ord(never[0])}")
@@ -97,7 +97,7 @@ def parse_unit(text: str) -> Unit:
 
 
 def parse_mnemonics(header: str) -> tuple[Mnemonic, ...]:
-    """Return the mnemonics of a header in capitals with their suffixes, None where none came. Raises LanguageError."""
+    """Return the mnemonics of a header in capitals with their suffixes, None without one. Raises CommandError."""
     if header[0] == "*":
         return ((header.upper(), None),)
     return tuple(map(_mnemonic, header.lstrip(":").split(":")))

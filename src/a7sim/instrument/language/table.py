@@ -1,4 +1,4 @@
-"""What a command looks like, and a table of them expanded once into a dictionary."""
+"""Structure of a command, and the command table, expanded once into a dictionary."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -20,37 +20,33 @@ Limits = tuple[float, float, float]
 """MIN, MAX, DEF."""
 
 
-class CommandContext(Protocol):
-    """Whoever a handler acts for; the engine's session with one client."""
-
-
 Handler = Callable[[Any, "Call"], str | bytes | None]
 
 
 class Call(Struct, frozen=True, gc=False):
-    """A command with its header suffix and its parameters, checked and in base units."""
+    """Command with its header suffix and its checked parameters in base units."""
 
     suffix: int
     arguments: tuple[Any, ...]
 
 
 class ParameterType(Protocol):
-    """A kind of parameter: how it reads what came, and how it is describe."""
+    """Type of a parameter: its parsing and its description."""
 
     @property
     def optional(self) -> bool:
         """Whether the parameter may be left out."""
 
     def read(self, parameter: Parameter, client: Any, suffix: int) -> Any:
-        """Return the value. Raises LanguageError."""
+        """Return the value. Raises CommandError."""
 
     def describe(self) -> str:
-        """Return how the parameter is written, for people."""
+        """Return the notation of the parameter for documentation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A number in mm, in gon or bare; MIN, MAX and DEF where it has limits."""
+    """Number in mm, in gon or without unit; MIN, MAX and DEF if it has limits."""
 
     unit: str = ""
     limits: Callable[[Any, int], Limits] | None = None
@@ -58,7 +54,7 @@ class Quantity:
     optional: bool = False
     name: str = "value"
     unit_there: Callable[[Any], str] | None = None
-    """Tells the unit where it depends on the instrument."""
+    """Returns the unit if it depends on the instrument."""
 
     def read(self, parameter: Parameter, client: Any, suffix: int) -> float:
         """Return the number in its base unit."""
@@ -85,7 +81,7 @@ class Quantity:
         return self.limits(client, suffix)[places[word.value]]
 
     def describe(self) -> str:
-        """Return how the number is written."""
+        """Return the notation of the number."""
         return f"<{self.name}{' ' + self.unit if self.unit else ''}>"
 
 
@@ -97,7 +93,7 @@ class Choice:
     optional: bool = False
 
     def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
-        """Return the chosen word in lower case, whole."""
+        """Return the chosen word in lower case, long form."""
         if not isinstance(parameter, Word):
             raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected {self.describe()}")
         for word in self.words:
@@ -106,13 +102,13 @@ class Choice:
         raise CommandError(ErrorNumber.ILLEGAL_PARAMETER_VALUE, f"expected {self.describe()}, got {parameter.value}")
 
     def describe(self) -> str:
-        """Return the words with a bar between them."""
+        """Return the words separated by bars."""
         return "|".join(self.words)
 
 
 @dataclass(frozen=True, slots=True)
 class Quoted:
-    """A text in quotes."""
+    """Quoted text."""
 
     name: str = "text"
     optional: bool = False
@@ -130,7 +126,7 @@ class Quoted:
 
 @dataclass(frozen=True, slots=True)
 class QuotedOrNumber:
-    """A text in quotes or a bare number."""
+    """Quoted text or bare number."""
 
     name: str = "name"
     optional: bool = False
@@ -142,13 +138,13 @@ class QuotedOrNumber:
         return Quantity().read(parameter, client, suffix)
 
     def describe(self) -> str:
-        """Return both ways."""
+        """Return both notations."""
         return f'"{self.name}"|<value>'
 
 
 @dataclass(frozen=True, slots=True)
 class AnyWord:
-    """A word that the handler makes out."""
+    """Word interpreted by the handler."""
 
     name: str = "word"
     optional: bool = True
@@ -166,21 +162,21 @@ class AnyWord:
 
 @dataclass(frozen=True)
 class Command:
-    """A header as SCPI writes it, what it takes, what it does. `<n>` in the header stands for 1 or 2."""
+    """Header in SCPI notation, parameters and handler. `<n>` in the header stands for 1 or 2."""
 
     header: str
     handler: Handler
     parameters: tuple[ParameterType, ...] = ()
     repeated_parameter: ParameterType | None = None
-    """A parameter that may follow the others any number of times."""
+    """Parameter that may follow the others any number of times."""
     moves: bool = False
-    """Whether it moves something, which the holder of the lock may do alone."""
+    """Whether it moves something, which is reserved to the holder of the lock."""
     waits: bool = False
-    """Whether it waits until the movement that is going on is done."""
+    """Whether it waits until the current movement is done."""
     polls: bool = False
-    """Whether it looks at the status, as who waits for movement may do again and again."""
+    """Whether it queries the status, as a client does repeatedly while waiting for movement."""
     allowed_before_login: bool = False
-    """Whether who has not logged in may say it."""
+    """Whether it is allowed before login."""
     help: str = ""
     suffixes: tuple[int, ...] = field(default=(1, 2))
 
@@ -191,24 +187,24 @@ class Command:
 
     @property
     def may_wait(self) -> bool:
-        """Whether it may be held back, or hold back what follows."""
+        """Whether it may wait, or make later units wait."""
         return self.moves or self.waits or self.polls
 
     def syntax(self) -> str:
-        """Return header and parameters as the manual prints them."""
+        """Return header and parameters as in the manual."""
         parts = [f"[{each.describe()}]" if each.optional else each.describe() for each in self.parameters]
         if self.repeated_parameter:
             parts.append(f"{self.repeated_parameter.describe()}...")
         return " ".join([self.header, ",".join(parts)]).strip()
 
     def call(self, given: Sequence[Parameter], suffix: int, client: Any) -> Call:
-        """Return the call that the parameters of a unit make of this command. Raises LanguageError."""
+        """Return the call for the parameters of a unit. Raises CommandError."""
         taken = self.parameters if len(given) == len(self.parameters) else self._taken(len(given))
         values = [kind.read(parameter, client, suffix) for kind, parameter in zip(taken, given, strict=False)]
         return Call(suffix, tuple(values))
 
     def _taken(self, given: int) -> Sequence[ParameterType]:
-        """Return what so many parameters are, one by one; those that are left out stand behind them."""
+        """Return the types of the given parameters in order; omitted ones are the last."""
         if given < sum(not each.optional for each in self.parameters):
             raise CommandError(ErrorNumber.MISSING_PARAMETER, f"expected {self.syntax()}")
         more = max(0, given - len(self.parameters))
@@ -222,7 +218,7 @@ class Command:
 
 
 def short_form(word: str) -> str:
-    """Return the capitals of a word written as SCPI writes it, such as MODE or BACK or FRON of FRONt."""
+    """Return the capitals of a word in SCPI notation, such as MODE or BACK or FRON of FRONt."""
     return "".join(c for c in word if not c.islower())
 
 
@@ -233,7 +229,7 @@ class _Found:
 
 
 class CommandTable:
-    """Commands by header, every short and long form and optional node expanded once."""
+    """Commands by header, with each short and long form and optional node expanded once."""
 
     def __init__(self, commands: Sequence[Command]) -> None:
         self.commands = tuple(commands)
@@ -250,7 +246,7 @@ class CommandTable:
                 raise ValueError(f"{command.header} stands twice in the table")
 
     def find(self, mnemonics: Sequence[tuple[str, int | None]], query: bool) -> tuple[Command, int]:
-        """Return the command of a whole header path and its suffix. Raises LanguageError."""
+        """Return the command of a complete header path and its suffix. Raises CommandError."""
         found = self._commands.get((tuple([name for name, _ in mnemonics]), query))
         if found is None:
             raise CommandError(ErrorNumber.UNDEFINED_HEADER, _shown(mnemonics) + ("?" if query else ""))
@@ -274,7 +270,7 @@ def _shown(mnemonics: Sequence[tuple[str, int | None]]) -> str:
 
 
 def _paths_of(header: str) -> list[tuple[str, ...]]:
-    """Return the node paths of a header with every optional node once left out and once in."""
+    """Return the node paths of a header with each optional node left out and included."""
     nodes = re.findall(r"\[:?[^\]]+\]|[^:\[\]]+", header.rstrip("?"))
     choices = [((node.strip("[]:"),), ()) if node.startswith("[") else ((node,),) for node in nodes]
     return [tuple(name for part in combination for name in part) for combination in product(*choices)]

@@ -1,4 +1,4 @@
-"""Lines as they may be told to others: what somebody gave as a token never is, but whether it was the token."""
+"""Redaction of tokens in lines that are reported to others: only whether the token was right is kept."""
 
 import hmac
 import re
@@ -6,7 +6,7 @@ import re
 from a7sim.instrument.language.syntax import split_units
 
 TOKEN_PLACEHOLDER = "(the token)"
-"""Stands for the token, so that a line can be said again to an instrument whose token is this."""
+"""Placeholder of the token, valid as the token of a replayed instrument."""
 
 _ANOTHER, _SECRET = "(not the token)", "(kept secret)"
 
@@ -16,7 +16,7 @@ _QUOTED = re.compile(r"\"((?:[^\"]|\"\")*)\"\s*|'((?:[^']|'')*)'\s*")
 
 
 def redact_token(text: str, token: str | None) -> str:
-    """Return a line with what it gives as a token left out; None where nobody knows the token and all may be it."""
+    """Return a line without the token in it; None if it cannot be found and all may be the token."""
     return ";".join(_told(unit, token) for unit in split_units(text)) if _LOGIN.search(text) else text
 
 

@@ -1,4 +1,4 @@
-"""A line to a served instrument, beside which a twin in this process hears the same lines."""
+"""Port of a served instrument whose replies are compared with those of a reference instrument in process."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,10 +12,10 @@ from a7sim.link.inprocess import InProcessSerial
 
 
 class TwinCheckedPort:
-    """A port whose replies are the served instrument's, checked against those of its twin.
+    """Port with the replies of the served instrument, checked against those of a reference instrument.
 
-    Whoever holds it gets only what was served; the twin says whether a reply is due, and what the scenario makes of
-    it. Raises Mistake where the two differ.
+    The caller gets only the served replies; the reference instrument tells whether a reply is due. Raises A7SimError if
+    the two differ.
     """
 
     def __init__(self, served: Port, twin: InProcessSerial, url: str) -> None:
@@ -31,7 +31,7 @@ class TwinCheckedPort:
         return self._served.write(data)
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """Return the served reply, nothing at once where none is due. Raises Mistake."""
+        """Return the served reply, immediately empty if none is due. Raises A7SimError."""
         if not self._twin.in_waiting:
             return b""
         due = self._twin.readline(size)
@@ -54,7 +54,7 @@ def _difference(sent: bytes, served: bytes, due: bytes) -> str:
 
 
 def _shown(data: bytes, around: int = 0) -> str:
-    """Return about 80 printable characters, those around a place where there are more."""
+    """Return about 80 printable characters around a position."""
     text = "".join(c if " " <= c <= "~" else "?" for c in data.decode("latin-1").strip())
     begins = max(0, around - 40)
     return ("..." if begins else "") + text[begins : begins + 80] + ("..." if begins + 80 < len(text) else "")
@@ -62,7 +62,7 @@ def _shown(data: bytes, around: int = 0) -> str:
 
 @contextmanager
 def open_checked_port(url: str, timeout: float, token: str | None = None) -> Iterator[Any]:
-    """Yield the port of a served instrument, its lock held. Raises Mistake, also when the line breaks."""
+    """Yield the port of a served instrument with its lock held. Raises A7SimError, also if the connection breaks."""
     port = open_port(url, timeout)
     try:
         with port_errors(url):

@@ -1,4 +1,4 @@
-"""Talking to an instrument over any pyserial port."""
+"""Client of an instrument over any pyserial port."""
 
 import csv
 from collections.abc import Iterator
@@ -11,17 +11,17 @@ from a7sim.link.client.replies import MalformedReplyError, Part, parse_reply
 
 
 class Port(Protocol):
-    """The part of a pyserial port that a conversation needs."""
+    """Part of a pyserial port that a client uses."""
 
     def write(self, data: bytes, /) -> int | None:
         """Send bytes."""
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """Return a line, or what came before the timeout."""
+        """Return a line, or the bytes received before the timeout."""
 
 
 class InstrumentError(Exception):
-    """The instrument reported errors: `errors` are the entries of its queue."""
+    """Errors reported by the instrument: `errors` are the entries of its queue."""
 
     def __init__(self, line: str, errors: list[str]) -> None:
         super().__init__(f"{line}: {'; '.join(errors) or 'no answer'}")
@@ -30,7 +30,7 @@ class InstrumentError(Exception):
 
 
 class Identity(NamedTuple):
-    """What an instrument says that it is."""
+    """Identification of an instrument."""
 
     maker: str
     model: str
@@ -39,7 +39,7 @@ class Identity(NamedTuple):
 
 
 class Client:
-    """A conversation in lines of text.
+    """Client that exchanges lines of text with an instrument.
 
     >>> from a7sim import Client
     >>> with Client.open("a7sim://akwanga") as client:
@@ -55,8 +55,8 @@ class Client:
     def open(cls, url: str, timeout: float = TIMEOUT_S, token: str | None = None) -> Self:
         """Return a client of the instrument at a URL, logged in if a token is given.
 
-        URLs are a7sim://SCENARIO?seed=N, tcp://HOST:PORT, rfc2217://HOST:PORT, or the path of a device or pty. A
-        reply is waited for `timeout` s. Raises Mistake where nothing can be opened.
+        URLs are a7sim://SCENARIO?seed=N, tcp://HOST:PORT, rfc2217://HOST:PORT, or the path of a device or pty.
+        `timeout` is the wait for a reply in s. Raises A7SimError if the port cannot be opened.
         """
         client = cls(open_port(url, timeout))
         if token is not None:
@@ -64,7 +64,7 @@ class Client:
         return client
 
     def close(self) -> None:
-        """Hang up; a lock that the client holds is free again."""
+        """Disconnect; a lock of this client is released."""
         close: Any = getattr(self._port, "close", None)
         if close is not None:
             close()
@@ -78,18 +78,18 @@ class Client:
         self.close()
 
     def log_in(self, token: str) -> None:
-        """Show the token that a server asks for when it listens beyond its own machine."""
+        """Log in with the token of a server that listens beyond its own machine."""
         doubled = token.replace('"', '""')
         self.send(f'SYST:LOG "{doubled}"')
 
     @property
     def identity(self) -> Identity:
-        """What the instrument says that it is."""
+        """Identification of the instrument."""
         return Identity(*self.fields("*IDN?")[:4])
 
     @contextmanager
     def lock(self) -> Iterator[Self]:
-        """Hold the lock, so that this client alone turns. Raises InstrumentRefused while another holds it."""
+        """Hold the lock, so that only this client moves parts. Raises InstrumentError if another client holds it."""
         if self.ask("SYST:LOCK:REQ?") != "1":
             raise InstrumentError("SYST:LOCK:REQ?", ["another client holds the lock"])
         try:
@@ -98,15 +98,15 @@ class Client:
             self.send("SYST:LOCK:REL")
 
     def wait(self) -> None:
-        """Return when all movement is done. Raises InstrumentRefused if that takes longer than the port waits."""
+        """Return when all movement is done. Raises InstrumentError if that exceeds the port's timeout."""
         self.ask("*OPC?")
 
     def send(self, line: str) -> None:
-        """Send a line that asks nothing."""
+        """Send a line without a query."""
         self._port.write(line.encode() + b"\n")
 
     def ask(self, line: str) -> str:
-        """Send a line and return its reply. Raises InstrumentRefused when none comes."""
+        """Send a line and return its reply. Raises InstrumentError if none arrives."""
         self.send(line)
         reply = self._port.readline()
         if not reply.endswith(b"\n"):
@@ -114,17 +114,17 @@ class Client:
         return reply[:-1].decode("ascii")
 
     def fields(self, line: str) -> list[str]:
-        """Send a line and return the values of its reply, texts without their quotes."""
+        """Send a line and return the values of its reply, texts without quotes."""
         return next(csv.reader([self.ask(line)]))
 
     def numbers(self, line: str) -> list[float]:
-        """Send a line and return all numbers of its reply; 9.91E37 stands for what cannot be seen."""
+        """Send a line and return all numbers of its reply; 9.91E37 marks a quantity that is not visible."""
         return [float(each) for each in self.ask(line).replace(";", ",").split(",")]
 
     def block(self, line: str) -> bytes:
         """Send a line and return the bytes of its reply, an IEEE 488.2 block of definite length.
 
-        Raises InstrumentRefused when none comes.
+        Raises InstrumentError if none arrives.
         """
         self.send(line)
         parts = self.reply()
@@ -133,7 +133,7 @@ class Client:
         return parts[0]
 
     def reply(self) -> tuple[Part, ...] | None:
-        """Return the next reply, a text or the bytes of a block for each query; None when none comes in time."""
+        """Return the next reply, a text or the bytes of a block for each query; None if none arrives in time."""
         received = bytearray()
         while True:
             more = self._port.readline()
@@ -148,7 +148,7 @@ class Client:
                 return None
 
     def errors(self) -> list[str]:
-        """Take all entries off the instrument's error queue, oldest first."""
+        """Read and remove all entries of the instrument's error queue, oldest first."""
         entries: list[str] = []
         while True:
             self.send("SYST:ERR?")
@@ -158,7 +158,7 @@ class Client:
             entries.append(reply)
 
     def check(self, about: str) -> None:
-        """Raise InstrumentRefused if the instrument has reported anything since the last look."""
+        """Raise InstrumentError if the instrument has reported errors since the last check."""
         found = self.errors()
         if found:
             raise InstrumentError(about, found)

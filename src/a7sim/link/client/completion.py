@@ -1,4 +1,4 @@
-"""What may stand where somebody types a header: completion from an instrument's own list of headers."""
+"""Completion of headers from an instrument's own list."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -9,10 +9,10 @@ _NODE = re.compile(r"([A-Za-z*_]*)([12]?)")
 
 
 def completions(typed: str, headers: Sequence[str]) -> list[str]:
-    """Return the whole headers that the last word of what is typed can become; none inside parameters and quotes.
+    """Return the headers that complete the last word; empty inside parameters and quotes.
 
-    `headers` are written as the instrument lists them: `PROJector<n>:KAPPa?`. After `;` the level of the unit before it
-    is tried first, as the instrument does.
+    `headers` are in the instrument's notation: `PROJector<n>:KAPPa?`. After `;` the level of the previous unit is tried
+    first, as the instrument does.
     """
     *before, unit = _units(typed)
     word = unit.lstrip(" \t")
@@ -54,7 +54,7 @@ def _matching(word: str, headers: Sequence[str]) -> list[str]:
 
 
 def _paths(header: str) -> Iterator[list[str]]:
-    """Yield the nodes of a header, every optional one once left out and once in."""
+    """Yield the nodes of a header, with each optional node left out and included."""
     nodes = re.findall(r"\[:?[^\]]+\]|[^:\[\]?]+", header)
     choices = [((node.strip("[]:"),), ()) if node.startswith("[") else ((node,),) for node in nodes]
     mark = "?" if header.endswith("?") else ""
@@ -64,7 +64,7 @@ def _paths(header: str) -> Iterator[list[str]]:
 
 
 def _continued(typed: Sequence[str], path: Sequence[str]) -> Iterator[str]:
-    """Yield a path as it goes on from the nodes typed, which stay as they are but for the last."""
+    """Yield the continuation of a path from the typed nodes, which stay unchanged except for the last."""
     if len(typed) > len(path) or not all(_is(*pair) for pair in zip(typed[:-1], path, strict=False)):
         return
     last = _NODE.fullmatch(typed[-1])

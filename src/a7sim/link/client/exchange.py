@@ -1,4 +1,4 @@
-"""A line and all that comes of it: its reply and its errors, without waiting for an answer that never comes."""
+"""Exchange of a line: its reply and its errors, without waiting for a reply that never comes."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from a7sim.link.client.replies import Part, part_as_text
 from a7sim.plotters import SCPI_VERSION
 
 _MARKER = ":SYST:ERR:COUN?;:SYST:VERS?"
-"""Sent behind every line: what it answers shows that the line had no reply, or that its reply is whole."""
+"""Query sent behind each line: its answer shows that the line had no reply, or that its reply is complete."""
 
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """A line as it was sent, its reply by query, and the errors that the instrument reported of it."""
+    """Line as sent, its reply by query, and the errors that it caused."""
 
     sent: str
     reply: tuple[Part, ...] | None
@@ -21,12 +21,12 @@ class Exchange:
 
     @property
     def shown(self) -> str | None:
-        """The reply for people, blocks as their sizes; None where there is none."""
+        """Reply as text, blocks as their sizes; None without a reply."""
         return None if self.reply is None else ";".join(map(part_as_text, self.reply))
 
 
 def send_line(client: Client, line: str) -> Exchange:
-    """Send a line and return what came of it. Raises Mistake when the instrument does not answer at all."""
+    """Send a line and return its exchange. Raises A7SimError if the instrument does not answer at all."""
     client.send(line)
     client.send(_MARKER)
     first = _expected(client, line)

@@ -1,4 +1,4 @@
-"""Opening whatever a URL names as a pyserial port, and saying clearly why it cannot be."""
+"""Opening of pyserial ports by URL, with clear error messages."""
 
 import re
 from collections.abc import Iterator
@@ -14,18 +14,18 @@ URL_FORMS = "a7sim://SCENARIO?seed=N, tcp://HOST:PORT, rfc2217://HOST:PORT, or t
 MAX_PORT = 65535
 
 TIMEOUT_S = 5.0
-"""How long a reply is waited for, unless somebody says otherwise."""
+"""Default wait for a reply in s."""
 
 _ADDRESS = re.compile(r"[^/\\]+:[0-9]{1,5}")
-"""HOST:PORT, which wants a scheme: no device or pty has such a name."""
+"""HOST:PORT without a scheme: no device or pty has such a name."""
 
 _URL = re.compile(r"a7sim://.+|(tcp|socket|rfc2217)://(\[[0-9a-f:.%]+\]|[^/:?#\[\]]+):([0-9]{1,5})/?", re.IGNORECASE)
 
 
 def open_port(url: str, timeout: float = TIMEOUT_S) -> Any:
-    """Return the pyserial port that a URL names, open, its reads ending after `timeout` s.
+    """Return the open pyserial port of a URL, with a read timeout in s.
 
-    `socket://` is pyserial's name of `tcp://`. Raises Mistake in one sentence where it cannot be opened.
+    `socket://` is pyserial's name of `tcp://`. Raises A7SimError if it cannot be opened.
     """
     if not _is_named(url):
         raise A7SimError(f"expected {URL_FORMS}, got {url!r}")
@@ -38,7 +38,7 @@ def open_port(url: str, timeout: float = TIMEOUT_S) -> Any:
 
 @contextmanager
 def port_errors(url: str) -> Iterator[None]:
-    """Turn what goes wrong on a line that was open into a sentence that names it. Raises Mistake."""
+    """Convert exceptions of an open port into an error that names it. Raises A7SimError."""
     try:
         yield
     except serial.SerialException as error:
@@ -53,7 +53,7 @@ def _is_named(url: str) -> bool:
 
 
 def _reason(error: BaseException) -> str:
-    """Return what the operating system said, if it is at the bottom of an error, else what the error says."""
+    """Return the operating system's message in an error, otherwise the error's own."""
     cause: BaseException | None = error
     while cause is not None:
         if len(cause.args) == 2 and isinstance(cause.args[1], str) and not isinstance(cause, serial.SerialException):

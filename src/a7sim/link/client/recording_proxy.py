@@ -1,4 +1,4 @@
-"""Between a client and an instrument: lines and replies go through whole, and somebody hears each before it goes on."""
+"""Proxy between a client and an instrument that reports each line and reply to a listener before it is passed on."""
 
 import socket
 import threading
@@ -12,15 +12,15 @@ from a7sim.link.client.replies import MalformedReplyError, Part, parse_reply
 from a7sim.link.clock import WallClock
 
 POLL_INTERVAL_S = 0.1
-"""How often somebody who waits looks whether to stop."""
+"""Interval in s at which a waiting thread checks whether to stop."""
 
 _AT_ONCE = 65536
 
 
 class RecordingProxy:
-    """A door with an instrument behind it, to which one client at a time is let through.
+    """Endpoint in front of an instrument, for one client at a time.
 
-    What the listener raises ends it: neither line nor reply goes on that was not heard.
+    An exception of the listener ends it: no line or reply is passed on that was not recorded.
     """
 
     def __init__(self, url: str, listener: Listener, clock: WallClock, stop: threading.Event) -> None:
@@ -33,7 +33,7 @@ class RecordingProxy:
         self._error: A7SimError | None = None
 
     def serve(self, door: socket.socket) -> None:
-        """Let clients through until it is told to stop. Raises Mistake where the instrument or the listener fails."""
+        """Serve clients until stopped. Raises A7SimError if the instrument or the listener fails."""
         door.settimeout(POLL_INTERVAL_S)
         while not self._stop.is_set():
             try:
@@ -116,7 +116,7 @@ class RecordingProxy:
 
 
 def _taken(come: bytearray) -> tuple[str, int] | None:
-    """Return the text of the first whole reply and how many bytes it is."""
+    """Return the text of the first complete reply and its length in bytes."""
     try:
         taken = parse_reply(come)
     except MalformedReplyError:

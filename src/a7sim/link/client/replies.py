@@ -1,11 +1,11 @@
-"""Taking a reply apart: texts, and blocks of bytes that may hold any character (IEEE 488.2 definite length)."""
+"""Parsing of replies: texts, and blocks of arbitrary bytes (IEEE 488.2 definite length)."""
 
 from dataclasses import dataclass
 
 _SEMICOLON, _QUOTE, _END, _HASH = b';"\n#'
 
 Part = str | bytes
-"""What one query answered: text, or the bytes of a block."""
+"""Answer of one query: text, or the bytes of a block."""
 
 
 class MalformedReplyError(Exception):
@@ -14,14 +14,14 @@ class MalformedReplyError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ParsedReply:
-    """A reply and how many bytes it took, its end with them."""
+    """Reply and its length in bytes, including its end."""
 
     parts: tuple[Part, ...]
     length: int
 
 
 def parse_reply(received: bytes | bytearray) -> ParsedReply | None:
-    """Return the reply at the beginning of what was received, None while it is not whole. Raises NotAReply."""
+    """Return the reply at the start of the input, None while it is incomplete. Raises MalformedReplyError."""
     parts: list[Part] = []
     at = 0
     while True:
@@ -64,5 +64,5 @@ def _block(received: bytes | bytearray, start: int) -> tuple[bytes, int] | None:
 
 
 def part_as_text(part: Part) -> str:
-    """Return a part for people: a block as its size."""
+    """Return a part as text: a block as its size."""
     return part if isinstance(part, str) else f"#block of {len(part)} bytes"

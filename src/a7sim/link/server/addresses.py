@@ -1,4 +1,4 @@
-"""Where a server listens: HOST:PORT as people write it."""
+"""Addresses of a server in the form HOST:PORT."""
 
 import ipaddress
 import re
@@ -11,7 +11,7 @@ _ADDRESS = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([^\s:\[\]]+)):(\d{1,5})")
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """A host and a port; port 0 is one that the operating system chooses."""
+    """Host and port; the operating system chooses a port for 0."""
 
     host: str
     port: int
@@ -21,7 +21,7 @@ class Address:
 
     @property
     def loopback(self) -> bool:
-        """Whether only this machine can reach it."""
+        """Whether only this machine can connect."""
         if self.host == "localhost":
             return True
         try:
@@ -31,7 +31,7 @@ class Address:
 
 
 def parse_address(text: str, option: str) -> Address:
-    """Return the address that a text such as 127.0.0.1:5025 or [::1]:5025 names. Raises Mistake."""
+    """Return the address of a text such as 127.0.0.1:5025 or [::1]:5025. Raises A7SimError."""
     found = _ADDRESS.fullmatch(text)
     if found is None or int(found[3]) > 65535:
         raise A7SimError(f"{option}: expected HOST:PORT such as 127.0.0.1:5025, got {text!r}")

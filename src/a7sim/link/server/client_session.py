@@ -1,4 +1,4 @@
-"""One client's bytes on their way between a wire and the engine, with the limits that keep clients fair."""
+"""Session of one client between its transport and the engine, with limits that keep clients fair."""
 
 import asyncio
 from dataclasses import dataclass
@@ -12,48 +12,48 @@ from a7sim.link.server.faults import ConnectionDropped, FaultInjector, FaultRate
 from a7sim.link.server.pacing import BaudLimiter
 
 CHUNK_BYTES = 512
-"""Bytes of input, some dozens of lines, that are obeyed before the others have their turn."""
+"""Bytes of input, some dozens of lines, executed before other clients have their turn."""
 
 MAX_PACED_BYTES = 4096
-"""Bytes; more input is not read, and while more replies are on their way nothing is obeyed."""
+"""Bytes; more input is not read, and with more replies in transit nothing is executed."""
 
 
 @dataclass(frozen=True, slots=True)
 class ServerLimits:
-    """What every client is granted."""
+    """Limits of a client."""
 
     baud: int | None = None
-    """Bits/s of every line, None where bytes need no time."""
+    """Bits/s of each line, None without pacing."""
     faults: FaultRates | None = None
     fault_seed: int = 0
     idle_timeout: float = 3600.0
-    """s without a byte after which a client is dropped."""
+    """s without a byte after which a client is disconnected."""
     write_timeout: float = 10.0
-    """s that replies wait for a client that does not read them, before it is dropped."""
+    """s that replies wait for a client that does not read them, before it is disconnected."""
     max_clients: int = 64
 
 
 class Transport(Protocol):
-    """What carries the bytes of one client, and tells the conversation what is received and how the line stands."""
+    """Transport of the bytes of one client, which calls the session with input and events."""
 
     def write(self, data: bytes) -> None:
-        """Send bytes, now or as soon as they can go."""
+        """Send bytes, now or as soon as possible."""
 
     def pause_reading(self) -> None:
-        """Receive nothing more for the time being."""
+        """Stop receiving."""
 
     def resume_reading(self) -> None:
-        """Receive again."""
+        """Continue receiving."""
 
     def close(self, farewell: bytes = b"") -> None:
-        """Hang up when what is written, and a farewell where the other side can hear it, has gone."""
+        """Disconnect when all written bytes, and a farewell if the client can receive it, are sent."""
 
     def abort(self) -> None:
-        """Hang up at once."""
+        """Disconnect at once."""
 
 
 class ClientSession:
-    """A client at its wire."""
+    """Session of a client on its transport."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class ClientSession:
         self._incoming = BaudLimiter(loop, self._arrived, terms.baud) if terms.baud else None
         self._outgoing = BaudLimiter(loop, self._carried, terms.baud, delay) if terms.baud or delay else None
         self._plain = self._incoming is None and self._outgoing is None and self._noise is None
-        """Whether bytes go straight to the engine and from it, as long as nothing holds them back."""
+        """Whether bytes pass directly to and from the engine, because nothing delays them."""
         self._next: asyncio.Handle | None = None
         self._impatient: asyncio.Handle | None = None
         self._heard_at = loop.time()
@@ -88,7 +88,7 @@ class ClientSession:
     # --- what the wire tells --------------------------------------------------------------------------
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes that the client sent."""
+        """Process bytes from the client."""
         self._heard_at = self._loop.time()
         if self._plain and self._reading and len(data) <= CHUNK_BYTES:
             replies = self._engine.feed_with_replies(data, self._clock.now)
@@ -103,25 +103,25 @@ class ClientSession:
             self._arrived(data)
 
     def pause_writing(self) -> None:
-        """Obey nothing more: the client does not read its replies. It is dropped if it goes on like that."""
+        """Stop executing: the client does not read its replies. It is disconnected if that continues."""
         self._clogged = True
         self._pause()
         self._impatient = self._loop.call_later(self._terms.write_timeout, self._wire.abort)
 
     def resume_writing(self) -> None:
-        """Go on: the client has read."""
+        """Continue: the client has read."""
         self._clogged = False
         if self._impatient is not None:
             self._impatient.cancel()
         self._go_on_soon()
 
     def eof_received(self) -> None:
-        """Hang up as soon as all is answered: the client sends nothing more."""
+        """Disconnect as soon as all is answered: the client sends nothing more."""
         self._ended = True
         self._go_on_soon()
 
     def connection_lost(self) -> None:
-        """Forget the client: it is gone, and a lock that it holds is free again."""
+        """Remove the client: it has disconnected, and its lock is released."""
         self._open = False
         self._instrument.close(self._engine.client, self._clock.now)
         for timer in (self._next, self._impatient, self._sleeper):
@@ -131,7 +131,7 @@ class ClientSession:
             if pace is not None:
                 pace.clear()
 
-    # --- how it goes on -------------------------------------------------------------------------------
+    # --- next steps ------------------------------------------------------------------------------------
 
     def _arrived(self, data: bytes) -> None:
         if len(data) <= CHUNK_BYTES and not self._backlog and self._next is None and not self._holds_back():
@@ -151,7 +151,7 @@ class ClientSession:
             self._send(reply)
 
     def _go_on_soon(self) -> None:
-        """Arrange what comes next: a wait that ends, input that is left, or reading again."""
+        """Schedule the next step: a wait that ends, remaining input, or reading again."""
         if not self._open or self._next is not None:
             return
         waits_until = self._engine.waits_until

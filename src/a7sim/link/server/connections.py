@@ -1,4 +1,4 @@
-"""TCP as a wire, bare or with telnet and RFC 2217 on it: asyncio protocols that call the conversation directly."""
+"""TCP transports, raw or with telnet and RFC 2217: asyncio protocols that call the client session directly."""
 
 import asyncio
 import socket
@@ -9,30 +9,30 @@ from a7sim.link.server.client_session import ClientSession, Transport
 from a7sim.link.server.telnet import Telnet
 
 MAX_READ = 16 * 1024
-"""Bytes taken from a socket at once."""
+"""Bytes read from a socket at once."""
 
 MAX_UNREAD = 64 * 1024
-"""Bytes of replies that may wait for a client to read them before it is obeyed no more."""
+"""Bytes of unread replies above which a client's input is not executed."""
 
 QUICK_ACKNOWLEDGEMENT: int | None = getattr(socket, "TCP_QUICKACK", None)
 """An option of Linux."""
 
 FAREWELL = 1.0
-"""s that a client has to hear why it is turned away."""
+"""s that a rejected client has to receive the reason."""
 
 
 class Host(Protocol):
-    """Who opens a conversation for every wire."""
+    """Factory of client sessions for transports."""
 
     def accept(self, wire: Transport, serial: bool) -> ClientSession | bytes:
-        """Return a conversation, or why there is none, as a line."""
+        """Return a session, or the reason for a rejection, as a line."""
 
     def release(self, wire: Transport) -> None:
-        """Take note that a wire is no more."""
+        """Record that a transport is closed."""
 
 
 class TcpConnection(asyncio.BufferedProtocol):
-    """A TCP connection. All share one buffer, since what is read is taken out of it at once."""
+    """TCP connection. All share one buffer, because input is consumed at once."""
 
     serial = False
 
@@ -46,7 +46,7 @@ class TcpConnection(asyncio.BufferedProtocol):
     # --- what asyncio tells ---------------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin a conversation, or turn the client away."""
+        """Start a session, or reject the client."""
         self._transport = cast(asyncio.Transport, transport)
         self._socket = self._transport.get_extra_info("socket")
         self._transport.set_write_buffer_limits(high=MAX_UNREAD)
@@ -67,7 +67,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Hand on what was read."""
+        """Pass the input to the session."""
         self._take(self._buffer[:nbytes].tobytes())
 
     def _take(self, data: bytes) -> None:
@@ -78,66 +78,67 @@ class TcpConnection(asyncio.BufferedProtocol):
                 self._acknowledge()
 
     def _acknowledge(self) -> None:
-        """Let the client know at once that a command has come, since no reply says so.
+        """Acknowledge a received command at once, because no reply does.
 
-        Otherwise one that sends small pieces by Nagle's algorithm, as pyserial's does, waits 40 ms with the next.
+        Otherwise a client that sends small segments by Nagle's algorithm, as pyserial's does, waits 40 ms before the
+        next one.
         """
         if QUICK_ACKNOWLEDGEMENT is not None and not self._transport.is_closing():
             self._socket.setsockopt(socket.IPPROTO_TCP, QUICK_ACKNOWLEDGEMENT, 1)
 
     def eof_received(self) -> bool:
-        """Keep the line until all is answered."""
+        """Keep the connection until all is answered."""
         if self._conversation is None:
             return False
         self._conversation.eof_received()
         return True
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """End the conversation."""
+        """End the session."""
         if self._conversation is not None:
             self._conversation.connection_lost()
             self._conversation = None
         self._host.release(self)
 
     def pause_writing(self) -> None:
-        """Tell that the client does not read."""
+        """Report that the client does not read."""
         if self._conversation is not None:
             self._conversation.pause_writing()
 
     def resume_writing(self) -> None:
-        """Tell that it has read."""
+        """Report that the client reads again."""
         if self._conversation is not None:
             self._conversation.resume_writing()
 
     # --- what the conversation asks -------------------------------------------------------------------
 
     def write(self, data: bytes) -> None:
-        """Send bytes, unless the line is cut."""
+        """Send bytes, unless the connection is closed."""
         if not self._transport.is_closing():
             self._answered = True
             self._transport.write(data)
 
     def pause_reading(self) -> None:
-        """Receive nothing more for the time being."""
+        """Stop receiving."""
         self._transport.pause_reading()
 
     def resume_reading(self) -> None:
-        """Receive again."""
+        """Continue receiving."""
         self._transport.resume_reading()
 
     def close(self, farewell: bytes = b"") -> None:
-        """Hang up when all is sent, the farewell as well."""
+        """Disconnect when all is sent, including the farewell."""
         if farewell:
             self.write(farewell)
         self._transport.close()
 
     def abort(self) -> None:
-        """Hang up at once."""
+        """Disconnect at once."""
         self._transport.abort()
 
 
 class TelnetConnection(TcpConnection):
-    """A TCP connection that passes for a serial port (RFC 2217)."""
+    """TCP connection that emulates a serial port (RFC 2217)."""
 
     serial = True
 
@@ -146,12 +147,12 @@ class TelnetConnection(TcpConnection):
         self._telnet = Telnet()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin a conversation, and negotiate."""
+        """Start a session, and negotiate."""
         cast(asyncio.Transport, transport).write(self._telnet.greeting())
         super().connection_made(transport)
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Hand on what of it is data, and answer the rest."""
+        """Pass the data to the session, and answer the commands."""
         data, answer = self._telnet.received(self._buffer[:nbytes].tobytes())
         if answer:
             super().write(answer)
@@ -159,5 +160,5 @@ class TelnetConnection(TcpConnection):
             self._take(data)
 
     def write(self, data: bytes) -> None:
-        """Send bytes as telnet sends them."""
+        """Send bytes escaped for telnet."""
         super().write(self._telnet.escape(data))

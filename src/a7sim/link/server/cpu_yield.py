@@ -1,16 +1,16 @@
-"""When a server gives up the processor to a client that is about to ask."""
+"""Policy of yielding the processor to a client that is about to send."""
 
 import os
 from time import monotonic
 
 BRIEFLY, UNTIL_ALONE = 0.5e-3, 1.0
-"""s; who twice in a row gets the processor back later than this has company, and keeps it for a while."""
+"""s; a server that twice in a row gets the processor back later than this has competitors, and keeps it for a while."""
 
 
 class YieldPolicy:
-    """Giving up the processor between two looks, which is quicker than to sleep and be woken.
+    """Yielding of the processor between two polls, which is faster than sleeping and waking.
 
-    Where others want the processor it would be theirs for milliseconds, so there it is kept.
+    If other processes want the processor they would keep it for milliseconds, so the server does not yield.
     """
 
     def __init__(self) -> None:
@@ -18,7 +18,7 @@ class YieldPolicy:
         self._was_brief = True
 
     def yield_cpu(self) -> bool:
-        """Give up the processor, unless others want it; return whether that was done."""
+        """Yield the processor, unless others want it; return whether it was yielded."""
         left_at = monotonic()
         if left_at < self._alone_from:
             return False

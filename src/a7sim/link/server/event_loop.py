@@ -1,4 +1,4 @@
-"""The loop of events that a server runs on."""
+"""Event loop of a server."""
 
 import asyncio
 from collections.abc import Callable, Coroutine
@@ -12,6 +12,6 @@ except ImportError:  # there is none for Windows
 
 
 def run(server: Coroutine[Any, Any, None]) -> None:
-    """Run a server to its end, on uvloop where that is installed: half as long from a question to its answer."""
+    """Run a server to its end, on uvloop if installed, which halves the time from query to reply."""
     with asyncio.Runner(loop_factory=new_event_loop) as runner:
         runner.run(server)

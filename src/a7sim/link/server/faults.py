@@ -1,4 +1,4 @@
-"""Faults on request, for people who test drivers: replies that get lost, late or garbled, lines that are cut."""
+"""Faults on request, for tests of drivers: lost, late or garbled replies, and dropped connections."""
 
 import math
 import re
@@ -18,20 +18,20 @@ _DELAY = re.compile(r"(\d+(?:\.\d+)?)(ms|s)")
 
 @dataclass(frozen=True, slots=True)
 class FaultRates:
-    """How often a line fails its client, and how late it is."""
+    """Rates of faults of a connection, and its delay."""
 
     drop_reply: float = 0.0
-    """Probability that a reply is lost whole."""
+    """Probability that a reply is lost."""
     garble: float = 0.0
-    """Probability of each byte of a reply, but not of its line end, to arrive as another."""
+    """Probability that a byte of a reply, except its line end, is replaced."""
     disconnect: float = 0.0
-    """Probability that the line is cut where a reply was due."""
+    """Probability that the connection is dropped instead of a reply."""
     delay: float = 0.0
-    """s by which every reply is late."""
+    """Delay of each reply in s."""
 
 
 def parse_faults(text: str) -> FaultRates:
-    """Return the faults that a text such as EXAMPLE names. Raises Mistake."""
+    """Return the faults of a text such as EXAMPLE. Raises A7SimError."""
     found: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = part.strip().partition(":")
@@ -63,18 +63,18 @@ def _delay(text: str) -> float:
 
 
 class ConnectionDropped(Exception):
-    """The line is cut."""
+    """The connection is dropped."""
 
 
 class FaultInjector:
-    """What one line does to the replies that it carries, drawn from a generator of its own."""
+    """Faults of one connection, drawn from its own generator."""
 
     def __init__(self, faults: FaultRates, rng: np.random.Generator) -> None:
         self._faults = faults
         self._rng = rng
 
     def apply(self, reply: bytes) -> bytes:
-        """Return what arrives of a reply, nothing where it is lost. Raises Cut."""
+        """Return the received bytes of a reply, empty if it is lost. Raises ConnectionDropped."""
         cut, dropped = self._rng.random(2)
         if cut < self._faults.disconnect:
             raise ConnectionDropped

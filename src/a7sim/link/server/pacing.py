@@ -1,4 +1,4 @@
-"""A line as slow as the real wire: ten bits a byte, each byte after the one before it."""
+"""Pacing of a serial line: ten bits per byte, in order."""
 
 import asyncio
 from collections import deque
@@ -8,11 +8,11 @@ BITS_A_BYTE = 10
 """A start bit, eight data bits, a stop bit."""
 
 SLICE = 0.01
-"""s of the line that are handed on at once."""
+"""Duration in s of the bytes that are passed on at once."""
 
 
 class BaudLimiter:
-    """Hands bytes on, in order, when a line of a baud rate (None: at once) that is late by a delay in s would."""
+    """Passes bytes on, in order, at the time of a line with a baud rate (None: at once) and a delay in s."""
 
     def __init__(
         self,
@@ -22,7 +22,7 @@ class BaudLimiter:
         delay: float = 0.0,
     ) -> None:
         self.size = 0
-        """Bytes on the line."""
+        """Bytes in transit."""
         self._loop = loop
         self._deliver = deliver
         self._seconds_a_byte = BITS_A_BYTE / baud if baud else 0.0
@@ -33,7 +33,7 @@ class BaudLimiter:
         self._timer: asyncio.TimerHandle | None = None
 
     def put(self, data: bytes) -> None:
-        """Send bytes on their way."""
+        """Send bytes."""
         earliest = self._loop.time() + self._delay
         step = self._slice or max(1, len(data))
         for start in range(0, len(data), step):
@@ -44,7 +44,7 @@ class BaudLimiter:
         self._set_timer()
 
     def clear(self) -> None:
-        """Forget what is on its way."""
+        """Discard the bytes in transit."""
         self._due.clear()
         self.size = 0
         if self._timer is not None:

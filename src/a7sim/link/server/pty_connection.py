@@ -1,4 +1,4 @@
-"""A pseudo-terminal as a wire: a serial port of this machine under a name of one's own."""
+"""Pseudo-terminal transport: a serial port of this machine under a chosen name."""
 
 import asyncio
 import fcntl
@@ -13,24 +13,24 @@ from a7sim.link.server.connections import MAX_UNREAD, Host
 from a7sim.link.server.cpu_yield import YieldPolicy
 
 POLLS_BEFORE_SLEEP = 8
-"""A client that was answered mostly asks again at once: so often the wire looks before it sleeps until it is woken."""
+"""Number of polls after a reply before the transport sleeps: a client usually asks again at once."""
 
 MAX_READ = 4096
-"""Bytes that a terminal of Linux holds."""
+"""Bytes in the buffer of a terminal of Linux."""
 
 PTY_DIRECTORY = "/dev/pts/"
-"""Where the links lead that may be overwritten."""
+"""Directory of the targets of links that may be replaced."""
 
 
 class PtyConnection:
-    """The instrument's end of a pseudo-terminal, and the link to the other end.
+    """Instrument's end of a pseudo-terminal, and the link to the other end.
 
-    It keeps the other end open itself, so that clients may come and go. Like a cable of three wires it cannot tell
-    one from the next; a client that is dropped leaves an empty line, on which a new conversation begins.
+    It keeps the other end open, so that clients may come and go. Like a cable of three wires it cannot distinguish
+    clients; a dropped client leaves an empty line, on which a new session starts.
     """
 
     def __init__(self, host: Host, link: Path) -> None:
-        """Make the terminal and the link. Raises Mistake where there is something else in the link's place."""
+        """Create the terminal and the link. Raises A7SimError if another file has the link's path."""
         self._host = host
         self._link = link
         self._unsent = bytearray()
@@ -60,7 +60,7 @@ class PtyConnection:
         return welcomed
 
     def remove(self) -> None:
-        """Take link and terminal away."""
+        """Remove link and terminal."""
         self._conversation.connection_lost()
         self.pause_reading()
         self._loop.remove_writer(self._near)
@@ -102,7 +102,7 @@ class PtyConnection:
     # --- what the conversation asks -------------------------------------------------------------------
 
     def write(self, data: bytes) -> None:
-        """Send bytes, now or as soon as they can go."""
+        """Send bytes, now or as soon as possible."""
         if not self._unsent:
             sent = self._sent(data)
             if sent == len(data):
@@ -115,22 +115,22 @@ class PtyConnection:
             self._conversation.pause_writing()
 
     def pause_reading(self) -> None:
-        """Receive nothing more for the time being."""
+        """Stop receiving."""
         self._reading = False
         self._loop.remove_reader(self._near)
 
     def resume_reading(self) -> None:
-        """Receive again."""
+        """Continue receiving."""
         if not self._reading:
             self._reading = True
             self._loop.add_reader(self._near, self._readable)
 
     def close(self, farewell: bytes = b"") -> None:
-        """Begin anew: there is nobody who could be told."""
+        """Start a new session; no client can receive a farewell."""
         self.abort()
 
     def abort(self) -> None:
-        """Forget the client with all that is on the line, and begin anew."""
+        """Discard the client and all bytes on the line, and start a new session."""
         self._conversation.connection_lost()
         self._host.release(self)
         self._loop.remove_writer(self._near)
@@ -159,7 +159,7 @@ def _make_link(link: Path, device: str) -> None:
 
 
 def _is_served(link: Path) -> bool:
-    """Whether somebody holds the lock that every server has on its terminal; `flock` is left to clients."""
+    """Return whether a server holds the lock of its terminal; `flock` is left to clients."""
     try:
         terminal = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     except OSError:

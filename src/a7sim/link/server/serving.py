@@ -1,4 +1,4 @@
-"""The instrument at its doors: TCP, RFC 2217 and pseudo-terminals, one loop, one desk, an engine for every client."""
+"""Server of an instrument: TCP, RFC 2217 and pseudo-terminals, one loop, one engine per client."""
 
 import asyncio
 import os
@@ -17,15 +17,15 @@ from a7sim.link.server.pty_connection import PtyConnection
 from a7sim.text import pluralize
 
 MAX_REJECTION_NOTICES = 64
-"""Clients at a time that are told why they are turned away; the others are just turned away."""
+"""Number of clients at a time that get the reason of their rejection; further ones are only disconnected."""
 
 LISTEN_BACKLOG = 512
-"""Connections that may wait to be taken in, and are taken in before the clients have their turn."""
+"""Connections that may wait to be accepted, and are accepted before the clients have their turn."""
 
 
 @dataclass(frozen=True)
 class Endpoints:
-    """Where the instrument is to be reached."""
+    """Endpoints of the instrument."""
 
     tcp: Sequence[Address] = ()
     rfc2217: Sequence[Address] = ()
@@ -33,7 +33,7 @@ class Endpoints:
 
 
 class Server:
-    """An instrument that is served, from `open` to `close`."""
+    """Served instrument, from `open` to `close`."""
 
     def __init__(self, instrument: SharedInstrument, clock: Clock | WallClock, terms: ServerLimits) -> None:
         self.instrument = instrument
@@ -46,7 +46,7 @@ class Server:
         self._terminals: list[PtyConnection] = []
 
     async def open(self, doors: Endpoints) -> list[dict[str, Any]]:
-        """Open all doors and return what each is, as a document. Raises Mistake, and then none is open."""
+        """Open all endpoints and return their description as a document. Raises A7SimError, and then none is open."""
         try:
             opened = [await self._listen("tcp", TcpConnection, address) for address in doors.tcp]
             opened += [await self._listen("rfc2217", TelnetConnection, address) for address in doors.rfc2217]
@@ -74,7 +74,7 @@ class Server:
         return {"kind": "pty", "path": str(path), "device": terminal.device, "url": str(path)}
 
     async def close(self) -> None:
-        """Close all doors; every client is cut off."""
+        """Close all endpoints; all clients are disconnected."""
         for listener in self._listeners:
             listener.close()
         for terminal in self._terminals:
@@ -87,11 +87,11 @@ class Server:
 
     @property
     def clients(self) -> int:
-        """How many there are, each terminal counted as one."""
+        """Number of clients, each terminal counted as one."""
         return len(self._wires)
 
     def accept(self, wire: Transport, serial: bool) -> ClientSession | bytes:
-        """Return a conversation for a wire, or why there is none, as a line."""
+        """Return a session for a transport, or the reason for a rejection, as a line."""
         most = self._terms.max_clients
         if len(self._wires) >= most:
             if len(self._turned_away) >= MAX_REJECTION_NOTICES:
@@ -103,12 +103,15 @@ class Server:
         return ClientSession(self.instrument, self._clock, self._terms, wire, self.instrument.client_count + 1, serial)
 
     def release(self, wire: Transport) -> None:
-        """Take note that a wire is no more."""
+        """Record that a transport is closed."""
         self._wires.discard(wire)
         self._turned_away.discard(wire)
 
 
 def _reason(error: OSError) -> str:
-    """Return what the operating system says, without what asyncio adds; a name that leads nowhere is below 0."""
+    """Return the operating system's message without asyncio's additions;
+
+    the error number of an unresolvable name is negative.
+    """
     number = error.errno or 0
     return os.strerror(number) if number > 0 else error.strerror or str(error)

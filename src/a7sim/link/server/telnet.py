@@ -1,4 +1,4 @@
-"""Telnet with the com port options of RFC 2217, without I/O: what of the bytes is data, and what is to be answered.
+"""Telnet with the com port options of RFC 2217, without I/O: separates data from commands, and answers these.
 
 RFC 854 and 855 (commands, options), 856 (binary), 858 (no go-ahead), 2217 (com port control).
 """
@@ -8,13 +8,13 @@ from collections.abc import Callable
 SE, SB, WILL, WONT, DO, DONT, IAC = 240, 250, 251, 252, 253, 254, 255
 BINARY, NO_GO_AHEAD, COM_PORT = 0, 3, 44
 WILLING = frozenset({BINARY, NO_GO_AHEAD, COM_PORT})
-"""Options that both sides may have; an instrument does not echo."""
+"""Accepted options of both sides; an instrument does not echo."""
 
 MAX_SUBNEGOTIATION_LENGTH = 64
-"""Bytes; what goes beyond is dropped."""
+"""Bytes; the excess is dropped."""
 
 TO_THE_CLIENT = 100
-"""What RFC 2217 adds to the number of a client's option for the answer to it."""
+"""Offset of RFC 2217 from the number of a client's option to that of the answer."""
 
 SIGNATURE, BAUD_RATE, DATA_SIZE, PARITY, STOP_SIZE, CONTROL, LINE_STATE, MODEM_STATE = range(8)
 LINE_STATE_MASK, MODEM_STATE_MASK, PURGE = 10, 11, 12
@@ -22,7 +22,7 @@ LINE_STATE_MASK, MODEM_STATE_MASK, PURGE = 10, 11, 12
 _AT_FIRST = {BAUD_RATE: (9600).to_bytes(4, "big"), DATA_SIZE: b"\x08", PARITY: b"\x01", STOP_SIZE: b"\x01"}
 
 _CONTROL_ASKED = {0: 1, 4: 6, 7: 8, 10: 11, 13: 14}
-"""Control codes that ask, and the first answer: no flow control, no break, DTR and RTS on, no inbound control."""
+"""Control codes that query, and the first answer: no flow control, no break, DTR and RTS on, no inbound control."""
 
 _CONTROL_GROUPS = {0: {1, 2, 3, 17, 19}, 4: {5, 6}, 7: {8, 9}, 10: {11, 12}, 13: {14, 15, 16, 18}}
 
@@ -33,7 +33,7 @@ NAME = b"a7sim"
 
 
 class Telnet:
-    """One side of a telnet connection that passes for a serial port: settings are taken and change nothing."""
+    """One side of a telnet connection that emulates a serial port: settings are accepted without effect."""
 
     def __init__(self) -> None:
         self._ours = {BINARY, NO_GO_AHEAD}
@@ -49,16 +49,16 @@ class Telnet:
 
     @staticmethod
     def greeting() -> bytes:
-        """Return what the connection begins with: the wish for eight bits and no go-ahead, both ways."""
+        """Return the opening negotiation: eight bits and no go-ahead, both ways."""
         return bytes([IAC, WILL, BINARY, IAC, DO, BINARY, IAC, WILL, NO_GO_AHEAD, IAC, DO, NO_GO_AHEAD])
 
     @staticmethod
     def escape(data: bytes) -> bytes:
-        """Return data as it goes over the line."""
+        """Return data escaped for the line."""
         return data.replace(b"\xff", b"\xff\xff")
 
     def received(self, raw: bytes) -> tuple[bytes, bytes]:
-        """Take bytes from the line; return those of them that are data, and what is to be sent in answer."""
+        """Process bytes from the line; return the data in them, and the answer to be sent."""
         if self._in_binary and self._taker == self._take_data and IAC not in raw:
             return raw, b""
         for byte in raw:

@@ -1,9 +1,9 @@
-"""Compilation: spot heights, contours and lines of a level model, followed with the mark and registered as vertices.
+"""Compilation of a level model: spot heights, contours and lines, followed with the mark and registered as vertices.
 
-A contour is followed by predictor and corrector: the mark stays at its height and goes on along the ground's strike as
-the eyes see it; where it then seems to stand above or below the ground it is brought back up or down the slope. A road
-is followed by its middle as the left eye sees it, the mark being kept on the ground with the foot disc. It is done on
-the link bench alone, since it needs what the eyepieces show; lengths are mm at model scale unless said otherwise.
+A contour is followed by predictor and corrector: the mark stays at its height and moves along the perceived strike of
+the ground; if it then appears above or below the ground it is moved up or down the slope. A road is followed by its
+middle in the left eyepiece, the mark kept on the ground with the foot disc. Compilation needs the images of the
+eyepieces and therefore runs over a link only. Lengths are mm at model scale unless stated otherwise.
 """
 
 from collections.abc import Sequence
@@ -40,43 +40,49 @@ from a7sim.operator.people.person import Person
 from a7sim.text import pluralize
 
 MAX_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
-"""From vertex to vertex."""
+"""Step from vertex to vertex."""
 
 SPOTS_MM = 25.0
-"""About how far spot heights stand from each other."""
+"""Approximate distance of spot heights."""
 
 _SHARP_TURN, _GENTLE_TURN = 0.35, 0.12
-"""Radians from vertex to vertex, beyond which steps are made shorter, and below which they are made longer."""
+"""Radians from vertex to vertex above which steps are shortened, and below which they are lengthened."""
 
 _MAX_STRAYED, _SHARPEST = 0.6, 0.3
-"""Of a correction, as a share of the step; and of a turn from vertex to vertex, as its cosine."""
+"""Limit of a correction, as a share of the step; and of a turn from vertex to vertex, as its cosine."""
 
 _MAX_VERTICES = 4000
 _MAX_LOOKS = 14
 _NEAR_ENOUGH_MM = 0.15
-"""A correction in plan that is left to the next vertex's turn of the wheels without another look."""
+"""A smaller correction in plan is left to the next movement without another look."""
 
 _MAX_CORRECTION_MM = 3.0
 _SAME_LINE_MM, _JOINED_MM, _STUB_MM = 2.5, 1.5, 10.0
-"""From a line drawn before: where none is begun anew, and where one ends, as at a saddle of its own height; what is
-shorter and ends so is no line of its own."""
+"""Distance from a drawn line within which no line starts, and at which a line ends, as at a saddle of its own height;
+
+a shorter piece that ends so is not a line of its own.
+"""
 
 _AT_A_GLANCE = 10.0
-"""Height by the size of a picture element up to which the eyes fuse without searching; beyond it they might fuse what
-does not belong together."""
+"""Height, by size of a picture element, up to which the eyes fuse without a search;
+
+beyond, unrelated images might be fused.
+"""
 
 _CLOSELY = ((FINE_MM, 0.0), (MIDDLING_MM, 0.0), (MIDDLING_MM, 3.0), (COARSE_MM, 12.0))
 _WIDELY = _CLOSELY[2:]
-"""Sizes of picture elements and heights that are searched, from the closest look outward; a middling one is as good as
-a close one where a signal disturbs that."""
+"""Sizes of picture elements and heights that are searched, from the finest outward;
+
+a medium one is as good as a fine one if a signal disturbs that.
+"""
 
 ROAD_MM = 0.08
-"""Size of a picture element where lines are followed: 3.8 mm of the photograph are seen."""
+"""Size of a picture element for following lines: 3.8 mm of the photograph are visible."""
 
 _ON_ROADS = ((ROAD_MM, 0.0), (ROAD_MM, 1.0), (COARSE_MM, 12.0))
 _ROAD_SIDE = 43
 _ROAD_SEEN = 0.45
-"""Correlation with a light band from which a road is seen."""
+"""Correlation with a light band above which a road is recognised."""
 
 _WIDTHS_MM = tuple(np.geomspace(0.5, 4.0, 10).tolist())
 _END_REACHED_MM = 6.0
@@ -84,7 +90,7 @@ _END_REACHED_MM = 6.0
 
 @dataclass(frozen=True)
 class _Vertex:
-    """Where the mark was meant to stand ``(2,)``, and which way the line goes on there ``(2,)``, one long."""
+    """Intended position of the mark ``(2,)``, and unit direction of the line there ``(2,)``."""
 
     place: Array
     heading: Array
@@ -92,7 +98,7 @@ class _Vertex:
 
 
 class Compilation:
-    """One person compiling a level model."""
+    """Compilation of a level model by one operator."""
 
     def __init__(
         self,
@@ -127,7 +133,7 @@ class Compilation:
         return np.asarray(self._workstation.controls.counters(self._active)[:2, 0])
 
     def _registered(self, name: str) -> Array:
-        """Register the mark under a name and return the readings ``(3,)`` on the record."""
+        """Register the mark under a name and return the registered readings ``(3,)``."""
         self._workstation.operators.spend(self._active, self._tracing.seconds_per_vertex, "turning")
         fields = self._person.client.fields(f'REC "{name}";:REC:LAST?')
         return np.array(fields[2:5], dtype=float)
@@ -135,7 +141,7 @@ class Compilation:
     def _seen(
         self, expected: PerceivedSurface | None = None, looks: Sequence[tuple[float, float]] = _CLOSELY
     ) -> tuple[StereoPatch, PerceivedSurface] | None:
-        """Look at the ground, more and more widely until it fuses; None if it does not."""
+        """Look at the ground, with a widening search, until it fuses; None if it does not."""
         look = None
         for pitch, reach in looks:
             if look is None or look.pitch != pitch:
@@ -146,7 +152,7 @@ class Compilation:
         return None
 
     def _tremor(self, look: StereoPatch) -> tuple[Array, float]:
-        """Draw tremor along and across ``(2,)``, and how much too high the ground seems to be, in mm."""
+        """Draw tremor along and across ``(2,)``, and the error of the perceived height, in mm."""
         along, across, height = self._workstation.operators.draw_setting_errors(self._active, 1.0, (3,))[:, 0]
         tremor = 1e-3 * self._tracing.tremor_um * look.enlargement * np.array([along, across])
         return tremor, float(1e-3 * self._workstation.operators.observer.height_um * height / look.parallax_by_height)
@@ -222,7 +228,7 @@ class Compilation:
         return TracedLine(name, CONTOUR, height, as_polyline([*back[::-1], *there]), (other, ending))
 
     def _followed(self, name: str, start: _Vertex, drawn: Sequence[TracedLine]) -> tuple[list[Array], Ending]:
-        """Follow a contour from a place on it; return its vertices and how it ended."""
+        """Follow a contour from a position on it; return its vertices and how it ended."""
         vertices: list[Array] = []
         at, step, bend = start, FIRST_STEP_MM, 0.0
         while len(vertices) < _MAX_VERTICES:
@@ -259,7 +265,7 @@ class Compilation:
         name: str,
         into: list[Array] | None = None,
     ) -> _Vertex | None:
-        """Bring the mark onto the contour at its height; with `into`, register it there with the hand's tremor."""
+        """Move the mark onto the contour at its height; with `into`, register it there with the tremor of the hand."""
         expected = None if before is None else PerceivedSurface(0.0, before.surface.slope, 0.0, 1.0)
         for number in range(_MAX_LOOKS):
             seen = self._seen(expected, _CLOSELY if number or before is not None else _WIDELY)
@@ -293,7 +299,7 @@ class Compilation:
     # --- lines ----------------------------------------------------------------------------------------
 
     def line(self, target: LineTarget, spots: SpotHeights) -> TracedLine:
-        """Follow a road or track by its middle. Gives up where none is seen at its start."""
+        """Follow a road or track by its middle. Gives up if none is visible at its start."""
         start, towards, end = (self._readings_in_plan(each) for each in (target.start, target.towards, target.end))
         heading = (towards - start) / length_of(towards - start)
         self._drive(start, spots.nearest(start))
@@ -344,7 +350,7 @@ class Compilation:
     def _road_at(
         self, heading: Array, within: float, widths: Sequence[float], expected: PerceivedSurface | None = None
     ) -> "_Road | None":
-        """Look for a light band near the mark that goes about a direction ``(2,)``, `within` so many radians."""
+        """Find a light band near the mark with a direction ``(2,)``, `within` an angle in radians."""
         slope = None if expected is None else PerceivedSurface(0.0, expected.slope, 0.0, 1.0)
         seen = self._seen(slope, _ON_ROADS)
         if seen is not None and seen[0].pitch != ROAD_MM:
@@ -360,7 +366,7 @@ class Compilation:
 
 @dataclass(frozen=True)
 class _Road:
-    """A road near the mark: how far its middle lies ``(2,)``, which way it goes ``(2,)``, how wide it is."""
+    """Road near the mark: offset of its middle ``(2,)``, direction ``(2,)``, width."""
 
     look: StereoPatch
     surface: PerceivedSurface
@@ -402,7 +408,7 @@ def _fit(grey: Array, plan: Array, direction: Array, offsets: Array, width: floa
 
 
 def _peak(values: Array, at: int) -> float:
-    """Return by what part of a step the top of a parabola through three values lies off the middle one."""
+    """Return the offset of the vertex of a parabola through three values from the middle one, in steps."""
     if not 0 < at < values.size - 1:
         return 0.0
     before, here, after = values[at - 1 : at + 2]
@@ -411,7 +417,7 @@ def _peak(values: Array, at: int) -> float:
 
 
 def _strayed(before: _Vertex, wanted: Array, here: Array, heading: Array) -> bool:
-    """Return whether a correction led to where the line cannot have gone: perhaps another contour beyond a saddle."""
+    """Return whether a correction led to an impossible position: perhaps another contour beyond a saddle."""
     step = float(length_of(wanted - before.place))
     return bool(
         length_of(here - wanted) > _MAX_STRAYED * step + _NEAR_ENOUGH_MM or heading @ before.heading < _SHARPEST

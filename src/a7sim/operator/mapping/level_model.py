@@ -1,4 +1,4 @@
-"""A level model to scale, as lines are drawn from it: its orientation to the ground by all control (thesis 3.5)."""
+"""Level model to scale for compilation: its orientation to the ground by all control (thesis 3.5)."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,24 +17,24 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class LevelModel:
-    """A level model to scale: its orientation to the ground, and what was measured in it by point, in readings."""
+    """Level model to scale: its orientation to the ground, and the readings of its points."""
 
     absolute: AbsoluteOrientation
     points: Mapping[str, Place]
     scale_number: float
-    """Of the model as ordered: 3750 for 1:3750."""
+    """Scale number of the model as requested: 3750 for 1:3750."""
     tilt_gon: float
-    """What is left of its tilt."""
+    """Remaining tilt."""
     units_per_mm: float
     rounds: int
 
     def on_ground(self, readings: Array) -> Array:
-        """Return readings ``(3, ...)`` of the counters as places on the ground ``(3, ...)`` in m."""
+        """Return counter readings ``(3, ...)`` as positions on the ground ``(3, ...)`` in m."""
         places = (readings.reshape(3, -1).T / self._units).T
         return self.absolute.similarity.applied_to(places).reshape(readings.shape)
 
     def readings_of(self, ground: Array) -> Array:
-        """Return the readings ``(3, ...)`` at which places on the ground ``(3, ...)`` in m stand in the model."""
+        """Return the readings ``(3, ...)`` of positions on the ground ``(3, ...)`` in m."""
         places = self.absolute.similarity.inverted(ground.reshape(3, -1))
         return np.asarray((places.T * self._units).T.reshape(ground.shape))
 
@@ -44,7 +44,7 @@ class LevelModel:
 
     @property
     def metres_per_mm(self) -> float:
-        """Of the ground, a mm of the model as it came out."""
+        """Metres on the ground per mm of the model as levelled."""
         return float(self.absolute.similarity.scale)
 
 
@@ -56,10 +56,10 @@ def level_model(
     scale_number: float,
     also: Sequence[str] = (),
 ) -> LevelModel:
-    """Level a relatively oriented model of one person and bring it to scale; `points` are readings measured in it.
+    """Level a relatively oriented model and bring it to scale over a link; `points` are readings measured in it.
 
-    The control in the model, and the points of `also`, are measured anew in the end. Gives up where the control
-    does not determine the orientation.
+    The control in the model, and the points of `also`, are finally measured again. Gives up if the control does not
+    determine the orientation.
     """
     operators, units = workstation.operators, workstation.controls.units_per_mm
     wanted = [name for name in points if name in control.points or name in also]
@@ -87,7 +87,7 @@ def _measured(workstation: Workstation, names: Sequence[str]) -> dict[str, Place
 def orient_model(
     workstation: Workstation, points: Mapping[str, Place], control: Ground, units: float
 ) -> AbsoluteOrientation:
-    """Return the orientation to the ground of a model in which the control was measured, gives up where it has none."""
+    """Return the orientation to the ground of a model with measured control; gives up without control."""
     names = tuple(name for name in points if name in control.points)
     coordinates = np.array([points[name] for name in names]).reshape(-1, 3).T / np.array([[1.0], [1.0], [units]])
     try:
@@ -100,6 +100,6 @@ def orient_model(
 
 
 def _tilt(absolute: AbsoluteOrientation) -> float:
-    """Return how far the ground's plumb line leans in the model, gon."""
+    """Return the inclination of the ground's plumb line in the model, gon."""
     x, y, _ = absolute.similarity.rotation[2]
     return math.hypot(x, y) / GON

@@ -1,4 +1,4 @@
-"""A sheet from the pictures in the drawer to the last line: the work of one person at the plotter and its table."""
+"""Compilation of a map by one operator at the plotter and its table, from mounting to the last line."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -23,29 +23,29 @@ from a7sim.operator.procedures.models import ModelRecord, begin_form, measure_mo
 from a7sim.reduction import Ground
 
 TABLE_GEARS: Mapping[str, float] = MappingProxyType({"1-1-1": 1.0, **PLAN_GEARS})
-"""How many times larger than the model the plotting table draws; 1-1-1 is taken for equal gears [assumption]."""
+"""Enlargements from the model to the plotting table; 1-1-1 is taken for equal gears [assumption]."""
 
 ROUND_SCALE = 500.0
-"""The map's scale number is made the nearest multiple of this."""
+"""The map's scale number is rounded to a multiple of this."""
 
 MAX_CONTOURS = 100
 
 
 @dataclass(frozen=True)
 class MapRequest:
-    """What is to be drawn: heights of contours in m, all multiples of an interval, lines, and at what scale."""
+    """Requested map: heights of contours in m, all multiples of an interval, lines, and the scale."""
 
     contours: tuple[float, ...]
     interval: float | None
     lines: tuple[LineTarget, ...]
     tracing: Tracing
     map_scale: float | None = None
-    """Scale number of the map; when absent, the nearest round one."""
+    """Scale number of the map; if absent, the nearest round one."""
 
 
 @dataclass(frozen=True)
 class CompiledMap:
-    """A compiled model as the person who compiled it knows it."""
+    """Compiled model as known to the operator."""
 
     record: ModelRecord
     model: LevelModel
@@ -55,22 +55,22 @@ class CompiledMap:
     heights: tuple[float, ...]
     """Of the contours, m."""
     gear: float
-    """How many times larger than the model the table draws."""
+    """Enlargement from the model to the table."""
     height_above_ground: float
     """Of the projection centres, m."""
     sigma_height: float
     sigma_plan: float
-    """Standard errors in m that the person expects: of a setting and tremor, with the misfit of the control."""
+    """Expected standard errors in m: of a setting and tremor, with the misfit of the control."""
 
     @property
     def map_scale(self) -> float:
-        """Scale number of the sheet."""
+        """Scale number of the map."""
         return self.model.scale_number / self.gear
 
     def on_table(self, readings: Array) -> Array:
-        """Return where the pencil stands ``(2, ...)`` in mm from the mark's place at readings of zero, north up.
+        """Return the position of the pencil ``(2, ...)`` in mm from the mark's position at readings of zero, north up.
 
-        The sheet is turned on the table until the control fits.
+        The map is rotated on the table until the control fits.
         """
         east, north = self.model.absolute.similarity.rotation[:2, 0], self.model.absolute.similarity.rotation[:2, 1]
         turn = np.array([[east[0] + north[1], north[0] - east[1]], [east[1] - north[0], east[0] + north[1]]])
@@ -86,9 +86,9 @@ def compile_map(
     tick: Callable[[], None] = lambda: None,
     begins: Callable[[str], None] = lambda _: None,
 ) -> CompiledMap:
-    """Set up the one model of a job, level it on the control, and compile what is ordered.
+    """Set up the one model of a job, level it on the control, and compile the requested lines.
 
-    Raises DoesNotFit when it cannot be set up, Mistake for a contour that does not run in the model.
+    Raises OperatorGaveUp if it cannot be set up, A7SimError for a contour outside the model.
     """
     person.book.set_heading("", "preparation")
     workstation = Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick)
@@ -133,7 +133,7 @@ def _round_scale(number: float) -> float:
 
 
 def _heights(order: MapRequest, spots: SpotHeights) -> tuple[float, ...]:
-    """Return the heights to be contoured in order. Raises Mistake for one outside the model."""
+    """Return the requested heights of contours in order. Raises A7SimError for one outside the model."""
     low, high = spots.range
     for height in order.contours:
         if not low < height < high:
@@ -155,7 +155,7 @@ def _heights(order: MapRequest, spots: SpotHeights) -> tuple[float, ...]:
 def _expected(
     workstation: Workstation, view: StereoView, model: LevelModel, spots: SpotHeights, tracing: Tracing
 ) -> tuple[float, float, float]:
-    """Return the height of the centres above the mean spot in m, and the standard errors in m that a person expects."""
+    """Return the height of the centres above the mean spot in m, and the expected standard errors in m."""
     active, observer = workstation.operators.active, workstation.operators.observer
     look = view.look()
     residuals = model.absolute.fit.at_control

@@ -9,21 +9,22 @@ from a7sim.errors import A7SimError
 from a7sim.plotters import Variant
 
 PLAN_GEARS: Mapping[str, float] = MappingProxyType({"3-1-1": 4.0 / 3.0, "1-2-1": 1.5})
-"""How many times larger than the model a horizontal gear draws: 1:3333 and 1:3750 into 1:2500 (thesis table 3.3).
+"""Enlargements of the horizontal gears from model to map: 1:3333 and 1:3750 into 1:2500 (thesis table 3.3).
 
-Only these two ratios stand in the thesis; the plotter had more."""
+The thesis names only these two ratios; the plotter had more.
+"""
 
 RATIO_AGREES = 2e-3
-"""Share within which a model scale such as 1:3333 and a ratio of gears belong together."""
+"""Tolerance of a model scale such as 1:3333 and a ratio of gears, as a share."""
 
 FORMAT_MM = 230.0
 MIN_WIDE_DEG, WIDEST_WIDE_DEG = 75.0, 100.0
-"""Field angles across the picture that are called wide (thesis 3.2.3.2)."""
+"""Field angles across the picture called wide (thesis 3.2.3.2)."""
 
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """What is known of a flight: principal distance and photo base in mm, heights of the ground in m."""
+    """Data of a flight: principal distance and photo base in mm, heights of the ground in m."""
 
     c: float
     photo_scale: float
@@ -43,7 +44,7 @@ class FlightPlan:
     ) -> "FlightPlan":
         """Return a flight over the lowest and the highest ground, by its photo scale or its flying height.
 
-        Heights are m, the flying height above the mean ground. Raises Mistake where they do not make a flight.
+        Heights are m, the flying height above the mean ground. Raises A7SimError if they are inconsistent.
         """
         if (photo_scale is None) == (flying_height is None):
             got = "none" if photo_scale is None else "both"
@@ -98,27 +99,27 @@ class FlightPlan:
 
 @dataclass(frozen=True)
 class ModelScale:
-    """A model scale with what belongs to it, mm at the instrument, and why it cannot be had (`against`)."""
+    """Model scale with its settings, mm at the instrument, and the reasons for which it is rejected."""
 
     number: float
     height_gear: str
     interval: float
     """Last digit of the height counter, m."""
     plan_gear: str
-    """Horizontal gear to the map, empty where none is asked for or known."""
+    """Horizontal gear to the map, empty if none is requested or known."""
     projection_height: float
     lowest: float
     highest: float
     """Projection distances of the highest and the lowest ground."""
     bx: float
     width: float
-    """How far the corners of the picture reach across the base."""
+    """Extent of the corners of the picture across the base."""
     reason_rejected: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class FlightSettings:
-    """The settings of a flight: the optimum scale number, all scales for which there are gears, the one chosen."""
+    """Settings of a flight: the optimum scale number, all scales with gears, and the chosen one."""
 
     flight: FlightPlan
     optimum: float
@@ -131,10 +132,10 @@ class FlightSettings:
 def choose_settings(flight: FlightPlan, variant: Variant, map_scale: float | None = None) -> FlightSettings:
     """Return the settings for a flight on a plotter, from a flight in mm and m and a map's scale number.
 
-    The optimum puts the mean ground at the longest projection distance, equation 3.1. Of the scales for which there is
-    a height gear that counts metres, those remain within the ranges of Z, bx, X and Y and with a horizontal gear to the
-    map; the height counter with the finest last digit is taken, and among equals the scale nearest to the optimum.
-    Raises Mistake where none remains.
+    The optimum places the mean ground at the longest projection distance, equation 3.1. Of the scales for which a
+    height gear counts metres, those within the ranges of Z, bx, X and Y and with a horizontal gear to the map remain;
+    the height counter with the finest last digit is chosen, and among equals the scale nearest to the optimum. Raises
+    A7SimError if none remains.
     """
     optimum = 1e3 * flight.flying_height / _longest(variant)
     gears = {gear.units_per_mm: name for name, gear in variant.height_gears.items()}

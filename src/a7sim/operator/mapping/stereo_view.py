@@ -1,9 +1,8 @@
-"""Seeing the ground at the mark: the pictures of both eyepieces, brought together as a person fuses them.
+"""Stereoscopic view of the ground at the mark: the images of both eyepieces, fused.
 
-The eyepieces name no ground: they show texture. Two eyes that look at it see a surface that passes above or below
-the mark, and how it slopes. Here that is least-squares matching of the two pictures: the surface is a plane in the
-model, it is turned and raised until the left and the right picture of it agree. What a person's eyes add
-in error is added by the procedures.
+The eyepieces show texture only. Two eyes see a surface above or below the mark, and its slope. Here that is
+least-squares matching of the two images: the surface is a plane in the model, turned and raised until its left and
+right images agree. The procedures add the errors of the observer.
 """
 
 from dataclasses import dataclass
@@ -17,20 +16,22 @@ from a7sim.operator.driving.workstation import Workstation
 from a7sim.operator.people.person import Person
 
 SIDE = 48
-"""Columns and rows of a look."""
+"""Columns and rows of an image."""
 
 FINE_MM, MIDDLING_MM, COARSE_MM = 0.03, 0.07, 0.2
-"""Size of a picture element at photo scale; the finest shows 1.44 mm of the photograph."""
+"""Size of a picture element at photo scale; the finest image shows 1.44 mm of the photograph."""
 
 FUSED = 0.95
-"""Correlation from which two pictures are taken for the same ground: on bare ground 0.97 and more, elsewhere
-less (docs/compilation.md)."""
+"""Correlation above which two images count as the same ground:
+
+on bare ground 0.97 and more, elsewhere less (docs/compilation.md).
+"""
 
 _PATCH = 31
-"""Places each way at which the pictures are compared, one every picture element."""
+"""Number of positions in each direction at which the images are compared, one per picture element."""
 
 _MARK_RADIUS = 3.5
-"""Picture elements about the middle that the mark covers, with what interpolation spreads of it."""
+"""Radius in picture elements of the part covered by the mark, including the effect of interpolation."""
 
 _MAX_STEPS = 12
 _AT_REST = 2e-4
@@ -40,41 +41,41 @@ _NUDGE_MM = 0.05
 
 @dataclass(frozen=True)
 class PerceivedSurface:
-    """The ground as both eyes see it about the mark; lengths in mm at model scale."""
+    """Ground surface about the mark as seen by both eyes; lengths in mm at model scale."""
 
     height: float
-    """Of the ground above the mark, straight over or under it."""
+    """Of the ground above the mark, vertically."""
     slope: Array
-    """How it rises along X and Y ``(2,)``."""
+    """Along X and Y ``(2,)``."""
     y_parallax: float
     """mm at photo scale, left eye minus right eye."""
     correlation: float
 
     def above(self, plan: Array) -> float:
-        """Return how high the ground stands above the mark at a displacement in plan ``(2,)``."""
+        """Return the height of the ground above the mark at a displacement in plan ``(2,)``."""
         return float(self.height + self.slope @ plan)
 
     @property
     def fused(self) -> bool:
-        """Whether the two pictures came together."""
+        """Whether the two images were fused."""
         return self.correlation >= FUSED
 
 
 @dataclass(frozen=True)
 class StereoPatch:
-    """The pictures of both eyes ``(2, rows, columns)`` and how model displacements show in them."""
+    """Images of both eyes ``(2, rows, columns)`` and the projection of model displacements into them."""
 
     pictures: Array
     pitch: float
     """mm at photo scale."""
     shown: Array
-    """From displacements in the model to those in the pictures ``(2 eyes, 2, 3)``."""
+    """From displacements in the model to those in the images ``(2 eyes, 2, 3)``."""
     spacing: float
-    """mm in the model that a picture element shows."""
+    """mm in the model per picture element."""
 
     @property
     def parallax_by_height(self) -> float:
-        """x-parallax at photo scale by a mm of height in the model."""
+        """x-parallax at photo scale per mm of height in the model."""
         return float(abs(self.shown[0, 0, 2] - self.shown[1, 0, 2]))
 
     @property
@@ -84,16 +85,18 @@ class StereoPatch:
 
     @cached_property
     def comparison_points(self) -> Array:
-        """Displacements in plan ``(2, n)`` of the places at which the pictures are compared, mm in the model."""
+        """Displacements in plan ``(2, n)`` of the positions at which the images are compared, mm in the model."""
         return self.patch(_PATCH)
 
     def patch(self, side: int) -> Array:
-        """Return displacements in plan ``(2, n)`` over so many picture elements each way, mm in the model."""
+        """Return displacements in plan ``(2, n)`` over `side` picture elements in each direction, mm in the model."""
         at = self.spacing * (np.arange(side) - (side - 1) / 2.0)
         return np.array(np.meshgrid(at, at)).reshape(2, -1)
 
     def elements_at(self, seen: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-        """Return columns and rows ``(..., n)`` of places ``(..., 2, n)``, and which are seen free of the mark."""
+        """Return columns and rows ``(..., n)`` of positions ``(..., 2, n)``, and which are visible and not covered by
+        the mark.
+        """
         columns = seen[..., 0, :] / self.pitch + (SIDE - 1) / 2.0
         rows = -seen[..., 1, :] / self.pitch + (SIDE - 1) / 2.0
         inside = (columns >= 0) & (columns < SIDE - 1) & (rows >= 0) & (rows < SIDE - 1)
@@ -101,7 +104,7 @@ class StereoPatch:
         return columns, rows, inside & uncovered
 
     def places(self, surface: Array) -> tuple[Array, Array]:
-        """Return displacements ``(2, n)`` over the patch and where either eye sees them on a surface ``(2, 2, n)``.
+        """Return displacements ``(2, n)`` over the patch and their positions in both images on a surface ``(2, 2, n)``.
 
         `surface` is height, slope in X, slope in Y in the model, and y-parallax at photo scale.
         """
@@ -114,7 +117,7 @@ class StereoPatch:
 
 
 class StereoView:
-    """The eyes of one person at a line on the ground at the mark."""
+    """Stereoscopic view of one operator at a link, of the ground at the mark."""
 
     def __init__(self, workstation: Workstation, person: Person) -> None:
         self._workstation = workstation
@@ -124,7 +127,7 @@ class StereoView:
         self.read_projectors()
 
     def read_projectors(self) -> None:
-        """Read off how the projectors stand."""
+        """Read the poses of the projectors."""
         names = [f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz", "c") for n in (1, 2)]
         counts = self._workstation.controls.elements(self._active, [*names, "bx"])
         self._elements = {name: float(each[0]) for name, each in counts.items()}
@@ -138,7 +141,7 @@ class StereoView:
         return centre, turned
 
     def displacements(self, mark: Array) -> Array:
-        """Return the derivatives ``(2 eyes, 2, 3)`` of what the eyes see by displacements from the mark ``(3,)``."""
+        """Return the derivatives ``(2 eyes, 2, 3)`` of the view by displacements from the mark ``(3,)``."""
         steps = _NUDGE_MM * np.concatenate([np.eye(3), -np.eye(3)], axis=1)
         seen = []
         for side in (1, 2):
@@ -150,7 +153,10 @@ class StereoView:
         return np.array(seen)
 
     def look(self, pitch: float = FINE_MM) -> StereoPatch:
-        """Look with both eyes, a picture element being so many mm of the photographs; whoever looks spends the time."""
+        """Look with both eyes;
+
+        `pitch` is the size of a picture element in mm of the photographs. The caller adds the time.
+        """
         workstation = self._workstation
         mark = workstation.controls.model_position(self._active, workstation.controls.counters(self._active))[:, 0] * (
             1.0,
@@ -169,7 +175,7 @@ class StereoView:
     def surface(
         self, look: StereoPatch, expected: PerceivedSurface | None = None, reach: float = 0.0
     ) -> PerceivedSurface:
-        """Return the ground that a look shows, beginning with an expected slope.
+        """Return the ground shown by a look, starting with an expected slope.
 
         Heights within `reach` mm of the mark are tried; without it the ground is expected at the mark's height.
         """
@@ -186,7 +192,7 @@ class StereoView:
 
 
 def _matched(look: StereoPatch, surface: Array) -> PerceivedSurface:
-    """Return the plane that makes both pictures agree best, by Gauss-Newton from a plane nearby."""
+    """Return the plane for which both images agree best, by Gauss-Newton from a plane nearby."""
     scale = np.array([1.0, 10.0, 10.0, 1.0])
     for _ in range(_MAX_STEPS):
         left, right, left_slopes, right_slopes, plan = _compared(look, surface)
@@ -210,9 +216,10 @@ def _matched(look: StereoPatch, surface: Array) -> PerceivedSurface:
 
 
 def _compared(look: StereoPatch, surface: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Return the greys ``(n,)`` of a surface in both pictures, their slopes ``(2, n)`` a mm and the places ``(2, n)``.
+    """Return the greys ``(n,)`` of a surface in both images, their gradients ``(2, n)`` per mm and the positions ``(2,
+    n)``.
 
-    Places that the mark covers or that lie outside either picture are left out.
+    Positions covered by the mark or outside either image are left out.
     """
     between, plan = _seen_by_both(look, surface)
     sense = np.array([[1.0], [-1.0]])
@@ -221,7 +228,7 @@ def _compared(look: StereoPatch, surface: Array) -> tuple[Array, Array, Array, A
 
 
 def _seen_by_both(look: StereoPatch, surface: Array) -> tuple[list["_Between"], Array]:
-    """Return where both pictures show a surface free of the mark, and the places ``(2, n)``."""
+    """Return the positions where both images show a surface clear of the mark, and the displacements ``(2, n)``."""
     plan, seen = look.places(surface)
     columns, rows, plain = look.elements_at(seen)
     keep = plain.all(axis=0)
@@ -231,7 +238,10 @@ def _seen_by_both(look: StereoPatch, surface: Array) -> tuple[list["_Between"], 
 
 @dataclass(frozen=True)
 class _Between:
-    """Places ``(n,)`` between picture elements: how far to the right and down, and the changes of grey about them."""
+    """Positions ``(n,)`` between picture elements:
+
+    fractions to the right and down, and the differences of grey about them.
+    """
 
     to_right: Array
     down: Array
@@ -260,21 +270,24 @@ class _Between:
 
     @property
     def slopes(self) -> Array:
-        """How they change by column and row ``(2, n)``."""
+        """Differences of grey by column and row ``(2, n)``."""
         return np.array([self.upper_change * (1.0 - self.down) + self.lower_change * self.down, self._ends[1]])
 
 
 def _correlation(look: StereoPatch, surface: Array) -> float:
-    """Return how the greys of a surface in both pictures are correlated."""
+    """Return the correlation of the greys of a surface in both images."""
     left, right = (each.greys for each in _seen_by_both(look, surface)[0])
     spread = float(left.std() * right.std()) if left.size >= _PATCH else 0.0
     return float(((left - left.mean()) * (right - right.mean())).mean()) / spread if spread > 0.0 else 0.0
 
 
 def rectify(look: StereoPatch, surface: PerceivedSurface, side: int) -> tuple[npt.NDArray[np.bool_], Array, Array]:
-    """Return what the left eye sees laid out on the ground: where it sees, greys, both ``(n,)``, and places ``(2, n)``.
+    """Return the view of the left eye projected onto the ground:
 
-    The patch is `side` picture elements each way; places are displacements from the mark in plan, mm in the model.
+    visibility, greys, both ``(n,)``, and positions ``(2, n)``.
+
+    The patch has `side` picture elements in each direction; positions are displacements from the mark in plan, mm in
+    the model.
     """
     plan = look.patch(side)
     seen = look.shown[0] @ np.concatenate([plan, [surface.height + surface.slope @ plan]])

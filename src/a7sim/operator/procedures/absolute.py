@@ -1,4 +1,4 @@
-"""Absolute orientation at the instrument: a model levelled and to scale, its heights indexed, read, set back."""
+"""Absolute orientation at the instrument: a model is levelled and scaled, its heights indexed and read, then reset."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,42 +14,42 @@ from a7sim.operator.driving.workstation import Workstation
 from a7sim.operator.procedures.levelling import MAX_ROUNDS, Control, Fit, Levelling, LevellingRound, Settings
 
 TOLERATED_SHARE = 2e-4
-"""Of the flying height, within which heights at control agree (the trade's 0.02 %)."""
+"""Tolerance of heights at control as a share of the flying height (the trade's 0.02 %)."""
 
 
 @dataclass(frozen=True)
 class GroundOrientation:
-    """A model in the system of the ground, as a session left it."""
+    """Model in the system of the ground, as the result of a session."""
 
     scale_number: float
     height_gear: str
     rounds: Sequence[LevellingRound]
     before: Mapping[str, float]
-    """Elements as the relative orientation had left them, and as they are set again in the end."""
+    """Elements after the relative orientation, and again at the end."""
     elements: Mapping[str, float]
-    """Elements as they stood while the model was level and to scale."""
+    """Elements while the model was level and to scale."""
     heights: Mapping[str, float]
     """Read minus given at control, m."""
     distance: float
-    """Read minus given between the two points that gave the scale, m."""
+    """Read minus given distance of the two points that define the scale, m."""
     tolerated: float
-    """For heights at control, m."""
+    """Tolerance of heights at control, m."""
     points: Mapping[str, tuple[float, float, float]]
     """X and Y in mm at the model scale, Z in m."""
 
     @property
     def within_tolerance(self) -> bool:
-        """Whether all heights at control agree."""
+        """Whether all heights at control are within tolerance."""
         return max(map(abs, self.heights.values())) <= self.tolerated
 
 
 def absolute_orientation_at(
     workstation: Workstation, model: ModelJob, control: Mapping[str, tuple[float, float, float]]
 ) -> dict[int, GroundOrientation]:
-    """Level and scale a model, read it with heights in metres, and set the instruments back to how they stood.
+    """Level and scale a model, read it with heights in metres, and reset the instruments to their previous state.
 
-    `control` is X, Y, Z in m, nan for what is not known of a point. What comes back is by session; those whose models
-    do not show two points of control in plan and three in height remark so and do nothing.
+    `control` is X, Y, Z in m, nan for unknown coordinates. The result is by session; sessions whose models do not show
+    two control points in plan and three in height write a remark and do nothing.
     """
     found: dict[int, GroundOrientation] = {}
     operators = workstation.operators
@@ -74,7 +74,7 @@ def absolute_orientation_at(
 
 
 def _gear(workstation: Workstation, metres: float) -> str:
-    """Return the planned height gear, or that which counts metres at the scale nearest to the model as it stands."""
+    """Return the planned height gear, or the gear that counts metres at the scale nearest to that of the model."""
     planned, gears = workstation.job.plan.height_gear, workstation.controls.manual.height_gears
     if isinstance(planned, str):
         return planned
@@ -91,7 +91,7 @@ class _InMetres:
         self.number = 1e3 * self.controls.manual.height_gears[gear].units_per_mm
 
     def done(self, active: Indices, fit: Fit, before: Settings, start: Array) -> dict[int, GroundOrientation]:
-        """Level, read and set back to settings and readings of Z ``(sessions,)``."""
+        """Level, read and reset to settings and readings of Z ``(sessions,)``."""
         self.controls.drive(active, {"Z": start[active]})
         self.controls.set_height_gear(active, self.gear)
         rounds = self.levelling.level(
@@ -107,7 +107,7 @@ class _InMetres:
         return found
 
     def _index_set(self, active: Indices) -> Array:
-        """Make the Z counter read heights, on the mean of the control; return how much more it reads ``(m,)``."""
+        """Index the Z counter to heights, on the mean of the control; return the change of its reading ``(m,)``."""
         names = [self.control.names[i] for i in self.control.with_height]
         self.workstation.begin_round(active, MAX_ROUNDS + 1)
         readings = self.workstation.measure_points(active, names)[2][:, active]
@@ -115,7 +115,7 @@ class _InMetres:
         return self.controls.shift_counter(active, "Z", more)
 
     def _read(self, active: Indices) -> dict[str, Array]:
-        """Measure control and all other points that are shown; X, Y in mm and Z in m ``(3, sessions)``."""
+        """Measure control and all other visible points; X, Y in mm and Z in m ``(3, sessions)``."""
         self.workstation.begin_round(active, MAX_ROUNDS + 2)
         wanted = dict.fromkeys([*self.control.names, *self.controls.model.other_points])
         names = [name for name in wanted if self.workstation.has_point(active, name).all()]
@@ -152,7 +152,7 @@ class _InMetres:
         }
 
     def _set_back(self, active: Indices, before: Settings, start: Array, shift: Array) -> None:
-        """Set elements, index and gear as they were before."""
+        """Reset elements, index and gear."""
         if active.size:
             self.controls.shift_counter(active, "Z", -shift[active])
             self.controls.drive(active, {"Z": start[active]})

@@ -1,8 +1,8 @@
-"""Bridging, or aeropolygon: base in, base out, base in ... through a strip, without joining models afterwards.
+"""Bridging (aeropolygon): base in, base out, base in ... along a strip, without joining models afterwards.
 
-The photograph that is oriented stays as it is in its projector; the next one is oriented to it by the dependent method,
-and bx carries the scale on: it is changed until common points read the heights that they had in the model before.
-The counters are preset so that readings go on in the system of the first model.
+The oriented photograph stays in its projector; the next one is oriented to it by the dependent method. bx transfers the
+scale: it is changed until common points have the same heights as in the previous model. The counters are preset so that
+readings continue in the system of the first model.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -39,29 +39,29 @@ from a7sim.operator.procedures.relative import (
 MAX_SCALINGS = 4
 MAX_REFINEMENTS = 4
 STILL_FALLING = 0.95
-"""Residual parallaxes, or changes of the base, go on falling while they are below this share of the best so far."""
+"""Residual parallaxes, or changes of the base, count as decreasing while below this share of the best so far."""
 
 SHARE_OF_RANGE = 0.5
-"""Of the range of by or bz, beyond which the strip is brought back to their zeros and Y or Z preset."""
+"""Share of the range of by or bz beyond which the strip is moved back to their zeros and Y or Z preset."""
 
 
 @dataclass(frozen=True)
 class BridgedModels:
-    """A model in a crew's strips; arrays have all sessions as their last axis."""
+    """Model of a batch of strips; the last axis of arrays contains all sessions."""
 
     model: ModelJob
     sessions: Indices
     orientation: OrientationRecordBatch
     points: Mapping[str, Array]
-    """Readings X, Y, Z ``(3, sessions)`` that go on from the first model, nan where a point was not measured."""
+    """Readings X, Y, Z ``(3, sessions)`` in the system of the first model, nan where a point was not measured."""
     common: Mapping[str, Array]
-    """Readings at common points, this model's minus those of the one before ``(3, sessions)``."""
+    """Readings at common points, this model's minus those of the previous one ``(3, sessions)``."""
     scale: Array
-    """Factor ``(sessions,)`` that bx took on to carry the scale."""
+    """Factor ``(sessions,)`` of bx for the transfer of scale."""
     z_units_per_mm: float
 
     def coordinates_of(self, session: int) -> dict[str, tuple[float, float, float]]:
-        """Return one session's points in mm, Z upward."""
+        """Return the points of one session in mm, Z upward."""
         each = {
             name: (place[:, session] / [1.0, 1.0, self.z_units_per_mm]).tolist() for name, place in self.points.items()
         }
@@ -74,7 +74,7 @@ def bridge_strip(
     tick: Callable[[], None] = lambda: None,
     begins: Callable[[str], None] = lambda _: None,
 ) -> Iterator[BridgedModels]:
-    """Yield the models of a strip as a person bridges it. Raises DoesNotFit when one cannot be set up."""
+    """Yield the models of a strip bridged over a link. Raises OperatorGaveUp if a model cannot be set up."""
     person.book.set_heading("", "preparation")
     yield from bridge_strip_batch(Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick), begins)
 
@@ -82,9 +82,10 @@ def bridge_strip(
 def bridge_strip_batch(
     workstation: Workstation, begins: Callable[[str], None] = lambda _: None
 ) -> Iterator[BridgedModels]:
-    """Yield the models of a strip as a crew bridges it, each session at its own instrument.
+    """Yield the models of a strip bridged by a batch of operators.
 
-    Every model must have the photograph of the one before it as its left-hand one and the other base; give up if not.
+    The left-hand photograph of each model must be the right-hand one of the previous model, with the other base mode;
+    otherwise the operator gives up.
     """
     try:
         yield from _bridged(workstation, begins)
@@ -143,9 +144,10 @@ def _see_that_it_follows(workstation: Workstation, last: ModelJob, model: ModelJ
 
 
 def extend_strip(workstation: Workstation, model: ModelJob) -> None:
-    """Preset X for the oriented photograph's new place on the left, and Y and Z where its by and bz run out.
+    """Preset X for the new position of the oriented photograph on the left, and Y and Z where its by and bz reach a
+    limit.
 
-    With the base changed over, its centre comes from X = bx to X = 0: what stands in X = 0 has to read bx more.
+    With the base changed over, its centre moves from X = bx to X = 0: the reading at X = 0 must increase by bx.
     """
     controls, active, n = workstation.controls, workstation.operators.active, model.left_projector
     controls.shift_counter(active, "X", controls.elements(active, ["bx"])["bx"])
@@ -159,7 +161,7 @@ def extend_strip(workstation: Workstation, model: ModelJob) -> None:
 
 
 def copy_common_photo_orientation(workstation: Workstation, model: ModelJob) -> None:
-    """Start the new photograph from the tilts and the by and bz of the oriented one, and bx from the plan."""
+    """Start the new photograph with the tilts, by and bz of the oriented one, and bx from the plan."""
     controls, active = workstation.controls, workstation.operators.active
     left, right = model.left_projector, model.right_projector
     names = ("phi", "omega", "by", "bz")
@@ -182,7 +184,7 @@ def _oriented(workstation: Workstation, model: ModelJob) -> OrientationRecordBat
 
 
 def transfer_scale(workstation: Workstation, active: Indices, model: ModelJob, before: Mapping[str, Array]) -> Array:
-    """Change the base until common points read the heights that they had; return the factor ``(sessions,)``.
+    """Change the base until common points have the previous heights; return the factor ``(sessions,)``.
 
     by and bz of the new photograph follow, so that the base keeps its direction and the parallaxes stay cleared.
     """
@@ -230,10 +232,10 @@ def transfer_scale(workstation: Workstation, active: Indices, model: ModelJob, b
 
 
 def _refined(workstation: Workstation, model: ModelJob, found: OrientationRecordBatch) -> OrientationRecordBatch:
-    """Look at what is left at all standard points and correct the new photograph while it falls.
+    """Look at the residuals at all standard points and correct the new photograph while they decrease.
 
-    The eye sees finer than by counts, and a drum turns finer than it shows; the settings with the smallest residual
-    parallaxes stand.
+    The eye resolves less than a count, and a drum turns finer than it reads; the settings with the smallest residual
+    parallaxes are kept.
     """
     operators, controls = workstation.operators, workstation.controls
     unknowns = unknown_elements("dependent", model)

@@ -1,4 +1,4 @@
-"""The perspective centres: observed at two levels of Z or more (thesis 3.6) or by a grid plate, or read off scales."""
+"""Perspective centres: by two or more levels of Z (thesis 3.6), by a grid plate, or read from scales."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -26,21 +26,21 @@ from a7sim.reduction import (
 )
 
 SUSPICIOUS_RMS = 0.19
-"""Counter units; none of the thesis's twenty centres but the misprinted one has a larger rms."""
+"""Counter units; none of the thesis's twenty centres except the misprinted one has a larger rms."""
 
 SLIPPED = 1.5
-"""A point whose removal lowers a suspicious rms by this factor is pointed at again."""
+"""A point whose removal reduces a suspicious rms by this factor is measured again."""
 
 MAX_REPETITIONS = 3
 
 MIN_CROSSES = 9
-"""Within the model, in two columns or more; the coarsest lines of the plate that have so many there are taken."""
+"""Within the model, in two columns or more; the coarsest grid lines of the plate with that number are used."""
 
 BESIDE_THE_MODEL = 0.1
-"""Crosses are pointed at so far beside the base, as a share of it: further out carriages and rods may not go."""
+"""Limit of crosses beyond the base, as a share of it: carriages and rods may not reach further."""
 
 MIN_POINTS = 3
-"""For a centre by levels: one that does not fit two others can still be told, if not which."""
+"""For a centre by levels: an outlier can be detected, but not identified."""
 
 Levels = npt.NDArray[np.float64]
 
@@ -50,8 +50,8 @@ _PARTS = attrgetter(*(field.name for field in fields(PerspectiveCentre)))
 def observe_centre(workstation: Workstation, active: Indices, model: ModelJob, side: int) -> PerspectiveCentre:
     """Return the centres ``(sessions,)`` of one photograph in counter units, by the method of the plan.
 
-    hand is 1 for the left-hand photograph, 2 for the right-hand one. Those for whom the rms is beyond the tolerated
-    give up.
+    `side` is 1 for the left-hand photograph, 2 for the right-hand one. Sessions whose rms exceeds the tolerance give
+    up.
     """
     plan, operators = workstation.job.plan, workstation.operators
     shown = workstation.controls.displayed_levels(active, plan.centre_levels)
@@ -75,7 +75,7 @@ def observe_centre(workstation: Workstation, active: Indices, model: ModelJob, s
 
 
 def centre_of(centres: PerspectiveCentre, session: int) -> PerspectiveCentre:
-    """Return one session's centre."""
+    """Return the centre of one session."""
     parts: list[Any] = [None if each is None else each[..., session] for each in _PARTS(centres)]
     return PerspectiveCentre(*parts)
 
@@ -101,7 +101,7 @@ def _each(found: PerspectiveCentre | PlatePlacement, change: Callable[[Array], A
 
 
 def _by_scales(workstation: Workstation, active: Indices, side: int, levels: Sequence[float]) -> PerspectiveCentre:
-    """Return where base, by, bz and the scales put the centres ``(sessions,)``, as P 3.1 and 3.2 take them.
+    """Return the centres ``(sessions,)`` given by base, by, bz and the scales (P 3.1 and 3.2).
 
     Their standard deviations are those of the rounding to the last digit.
     """
@@ -130,10 +130,10 @@ def _by_scales(workstation: Workstation, active: Indices, side: int, levels: Seq
 def _by_levels(
     workstation: Workstation, active: Indices, model: ModelJob, side: int, levels: Levels
 ) -> PerspectiveCentre:
-    """Point monocularly at points 1 to 6 at every level and compute the centres ``(sessions,)``.
+    """Point monocularly at points 1 to 6 at all levels and compute the centres ``(sessions,)``.
 
-    Those that the print does not show are done without; with fewer than three of them all standard points serve, and
-    whose prints do not show three of these give up.
+    Points that the print does not show are left out; with fewer than three of them all standard points are used, and
+    sessions with fewer than three of these give up.
     """
     operators = workstation.operators
     points = [model.standard_points[label] for label in model.all_positions()]
@@ -155,7 +155,7 @@ def _by_levels(
 
 
 def _gathered(groups: Sequence[tuple[Indices, Sequence[str], PerspectiveCentre]], sessions: int) -> PerspectiveCentre:
-    """Return the centres of groups, each from points of its own, among all sessions, nan where there is nothing."""
+    """Return the centres of groups with different points as one batch, nan for the other sessions."""
     points = list(dict.fromkeys(name for _, names, _ in groups for name in names))
     every: dict[str, Array] = {}
     for active, names, centres in groups:
@@ -172,10 +172,10 @@ def _gathered(groups: Sequence[tuple[Indices, Sequence[str], PerspectiveCentre]]
 def _of_points(
     workstation: Workstation, active: Indices, model: ModelJob, side: int, points: Sequence[str], levels: Levels
 ) -> PerspectiveCentre:
-    """Return the centres ``(m,)`` of those who go on, from points at every level.
+    """Return the centres ``(m,)`` of the active sessions, from points at all levels.
 
-    A point that does not fit the others is struck out and pointed at again; when the rms stays suspicious though no
-    point stands out, a second set is observed and the mean of both is taken.
+    A point that contradicts the others is struck out and measured again; if the rms stays suspicious without an
+    outlier, a second set is observed and both are averaged.
     """
     operators = workstation.operators
     pointings = _one_set(workstation, active, side, points, levels)
@@ -190,7 +190,7 @@ def _of_points(
 
 
 def _centre(pointings: Array, levels: Levels) -> PerspectiveCentre:
-    """Return the centre from pointings ``(2, k, n, ...)``; T0 goes from the first of two levels to the other."""
+    """Return the centre from pointings ``(2, k, n, ...)``; T0 is from the first of two levels to the other."""
     if len(levels) == 2:
         return perspective_centre(pointings[:, 0], pointings[:, 1], *levels.tolist())
     return perspective_centre_of_levels(pointings, levels)
@@ -226,7 +226,7 @@ def _one_set(workstation: Workstation, active: Indices, side: int, points: Seque
 
 
 def _misread_points(pointings: Array, levels: Levels) -> npt.NDArray[np.intp]:
-    """Return the index ``(m,)`` of the point that does not fit the others, -1 for none."""
+    """Return the index ``(m,)`` of the point that contradicts the others, -1 for none."""
     of_all = _rms(pointings, levels)
     without = np.array([_rms(np.delete(pointings, i, axis=2), levels) for i in range(pointings.shape[2])])
     suspicious = (of_all > SUSPICIOUS_RMS) & (of_all > SLIPPED * without.min(axis=0))
@@ -239,9 +239,9 @@ def _misread_points(pointings: Array, levels: Levels) -> npt.NDArray[np.intp]:
 def _by_grid_plate(
     workstation: Workstation, active: Indices, model: ModelJob, hand: int, levels: Levels
 ) -> PerspectiveCentre:
-    """Put the grid plate in the picture's place, point at its crosses at every level, and put the picture back.
+    """Mount the grid plate in place of the picture, point at its crosses at all levels, and mount the picture again.
 
-    The elements stay as they are. Both are centred anew, each as well as a fiducial is registered.
+    The elements stay unchanged. Plate and picture are centred anew with the precision of registering fiducials.
     """
     operators, job = workstation.operators, workstation.job
     plate = job.grid_plate
@@ -276,7 +276,7 @@ def _by_grid_plate(
 
 
 def _crosses_in_model(workstation: Workstation, active: Indices, side: int, levels: Levels) -> Crosses:
-    """Return crosses that lie within the model in every session, or none where they are too few."""
+    """Return crosses that lie within the model in all sessions, empty if they are too few."""
     controls, plate = workstation.controls, workstation.job.grid_plate
     bx = np.abs(controls.bx(active))
     beyond = BESIDE_THE_MODEL * bx
@@ -313,9 +313,11 @@ def _resected(
 def _in_counter_units(
     found: Resection, levels: Levels, units: float, c: Array, lie: PlatePlacement
 ) -> PerspectiveCentre:
-    """Return a resected centre as one of levels: residuals in X and Y at the mean level, T0 from the first to the last.
+    """Return a resected centre in the form of a centre by levels:
 
-    How well the plate's lie is known goes into the standard deviations of X0 and Y0.
+    residuals in X and Y at the mean level, T0 from first to last.
+
+    The precision of the plate's placement enters the standard deviations of X0 and Y0.
     """
     x, y, z = found.centre
     sigma_x, sigma_y, sigma_z = found.sigma_centre

@@ -1,10 +1,10 @@
-"""Empirical relative orientation: the y-parallax cleared at one point after the other, each with one element.
+"""Empirical relative orientation: the y-parallax is cleared at one point after the other, each with one element.
 
 One-projector (dependent): by, kappa, bz, phi, omega of the projector with the new photograph at 2, 1, 4, 3, 6.
 Swing-swing (independent): kappa', kappa", phi', phi", omega. Each of the first four points is cleared with an element
-that leaves the points before it clear. The last one is not so lucky: a turn of omega alone that clears it is too
-small, since part of what omega did has been taken up by the other four; it has to be made n times (geometry.md,
-Observation errors), and the four points are cleared again.
+that leaves the earlier points clear. At the last point a turn of omega alone that clears it is too small, because the
+other four elements have absorbed part of omega; it is multiplied by n, the over-correction (geometry.md, Observation
+errors), and the four points are cleared again.
 """
 
 import math
@@ -32,34 +32,34 @@ from a7sim.standard_points import CASES, FIGURE_4_1, PLACES, POSITIONS
 
 MAX_ROUNDS = 15
 MAX_PASSES = 5
-"""Over the first four points in a round."""
+"""Passes over the first four points in a round."""
 
 VISIBLE_SIGMAS = 2.5
-"""What is smaller than so many standard deviations of one setting is not seen as a parallax."""
+"""A parallax smaller than this number of standard deviations of one setting is not visible."""
 
 VISIBLE_SIGMAS_AT_LAST = 2.0 * 6.0**0.5
-"""At the last point the errors of all five come together: twice those of 1 and 2, or of 2, once the others'."""
+"""At the last point the errors of all five add up: twice those of 1 and 2, or of 2, once the others'."""
 
 MAX_OVER_CORRECTION = 10.0
-"""Beyond it the last point says next to nothing of omega."""
+"""Above it the last point hardly determines omega."""
 
 TRIES = 4
-"""At a point whose images are too far apart, or part while a long turn is made."""
+"""Attempts at a point whose images are too far apart, or separate during a long turn."""
 
 
 @dataclass(frozen=True)
 class ClearingStep:
-    """A position (thesis fig. 4.1) and the element with which its parallax is cleared."""
+    """Position (thesis fig. 4.1) and the element that clears its parallax."""
 
     position: str
     element: str
 
 
 def over_correction(z: Array, d: Array) -> Array:
-    """Return how many times the turn of omega that clears the last point has to be made, by z and d = |y| in mm.
+    """Return the factor n of the turn of omega that clears the last point, by z and d = |y| in mm.
 
-    Over flat ground, points 1 to 4 clear: omega off by w leaves ``2 w d^2 / z`` at the last point, and omega alone
-    changes that by ``w z (1 + d^2 / z^2)`` (T 2.32).
+    Over flat ground with points 1 to 4 clear, an error w of omega leaves ``2 w d^2 / z`` at the last point, and omega
+    alone changes that by ``w z (1 + d^2 / z^2)`` (T 2.32).
     """
     return np.asarray((1.0 + (z / d) ** 2) / 2.0)
 
@@ -67,8 +67,8 @@ def over_correction(z: Array, d: Array) -> Array:
 def over_correction_by_coefficients(coefficients: Array) -> Array:
     """Return the same for any five points, from the coefficients ``(5, 5, ...)`` of five elements (rows) at them.
 
-    The last element's own coefficient at the last point, over what is left of it when the other four elements keep
-    the other four points clear. Not a number where they cannot.
+    The last element's own coefficient at the last point, divided by its remainder when the other four elements keep the
+    other four points clear. nan where they cannot.
     """
     first = np.moveaxis(coefficients[:4, :4], (0, 1), (-1, -2))
     by_last = np.moveaxis(coefficients[4, :4], 0, -1)[..., None]
@@ -81,11 +81,12 @@ def over_correction_by_coefficients(coefficients: Array) -> Array:
 
 
 def clearing_coefficients(points: Array, left: ProjectorPose, right: ProjectorPose) -> Array:
-    """Return what the ten elements add to the y-parallax at points ``(3, n, m)``, in the order of PARALLAX_ELEMENTS.
+    """Return the coefficients of the ten elements in the y-parallax at points ``(3, n, m)``, in the order of
+    PARALLAX_ELEMENTS.
 
-    mm a radian or mm a mm, for any tilt, of the parallax that is seen when the mark has followed in height: that of
-    T 2.32 less what the x-parallax takes of it where the base runs aslant. The parallax is
-    ``b . (r1 x r2) / (x1 z2 - z1 x2)`` with the rays r1 and r2 to the point.
+    mm per radian or mm per mm, for any tilt, of the parallax that is visible when the mark has followed in height: T
+    2.32 minus the share of the x-parallax where the base is inclined. The parallax is ``b . (r1 x r2) / (x1 z2 - z1
+    x2)`` with the rays r1 and r2 to the point.
     """
     r1, r2 = points - left.centre[:, None], points - right.centre[:, None]
     base = np.broadcast_to((right.centre - left.centre)[:, None], points.shape)
@@ -107,10 +108,10 @@ def clearing_coefficients(points: Array, left: ProjectorPose, right: ProjectorPo
 
 
 def clearing_steps(method: str, model: ModelJob, usable: Sequence[str]) -> tuple[ClearingStep, ...] | None:
-    """Return where to clear with what, given the positions that can be seen; none where they do not suffice.
+    """Return the clearing steps for the usable positions; None if they do not suffice.
 
-    Two points on the base line, two in one outer row and one in the other, as near the corners as there are any: with
-    6 missing omega is turned at 5, with 3 or 4 missing the rows change places.
+    Two points on the base line, two in one outer row and one in the other, as near the corners as possible: with 6
+    missing omega is turned at 5, with 3 or 4 missing the rows are exchanged.
     """
     top, base, bottom = (_ends(row, usable) for row in FIGURE_4_1)
     pair, last = (top, bottom) if _apart(top) else (bottom, top)
@@ -145,9 +146,9 @@ def _apart(ends: tuple[str, str] | None) -> bool:
 
 
 def perturb_elements(workstation: Workstation, active: Indices, model: ModelJob, method: str, most: float) -> None:
-    """Set the elements that a method turns off by anything up to so many gon, alike on both sides.
+    """Perturb the elements that a method turns by up to a limit in gon, equally on both sides.
 
-    A component of the base by as much as tilts the base by that angle.
+    A component of the base is perturbed by the length that tilts the base by that angle.
     """
     unknowns = unknown_elements(method, model)
     shares = np.vectorize(math.erf)(workstation.operators.draw_setting_errors(active, 0.5**0.5, (len(unknowns),)))
@@ -175,11 +176,10 @@ def empirical_orientation(
 ) -> OrientationRecordBatch:
     """Clear the y-parallaxes of a model point by point, in rounds, until the last point stays clear.
 
-    In a round the first four points are cleared until they are seen to be clear; then omega is turned at the last one
-    n times as far as would clear it, n 'computed' from the places of the points or given. Points that are not
-    pricked on both prints, or whose images cannot be brought together, are done without where others of the
-    case do. Those whose residual parallaxes at all standard points in the end have a larger rms than tolerated, in
-    mm, give up.
+    In a round the first four points are cleared until they appear clear; then omega is turned at the last one by n
+    times the clearing turn, n 'computed' from the positions of the points or given. Points that are not pricked on both
+    prints, or whose images cannot be fused, are left out if others of the case suffice. Sessions whose residual
+    parallaxes at all standard points finally have a larger rms than tolerated, in mm, give up.
     """
     operators = workstation.operators
     labels = model.points_of_case(case)
@@ -226,7 +226,7 @@ def _assessed(
 def _with_pricked(
     workstation: Workstation, active: Indices, model: ModelJob, labels: Sequence[str]
 ) -> dict[frozenset[str], Indices]:
-    """Return the sessions by what positions are not in their model, or not pricked on both their prints."""
+    """Return the sessions by the positions that are not in their model, or not pricked on both prints."""
     absent = frozenset(CASES["A"]) - frozenset(labels)
     pricked = {label: workstation.has_point(active, model.standard_points[label]) for label in labels}
     groups: dict[frozenset[str], list[int]] = {}
@@ -244,7 +244,7 @@ def _too_few(model: ModelJob, missing: frozenset[str]) -> str:
 
 
 class _Clearing:
-    """The rounds of those sessions that clear with the same elements at the same points."""
+    """Rounds of the sessions that use the same elements at the same points."""
 
     def __init__(
         self,
@@ -262,7 +262,7 @@ class _Clearing:
         self.rounds: list[RoundBatch] = []
         self.rough = np.zeros(self.operators.size, dtype=np.intp)
         self.lost: list[tuple[Indices, str]] = []
-        """Who could not bring the images together, and at which position."""
+        """Sessions that could not fuse the images, and the position."""
         self._over_corrected = over_corrected
         self._found = {label: np.full(self.operators.size, np.nan) for label in self._labels()}
         self._places = np.zeros((3, len(steps), self.operators.size))
@@ -272,7 +272,7 @@ class _Clearing:
         self._visible = max(acuity, workstation.pointing.finest_mm)
 
     def run(self, active: Indices) -> Indices:
-        """Go round until the last point is found clear; return those who came to an end."""
+        """Run rounds until the last point is clear; return the sessions that finished."""
         ended = active[:0]
         while active.size:
             self.workstation.begin_round(active, len(self.rounds) + 1)
@@ -308,7 +308,7 @@ class _Clearing:
     # --- a round --------------------------------------------------------------------------------------
 
     def _clear_first_four(self, active: Indices) -> Indices:
-        """Clear them over and over until on arriving each is seen to be clear."""
+        """Clear the points repeatedly until each appears clear on arrival."""
         clearing = active
         for _ in range(MAX_PASSES):
             again = clearing[:0]
@@ -322,7 +322,7 @@ class _Clearing:
         return self._going(active)
 
     def _over_correct(self, active: Indices) -> tuple[Indices, Indices, Array]:
-        """Turn omega n times as far as clears the last point; return who is there, who had to turn, and n."""
+        """Turn omega by n times the clearing turn; return the sessions at the point, those that turned, and n."""
         controls, step, threshold = self.workstation.controls, self.steps[-1], VISIBLE_SIGMAS_AT_LAST * self._visible
         turn, n = np.zeros((2, self.operators.size))
         active = self._clear(active, len(self.steps) - 1, step, threshold, turn)
@@ -335,7 +335,7 @@ class _Clearing:
         return self._going(active), self._going(turning), n
 
     def _times(self, active: Indices) -> Array:
-        """Return the over-correction ``(m,)``: as given, or from the places of the five points."""
+        """Return the over-correction ``(m,)``: as given, or from the positions of the five points."""
         if not isinstance(self._over_corrected, str):
             return np.full(active.size, float(self._over_corrected))
         n = over_correction_by_coefficients(self._coefficients(active))
@@ -367,9 +367,9 @@ class _Clearing:
     def _clear(
         self, active: Indices, place: int, step: ClearingStep, unless_within: float = 0.0, turn: Array | None = None
     ) -> Indices:
-        """Clear a point, its images brought together first where they are too far apart; return who did.
+        """Clear a point, fusing its images first if they are too far apart; return the sessions that succeeded.
 
-        Put the turns that did it into place.
+        The clearing turns are written into `turn`.
         """
         point, cleared, parted = self.model.standard_points[step.position], active[:0], active[:0]
         for tries_left in reversed(range(TRIES)):
@@ -400,7 +400,7 @@ class _Clearing:
         return self.operators.remaining(np.asarray(cleared, dtype=np.intp))
 
     def _bring_together(self, one: Indices, point: str, step: ClearingStep) -> None:
-        """Turn an element by what the Y readings of each eye alone differ by."""
+        """Turn an element by the difference of the Y readings of both eyes."""
         workstation, controls, element = self.workstation, self.workstation.controls, step.element
         self.rough[one] += 1
         self.operators.remark(
@@ -424,9 +424,9 @@ class _Clearing:
         return f"{element[:-1]}{self.model.side_of(int(element[-1]))}"
 
     def _gain(self, element: str, active: Indices, place: Array) -> Array:
-        """Return what one unit of an element's counter adds to the parallax ``(m,)`` at places ``(3, m)``, mm.
+        """Return the change of the parallax ``(m,)`` by one unit of an element's counter at positions ``(3, m)``, mm.
 
-        While it is turned, that is, and the mark is still to follow in height.
+        Before the mark follows in height.
         """
         left, right = self._stands(active)
         point = _in_frame(place)
@@ -435,7 +435,7 @@ class _Clearing:
         return np.asarray(coefficients * (1.0 if element.startswith("b") else GON))
 
     def _coefficients(self, active: Indices) -> Array:
-        """Return those of the five elements at the five points ``(5, 5, m)``, mm a radian or mm a mm."""
+        """Return the coefficients of the five elements at the five points ``(5, 5, m)``, mm per radian or mm per mm."""
         rows = [PARALLAX_ELEMENTS.index(self._by_hand(name)) for name in self._elements()]
         return clearing_coefficients(_in_frame(self._places[:, :, active]), *self._stands(active))[rows]
 
@@ -448,5 +448,5 @@ class _Clearing:
 
 
 def _in_frame(places: Array) -> Array:
-    """Return places ``(3, ...)``, z downward, with Z upward."""
+    """Return positions ``(3, ...)``, z downward, with Z upward."""
     return np.array([places[0], places[1], -places[2]])

@@ -1,4 +1,4 @@
-"""The grid test: a plate in each projector in turn, its crosses pointed at, and the projector's errors computed."""
+"""Grid test: a plate in each projector in turn, pointings at its crosses, and the errors of the projector."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -22,23 +22,26 @@ from a7sim.reduction import Elements, PlatePlacement, ProjectorTest, grid_test
 from a7sim.scenario import Camera, GridPlate, Plan
 
 TIMES_REGISTERED = 4
-"""Each of the plate's fiducials, before the pointings: principal point and swing are no better than these."""
+"""Registrations of each fiducial of the plate before the pointings:
+
+they limit the precision of principal point and swing.
+"""
 
 MARGIN_MM = 5.0
-"""Kept from the ends of the carriages."""
+"""Margin to the ends of the carriages."""
 
 WHOLE_LEVELS_MM = 5.0
 
 MAX_DEPTH_RATIO = 2.0
-"""Of the levels below the centre, where the carriages allow it."""
+"""Maximum ratio of the levels below the centre, within the range of the carriages."""
 
 PREPARED_HEIGHT_MM, PREPARED_BASE_MM = 300.0, 10.0
-"""To begin with; the test is made with bx at zero."""
+"""Initial settings; the test is made with bx at zero."""
 
 
 @dataclass(frozen=True)
 class GridTestPlan:
-    """What is ordered: a plate, so many of its crosses, so many levels of Z, so many pointings at each."""
+    """Plan of a grid test: plate, number of crosses, levels of Z, and pointings at each."""
 
     camera: Camera
     """Its collimating marks are in the carriers, and its principal distance is set."""
@@ -47,17 +50,17 @@ class GridTestPlan:
     levels: int = 2
     pointings: int = 2
     polarity: str = "positive"
-    """How the plate is laid."""
+    """Polarity of the plate."""
 
     @property
     def job(self) -> Job:
-        """The job sheet for it: counters in mm of the instrument frame."""
+        """Job sheet of the test: counters in mm of the instrument frame."""
         plan = Plan(bx=PREPARED_BASE_MM, projection_height=PREPARED_HEIGHT_MM, height_gear=1.0, plan_gear="1-1-1")
         return Job(self.plate.certificate(self.camera), plan, (), self.plate)
 
     @property
     def chosen(self) -> Crosses:
-        """The crosses pointed at. Raises Mistake for a number of them that do not lie evenly on the plate."""
+        """Crosses to be measured. Raises A7SimError for a number that is not evenly spaced on the plate."""
         return self.plate.some_crosses(self.crosses)
 
     def heights(self, manual: Variant) -> list[float]:
@@ -66,7 +69,10 @@ class GridTestPlan:
 
 
 def level_heights(manual: Variant, c: float, outermost: float, levels: int) -> list[float]:
-    """Return levels of Z in mm of the frame where crosses so far out on a plate can be reached; one is the middle."""
+    """Return levels of Z in mm of the frame at which crosses of this distance from the middle can be reached;
+
+    one is the middle.
+    """
     reach = min(abs(end) for axis in "XY" for end in manual.carriages[axis]) - MARGIN_MM
     lowest, highest = manual.carriages["Z"]
     farthest = min(reach * c / outermost, -lowest - MARGIN_MM)
@@ -79,17 +85,17 @@ def level_heights(manual: Variant, c: float, outermost: float, levels: int) -> l
 
 @dataclass(frozen=True)
 class ProjectorReadings:
-    """A projector's grid test; arrays ``(..., m)`` have those who came to the end of it as their last axis."""
+    """Grid test of a projector; the last axis of arrays ``(..., m)`` contains the sessions that finished it."""
 
     projector: int
     sessions: Indices
     counters: Mapping[str, Array]
-    """What the counters of its elements and of bx show, gon and mm."""
+    """Counter readings of its elements and of bx, gon and mm."""
     heights: tuple[float, ...]
     crosses: Crosses
     test: ProjectorTest
     pointing: Array
-    """Standard deviation of one pointing, from its repetitions, mm at photo scale; nan of one."""
+    """Standard deviation of one pointing, from its repetitions, mm at photo scale; nan for one pointing."""
     finished_at: Array
     """Simulated seconds."""
 
@@ -100,7 +106,7 @@ def measure_grid(
     tick: Callable[[], None] = lambda: None,
     begins: Callable[[str], None] = lambda _: None,
 ) -> Iterator[ProjectorReadings]:
-    """Yield both projectors as one person tests them. Raises DoesNotFit when one cannot be tested."""
+    """Yield both projectors as tested over a link. Raises OperatorGaveUp if one cannot be tested."""
     yield from measure_grid_batch(
         Workstation(OperatorBatch.single(person), ScpiDriver(person), order.job, tick), order, begins
     )
@@ -109,7 +115,7 @@ def measure_grid(
 def measure_grid_batch(
     workstation: Workstation, order: GridTestPlan, begins: Callable[[str], None] = lambda _: None
 ) -> Iterator[ProjectorReadings]:
-    """Yield the left and the right projector as a crew tests them, each session at its own instrument."""
+    """Yield the left and the right projector as tested by a batch of operators."""
     operators = workstation.operators
     operators.begin(operators.active, "", "preparation")
     workstation.controls.prepare(operators.active)
@@ -159,7 +165,7 @@ def _set_to_zeros(workstation: Workstation, projector: int) -> None:
 
 
 def _pointings(workstation: Workstation, order: GridTestPlan, side: int, height: float) -> Array:
-    """Return places of the mark ``(p, 2, n, sessions)`` in mm of the frame, pointed at all crosses p times."""
+    """Return positions of the mark ``(p, 2, n, sessions)`` in mm of the frame for p pointings at all crosses."""
     operators, controls = workstation.operators, workstation.controls
     places = np.zeros((order.pointings, 2, len(order.chosen), operators.size))
     level = controls.units_per_mm * height
@@ -178,7 +184,7 @@ def _counters(workstation: Workstation, active: Indices, projector: int) -> Mapp
 
 
 def _elements(manual: Variant, counters: Mapping[str, Array], projector: int) -> Elements:
-    """Return what the counters say of a projector, in mm and radians from the zeros; base in."""
+    """Return the elements of a projector by its counters, in mm and radians from the zeros; base in."""
     omega, phi, kappa = manual.tilts(counters, projector)
     nothing = np.zeros_like(counters["bx"])
     return Elements(

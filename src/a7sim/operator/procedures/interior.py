@@ -12,29 +12,29 @@ from a7sim.reduction import PicturePlacement, Undetermined, picture_placement
 from a7sim.scenario import Camera
 
 CENTRED_MM = 0.02
-"""How well pictures are centred where a tolerance is stated (history.md)."""
+"""Tolerance of centring where one is stated (history.md)."""
 
 MISPLACED_MM = 50.0
-"""Beyond this a fiducial is not off its collimating mark, it is somewhere else."""
+"""Beyond this displacement a picture is misplaced rather than off centre."""
 
 MAX_ROUNDS = 6
 
 
 @dataclass(frozen=True)
 class InteriorOrientation:
-    """How a picture was centred: what was left at the fiducials, and the principal distance set."""
+    """Centring of a picture: residuals at the fiducials, and the principal distance set."""
 
     photograph: str
     rounds: int
     residual_mm: float
-    """Rms of the fiducials' displacements that no shift, turn or scale explains."""
+    """Rms of the fiducials' displacements without shift, rotation and scale."""
     film_scale: float
     principal_distance: float
 
 
 @dataclass(frozen=True)
 class InteriorOrientationBatch:
-    """The interior orientations ``(sessions,)`` of a photograph in every session."""
+    """Interior orientations ``(sessions,)`` of a photograph."""
 
     photograph: str
     rounds: npt.NDArray[np.intp]
@@ -43,7 +43,7 @@ class InteriorOrientationBatch:
     principal_distance: Array
 
     def of(self, session: int) -> InteriorOrientation:
-        """Return one session's interior orientation."""
+        """Return the interior orientation of one session."""
         return InteriorOrientation(
             self.photograph,
             int(self.rounds[session]),
@@ -58,8 +58,8 @@ def interior_orientation(
 ) -> InteriorOrientationBatch:
     """Mount a photograph in a projector, centre it and set its principal distance.
 
-    Uniform film shrinkage, seen as a change of scale at the fiducials, goes into the principal distance. Those who
-    cannot centre the picture give up.
+    Uniform film shrinkage, visible as a change of scale at the fiducials, is included in the principal distance.
+    Sessions that cannot centre the picture give up.
     """
     found = centre_picture(workstation, active, projector, photograph, certificate)
     _set_principal_distance(
@@ -71,9 +71,9 @@ def interior_orientation(
 def centre_picture(
     workstation: Workstation, active: Indices, projector: int, photograph: str, certificate: Camera
 ) -> InteriorOrientationBatch:
-    """Mount a picture in a projector and centre it on the calibrated principal point; no element is touched.
+    """Mount a picture in a projector and centre it on the calibrated principal point; no element is changed.
 
-    The principal distances found are zero. Those who cannot centre the picture give up.
+    The principal distances of the result are zero. Sessions that cannot centre the picture give up.
     """
     operators, driver = workstation.operators, workstation.driver
     _mount(workstation, active, projector, photograph)
@@ -125,7 +125,7 @@ def _mount(workstation: Workstation, active: Indices, projector: int, photograph
 
 
 def view_fiducials(workstation: Workstation, active: Indices, projector: int) -> tuple[list[str], Array]:
-    """Return the names of a picture's fiducials and their displacements ``(2, n, m)`` as they are registered, mm."""
+    """Return the names of a picture's fiducials and their displacements ``(2, n, m)`` as registered, mm."""
     names, exact = workstation.driver.fiducials(active, projector)
     operators = workstation.operators
     operators.spend(active, len(names) * operators.observer.seconds_to_read, "reading")
@@ -137,7 +137,10 @@ def view_fiducials(workstation: Workstation, active: Indices, projector: int) ->
 def _rightly_laid(
     workstation: Workstation, active: Indices, projector: int, photograph: str, displacements: Array, places: Array
 ) -> npt.NDArray[np.bool_]:
-    """Return whose fiducials stand near the collimating marks of their names ``(m,)``; the others give up."""
+    """Return which sessions have their fiducials near the collimating marks of their names ``(m,)``;
+
+    the others give up.
+    """
     furthest = np.abs(displacements).max(axis=(0, 1))
     upside_down = np.abs(displacements + 2.0 * places[:, :, None]).max(axis=(0, 1)) < MISPLACED_MM
     misplaced = furthest > MISPLACED_MM

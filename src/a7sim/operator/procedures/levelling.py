@@ -1,9 +1,9 @@
 """Levelling and scaling a model at the instrument, by computed changes of its elements (thesis 3.5).
 
 Scale by the base against a known distance, levelling by the tilts against known heights. Both projectors and the base
-are turned together, so that the relative orientation stays: on a plotter with bz by omega, phi, bz and bx of both, to
-second order also by kappa and by; on one with a common Phi by that, by equal changes of omega, and by the base. The
-elements that the manual lists decide which.
+are turned together, so that the relative orientation is unchanged: on a plotter with bz by omega, phi, bz and bx of
+both, to second order also by kappa and by; on one with a common Phi by that, by equal changes of omega, and by the
+base. The list of the plotter's elements selects the method.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,46 +30,46 @@ Settings = Mapping[str, Array]
 
 @dataclass(frozen=True)
 class LevellingRound:
-    """A round of a session: what was read at control, and how far model and ground were apart."""
+    """Levelling round of a session: readings at control, and differences of model and ground."""
 
     height_rms: float
-    """Of the heights about their mean, m."""
+    """Rms of the heights about their mean, m."""
     scale: float
-    """By what factor the model was too small."""
+    """Factor by which the model was too small."""
     tilts: tuple[float, float]
-    """How the plumb line leans in the model, along the base and across it, gon."""
+    """Inclination of the plumb line in the model, along the base and across it, gon."""
 
 
 @dataclass(frozen=True)
 class Control:
-    """Control that a model shows: names, ground ``(3, n)`` in m with nan for what is not known."""
+    """Control of a model: names, ground ``(3, n)`` in m with nan for unknown coordinates."""
 
     names: tuple[str, ...]
     ground: Array
 
     @classmethod
     def of(cls, ground: Ground, names: Sequence[str]) -> "Control":
-        """Return what is known of these points."""
+        """Return the control among these points."""
         return cls(tuple(names), ground.coordinates[:, [ground.points.index(name) for name in names]])
 
     @property
     def with_height(self) -> list[int]:
-        """Which have a height."""
+        """Indices of points with height."""
         return np.flatnonzero(np.isfinite(self.ground[2])).tolist()
 
     @property
     def in_plan(self) -> list[int]:
-        """Which have plan coordinates."""
+        """Indices of points with plan coordinates."""
         return np.flatnonzero(np.isfinite(self.ground[:2]).all(axis=0)).tolist()
 
     @property
     def is_enough(self) -> bool:
-        """Whether there is enough for scale and levelling."""
+        """Whether scale and levelling are determined."""
         return len(self.in_plan) >= MIN_PLAN and len(self.with_height) >= MIN_HEIGHTS
 
     @property
     def ends(self) -> tuple[int, int]:
-        """The two points furthest apart in plan."""
+        """The two points farthest apart in plan."""
         return max(combinations(self.in_plan, 2), key=lambda pair: float(length_of(self.between(*pair)[:2])))
 
     def between(self, first: int, last: int) -> Array:
@@ -79,18 +79,18 @@ class Control:
 
 @dataclass(frozen=True)
 class Fit:
-    """How models of m sessions stand to the ground."""
+    """Fit of the models of m sessions to the ground."""
 
     up: Array
-    """The direction in the frame that points upward on the ground ``(3, m)``."""
+    """Direction in the frame that points upward on the ground ``(3, m)``."""
     metres: Array
-    """On the ground, a mm of the model ``(m,)``."""
+    """Metres on the ground per mm of the model ``(m,)``."""
     heights: Array
-    """Of the control in the model, mm, and on the ground, m ``(2, n, m)``."""
+    """Heights of the control in the model, mm, and on the ground, m ``(2, n, m)``."""
 
     @property
     def tilts(self) -> Array:
-        """How the plumb line leans along the base and across it ``(2, m)``, gon."""
+        """Inclination of the plumb line along the base and across it ``(2, m)``, gon."""
         return np.asarray(np.arctan2(self.up[:2], self.up[2]) / GON)
 
     def factor(self, number: float) -> Array:
@@ -103,12 +103,12 @@ class Fit:
         return np.asarray((1e-3 * number * in_model - on_ground).std(axis=0))
 
     def of(self, keep: BoolArray) -> "Fit":
-        """Return the fit of some of the sessions."""
+        """Return the fit of selected sessions."""
         return Fit(self.up[:, keep], self.metres[keep], self.heights[:, :, keep])
 
 
 class Levelling:
-    """Sessions with the same control at work on one model."""
+    """Levelling of the sessions with the same control in one model."""
 
     def __init__(self, workstation: Workstation, model: ModelJob, control: Control) -> None:
         self.workstation, self.operators, self.controls = workstation, workstation.operators, workstation.controls
@@ -116,18 +116,18 @@ class Levelling:
         self.names = [name for name in workstation.controls.manual.elements if name not in ("c1", "c2")]
 
     def settings(self, active: Indices) -> dict[str, Array]:
-        """Return where all elements stand ``(sessions,)``."""
+        """Return the positions of all elements ``(sessions,)``."""
         return expand_to_batch(self.controls.exact_values(active, self.names), active, self.operators.size)
 
     def measured(self, active: Indices, number: int) -> Array:
-        """Return places ``(3, n, m)`` of the control in the frame as a round measures them, mm, Z up."""
+        """Measure the control in a round; return positions ``(3, n, m)`` in the frame, mm, Z up."""
         self.workstation.begin_round(active, number)
         readings = self.workstation.measure_points(active, self.control.names)[:, :, active]
         x, y, z = np.stack([self.controls.model_position(active, each) for each in np.moveaxis(readings, 1, 0)], axis=1)
         return np.array([x, y, -z])
 
     def compared(self, active: Indices, at: Array) -> Fit:
-        """Compare places ``(3, n, m)`` with the control: the scale by its two ends, the tilts by its heights."""
+        """Compare positions ``(3, n, m)`` with the control: the scale by its two ends, the tilts by its heights."""
         self.workstation.compute(active)
         first, last = self.control.ends
         across = self.control.between(first, last)
@@ -142,7 +142,7 @@ class Levelling:
         return Fit(up, metres, np.array([in_model, np.broadcast_to(given, in_model.shape)]))
 
     def _up(self, active: Indices, at: Array, given: Array) -> Array:
-        """Return the up directions ``(3, m)`` from places ``(3, n, m)`` and heights at their scale ``(n, m)``, mm."""
+        """Return the up directions ``(3, m)`` of positions ``(3, n, m)`` and heights at their scale ``(n, m)``, mm."""
         slopes = np.zeros((2, active.size))
         design = np.moveaxis(np.array([at[0], at[1], np.ones_like(at[0])]), 0, 1)
         for _ in range(5):
@@ -158,7 +158,7 @@ class Levelling:
         return np.array([*slopes, np.sqrt(1.0 - (slopes**2).sum(axis=0))])
 
     def level(self, active: Indices, fit: Fit, number: float) -> dict[int, list[LevellingRound]]:
-        """Turn and measure until it gets no better, the model to a scale number; the best settings stand.
+        """Turn and measure until the fit no longer improves, the model to a scale number; the best settings are kept.
 
         Return the rounds by session.
         """
@@ -200,9 +200,9 @@ def _note(rounds: Mapping[int, list[LevellingRound]], active: Indices, fit: Fit,
 def levelled_elements(
     settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array
 ) -> dict[str, Array]:
-    """Return the elements ``(m,)`` that set a whole model upright and larger by a factor, of those the plotter has.
+    """Return the elements ``(m,)`` that level a model and enlarge it by a factor, with the elements of the plotter.
 
-    `up` ``(3, m)`` is the direction in the frame that is to point upward.
+    `up` ``(3, m)`` is the direction in the frame that will point upward.
     """
     turned = levelled_by_common_phi if "common_phi" in manual.elements else levelled_by_all_elements
     return turned(settings, model, manual, up, factor)
@@ -211,9 +211,9 @@ def levelled_elements(
 def levelled_by_all_elements(
     settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array
 ) -> dict[str, Array]:
-    """Return the elements ``(m,)`` at which the whole model stands upright and is larger by a factor.
+    """Return the elements ``(m,)`` that level the model and enlarge it by a factor.
 
-    bz' and bz" share what the base rises.
+    bz' and bz" share the rise of the base.
     """
     left, right = model.left_projector, model.right_projector
     about_y = -np.arctan2(up[0], up[2])
@@ -245,7 +245,7 @@ def levelled_by_all_elements(
 def levelled_by_common_phi(
     settings: Settings, model: ModelJob, manual: Variant, up: Array, factor: Array
 ) -> dict[str, Array]:
-    """Return the elements ``(m,)`` that do the same where a common Phi tilts the whole along the base."""
+    """Return the elements ``(m,)`` that do the same with a common Phi along the base."""
     zero = manual.elements["common_phi"].zero
     common = (settings["common_phi"] - zero) * GON
     x, y, z = mxv(rotation(np.zeros_like(common), -common, np.zeros_like(common)), up)

@@ -1,4 +1,4 @@
-"""A day's work: the models of a job, one after the other."""
+"""Measurement of the models of a job, one after the other."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -27,29 +27,29 @@ from a7sim.standard_points import CASES
 
 @dataclass(frozen=True)
 class ModelRecord:
-    """What an operator found of a model, in counter readings."""
+    """Results of an operator for a model, in counter readings."""
 
     model: ModelJob
     interior: Mapping[str, InteriorOrientation]
     orientation: OrientationRecord
     points: Mapping[str, tuple[float, float, float]]
     centres: Mapping[int, PerspectiveCentre]
-    """By hand: 1 left, 2 right."""
+    """By side: 1 left, 2 right."""
     xy_units_per_mm: float
     z_units_per_mm: float
     finished_at: float
     """Simulated seconds."""
     on_ground: GroundOrientation | None = None
-    """The model in the system of the ground, where it was oriented absolutely at the instrument."""
+    """Model in the system of the ground, if it was oriented absolutely at the instrument."""
 
 
 @dataclass(frozen=True)
 class ModelRecordBatch:
-    """What a crew found of a model; arrays have all sessions as their last axis."""
+    """Results of a batch of operators for a model; the last axis of arrays contains all sessions."""
 
     model: ModelJob
     sessions: Indices
-    """Those who came to the end of it."""
+    """Sessions that finished it."""
     interior: Mapping[str, InteriorOrientationBatch]
     orientation: OrientationRecordBatch
     points: Mapping[str, Array]
@@ -59,14 +59,14 @@ class ModelRecordBatch:
     z_units_per_mm: float
     finished_at: Array
     on_ground: Mapping[int, GroundOrientation] | None = None
-    """By session, where models are levelled and scaled at the instrument; those without enough control have none."""
+    """By session, if models are levelled and scaled at the instrument; sessions without enough control have none."""
 
     @cached_property
     def _points_listed(self) -> dict[str, list[list[float]]]:
         return {point: each.T.tolist() for point, each in self.points.items()}
 
     def of(self, session: int) -> ModelRecord:
-        """Return one session's record."""
+        """Return the record of one session."""
         places = {point: each[session] for point, each in self._points_listed.items()}
         return ModelRecord(
             self.model,
@@ -87,9 +87,9 @@ def measure_models(
     tick: Callable[[], None] = lambda: None,
     begins: Callable[[str], None] = lambda _: None,
 ) -> Iterator[ModelRecord]:
-    """Yield the models of a job as a person does them. Raises DoesNotFit when one cannot be set up.
+    """Yield the models of a job measured over a link. Raises OperatorGaveUp if a model cannot be set up.
 
-    `begins` is told of every activity, `tick` comes after every point.
+    `begins` is called with each activity, `tick` after each point.
     """
     person.book.set_heading("", "preparation")
     for records in measure_models_batch(
@@ -101,7 +101,7 @@ def measure_models(
 def measure_models_batch(
     workstation: Workstation, begins: Callable[[str], None] = lambda _: None
 ) -> Iterator[ModelRecordBatch]:
-    """Yield the models of a job as a crew does them, each session at its own instrument."""
+    """Yield the models of a job measured by a batch of operators."""
     try:
         yield from _worked(workstation, begins)
     except AllGaveUpError:
@@ -149,13 +149,13 @@ def _worked(workstation: Workstation, begins: Callable[[str], None]) -> Iterator
 
 
 def require_active(workstation: Workstation) -> None:
-    """Raise NobodyGoesOn when all have given up."""
+    """Raise AllGaveUpError if all have given up."""
     if not workstation.operators.active.size:
         raise AllGaveUpError
 
 
 def note_missing_points(workstation: Workstation, model: ModelJob) -> None:
-    """Write into the book which points of the case lie in water, or are not pricked on both prints."""
+    """Write into the book which points of the case are in water, or not pricked on both prints."""
     operators = workstation.operators
     listed = {label: model.standard_points.get(label, "") for label in CASES[workstation.job.plan.case]}
     for active, there in workstation.group_by_points(operators.active, list(listed.values())):
@@ -165,9 +165,9 @@ def note_missing_points(workstation: Workstation, model: ModelJob) -> None:
 
 
 def preset_counters(workstation: Workstation, model: ModelJob) -> None:
-    """Preset the counters at point 1, as the thesis does, or where that is not there at the first point that is.
+    """Preset the counters at point 1 (thesis), or at the first existing point.
 
-    Those who find no standard point at all on both their prints give up.
+    Sessions without a standard point on both prints give up.
     """
     operators = workstation.operators
     waiting = operators.active
@@ -185,7 +185,7 @@ def preset_counters(workstation: Workstation, model: ModelJob) -> None:
 
 
 def model_coordinates(workstation: Workstation, model: ModelJob) -> dict[str, Array]:
-    """Measure all points that both prints show; sessions whose prints show the same do it together."""
+    """Measure all points on both prints; sessions with the same points measure them together."""
     operators = workstation.operators
     wanted = list(dict.fromkeys([*model.standard_points.values(), *model.other_points]))
     points: dict[str, Array] = {}
@@ -196,7 +196,7 @@ def model_coordinates(workstation: Workstation, model: ModelJob) -> dict[str, Ar
 
 
 def begin_form(workstation: Workstation, model: ModelJob, form: str, begins: Callable[[str], None]) -> None:
-    """Begin a form of a model in book and journal."""
+    """Start a form of a model in book and journal."""
     require_active(workstation)
     begins(f"model {model.name}: {form}")
     workstation.operators.begin(workstation.operators.active, model.name, form)
@@ -218,7 +218,7 @@ def orient_model(workstation: Workstation, model: ModelJob) -> OrientationRecord
 
 
 def set_base_and_fittings(workstation: Workstation, base: str, polarity: str) -> None:
-    """Set base in or out, and the fittings that belong to it and to the pictures."""
+    """Set base in or out, and the fittings required by it and by the pictures."""
     active, driver = workstation.operators.active, workstation.driver
     right = required_fittings(workstation.controls.manual, polarity, base)
     workstation.controls.spend_setting(active, 1 + len(right))
@@ -230,7 +230,7 @@ def set_base_and_fittings(workstation: Workstation, base: str, polarity: str) ->
 
 
 def mount_photographs(workstation: Workstation, model: ModelJob, interior: dict[str, InteriorOrientationBatch]) -> None:
-    """Mount what is not yet in its projector; a projector with a new picture starts from its counter zeros."""
+    """Mount the photographs that are not yet mounted; a projector with a new picture starts from its counter zeros."""
     controls, driver = workstation.controls, workstation.driver
     for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
         active = workstation.operators.active
@@ -250,7 +250,7 @@ def mount_photographs(workstation: Workstation, model: ModelJob, interior: dict[
 
 
 def load_prints(workstation: Workstation, model: ModelJob) -> dict[int, dict[str, Array]]:
-    """Take up the paper prints of both photographs and see that they overlap the right way round."""
+    """Load the paper prints of both photographs and check that they overlap the right way round."""
     operators = workstation.operators
     active = operators.active
     prints = {}

@@ -1,4 +1,4 @@
-"""Working with a grid plate: how it lies on its carrier, and pointing at its crosses."""
+"""Grid plate: its placement on the carrier, and pointings at its crosses."""
 
 from collections.abc import Mapping
 
@@ -13,13 +13,14 @@ from a7sim.reduction import PlatePlacement, plane_fit, plate_placement
 from a7sim.scenario import Camera
 
 Crosses = Mapping[str, tuple[float, float]]
-"""Names and nominal places in mm."""
+"""Names and nominal positions in mm."""
 
 MAX_SLIP_SIGMAS = 4.5
-"""A cross that stands further from where its fellows put it is pointed at again; of 25 good ones 1 in 3000 does."""
+"""A cross farther than this from the position given by the others is measured again; 1 of 3000 good ones among 25 is.
+"""
 
 MIN_SLIP_MM = 0.01
-"""At photo scale: less is never taken for a slip."""
+"""At photo scale: a smaller deviation never counts as a slip."""
 
 MAX_REPETITIONS = 12
 
@@ -27,12 +28,12 @@ _MIN_REDUNDANCY_NUMBER = 0.05
 
 
 def cross_positions(crosses: Crosses) -> Array:
-    """Return nominal places ``(2, n)`` in mm."""
+    """Return nominal positions ``(2, n)`` in mm."""
     return np.array(list(crosses.values())).T
 
 
 def sketch_positions(workstation: Workstation, active: Indices, projector: int) -> dict[str, Array]:
-    """Return where the sketch of what lies in a projector shows points ``(2, sessions)``, nan for those not asked."""
+    """Return the positions of points on the sketch of a picture ``(2, sessions)``, nan for other sessions."""
     prints = {}
     for name, place in workstation.driver.prints(active, projector).items():
         prints[name] = np.full((2, workstation.operators.size), np.nan)
@@ -43,7 +44,7 @@ def sketch_positions(workstation: Workstation, active: Indices, projector: int) 
 def locate_plate(
     workstation: Workstation, active: Indices, projector: int, certificate: Camera, times: int
 ) -> PlatePlacement:
-    """Register a mounted plate's fiducials so many times and return how it lies ``(sessions,)``."""
+    """Register a mounted plate's fiducials `times` times and return its placement ``(sessions,)``."""
     marks = {fiducial.name: (fiducial.x, fiducial.y) for fiducial in certificate.fiducials}
     registered = [view_fiducials(workstation, active, projector) for _ in range(times)]
     displacements = np.concatenate([seen for _, seen in registered], axis=1)
@@ -55,7 +56,7 @@ def locate_plate(
 def point_at_crosses(workstation: Workstation, active: Indices, side: int, crosses: Crosses, level: float) -> Array:
     """Point with one eye at crosses at a Z reading; X, Y readings ``(2, n, sessions)``.
 
-    A cross that its fellows contradict is struck out and pointed at again.
+    A cross that contradicts the others is struck out and measured again.
     """
     operators = workstation.operators
     names = list(crosses)
@@ -76,13 +77,19 @@ def point_at_crosses(workstation: Workstation, active: Indices, side: int, cross
 
 
 def _go_below(workstation: Workstation, active: Indices, side: int) -> None:
-    """Run the mark straight below a centre, whence it can go to any level: from the side the rods may not let it."""
+    """Drive the mark vertically below a centre, from where all levels are reachable.
+
+    From the side the rods may not be.
+    """
     x, y = np.round(workstation.controls.under_centre(active, side), 2)
     workstation.controls.drive(active, {"X": x, "Y": y})
 
 
 def _misread(readings: Array, crosses: Array) -> npt.NDArray[np.intp]:
-    """Return which cross ``(m,)`` does not fit the others, -1 for none; a tilted plane is seen in perspective."""
+    """Return the index ``(m,)`` of the cross that contradicts the others, -1 for none;
+
+    a tilted plane is seen in perspective.
+    """
     fit = plane_fit(readings, crosses, "projective")
     controlled = fit.adjustment.redundancy_numbers.reshape(fit.residuals.shape)
     off = np.abs(fit.residuals) / np.sqrt(np.maximum(controlled, _MIN_REDUNDANCY_NUMBER))

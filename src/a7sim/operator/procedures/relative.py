@@ -24,34 +24,35 @@ from a7sim.standard_points import CASES, POSITIONS, determine_orientation
 MAX_ROUNDS = 12
 MAX_ROUGH_ROUNDS = 3
 STILL_FALLING = 0.8
-"""Residuals go on falling while their rms is below this share of the best so far."""
+"""Residuals count as decreasing while their rms is below this share of the best so far."""
 
 GROSS_MM = 0.5
-"""While the rms is above this the mean stays in: it comes of the swings and omega, which are still to be found."""
+"""While the rms is above this the mean is kept: it is due to the swings and omega, which are still unknown."""
 
 OFF_PATTERN = 0.08
-"""Points may lie off the regular pattern by this share of the height; what that spoils the next round puts right."""
+"""Tolerated deviation of points from the regular pattern, as a share of the height; the next round corrects its effect.
+"""
 
 ALL_ELEMENTS = (*(f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz", "c") for n in (1, 2)), "bx")
 
 
 @dataclass(frozen=True)
 class Round:
-    """One round of a session: the parallaxes at the points of the case, their mean, and their rms about it, mm."""
+    """Round of a session: the parallaxes at the points of the case, their mean, and their rms about it, mm."""
 
     settings: Mapping[str, float]
     parallaxes: Mapping[str, float]
     mean: float
     rms: float
     sigmas: Mapping[str, float]
-    """Standard deviations of the corrections computed from this round, gon and mm; empty where none were."""
+    """Standard deviations of the corrections computed from this round, gon and mm; empty without corrections."""
     over_correction: float = 0.0
-    """How many times the turn that clears the last point was made; zero where none was."""
+    """Over-correction: multiple of the turn that clears the last point; zero if none was made."""
 
 
 @dataclass(frozen=True)
 class OrientationRecord:
-    """The orientation of a session as set: rounds, elements as the counters show them, residuals by position."""
+    """Orientation of a session as set: rounds, elements as the counters show them, residuals by position."""
 
     method: str
     case: str
@@ -71,7 +72,7 @@ class OrientationRecord:
 
 @dataclass(frozen=True)
 class RoundBatch:
-    """A round of those sessions that measured in it; arrays have all sessions as their last axis."""
+    """Round of the sessions that measured in it; the last axis of arrays contains all sessions."""
 
     active: Indices
     settings: Mapping[str, Array]
@@ -84,11 +85,11 @@ class RoundBatch:
 
     @cached_property
     def sessions(self) -> frozenset[int]:
-        """Who measured in it, to ask for one."""
+        """Sessions that measured in it, as a set."""
         return frozenset(self.active.tolist())
 
     def of(self, session: int) -> Round:
-        """Return one session's round."""
+        """Return the round of one session."""
         return Round(
             _picked(self.settings, session),
             _there(_picked(self.parallaxes, session)),
@@ -100,7 +101,7 @@ class RoundBatch:
 
 
 class SessionRounds(Sequence[Round]):
-    """The rounds of one session, each put together when it is asked for."""
+    """Rounds of one session, each built on access."""
 
     def __init__(self, session: int, rounds: Sequence[RoundBatch]) -> None:
         self._session, self._rounds = session, rounds
@@ -122,7 +123,7 @@ class SessionRounds(Sequence[Round]):
 
 @dataclass(frozen=True)
 class OrientationRecordBatch:
-    """The orientations of a crew; arrays have all sessions as their last axis."""
+    """Orientations of a batch; the last axis of arrays contains all sessions."""
 
     method: str
     case: str
@@ -149,7 +150,7 @@ class OrientationRecordBatch:
         )
 
     def of(self, session: int) -> OrientationRecord:
-        """Return one session's orientation."""
+        """Return the orientation of one session."""
         listed = self._listed
         residuals = _there(_picked(listed.residuals, session))
         return OrientationRecord(
@@ -166,7 +167,7 @@ class OrientationRecordBatch:
 
 @dataclass(frozen=True)
 class _Listed:
-    """What is left at standard points and what the counters show, as lists by session: quicker asked for one by one."""
+    """Residuals at standard points and counter readings as lists by session, which are faster to index."""
 
     elements: Mapping[str, Sequence[float]]
     residuals: Mapping[str, Sequence[float]]
@@ -184,8 +185,8 @@ def _there(values: Mapping[str, float]) -> dict[str, float]:
 def unknown_elements(method: str, model: ModelJob) -> tuple[str, ...]:
     """Return the elements that a method turns.
 
-    Independent (swing-swing): kappa', kappa", phi', phi", omega'. Dependent: kappa, phi, omega, by, bz of the
-    projector with the new, right-hand photograph: the right one with base in, the left one with base out.
+    Independent (swing-swing): kappa', kappa", phi', phi", omega'. Dependent: kappa, phi, omega, by, bz of the projector
+    with the new, right-hand photograph: the right one with base in, the left one with base out.
     """
     if method == "independent":
         return ("kappa1", "kappa2", "phi1", "phi2", "omega1")
@@ -205,10 +206,10 @@ def relative_orientation(
 ) -> OrientationRecordBatch:
     """Clear the y-parallaxes of a model in rounds of measuring, computing and setting.
 
-    Once the parallaxes of a round are no longer gross their mean is taken off; in the dependent method, where by is
-    itself unknown, only to see whether they fall. When they no longer do, the best settings stand and their
-    mean goes on by' (dependent: on the by that was turned). Those whose residual parallaxes at all standard points
-    then have a larger rms than tolerated, in mm, give up, and so do those whose prints show too few of the points.
+    Once the parallaxes of a round are no longer gross their mean is subtracted; in the dependent method, where by is an
+    unknown, only for the check of convergence. When they no longer decrease, the best settings are restored and their
+    mean is set on by' (dependent: on the by that was turned). Sessions whose residual parallaxes at all standard points
+    then have a larger rms than tolerated, in mm, give up, and so do sessions whose prints show too few of the points.
     """
     operators, controls = workstation.operators, workstation.controls
     if not controls.has_parallax_elements:
@@ -254,7 +255,7 @@ def _oriented(
     readings: int,
     base: float,
 ) -> OrientationRecordBatch:
-    """Return what came of the rounds on the points at some positions, the best settings standing."""
+    """Return the result of the rounds on the points at some positions, with the best settings restored."""
     operators, controls, plan = workstation.operators, workstation.controls, workstation.job.plan
     unknowns = unknown_elements(method, model)
     measured_with = {"both": (1, 2), "by1": (1,), "by2": (2,)}[plan.measure_with]
@@ -299,7 +300,7 @@ def _oriented(
 def merge_groups(
     groups: Sequence[tuple[Indices, OrientationRecordBatch]], method: str, case: str, sessions: int, procedure: str
 ) -> OrientationRecordBatch:
-    """Return the orientations of all groups in one."""
+    """Return the orientations of all groups as one batch."""
     labels = [label for label in POSITIONS if any(label in found.residuals for _, found in groups)]
     elements: dict[str, Array] = {}
     residuals = {label: np.full(sessions, np.nan) for label in labels}
@@ -318,7 +319,7 @@ def merge_groups(
 
 
 class _Best:
-    """The best settings so far of every session."""
+    """Best settings so far of each session."""
 
     def __init__(self, unknowns: Sequence[str], sessions: int) -> None:
         self.settings = {name: np.zeros(sessions) for name in unknowns}
@@ -326,7 +327,7 @@ class _Best:
         self.rms = np.full(sessions, np.inf)
 
     def see(self, active: Indices, settings: Mapping[str, Array], mean: Array, rms: Array) -> None:
-        """Keep the settings where the rms is smaller than any before."""
+        """Keep the settings where the rms is smaller than before."""
         better = active[rms[active] < self.rms[active]]
         self.mean[better], self.rms[better] = mean[better], rms[better]
         for name, kept in self.settings.items():
@@ -334,7 +335,7 @@ class _Best:
 
 
 def _mean_and_rms(p: Array, active: Indices) -> tuple[Array, Array]:
-    """Return the mean parallax, none while they are gross, and the rms about it ``(sessions,)``."""
+    """Return the mean parallax, zero while they are gross, and the rms about it ``(sessions,)``."""
     gross = np.sqrt(np.mean(p**2, axis=0)) > GROSS_MM
     mean = np.where(gross, 0.0, p.mean(axis=0))
     rms = np.full(p.shape[-1], np.nan)
@@ -351,7 +352,7 @@ def assess_residuals(
     readings: int,
     tolerated_rms: float,
 ) -> OrientationRecordBatch:
-    """Return an orientation with what is left at standard points; those for whom it is too much give up."""
+    """Return an orientation with the residuals at standard points; sessions beyond the tolerance give up."""
     operators = workstation.operators
     names = [model.standard_points[label] for label in labels]
     measured = workstation.controls.has_parallax_elements
@@ -385,7 +386,7 @@ def assess_residuals(
 
 
 def expand_to_batch(values: Mapping[str, Array], active: Indices, sessions: int) -> dict[str, Array]:
-    """Return values ``(m,)`` of those who act among all sessions."""
+    """Return values ``(m,)`` of the active sessions as arrays of all sessions."""
     spread = {name: np.zeros(sessions) for name in values}
     for name, each in values.items():
         spread[name][active] = each
@@ -410,7 +411,7 @@ def _bring_together(
     apart: npt.NDArray[np.object_],
     rough_rounds: npt.NDArray[np.intp],
 ) -> None:
-    """Orient roughly, where images are too far apart for by, from the Y readings of each eye alone."""
+    """Orient roughly, where images are too far apart for by, from the Y readings of each eye."""
     operators, controls = workstation.operators, workstation.controls
     operators.give_up(
         active[rough_rounds[active] > MAX_ROUGH_ROUNDS],
@@ -449,8 +450,8 @@ def compute_corrections(
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return corrections and their standard deviations ``(sessions,)`` by element, gon and mm.
 
-    Places ``(3, n, sessions)`` and parallaxes ``(n, sessions)`` in mm, bases ``(m,)``; labels are the positions, which
-    a closed form asks for. Those whose points do not determine the elements give up.
+    Positions ``(3, n, sessions)`` and parallaxes ``(n, sessions)`` in mm, bases ``(m,)``; labels are the positions for
+    the closed form. Sessions whose points do not determine the elements give up.
     """
     nothing = {name: np.zeros(workstation.operators.size) for name in unknowns}
     if not active.size:
@@ -489,7 +490,7 @@ def _pattern(places: Array, base: Array) -> tuple[Array, Array, Array]:
 def _on_pattern(
     workstation: Workstation, active: Indices, labels: Sequence[str], places: Array, base: Array
 ) -> BoolArray:
-    """Return whose points ``(3, n, m)`` lie near enough to the pattern of six or nine for the closed form."""
+    """Return which sessions have points ``(3, n, m)`` near enough to the pattern of six or nine for the closed form."""
     if not labels:
         return np.zeros(active.size, dtype=bool)
     if "".join(labels) not in (CASES["A"], CASES["D"]):
@@ -509,7 +510,7 @@ def _on_pattern(
 
 
 def projector_pose(workstation: Workstation, active: Indices, projector: int, x: Array) -> ProjectorPose:
-    """Return how projectors stand by their counters, the centres at x ``(m,)`` of the instrument frame."""
+    """Return the poses of projectors by their counters, the centres at x ``(m,)`` of the instrument frame."""
     counts = workstation.controls.elements(active, [f"{name}{projector}" for name in (*TILTS, "by", "bz")])
     omega, phi, kappa = workstation.controls.manual.tilts(counts, projector)
     by, bz = counts[f"by{projector}"], counts[f"bz{projector}"]

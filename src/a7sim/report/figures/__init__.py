@@ -1,1 +1,1 @@
-"""The figures of a report, each drawn from what the results say."""
+"""Figures of a report, drawn from the results."""

@@ -1,4 +1,4 @@
-"""A grid test: what the pointings leave at the crosses of the plate."""
+"""Figure of a grid test: residuals at the crosses of the plate."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""A model: residual parallaxes, the iterations, and where the perspective centres were found."""
+"""Figures of a model: residual parallaxes, iterations, and perspective centres."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 CONFIDENT = 2.4477
-"""So many standard deviations make the ellipse that holds 95 % of a plane's normal errors."""
+"""Standard deviations of the ellipse that contains 95 % of normal errors in a plane."""
 
 OTHER = {"left": "right", "right": "left"}
 
 OF_PROJECTOR = {"left": ("′", LEFT, "o"), "right": ("″", RIGHT, "s")}
-"""Sign, colour and marker of the projectors; with base out the left-hand photograph lies in the right one."""
+"""Sign, colour and marker of the projectors; with base out the left-hand photograph is in the right one."""
 
 
 def residual_parallaxes(model: Document, name: str) -> PageFigure:
-    """Return the residual y-parallaxes as arrows over the standard points in plan, with their scale."""
+    """Return the residual y-parallaxes as arrows at the standard points in plan, with their scale."""
     orientation = model["relative_orientation"]
     residuals: Mapping[str, float] = orientation["residual_parallax_mm"]
     places, unit = _places(model, residuals)
@@ -72,7 +72,7 @@ def residual_parallaxes(model: Document, name: str) -> PageFigure:
 
 
 def _places(model: Document, labels: Mapping[str, float]) -> tuple[dict[str, tuple[float, float]], str]:
-    """Return where standard points lie in the model: as measured there, else as the pattern has them."""
+    """Return the positions of standard points in the model: measured, otherwise those of the pattern."""
     points, names = model["points"], model["standard_points"]
     if all(names.get(label) in points for label in labels):
         unit = "mm" if model["xy_units_per_mm"] == 1.0 else "counter units"
@@ -89,7 +89,7 @@ def parallax_table(model: Document) -> TableBlock:
 
 
 def iterations(model: Document, name: str) -> PageFigure:
-    """Return rms and mean of the parallaxes of every round on a logarithmic scale."""
+    """Return rms and mean of the parallaxes of each round on a logarithmic scale."""
     orientation = model["relative_orientation"]
     rounds = orientation["rounds"]
     numbers = list(range(1, len(rounds) + 1))
@@ -113,14 +113,14 @@ def iterations(model: Document, name: str) -> PageFigure:
 
 
 def _above_zero(values: Iterable[float]) -> list[float]:
-    """Return values with a gap where they have no place on a logarithmic scale."""
+    """Return values with gaps where a logarithmic scale cannot show them."""
     return [value if value > 0.0 else math.nan for value in values]
 
 
 def perspective_centre(model: Document, side: str, rays: Mapping[str, tuple[float, float]], name: str) -> PageFigure:
     """Return a perspective centre with its error ellipse in plan and its height beside, the true one marked.
 
-    `rays` are the places (X, Y) at which each point's ray comes through the height of the centre.
+    `rays` are the positions (X, Y) of each point's ray at the height of the centre.
     """
     found, true = model["perspective_centres"][side], model["truth"]["centres"][side]
     sign, colour, marker = OF_PROJECTOR[side if model["base"] == "inside" else OTHER[side]]
@@ -169,7 +169,7 @@ def _ellipses(axes: "Axes", found: Document, colour: str) -> None:
 
 
 def centre_residuals(model: Document, rays: Mapping[str, Mapping[str, tuple[float, float]]]) -> TableBlock | None:
-    """Return by how much each point's ray misses the centres, none where that is not to be told from the book."""
+    """Return the distance of each point's ray from the centres, None if the book does not contain it."""
     points = list(dict.fromkeys(point for side in rays.values() for point in side))
     if not points:
         return None

@@ -1,4 +1,4 @@
-"""Where the time went, and how the strips of all cases compare."""
+"""Figures of the time spent, and of the strips of all cases."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,7 +8,7 @@ from a7sim.result_documents import Document
 
 
 def hours(spent: Mapping[str, float], name: str, title: str) -> PageFigure:
-    """Return hours as bars, in the order in which they were first spent."""
+    """Return hours as bars, in order of first occurrence."""
     said = "; ".join(f"{what} {each:.2f} hours" for what, each in spent.items())
     with drawing(name, title, said, size=(WIDTH_IN, 1.3 + 0.5 * len(spent))) as drawn:
         axes = drawn.axes[0]
@@ -27,7 +27,7 @@ def _in_two_lines(names: Mapping[str, float]) -> list[str]:
 
 
 def all_strips(strips: Sequence[Document], name: str) -> PageFigure:
-    """Return the rms residuals at the checks, or at control where there are none, of every strip."""
+    """Return the rms residuals at the checks, or at control if there are none, of each strip."""
     on = "checks" if all("checks" in strip["accuracy_m"] for strip in strips) else "control"
     title = f"Rms residuals at {on} by strip"
     said = f"{len(strips)} strips, one for every combination of cases, numbered as in the thesis."

@@ -1,4 +1,4 @@
-"""A strip on the ground: its residuals in plan and height, and the strip itself in plan and profile."""
+"""Figures of a strip on the ground: residuals in plan and height, plan and profile."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -32,14 +32,14 @@ FAR_M = 20_000.0
 """Coordinates above this are shown without their kilometres."""
 
 MANY = 20
-"""Above so many ground points a figure takes the whole width."""
+"""Above this number of ground points a figure has the full width."""
 
 _LOOKS = {False: ("^", LEFT, LEFT, "control"), True: ("o", RIGHT, PANEL, "check")}
-"""Marker, edge, face and word of control and checks."""
+"""Marker, edge, face and label of control and checks."""
 
 
 def residuals_in_plan(strip: Document, places: Places, name: str, of: str) -> PageFigure | None:
-    """Return residuals in plan at control and checks as arrows; none where no place is known."""
+    """Return residuals in plan at control and checks as arrows; None without positions."""
     residuals = {
         point: each
         for point, each in _last(strip)["residuals_m"].items()
@@ -151,7 +151,7 @@ def plan_and_profile(places: Places, strip: Document, name: str, of: str) -> Pag
 
 
 def _last(strip: Document) -> Document:
-    """Return the strip as adjusted last."""
+    """Return the strip after the last adjustment."""
     adjusted: Document = strip.get("polynomial", strip)
     return adjusted
 
@@ -161,7 +161,7 @@ def _is(role: str | None, check: bool | None) -> bool:
 
 
 def _origin(places: Places) -> tuple[float, float]:
-    """Return whole kilometres that may be left off east and north, none where they are few."""
+    """Return whole kilometres that may be left off east and north, zero if they are few."""
     least = (min(at[axis] for at in places.values()) for axis in (0, 1))
     east, north = (1000.0 * math.floor(metres / 1000.0) if metres > FAR_M else 0.0 for metres in least)
     return east, north
@@ -177,7 +177,7 @@ def _flat(places: Places, origin: tuple[float, float]) -> tuple[list[float], lis
 
 
 def _along(centres: Places) -> Callable[[tuple[float, float, float]], float]:
-    """Return the function that tells how far a place lies along the strip from its first centre."""
+    """Return the function of the distance along the strip from its first centre."""
     (x, y, _), *_, (end_x, end_y, _) = centres.values()
     length = math.hypot(end_x - x, end_y - y) or 1.0
     return lambda at: ((at[0] - x) * (end_x - x) + (at[1] - y) * (end_y - y)) / length

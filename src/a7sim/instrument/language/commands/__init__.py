@@ -1,4 +1,4 @@
-"""Every command of the language: protocol.md as frozen data, each with the few lines that carry it out."""
+"""Commands of the language as frozen data, each with its handler (protocol.md)."""
 
 from a7sim.instrument.language.commands.carriages import CARRIAGES
 from a7sim.instrument.language.commands.elements import ELEMENT_COMMANDS

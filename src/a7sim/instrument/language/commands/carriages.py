@@ -1,8 +1,7 @@
 """Counters and carriages."""
 
-from typing import TYPE_CHECKING
-
 from a7sim.instrument.language.commands.common import autograph_for
+from a7sim.instrument.language.context import CommandContext
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.table import (
     Call,
@@ -11,49 +10,45 @@ from a7sim.instrument.language.table import (
     Quantity,
 )
 
-if TYPE_CHECKING:
-    from a7sim.instrument.language.engine import Engine
-
-
 MAX_READING = 999999.99
 """Of a counter's drums."""
 
 
-def _counters(engine: "Engine", call: Call) -> str:
+def _counters(engine: CommandContext, call: Call) -> str:
     return ",".join(autograph_for(engine).counter_text(axis) for axis in "XYZ")
 
 
 def _axis(axis: str) -> list[Command]:
     usual = "" if axis == "Z" else "mm"
 
-    def unit(engine: "Engine") -> str:
+    def unit(engine: CommandContext) -> str:
         return autograph_for(engine).variant.scales[axis].unit
 
-    def limits(engine: "Engine", suffix: int) -> Limits:
+    def limits(engine: CommandContext, suffix: int) -> Limits:
         autograph = autograph_for(engine)
         low, high = autograph.counter_limits(axis)
         return low, high, autograph.counter_at_rest(axis)
 
-    def to_the_ends(engine: "Engine", suffix: int) -> Limits:
+    def to_the_ends(engine: CommandContext, suffix: int) -> Limits:
         autograph = autograph_for(engine)
         low, high = autograph.counter_limits(axis)
         here = autograph.counter(axis)
         return low - here, high - here, 0.0
 
-    def preset_limits(engine: "Engine", suffix: int) -> Limits:
+    def preset_limits(engine: CommandContext, suffix: int) -> Limits:
         return -MAX_READING, MAX_READING, 0.0
 
-    def preset(engine: "Engine", call: Call) -> None:
+    def preset(engine: CommandContext, call: Call) -> None:
         if abs(call.arguments[0]) > MAX_READING:
             raise CommandError(
                 ErrorNumber.DATA_OUT_OF_RANGE, f"expected at most {MAX_READING}, got {call.arguments[0]:.10g}"
             )
         autograph_for(engine).preset(axis, call.arguments[0])
 
-    def drive(engine: "Engine", call: Call) -> None:
+    def drive(engine: CommandContext, call: Call) -> None:
         autograph_for(engine).drive(axis, call.arguments[0])
 
-    def wheel(engine: "Engine", call: Call) -> None:
+    def wheel(engine: CommandContext, call: Call) -> None:
         autograph_for(engine).turn_handwheel(axis, call.arguments[0])
 
     return [
@@ -77,7 +72,7 @@ def _axis(axis: str) -> list[Command]:
             wheel,
             (Quantity(usual, to_the_ends, name="amount", unit_there=unit),),
             moves=True,
-            help="turn by so much counter, signed",
+            help="turn by a signed counter amount",
         ),
     ]
 

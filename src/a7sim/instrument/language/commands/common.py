@@ -1,13 +1,13 @@
-"""What the commands of several subsystems share."""
+"""Functions shared by the commands of several subsystems."""
 
 from typing import TYPE_CHECKING
 
+from a7sim.instrument.language.context import CommandContext
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.table import Choice
 
 if TYPE_CHECKING:
     from a7sim.instrument.autograph import Autograph
-    from a7sim.instrument.language.engine import Engine
 
 
 MAX_TEXT_LENGTH = 1000
@@ -25,8 +25,8 @@ ELEMENT_NODES = (
 LIMIT = Choice(("MINimum", "MAXimum", "DEFault"), optional=True)
 
 
-def autograph_for(engine: "Engine") -> "Autograph":
-    """Return the instrument that an engine speaks for."""
+def autograph_for(engine: CommandContext) -> "Autograph":
+    """Return the instrument of an engine."""
     return engine.instrument.autograph
 
 
@@ -36,7 +36,7 @@ def format_fixed(value: float, decimals: int = 2) -> str:
 
 
 def text_argument(text: str) -> str:
-    """Return a text. Raises LanguageError for an empty one and for one that is too long."""
+    """Return a text argument. Raises CommandError for an empty or too long text."""
     if not 1 <= len(text) <= MAX_TEXT_LENGTH:
         raise CommandError(
             ErrorNumber.DATA_OUT_OF_RANGE, f"expected 1 to {MAX_TEXT_LENGTH} characters, got {len(text)}"

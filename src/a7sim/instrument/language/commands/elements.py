@@ -2,9 +2,9 @@
 
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from a7sim.instrument.language.commands.common import ELEMENT_NODES, LIMIT, autograph_for, format_fixed, text_argument
+from a7sim.instrument.language.context import CommandContext
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
@@ -17,10 +17,6 @@ from a7sim.instrument.language.table import (
     short_form,
 )
 
-if TYPE_CHECKING:
-    from a7sim.instrument.language.engine import Engine
-
-
 _FITTING_NODES = (
     ("DOVE", "dove", ("INside", "OUTside"), "indices of the Dove prisms"),
     ("TRIangulation", "triangulation", ("BACK", "FRONt"), "triangulation lever"),
@@ -31,22 +27,22 @@ _FITTING_NODES = (
 
 
 def _element(header: str, name_of: Callable[[int], str], unit: str, about: str) -> list[Command]:
-    def limits(engine: "Engine", suffix: int) -> Limits:
+    def limits(engine: CommandContext, suffix: int) -> Limits:
         element = autograph_for(engine).element_data(name_of(suffix))
         return element.low, element.high, element.zero
 
-    def move(engine: "Engine", call: Call) -> None:
+    def move(engine: CommandContext, call: Call) -> None:
         autograph_for(engine).set_element(name_of(call.suffix), call.arguments[0])
 
-    def turn(engine: "Engine", call: Call) -> None:
+    def turn(engine: CommandContext, call: Call) -> None:
         autograph_for(engine).turn_element(name_of(call.suffix), call.arguments[0])
 
-    def to_the_ends(engine: "Engine", suffix: int) -> Limits:
+    def to_the_ends(engine: CommandContext, suffix: int) -> Limits:
         low, high, _ = limits(engine, suffix)
         here = autograph_for(engine).element(name_of(suffix))
         return low - here, high - here, 0.0
 
-    def show(engine: "Engine", call: Call) -> str:
+    def show(engine: CommandContext, call: Call) -> str:
         shown = autograph_for(engine).element(name_of(call.suffix))
         if call.arguments:
             shown = dict(zip(LIMIT.words, limits(engine, call.suffix), strict=True))[_long(call.arguments[0])]
@@ -60,7 +56,7 @@ def _element(header: str, name_of: Callable[[int], str], unit: str, about: str) 
             turn,
             (Quantity(unit, to_the_ends, name="amount"),),
             moves=True,
-            help="turn its drum by so much, signed, between two counts too",
+            help="turn its drum by a signed amount, between two counts too",
         ),
     ]
 
@@ -73,14 +69,14 @@ def _numbered(name: str) -> Callable[[int], str]:
     return lambda suffix: f"{name}{suffix}"
 
 
-def _base_mode(engine: "Engine", call: Call) -> None:
+def _base_mode(engine: CommandContext, call: Call) -> None:
     autograph_for(engine).set_base_mode(call.arguments[0])
 
 
 def _fitting(node: str, name: str, words: tuple[str, ...], about: str) -> list[Command]:
     shown = {word.lower(): short_form(word) for word in words}
 
-    def put(engine: "Engine", call: Call) -> None:
+    def put(engine: CommandContext, call: Call) -> None:
         autograph_for(engine).set_fitting(name, call.arguments[0])
 
     return [
@@ -89,11 +85,11 @@ def _fitting(node: str, name: str, words: tuple[str, ...], about: str) -> list[C
     ]
 
 
-def _height_gear(engine: "Engine", call: Call) -> None:
+def _height_gear(engine: CommandContext, call: Call) -> None:
     autograph_for(engine).set_height_gear(call.arguments[0])
 
 
-def _plan_gear(engine: "Engine", call: Call) -> None:
+def _plan_gear(engine: CommandContext, call: Call) -> None:
     gear = call.arguments[0]
     if isinstance(gear, float) and not 0.0 < gear <= 100.0:
         raise CommandError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected more than 0 to 100, got {gear:g}")

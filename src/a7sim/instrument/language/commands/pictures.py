@@ -1,11 +1,11 @@
-"""Photographs in their carriers, and what the eyepieces show."""
+"""Photographs in their carriers, and the views of the eyepieces."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from a7sim.instrument.language.commands.common import autograph_for, format_fixed
+from a7sim.instrument.language.context import CommandContext
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
@@ -17,48 +17,44 @@ from a7sim.instrument.language.table import (
 )
 from a7sim.plotters import NOT_VISIBLE
 
-if TYPE_CHECKING:
-    from a7sim.instrument.language.engine import Engine
-
-
 MAX_PICTURE = 1024
 """Columns or rows of an eyepiece picture."""
 
 
-def _load(engine: "Engine", call: Call) -> None:
+def _load(engine: CommandContext, call: Call) -> None:
     autograph_for(engine).load(call.suffix, call.arguments[0])
 
 
-def _unload(engine: "Engine", call: Call) -> None:
+def _unload(engine: CommandContext, call: Call) -> None:
     autograph_for(engine).unload(call.suffix)
 
 
-def _catalogue(engine: "Engine", call: Call) -> str:
+def _catalogue(engine: CommandContext, call: Call) -> str:
     return ",".join(quote_text(name) for name in autograph_for(engine).catalogue) or '""'
 
 
-def _centre(engine: "Engine", call: Call) -> None:
+def _centre(engine: CommandContext, call: Call) -> None:
     autograph_for(engine).centre_picture(call.suffix, *call.arguments)
 
 
-def _centring_limits(name: str) -> Callable[["Engine", int], Limits]:
-    def limits(engine: "Engine", suffix: int) -> Limits:
+def _centring_limits(name: str) -> Callable[[CommandContext, int], Limits]:
+    def limits(engine: CommandContext, suffix: int) -> Limits:
         limit = getattr(autograph_for(engine).variant, name)
         return -limit, limit, 0.0
 
     return limits
 
 
-def _centring(engine: "Engine", call: Call) -> str:
+def _centring(engine: CommandContext, call: Call) -> str:
     return ",".join(format_fixed(value, 3) for value in autograph_for(engine).carrier(call.suffix).centring)
 
 
-def _fiducials(engine: "Engine", call: Call) -> str:
+def _fiducials(engine: CommandContext, call: Call) -> str:
     displacements = autograph_for(engine).carrier(call.suffix).fiducial_displacements()
     return ",".join(f"{quote_text(name)},{format_fixed(dx, 3)},{format_fixed(dy, 3)}" for name, dx, dy in displacements)
 
 
-def _sketch(engine: "Engine", call: Call) -> str:
+def _sketch(engine: CommandContext, call: Call) -> str:
     sketch = autograph_for(engine).carrier(call.suffix).photograph.sketch
     places = zip(sketch.names, sketch.xy[0], sketch.xy[1], strict=True)
     return (
@@ -71,15 +67,15 @@ def _pair(seen: tuple[float, float] | None) -> str:
     return f"{format_fixed(seen[0])},{format_fixed(seen[1])}" if seen else f"{NOT_VISIBLE},{NOT_VISIBLE}"
 
 
-def _eyepiece(engine: "Engine", call: Call) -> str:
+def _eyepiece(engine: CommandContext, call: Call) -> str:
     return _pair(autograph_for(engine).eyepiece(call.suffix, call.arguments[0]))
 
 
-def _stereo(engine: "Engine", call: Call) -> str:
+def _stereo(engine: CommandContext, call: Call) -> str:
     return _pair(autograph_for(engine).stereo(call.arguments[0]))
 
 
-def _picture(engine: "Engine", call: Call) -> bytes:
+def _picture(engine: CommandContext, call: Call) -> bytes:
     columns, rows, magnification = call.arguments
     for name, value, largest in (("columns", columns, MAX_PICTURE), ("rows", rows, MAX_PICTURE)):
         if not 1 <= value <= largest:

@@ -1,9 +1,9 @@
 """Registrations, strikes and remarks."""
 
 import re
-from typing import TYPE_CHECKING
 
 from a7sim.instrument.language.commands.common import ELEMENT_NODES, autograph_for, format_fixed, text_argument
+from a7sim.instrument.language.context import CommandContext
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import quote_text
 from a7sim.instrument.language.table import (
@@ -16,10 +16,6 @@ from a7sim.instrument.language.table import (
 )
 from a7sim.instrument.recorder import Registration
 
-if TYPE_CHECKING:
-    from a7sim.instrument.language.engine import Engine
-
-
 _RECORDED = {short_form(node): name for node, name, _, _ in ELEMENT_NODES}
 _RECORDED |= {node.upper(): name for node, name, _, _ in ELEMENT_NODES}
 
@@ -28,7 +24,7 @@ _COMMON_TO_BOTH = {"BX": "bx", "CPHI": "common_phi"}
 
 
 def recorded_element(word: str) -> str:
-    """Return the element that a word in a registration names. Raises LanguageError."""
+    """Return the element named by a word of a registration. Raises CommandError."""
     if word in _COMMON_TO_BOTH:
         return _COMMON_TO_BOTH[word]
     found = re.fullmatch(r"([A-Z]+)([12])", word)
@@ -39,7 +35,7 @@ def recorded_element(word: str) -> str:
     return f"{_RECORDED[found[1]]}{found[2]}"
 
 
-def _record(engine: "Engine", call: Call) -> None:
+def _record(engine: CommandContext, call: Call) -> None:
     autograph = autograph_for(engine)
     point, *words = call.arguments
     elements = [(word, format_fixed(autograph.element(recorded_element(word)))) for word in words]
@@ -47,14 +43,14 @@ def _record(engine: "Engine", call: Call) -> None:
     autograph.recorder.register(text_argument(point), counters + elements)
 
 
-def _last_record(engine: "Engine", call: Call) -> str:
+def _last_record(engine: CommandContext, call: Call) -> str:
     registrations = autograph_for(engine).recorder.registrations
     if not registrations:
         raise CommandError(ErrorNumber.EXECUTION_ERROR, "nothing is registered yet")
     return _shown(registrations[-1])
 
 
-def _numbered_record(engine: "Engine", call: Call) -> str:
+def _numbered_record(engine: CommandContext, call: Call) -> str:
     return _shown(autograph_for(engine).recorder.by_number(int(call.arguments[0])))
 
 
@@ -65,16 +61,16 @@ def _shown(registration: Registration) -> str:
     return ",".join([str(registration.number), quote_text(registration.point), *counters, *elements, *struck])
 
 
-def _struck_records(engine: "Engine", call: Call) -> str:
+def _struck_records(engine: CommandContext, call: Call) -> str:
     return str(sum(each.struck is not None for each in autograph_for(engine).recorder.registrations))
 
 
-def _strike(engine: "Engine", call: Call) -> None:
+def _strike(engine: CommandContext, call: Call) -> None:
     number, why = call.arguments
     autograph_for(engine).recorder.strike(int(number), text_argument(why))
 
 
-def _note(engine: "Engine", call: Call) -> None:
+def _note(engine: CommandContext, call: Call) -> None:
     text_argument(call.arguments[0])
 
 

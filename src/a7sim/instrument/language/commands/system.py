@@ -1,9 +1,9 @@
 """Common commands of IEEE 488.2, status and system."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from a7sim.instrument.language.commands.common import autograph_for
+from a7sim.instrument.language.context import CommandContext
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.status import Register
 from a7sim.instrument.language.syntax import quote_text
@@ -15,24 +15,21 @@ from a7sim.instrument.language.table import (
 )
 from a7sim.plotters import SCPI_VERSION
 
-if TYPE_CHECKING:
-    from a7sim.instrument.language.engine import Engine
 
-
-def _identity(engine: "Engine", call: Call) -> str:
+def _identity(engine: CommandContext, call: Call) -> str:
     autograph = autograph_for(engine)
     return f"WILD HEERBRUGG,{autograph.variant.name},{autograph.serial},{engine.instrument.version}"
 
 
-def _clear(engine: "Engine", call: Call) -> None:
+def _clear(engine: CommandContext, call: Call) -> None:
     engine.clear()
 
 
-def _complete(engine: "Engine", call: Call) -> None:
+def _complete(engine: CommandContext, call: Call) -> None:
     engine.complete()
 
 
-def _reset(engine: "Engine", call: Call) -> None:
+def _reset(engine: CommandContext, call: Call) -> None:
     engine.cancel_completion()
     autograph_for(engine).reset()
 
@@ -44,28 +41,28 @@ def _mask(call: Call, largest: int) -> int:
     return int(value)
 
 
-def _enable_events(engine: "Engine", call: Call) -> None:
+def _enable_events(engine: CommandContext, call: Call) -> None:
     engine.status.event_enable = _mask(call, 255)
 
 
-def _enable_service(engine: "Engine", call: Call) -> None:
+def _enable_service(engine: CommandContext, call: Call) -> None:
     engine.status.service_enable = _mask(call, 255) & ~64
 
 
-def _preset_status(engine: "Engine", call: Call) -> None:
+def _preset_status(engine: CommandContext, call: Call) -> None:
     engine.status.operation.enable = engine.status.questionable.enable = 0
 
 
-def _release(engine: "Engine", call: Call) -> None:
+def _release(engine: CommandContext, call: Call) -> None:
     engine.instrument.release_lock(engine.client)
 
 
-def _log_in(engine: "Engine", call: Call) -> None:
+def _log_in(engine: CommandContext, call: Call) -> None:
     engine.log_in(call.arguments[0])
 
 
-def _registers(node: str, which: Callable[["Engine"], Register]) -> list[Command]:
-    def enable(engine: "Engine", call: Call) -> None:
+def _registers(node: str, which: Callable[[CommandContext], Register]) -> list[Command]:
+    def enable(engine: CommandContext, call: Call) -> None:
         which(engine).enable = _mask(call, 65535) & 32767
 
     return [

@@ -1,7 +1,7 @@
-"""Time a crowd of Akwanga sessions against drawing its random numbers alone, and against one session over the line.
+"""Time a batch of Akwanga sessions against drawing its random numbers alone, and against one session over the link.
 
-Prints CPU seconds, their ratio, and beside them that the counters read the same as over the line.
-Usage: python benchmarks/crowd.py [SESSIONS...]
+Prints CPU seconds, their ratio, and whether the counters read the same as over the link. Usage: python
+benchmarks/session_batch.py [SESSIONS...]
 """
 
 import sys
