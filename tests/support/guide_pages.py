@@ -78,7 +78,7 @@ def type_in(run: Callable[..., tuple[int | str | None, str, str]], words: list[s
     code, out, err = run(*words)
     assert "Traceback" not in err
     if "opens the console" in remark:
-        assert (code, err[-90:].count("expected a terminal to sit at")) == (2, 1), (words, err)
+        assert (code, err[-90:].count("expected a terminal, got")) == (2, 1), (words, err)
         return out
     expected = int(found.group(1)) if (found := re.search(r"\(exit code (\d)", remark)) else 0
     assert code == expected, (words, out, err)
