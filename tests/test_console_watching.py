@@ -271,7 +271,7 @@ def test_who_watches_a_served_instrument_sees_what_another_does_and_turns_nothin
                     await person.until(lambda: [entry.struck for entry in console.entries] == [True, False])
                     assert console.dials.counters["X"] == "3.00"
                     await person.press("right", "+", "enter", "x")
-                    assert person.message() == f"hands are off: you watch what somebody else does at {url} now"
+                    assert person.message() == f"hands are off: this console only watches {url}"
                     await person.press("space")
                     assert (
                         person.message() == f"there is nothing to play: you watch what somebody else does at {url} now"

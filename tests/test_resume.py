@@ -59,7 +59,7 @@ def test_a_command_that_was_cut_off_goes_on_to_the_same_bytes_and_exit_code(tmp_
     ("words", "sentence"),
     [
         ((), "{command}: expected SCENARIO or --resume DIR, got none"),
-        (("--resume", "{folder}", "--seed", 7), "--resume: expected no --seed beside it, since the journal says what"),
+        (("--resume", "{folder}", "--seed", 7), "--resume: expected no --seed with it, because the journal contains"),
         (("--resume", "{folder}"), "{folder}/session.jsonl: expected the journal of a session: No such file"),
     ],
 )

@@ -157,7 +157,7 @@ def test_one_set_of_points_is_laid_on_each_of_many_and_many_on_one(solved):
 def test_an_iteration_that_does_not_come_to_rest_says_so():
     rng = np.random.default_rng(10)
     points, targets = rng.standard_normal((3, 5)), rng.standard_normal((3, 5, 2))
-    with pytest.raises(Undetermined, match="the similarity of 5 points does not come to rest in 100 iterations"):
+    with pytest.raises(Undetermined, match="the similarity of 5 points does not converge in 100 iterations"):
         similarity_by_iteration(points, targets)
 
 
