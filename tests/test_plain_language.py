@@ -41,11 +41,14 @@ FORBIDDEN_PHRASES = re.compile(
 )
 """Words that docs/glossary.md and CONTRIBUTING.md replace by plain ones."""
 
+CHECKED = ("src", "benchmarks", "docs", "tests/support")
+"""Folders of Python files with the rules of the package."""
+
 GENERATED = ("docs/figures/", "docs/studies/", "site/", "tests/journals/", "tests/__snapshots__/")
 
 
 def python_files() -> list[Path]:
-    return [file for folder in ("src", "benchmarks", "docs") for file in sorted((PROJECT / folder).rglob("*.py"))]
+    return [file for folder in CHECKED for file in sorted((PROJECT / folder).rglob("*.py"))]
 
 
 def pages() -> list[Path]:

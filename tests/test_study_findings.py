@@ -129,7 +129,12 @@ CLAIM = {"says": "One pointing does.", "about": "the second pointing", "factor":
     [
         ({"differ": [["1"], ["4"]]}, np.array([[2.0], [3.0]]) + NOISE[:2], "matters", ", 4 minus 1: +"),
         ({"alike": ["1", "4"]}, np.array([[2.0], [3.0]]) + NOISE[:2], "matters", ", 4 minus 1: +"),
-        ({"differ": [["1"], ["4"]]}, [[2.0], [3.0]], "is left open", "p unknown: left open by this number of replicates."),
+        (
+            {"differ": [["1"], ["4"]]},
+            [[2.0], [3.0]],
+            "is left open",
+            "p unknown: left open by this number of replicates.",
+        ),
     ],
     ids=["they differ", "they are not alike", "one replicate"],
 )
