@@ -197,8 +197,8 @@ def test_a_bad_keymap_is_one_sentence(content: str, words: str, tmp_path: Path) 
     [
         (["--keymap", "{folder}/none.toml"], "expected a readable file"),
         (["nowhere"], "nowhere"),
-        ([], "expected a terminal to sit at"),
-        (["--drawing", "halves", "--theme", "dark"], "expected a terminal to sit at"),
+        ([], "expected a terminal, got"),
+        (["--drawing", "halves", "--theme", "dark"], "expected a terminal, got"),
         (["--connect", "tcp://127.0.0.1:1"], "expected an instrument to answer there"),
         (["--connect", "tcp://127.0.0.1:1", "--seed", "7"], "expected no --seed beside it"),
     ],

@@ -152,7 +152,7 @@ def test_a_session_that_cannot_be_gone_on_with_is_kept_and_said_so(tmp_path: Pat
 
     async def told(person: Person) -> None:
         await person.settle()
-        assert "begun anew, since the last session cannot be gone on with" in person.message()
+        assert "new session: the last one cannot be resumed" in person.message()
         assert "the journal is damaged" in person.message()
 
     with pytest.raises(A7SimError, match=r"--resume: expected a session of akwanga .* damaged"):
@@ -177,7 +177,7 @@ def test_where_somebody_sits_nobody_else_goes_on() -> None:
         await person.press("right")
         elsewhere = place()
         assert elsewhere.config.resumable() is None
-        assert "somebody sits there" in elsewhere.config.greeting()
+        assert "the session is in use" in elsewhere.config.greeting()
         elsewhere.config.connect().close()
         taken.append(elsewhere.close())
 

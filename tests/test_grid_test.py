@@ -548,7 +548,7 @@ def test_two_tests_of_the_same_seed_are_the_same():
     [
         (
             ["akwanga", "--points", "24"],
-            "--points: expected as many crosses as lie evenly on the plate (9, 25, 81), got 24",
+            "--points: expected a number of crosses that are spaced evenly on the plate (9, 25, 81), got 24",
         ),
         (["nowhere"], "expected a scenario file or one of"),
         (["akwanga", "--set", "grid_plate.lines=2"], "grid_plate.lines: expected 3 to 23 lines each way, got 2"),

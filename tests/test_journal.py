@@ -322,7 +322,7 @@ def test_resume_takes_nothing_beside_it(whole, capsys):
     for extra in (["akwanga"], ["--seed", "7"], ["--out", "x"]):
         done = a7sim_captured(capsys, "run", "--resume", whole, *extra)
         assert done.returncode == 2
-        assert "since the journal says what was asked for" in done.stderr
+        assert "because the journal contains the options" in done.stderr
 
 
 # --- served -----------------------------------------------------------------------------------------------
@@ -565,8 +565,8 @@ def test_a_replay_that_only_tells_goes_on_beyond_a_difference_and_counts_it(copi
     ("words", "sentence"),
     [
         (("interior", "--from", "@3"), "--from: expected a journal to seek in, got a script"),
-        (("interior", "--scenario", "akwanga"), "--scenario: expected a journal, got a script, which says its own"),
-        ((".", "--out", "out"), "--out: expected a script, whose journal it keeps; a journal there is already"),
+        (("interior", "--scenario", "akwanga"), "--scenario: expected a journal, got a script, which names its own"),
+        ((".", "--out", "out"), "--out: expected a script, got a session, which already has a journal"),
     ],
 )
 def test_what_a_script_or_a_journal_cannot_take_is_refused_in_one_sentence(typed, words, sentence):

@@ -47,7 +47,7 @@ def test_a_study_says_what_was_asked_and_answers_in_words(study):
     assert "Do more pointings help?" in words
     assert "strip_height_at_checks_m: from" in words
     assert "pointings 4" in words
-    assert "1 session worked again over the link gave the same digits." in words
+    assert "1 session run again over the link: same digits." in words
 
 
 def test_a_replicate_in_the_table_is_the_session_that_run_gives_for_its_seed(study, capsys):

@@ -124,7 +124,7 @@ def test_hints_and_answers_are_documents_where_they_are_asked_for(train):
 def test_a_closed_attempt_takes_neither_hints_nor_answers(train, tmp_path):
     (tmp_path / "nothing.a7s").write_text("scenario akwanga\n*CLS\n")
     train("start", "--exam", "--script", tmp_path / "nothing.a7s")
-    assert "expected --exam, since an exam is under way" in train("start", "exam")[2]
+    assert "expected --exam, because an exam is open" in train("start", "exam")[2]
     train("grade")
     for words in (("hint",), ("answer", "x=1")):
         code, _, err = train(*words)
@@ -132,7 +132,7 @@ def test_a_closed_attempt_takes_neither_hints_nor_answers(train, tmp_path):
 
 
 def test_a_report_on_nobody_and_a_script_that_does_not_come_out_are_told(train, tmp_path):
-    assert train("report", "--to", "csv")[2] == "a7sim: student ada: expected attempts to report on, found none\n"
+    assert train("report", "--format", "csv")[2] == "a7sim: student ada: expected attempts to report on, found none\n"
     (tmp_path / "wrong.a7s").write_text("scenario akwanga\nexpect COUN:X? = 9.5\n")
     code, out, err = train("start", 4, "--script", tmp_path / "wrong.a7s")
     assert code == 2 and "[ ]" in out and "9.5" in err
@@ -142,7 +142,7 @@ def test_a_report_on_nobody_and_a_script_that_does_not_come_out_are_told(train, 
 def test_whoever_says_no_name_is_the_one_who_logged_in(train, monkeypatch):
     monkeypatch.delenv("A7SIM_STUDENT")
     monkeypatch.setattr("getpass.getuser", lambda: "grace")
-    assert train("report", "--to", "csv")[2].startswith("a7sim: student grace: ")
+    assert train("report", "--format", "csv")[2].startswith("a7sim: student grace: ")
 
 
 def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
@@ -187,16 +187,16 @@ def test_reports_of_student_and_class_in_every_form(train, tmp_path, monkeypatch
     monkeypatch.setenv("A7SIM_STUDENT", "Bob O'Neill")
     train("start", 4, "--seed", 4, "--script", EXERCISES / "04-parallax" / "faulty-by2-left.a7s")
     train("grade")
-    rows = list(csv.DictReader(io.StringIO(train("report", "--class", "--to", "csv")[1])))
+    rows = list(csv.DictReader(io.StringIO(train("report", "--class", "--format", "csv")[1])))
     assert [(row["student_id"], row["assignment"], float(row["score"])) for row in rows] == [
         ("Bob O'Neill", "04-parallax", 70.0),
         ("ada", "04-parallax", 100.0),
     ]
     assert list(rows[0])[:4] == ["assignment", "duedate", "timestamp", "student_id"]
-    statements = [json.loads(line) for line in train("report", "--class", "--to", "xapi")[1].splitlines()]
+    statements = [json.loads(line) for line in train("report", "--class", "--format", "xapi")[1].splitlines()]
     assert [each["verb"]["display"]["en"] for each in statements] == ["passed", "failed"]
     assert statements[1]["result"]["score"] == {"scaled": 0.7, "raw": 70.0, "min": 0, "max": 100.0}
-    document = json.loads(train("report", "--class", "--to", "json")[1])
+    document = json.loads(train("report", "--class", "--format", "json")[1])
     assert {each["student"] for each in document["grades"]} == {"ada", "Bob O'Neill"}
     for words in (["--class"], []):
         out = tmp_path / f"sheet{len(words)}.html"

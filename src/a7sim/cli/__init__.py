@@ -27,7 +27,7 @@ _COMMANDS = {
     "console": LazyCommand("a7sim.cli.console:command", "Operate the instrument yourself in a terminal."),
     "record": LazyCommand("a7sim.cli.record:command", "Record the traffic between a client and an instrument."),
     "replay": LazyCommand("a7sim.cli.replay:command", "Replay a session or a script on a fresh instrument."),
-    "report": LazyCommand("a7sim.cli.report:command", "Write the report of a session on one page."),
+    "report": LazyCommand("a7sim.cli.report:command", "Write the report of a session as one page."),
     "export": LazyCommand("a7sim.cli.export:command", "Export a session as asciicast, book, forms or cards."),
     "compare": LazyCommand("a7sim.cli.compare:command", "Compare the results of sessions."),
     "train": LazyCommand("a7sim.cli.train:command", "Train on the plotter: exercises with hints and grades."),
@@ -87,6 +87,6 @@ def _report_os_error(error: OSError) -> int:
     if isinstance(error, BrokenPipeError):
         sys.stdout = None
         return 1
-    place = error.filename or "standard output"
-    click.echo(f"a7sim: {place}: expected to be able to write and read: {error.strerror}", err=True)
+    path = error.filename or "standard output"
+    click.echo(f"a7sim: {path}: expected to be able to write and read: {error.strerror}", err=True)
     return EXIT_USAGE

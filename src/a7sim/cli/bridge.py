@@ -24,14 +24,18 @@ _POINTS_A_MODEL = 260
 @scenario_options
 @output_options()
 @display_options
-def command(scenario: str | None, asked: ScenarioOptions, kept: OutputOptions, told: DisplayOptions) -> None:
+def command(
+    scenario: str | None, scenario_options: ScenarioOptions, output: OutputOptions, display: DisplayOptions
+) -> None:
     """Bridge the strip of SCENARIO with base in and out in turn, and measure independent models for comparison.
 
     Example: a7sim bridge bridge --seed 7 --out runs/bridge
     """
     from a7sim.session.bridge import bridge_tables, run_bridge
 
-    order = resolve_request(scenario, asked, kept)
-    with progress_bar(_POINTS_A_MODEL * len(order.scenario.models), told) as watcher:
-        document = run_bridge(order.scenario, order.seed, kept.folder, watcher, kept.force, kept.journal_options)
-    show_results(document, told, bridge_tables)
+    request = resolve_request(scenario, scenario_options, output)
+    with progress_bar(_POINTS_A_MODEL * len(request.scenario.models), display) as watcher:
+        document = run_bridge(
+            request.scenario, request.seed, output.folder, watcher, output.force, output.journal_options
+        )
+    show_results(document, display, bridge_tables)

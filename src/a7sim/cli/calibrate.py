@@ -22,7 +22,12 @@ PROJECTORS = 2
 @click.command("calibrate")
 @click.argument("scenario", required=False, shell_complete=scenario_argument)
 @click.option(
-    "--points", type=int, metavar="N", default=25, show_default=True, help="Crosses of the plate, evenly spaced."
+    "--points",
+    type=int,
+    metavar="N",
+    default=25,
+    show_default=True,
+    help="Number of crosses, spaced evenly on the plate.",
 )
 @click.option("--levels", type=click.IntRange(1, 5), metavar="N", default=2, show_default=True, help="Levels of Z.")
 @click.option(
@@ -31,7 +36,7 @@ PROJECTORS = 2
     metavar="N",
     default=2,
     show_default=True,
-    help="At each cross and level.",
+    help="Pointings at each cross and level.",
 )
 @scenario_options
 @output_options()
@@ -41,9 +46,9 @@ def command(
     points: int,
     levels: int,
     pointings: int,
-    asked: ScenarioOptions,
-    kept: OutputOptions,
-    told: DisplayOptions,
+    scenario_options: ScenarioOptions,
+    output: OutputOptions,
+    display: DisplayOptions,
 ) -> None:
     """Test both projectors of SCENARIO's plotter with a grid plate, as in a service.
 
@@ -52,17 +57,20 @@ def command(
     from a7sim.operator.procedures.grid_test import GridTestPlan
     from a7sim.session.grid_test import report_tables, run_grid_test
 
-    order = resolve_request(scenario, asked, kept)
+    request = resolve_request(scenario, scenario_options, output)
     points, levels, pointings = (
-        order.setting(name, given) for name, given in (("points", points), ("levels", levels), ("pointings", pointings))
+        request.setting(name, given)
+        for name, given in (("points", points), ("levels", levels), ("pointings", pointings))
     )
-    camera, plate, polarity = order.scenario.camera, order.scenario.grid_plate, order.scenario.photos[0].polarity
+    camera, plate, polarity = request.scenario.camera, request.scenario.grid_plate, request.scenario.photos[0].polarity
     if points not in plate.even_counts:
         known = ", ".join(map(str, plate.even_counts))
-        raise A7SimError(f"--points: expected as many crosses as lie evenly on the plate ({known}), got {points}")
-    test = GridTestPlan(camera, plate, points, levels, pointings, polarity)
-    with progress_bar(PROJECTORS * points * levels * pointings, told) as watcher:
-        document = run_grid_test(
-            order.scenario, order.seed, test, kept.folder, watcher, kept.force, kept.journal_options
+        raise A7SimError(
+            f"--points: expected a number of crosses that are spaced evenly on the plate ({known}), got {points}"
         )
-    show_results(document, told, report_tables)
+    test = GridTestPlan(camera, plate, points, levels, pointings, polarity)
+    with progress_bar(PROJECTORS * points * levels * pointings, display) as watcher:
+        document = run_grid_test(
+            request.scenario, request.seed, test, output.folder, watcher, output.force, output.journal_options
+        )
+    show_results(document, display, report_tables)

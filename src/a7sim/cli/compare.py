@@ -10,9 +10,9 @@ from a7sim.errors import A7SimError
 
 @click.command("compare")
 @click.argument("folders", nargs=-1, required=True, type=options.PLACE, metavar="DIR DIR...")
-@click.option("--all", "everything", is_flag=True, help="Also what is the same.")
+@click.option("--all", "includes_equal", is_flag=True, help="Also list equal values.")
 @options.as_document
-def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> None:
+def command(folders: tuple[Path, ...], includes_equal: bool, as_document: bool) -> None:
     """Compare the results of sessions: settings, elements, residuals, centres, strips, times, slips.
 
     Example: a7sim compare runs/akwanga runs/akwanga-e
@@ -26,7 +26,7 @@ def command(folders: tuple[Path, ...], everything: bool, as_document: bool) -> N
     if len(folders) < 2:
         raise A7SimError(f"compare: expected two folders of sessions or more, got one: {folders[0]}")
     sessions = [read_session(folder) for folder in folders]
-    rows = compare_sessions(sessions, everything)
+    rows = compare_sessions(sessions, includes_equal)
     if as_document:
         click.echo(as_json(comparison_document(sessions, rows)), nl=False)
     else:

@@ -22,7 +22,7 @@ _POINTS = 400
 
 @click.command("compile")
 @click.argument("scenario", required=False, shell_complete=scenario_argument)
-@click.option("--model", "name", metavar="NAME", default="1", show_default=True, help="Model to be compiled.")
+@click.option("--model", "name", metavar="NAME", default="1", show_default=True, help="Model to compile.")
 @click.option(
     "--contour", "contours", multiple=True, type=options.HEIGHT, metavar="M", help="Height of a contour in m."
 )
@@ -43,9 +43,9 @@ def command(
     lines: tuple[str, ...],
     map_scale: float | None,
     tremor: float | None,
-    asked: ScenarioOptions,
-    kept: OutputOptions,
-    told: DisplayOptions,
+    scenario_options: ScenarioOptions,
+    output: OutputOptions,
+    display: DisplayOptions,
 ) -> None:
     """Set up a model of SCENARIO with the virtual operator, level it, and draw contours and lines.
 
@@ -54,12 +54,12 @@ def command(
     from a7sim.report.map_tables import map_tables
     from a7sim.session.compiling import CompilationRequest, compile_model
 
-    order = resolve_request(scenario, asked, kept)
-    wanted = CompilationRequest(name, contours, interval, lines, map_scale, tremor)
-    if order.begun_with is not None:
-        wanted = CompilationRequest.from_settings(order.begun_with)
-    with progress_bar(_POINTS, told) as watcher:
+    request = resolve_request(scenario, scenario_options, output)
+    compilation = CompilationRequest(name, contours, interval, lines, map_scale, tremor)
+    if request.begun_with is not None:
+        compilation = CompilationRequest.from_settings(request.begun_with)
+    with progress_bar(_POINTS, display) as watcher:
         document = compile_model(
-            order.scenario, order.seed, wanted, kept.folder, watcher, kept.force, kept.journal_options
+            request.scenario, request.seed, compilation, output.folder, watcher, output.force, output.journal_options
         )
-    show_results(document, told, map_tables)
+    show_results(document, display, map_tables)

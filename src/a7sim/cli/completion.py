@@ -17,7 +17,7 @@ VARIABLE = "_A7SIM_COMPLETE"
 @click.command("completion")
 @click.argument("shell", type=click.Choice(SHELLS), required=False)
 def command(shell: str | None) -> None:
-    """Print the script by which SHELL (the one that runs, if none is named) completes what is typed for a7sim.
+    """Print the script with which SHELL (the current one by default) completes a7sim commands.
 
     \b
     bash    eval "$(a7sim completion bash)"           in ~/.bashrc

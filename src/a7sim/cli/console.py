@@ -97,7 +97,7 @@ def command(
     _check_not_combined("--connect", connect, seed=seed, variant=variant, out=out, resume=resume)
     default_file = data_folder() / KEYMAP
     if write_keymap:
-        _write(keymap or default_file, sample())
+        _write_keymap(keymap or default_file, sample())
         return
     keys = load_keymap(keymap or default_file) if keymap or default_file.exists() else default_keymap()
     local: LocalConsole | None = None
@@ -135,10 +135,10 @@ def command(
 def _check_not_combined(option: str, given: str | None, **others: object) -> None:
     """Raise A7SimError if an option is combined with options of an instrument in this process."""
     if given is not None:
-        words = {"scenario": "SCENARIO", "resume": "--resume" if others.get("resume") else "--new"}
-        beside = [words.get(name, f"--{name}") for name, value in others.items() if value is not None]
-        if beside:
-            raise A7SimError(f"{option} {given}: expected no {' and no '.join(beside)} beside it")
+        labels = {"scenario": "SCENARIO", "resume": "--resume" if others.get("resume") else "--new"}
+        conflicts = [labels.get(name, f"--{name}") for name, value in others.items() if value is not None]
+        if conflicts:
+            raise A7SimError(f"{option} {given}: expected no {' and no '.join(conflicts)} beside it")
 
 
 def _require_textual() -> None:
@@ -159,7 +159,7 @@ def _is_first_use() -> bool:
     return True
 
 
-def _write(path: Path, keys: str) -> None:
+def _write_keymap(path: Path, keys: str) -> None:
     if path.exists():
         raise A7SimError(f"{path}: expected to write a new file, found one that exists")
     path.parent.mkdir(parents=True, exist_ok=True)

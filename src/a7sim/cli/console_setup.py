@@ -32,21 +32,21 @@ class LocalConsole:
         self._folder = out or data_folder() / SESSIONS_FOLDER / scenario_name(name)
         self._resume = resume
         self._clock, self._wall = Clock(), WallClock()
-        self._left: SavedSession | None = None
+        self._resumed: SavedSession | None = None
         self._interactive: InteractiveSession | None = None
         self._greeting = ""
         if resume is not None or (out is not None and out.exists()):
             self._decide_by_options(out)
 
     def _decide_by_options(self, out: Path | None) -> None:
-        last = self._last()
+        last = self._last_session()
         if self._resume:
             if last is None or last.begun is None:
-                found = last.error if last else "found none"
+                reason = last.error if last else "found none"
                 raise A7SimError(
-                    f"--resume: expected a session of {self._name} at seed {self._seed} in {self._folder}: {found}"
+                    f"--resume: expected a session of {self._name} at seed {self._seed} in {self._folder}: {reason}"
                 )
-            self._decide(last, True)
+            self._resume_if_chosen(last, True)
         elif last is None and out is not None and out.exists():
             raise A7SimError(
                 f"{out}: expected a folder that does not exist yet, or that of a session of {self._name} at seed "
@@ -57,55 +57,55 @@ class LocalConsole:
     def config(self) -> ConsoleConfig:
         """Configuration before the start."""
         return ConsoleConfig(
-            self._opened,
+            self._open_client,
             self._time,
             where=self._name,
             sheet=JobSheet(self._scenario.title, self._scenario.camera),
-            resumable=self._resumable,
+            resumable=self._resume_offer,
             greeting=lambda: self._greeting,
-            history=self._past,
+            history=self._history,
         )
 
-    def _last(self) -> "SavedSession | None":
+    def _last_session(self) -> "SavedSession | None":
         if not self._folder.exists():
             return None
         from a7sim.journal.session_store import last_session
 
         return last_session(self._folder, self._scenario, self._seed)
 
-    def _resumable(self) -> ResumeOffer | None:
+    def _resume_offer(self) -> ResumeOffer | None:
         if self._resume is not None:
             return None
-        last = self._last()
+        last = self._last_session()
         if last is None:
             return None
         if last.begun is None:
             self._greeting = f"new session: the last one cannot be resumed: {last.error}"
             return None
         if not last.has_changes:
-            self._decide(last, True)
+            self._resume_if_chosen(last, True)
             self._greeting = ""
             return None
-        when = datetime.fromtimestamp(last.last_activity).strftime("%Y-%m-%d %H:%M")  # local time
-        about = f"{format_elapsed(last.ended_at_s)} at the instrument, left {when}, in {last.folder}"
-        return ResumeOffer(about, lambda resumes: self._decide(last, resumes))
+        left_at = datetime.fromtimestamp(last.last_activity).strftime("%Y-%m-%d %H:%M")  # local time
+        about = f"{format_elapsed(last.ended_at_s)} at the instrument, left {left_at}, in {last.folder}"
+        return ResumeOffer(about, lambda resumes: self._resume_if_chosen(last, resumes))
 
-    def _decide(self, last: "SavedSession", resumes: bool) -> None:
+    def _resume_if_chosen(self, last: "SavedSession", resumes: bool) -> None:
         if resumes:
-            self._left = last
+            self._resumed = last
             self._wall = WallClock(now=last.ended_at_s)
             self._greeting = f"resumed after {format_elapsed(last.ended_at_s)} at the instrument; ? is help"
 
-    def _opened(self) -> Client:
+    def _open_client(self) -> Client:
         """Open the interactive session, which is built on first use."""
         if self._interactive is None:
             from a7sim.journal.interactive import InteractiveSession  # during the first paint of the screen
 
-            begun = self._left.begun if self._left else None
-            self._interactive = InteractiveSession(self._scenario, self._seed, self._folder, self._clock, begun)
+            session = self._resumed.begun if self._resumed else None
+            self._interactive = InteractiveSession(self._scenario, self._seed, self._folder, self._clock, session)
         return self._interactive.open()
 
-    def _past(self) -> Iterable[LoggedLine]:
+    def _history(self) -> Iterable[LoggedLine]:
         return (
             (LoggedLine(each.text, each.dir == "<") for each in self._interactive.history())
             if self._interactive
@@ -136,11 +136,11 @@ def remote_console(url: str, sheet: JobSheet, token_file: Path | None, watching:
         where=url,
         sheet=sheet,
         watching=watching,
-        greeting=_watching_now(url) if watching else lambda: "",
+        greeting=_watching_greeting(url) if watching else lambda: "",
     )
 
 
-def _watching_now(url: str) -> Callable[[], str]:
+def _watching_greeting(url: str) -> Callable[[], str]:
     return lambda: f"watching {url}; ? is help"
 
 
@@ -161,6 +161,6 @@ def playback_console(session: str) -> ConsoleConfig:
     )
 
 
-def is_url(watched: str) -> bool:
+def is_url(target: str) -> bool:
     """Return whether the text names a live instrument rather than a finished session."""
-    return "://" in watched or Path(watched).is_char_device()
+    return "://" in target or Path(target).is_char_device()

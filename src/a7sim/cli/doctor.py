@@ -67,7 +67,7 @@ def command(as_document: bool) -> None:
 def examine() -> dict[str, Any]:
     """Return the report as the document of `--json`. Raises A7SimError if a7sim is not installed."""
     asked = libraries()
-    extras = {name: _of_extra(name, parts) for name, parts in asked.items() if name not in ("", *NOT_FOR_USERS)}
+    extras = {name: _extra_document(name, parts) for name, parts in asked.items() if name not in ("", *NOT_FOR_USERS)}
     return {
         "schema_version": 1,
         "command": "doctor",
@@ -76,27 +76,27 @@ def examine() -> dict[str, Any]:
         "python": platform.python_version(),
         "implementation": platform.python_implementation(),
         "platform": f"{platform.system()} {platform.machine()}",
-        "libraries": [_of_library(each) for each in asked[""]],
+        "libraries": [_library_document(each) for each in asked[""]],
         "extras": extras,
         "comes_with": {kind: bundled_names(kind) for kind in _KINDS},
-        "terminal": _of_terminal(),
+        "terminal": _terminal_document(),
     }
 
 
-def _of_library(library: Library) -> dict[str, Any]:
+def _library_document(library: Library) -> dict[str, Any]:
     return library._asdict() | {"fits": library.fits}
 
 
-def _of_extra(name: str, parts: list[Library]) -> dict[str, Any]:
+def _extra_document(name: str, parts: list[Library]) -> dict[str, Any]:
     ready = all(each.fits for each in parts)
     return {
         "ready": ready,
-        "libraries": [_of_library(each) for each in parts],
+        "libraries": [_library_document(each) for each in parts],
         "get": None if ready else f"pip install 'a7sim[{name}]'",
     }
 
 
-def _of_terminal() -> dict[str, Any]:
+def _terminal_document() -> dict[str, Any]:
     size = shutil.get_terminal_size()
     encoding = (sys.stdout.encoding or "").lower()
     return {
@@ -124,24 +124,24 @@ def libraries() -> dict[str, list[Library]]:
     except metadata.PackageNotFoundError as error:
         raise A7SimError("doctor: expected a7sim to be installed (pip install .), found only its files") from error
     asked: dict[str, list[Library]] = {"": []}
-    within: dict[str, list[str]] = {}
+    included: dict[str, list[str]] = {}
     for text in requirements:
         found = _REQUIREMENT.match(text)
         assert found is not None, text
         name, parts, bounds, marker = found.groups(default="")
         extra = _EXTRA.search(marker)
-        here = asked.setdefault(extra[1] if extra else "", [])
+        members = asked.setdefault(extra[1] if extra else "", [])
         if name == "a7sim":
-            within.setdefault(extra[1] if extra else "", []).extend(part.strip() for part in parts.split(","))
-        elif _is_for_here(marker):
-            here.append(Library(name, bounds.strip(), _version(name)))
-    for extra_name, parts_of_it in within.items():
-        for part in parts_of_it:
+            included.setdefault(extra[1] if extra else "", []).extend(part.strip() for part in parts.split(","))
+        elif _is_for_this_platform(marker):
+            members.append(Library(name, bounds.strip(), _version(name)))
+    for extra_name, included_names in included.items():
+        for part in included_names:
             asked[extra_name] += [each for each in asked.get(part, []) if each not in asked[extra_name]]
     return {extra: sorted(each, key=lambda library: library.name.lower()) for extra, each in sorted(asked.items())}
 
 
-def _is_for_here(marker: str) -> bool:
+def _is_for_this_platform(marker: str) -> bool:
     named = _PLATFORM.search(marker)
     return named is None or (sys.platform == named[2]) == (named[1] == "==")
 
@@ -155,10 +155,10 @@ def _version(name: str) -> str | None:
 
 def satisfies(version: str, asked: str) -> bool:
     """Return whether a version is within bounds such as '>=8.2,<9'."""
-    return all(_holds(_numbers(version), sign, _numbers(bound)) for sign, bound in _BOUND.findall(asked))
+    return all(_satisfies_bound(_numbers(version), sign, _numbers(bound)) for sign, bound in _BOUND.findall(asked))
 
 
-def _holds(version: list[int], sign: str, bound: list[int]) -> bool:
+def _satisfies_bound(version: list[int], sign: str, bound: list[int]) -> bool:
     longest = max(len(version), len(bound))
     a, b = ([*each, *[0] * (longest - len(each))] for each in (version, bound))
     return {">=": a >= b, "<=": a <= b, "==": a == b, "!=": a != b, "<": a < b, ">": a > b}[sign]
@@ -173,25 +173,25 @@ def _as_lines(found: dict[str, Any]) -> Iterator[str]:
     yield f"a7sim {found['a7sim']}, {found['implementation']} {found['python']}, {found['platform']}"
     yield ""
     yield "Needed by every command"
-    yield from (_line_of(each) for each in found["libraries"])
+    yield from (_library_line(each) for each in found["libraries"])
     for name, extra in found["extras"].items():
         yield ""
         yield f"Extra {name}: {'ready' if extra['ready'] else 'missing, ' + extra['get']}"
-        yield from (_line_of(each) for each in extra["libraries"])
+        yield from (_library_line(each) for each in extra["libraries"])
     yield ""
     yield "Comes with a7sim: " + ", ".join(f"{len(names)} {kind}" for kind, names in found["comes_with"].items())
-    yield _of_terminal_in_words(found["terminal"])
+    yield _describe_terminal(found["terminal"])
     if not found["healthy"]:
-        yield "Some of what every command needs is missing or does not fit: pip install --upgrade a7sim"
+        yield "A library that every command needs is missing or does not fit: pip install --upgrade a7sim"
 
 
-def _line_of(library: dict[str, Any]) -> str:
+def _library_line(library: dict[str, Any]) -> str:
     state = "" if library["fits"] else "missing" if library["installed"] is None else "does not fit"
     asked = library["asked"] or "any"
     return f"  {library['name']:<16}{library['installed'] or '-':<14}{asked:<16}{state}".rstrip()
 
 
-def _of_terminal_in_words(terminal: dict[str, Any]) -> str:
+def _describe_terminal(terminal: dict[str, Any]) -> str:
     colours = {0: "no colours", 16: "16 colours", 256: "256 colours"}.get(terminal["colours"], "true colours")
     room = "room for the console" if terminal["room_for_console"] else "the console needs 80x24"
     kind = "Terminal" if terminal["terminal"] else "Not a terminal"

@@ -14,10 +14,10 @@ from a7sim.report.card_decks import strip_deck
 from a7sim.report.forms import forms_text
 from a7sim.report.session_folder import SessionFolder, read_session
 
-_OPTION_OF = {"speed": "asciicast", "method": "cards"}
+_KIND_OF_OPTION = {"speed": "asciicast", "method": "cards"}
 
 
-@click.command("export", cls=command_with_renamed_options({"--method": "--method"}))
+@click.command("export", cls=command_with_renamed_options({"--way": "--method"}))
 @click.argument("folder", type=options.PLACE, metavar="DIR")
 @click.option(
     "--to",
@@ -39,14 +39,14 @@ def command(folder: Path, kind: str, out: Path | None, speed: float | None, meth
     Example: a7sim export runs/akwanga --to asciicast --out akwanga.cast
     """
     for name, value in (("speed", speed), ("method", method)):
-        if value is not None and kind != _OPTION_OF[name]:
-            raise A7SimError(f"--{name}: expected only with --to {_OPTION_OF[name]}, got it with --to {kind}")
-    kept = read_session(folder)
+        if value is not None and kind != _KIND_OF_OPTION[name]:
+            raise A7SimError(f"--{name}: expected only with --to {_KIND_OF_OPTION[name]}, got it with --to {kind}")
+    session = read_session(folder)
     makers: dict[str, Callable[[], str]] = {
-        "asciicast": lambda: make_cast(kept, speed or 120.0),
-        "book": lambda: _book(kept),
-        "forms": lambda: forms_text(kept),
-        "cards": lambda: strip_deck(kept, method),
+        "asciicast": lambda: make_cast(session, speed or 120.0),
+        "book": lambda: _book(session),
+        "forms": lambda: forms_text(session),
+        "cards": lambda: strip_deck(session, method),
     }
     text = makers[kind]()
     if out is None:
@@ -56,7 +56,7 @@ def command(folder: Path, kind: str, out: Path | None, speed: float | None, meth
         click.echo(str(out))
 
 
-def _book(kept: SessionFolder) -> str:
-    if not kept.book:
-        raise A7SimError(f"{kept.folder / BOOK}: expected an observation book with entries, got none")
-    return kept.text(BOOK)
+def _book(session: SessionFolder) -> str:
+    if not session.book:
+        raise A7SimError(f"{session.folder / BOOK}: expected an observation book with entries, got none")
+    return session.text(BOOK)

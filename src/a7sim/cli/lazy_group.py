@@ -33,14 +33,21 @@ class LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import and return a command."""
-        if cmd_name in self._renamed:
-            warn_renamed(cmd_name, self._renamed[cmd_name])
-            cmd_name = self._renamed[cmd_name]
         if cmd_name not in self._commands:
             return None
         module, _, name = self._commands[cmd_name].import_path.partition(":")
         found = getattr(importlib.import_module(module), name)
         return found if isinstance(found, click.Command) else None
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that the arguments name; an old name warns and means the new one."""
+        if args and args[0] in self._renamed:
+            old, new = args[0], self._renamed[args[0]]
+            warn_renamed(ctx, f"{ctx.info_name} {old}", f"{ctx.info_name} {new}")
+            args = [new, *args[1:]]
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the short help of all commands."""
@@ -49,6 +56,6 @@ class LazyGroup(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the matching commands, and the group's own options."""
-        named = ((name, command) for name, command in self._commands.items() if name.startswith(incomplete))
-        own = click.Command.shell_complete(self, ctx, incomplete)
-        return [*(CompletionItem(name, help=command.short_help) for name, command in named), *own]
+        matches = ((name, command) for name, command in self._commands.items() if name.startswith(incomplete))
+        options = click.Command.shell_complete(self, ctx, incomplete)
+        return [*(CompletionItem(name, help=command.short_help) for name, command in matches), *options]

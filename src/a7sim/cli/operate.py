@@ -23,7 +23,7 @@ from a7sim.cli.run_options import (
 
 @click.command("operate")
 @click.argument("scenario", shell_complete=scenario_argument)
-@click.option("--link", "url", required=True, metavar="URL", help="Where the instrument is served.")
+@click.option("--link", "url", required=True, metavar="URL", help="Address of the served instrument.")
 @link_options
 @orientation_options
 @scenario_options
@@ -36,10 +36,10 @@ def command(
     token_file: Path | None,
     case: str | None,
     method: str | None,
-    asked: ScenarioOptions,
+    scenario_options: ScenarioOptions,
     out: Path | None,
     force: bool,
-    told: DisplayOptions,
+    display: DisplayOptions,
 ) -> None:
     """Run the virtual operator on the served instrument of SCENARIO, with the same results as `a7sim run`.
 
@@ -51,9 +51,9 @@ def command(
     from a7sim.api import Operator
     from a7sim.report.session_tables import session_tables
 
-    loaded, seed = resolve_scenario(scenario, asked, {"plan.case": case, "plan.method": method})
+    loaded, seed = resolve_scenario(scenario, scenario_options, {"plan.case": case, "plan.method": method})
     token = token_from(token_file)
-    with progress_bar(POINTS_A_MODEL * len(loaded.models), told) as watcher:
+    with progress_bar(POINTS_A_MODEL * len(loaded.models), display) as watcher:
         operator = Operator(loaded, seed)
         document = operator.run(url, out, force=force, timeout=timeout, token=token, watcher=watcher)
-    show_results(document, told, session_tables)
+    show_results(document, display, session_tables)

@@ -60,14 +60,14 @@ def combine_options(*options: Option[Any]) -> Option[Any]:
     return decorated
 
 
-def group_options(name: str, into: type[Any], *options: Option[Any]) -> Option[Any]:
+def group_options(name: str, record: type[Any], *options: Option[Any]) -> Option[Any]:
     """Return options whose values are passed as one dataclass parameter `name` with a field for each."""
 
     def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(command)
         def called(*arguments: Any, **values: Any) -> Any:
-            given = {field.name: values.pop(field.name) for field in fields(into)}
-            return command(*arguments, **values, **{name: into(**given)})
+            given = {field.name: values.pop(field.name) for field in fields(record)}
+            return command(*arguments, **values, **{name: record(**given)})
 
         with_options: Callable[..., Any] = combine_options(*options)(called)
         return with_options
@@ -120,7 +120,7 @@ def quiet(but: str = "") -> Option[Any]:
 
 def variant(default: str | None = None) -> Option[Any]:
     """Return --variant; without a default it is that of the scenario."""
-    text = option_help("Which plotter", None if default else "the scenario's")
+    text = option_help("Plotter", None if default else "the scenario's")
     return click.option(
         "--variant", type=CaseInsensitiveChoice(PLOTTERS), default=default, show_default=default is not None, help=text
     )

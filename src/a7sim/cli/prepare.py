@@ -20,7 +20,9 @@ from a7sim.text_tables import text_table
     "--photo-scale", type=options.greater_than(0.0), help="Scale number of the photographs at the mean ground."
 )
 @click.option(
-    "--flying-height", type=options.greater_than(0.0), help="Above the mean ground, m, in place of the photo scale."
+    "--flying-height",
+    type=options.greater_than(0.0),
+    help="Height above the mean ground, m, in place of the photo scale.",
 )
 @click.option("--photo-base", type=options.greater_than(0.0), required=True, help="Base in the photograph, mm.")
 @click.option("--heights", type=options.HEIGHT, nargs=2, required=True, help="Lowest and highest ground, m.")
@@ -42,15 +44,15 @@ def command(
     Example: a7sim prepare --c 152.676 --photo-scale 8000 --photo-base 91 --heights 430.24 487.92 --map-scale 2500
     """
     flight = FlightPlan.of_heights(c, photo_base, heights, photo_scale, flying_height)
-    found = choose_settings(flight, VARIANTS[variant], map_scale)
+    settings = choose_settings(flight, VARIANTS[variant], map_scale)
     if as_document:
-        click.echo(as_json(_document(found, variant)), nl=False)
+        click.echo(as_json(_document(settings, variant)), nl=False)
     else:
-        Console().print(_sheet(found, variant, map_scale))
+        Console().print(_settings_sheet(settings, variant, map_scale))
 
 
-def _document(found: FlightSettings, variant: str) -> dict[str, Any]:
-    flight = found.flight
+def _document(settings: FlightSettings, variant: str) -> dict[str, Any]:
+    flight = settings.flight
     return (
         document_header("prepare")
         | {"variant": variant}
@@ -61,23 +63,23 @@ def _document(found: FlightSettings, variant: str) -> dict[str, Any]:
                 "above_ground": [round(flight.lowest_flown, 3), round(flight.highest_flown, 3)],
                 "field_angle_deg": round(flight.field_angle_deg, 2),
             },
-            "optimum": {"number": round(found.optimum, 3), "bx": round(found.optimum_bx, 2)},
-            "scales": [_of_scale(scale) for scale in found.scales],
-            "chosen": _of_scale(found.chosen),
-            "reason": found.reason,
+            "optimum": {"number": round(settings.optimum, 3), "bx": round(settings.optimum_bx, 2)},
+            "scales": [_scale_document(scale) for scale in settings.scales],
+            "chosen": _scale_document(settings.chosen),
+            "reason": settings.reason,
         }
     )
 
 
-def _of_scale(scale: ModelScale) -> dict[str, Any]:
+def _scale_document(scale: ModelScale) -> dict[str, Any]:
     rounded = {name: round(value, 3) if isinstance(value, float) else value for name, value in vars(scale).items()}
     return rounded | {"against": list(scale.reason_rejected)}
 
 
-def _sheet(found: FlightSettings, variant: str, map_scale: float | None) -> RenderableType:
-    flight, chosen = found.flight, found.chosen
+def _settings_sheet(settings: FlightSettings, variant: str, map_scale: float | None) -> RenderableType:
+    flight, chosen = settings.flight, settings.chosen
     table = text_table("model scale", "gear", "last digit, m", "plan", "Z, mm", "bx, mm", "", left=(0, 6), fold=(6,))
-    for scale in found.scales:
+    for scale in settings.scales:
         table.add_row(
             f"1:{scale.number:.0f}",
             scale.height_gear,
@@ -94,9 +96,9 @@ def _sheet(found: FlightSettings, variant: str, map_scale: float | None) -> Rend
             f"Flown {flight.flying_height:.3f} m above {flight.mean_ground:.2f} m, {flight.lowest_flown:.3f} to "
             f"{flight.highest_flown:.3f} m above the ground; {flight.angle} angle, {flight.field_angle_deg:.1f} degrees"
         ),
-        Text(f"Optimum model scale 1:{found.optimum:.1f}, which would ask for bx {found.optimum_bx:.2f} mm\n"),
+        Text(f"Optimum model scale 1:{settings.optimum:.1f}, which requires bx {settings.optimum_bx:.2f} mm\n"),
         table,
-        Text(f"\nModel scale         1:{chosen.number:.0f}: {found.reason}"),
+        Text(f"\nModel scale         1:{chosen.number:.0f}: {settings.reason}"),
         Text(f"Gears               {chosen.height_gear} for heights in {chosen.interval:g} m{to_map}"),
         Text(f"Projection height   {chosen.projection_height:.3f} mm"),
         Text(f"bx                  {chosen.bx:.2f} mm, from the photo base"),

@@ -18,7 +18,7 @@ HISTORY = "send-history"
 MAX_HISTORY = 1000
 """Lines."""
 
-_LEAVING = ("exit", "quit", "bye")
+_EXIT_WORDS = ("exit", "quit", "bye")
 
 
 def run_prompt(url: str, client: Client) -> None:
@@ -26,7 +26,7 @@ def run_prompt(url: str, client: Client) -> None:
     identity = send_line(client, "*IDN?").shown or "an instrument that does not say what it is"
     headers = _headers(client)
     click.echo(f"{url}: {identity}. Tab completes, help lists the headers, exit leaves.")
-    with _editing(headers):
+    with _line_editing(headers):
         while True:
             try:
                 line = input("a7sim> ").strip()
@@ -36,15 +36,15 @@ def run_prompt(url: str, client: Client) -> None:
             except KeyboardInterrupt:
                 click.echo()
                 continue
-            if line.lower() in _LEAVING:
+            if line.lower() in _EXIT_WORDS:
                 return
             if line.lower() in ("help", "?"):
                 click.echo("\n".join(headers))
             elif line:
-                _shown(client, line)
+                _send_and_print(client, line)
 
 
-def _shown(client: Client, line: str) -> None:
+def _send_and_print(client: Client, line: str) -> None:
     exchange = send_line(client, line)
     if exchange.shown is not None:
         click.echo(exchange.shown)
@@ -59,7 +59,7 @@ def _headers(client: Client) -> list[str]:
 
 
 @contextmanager
-def _editing(headers: list[str]) -> Iterator[None]:
+def _line_editing(headers: list[str]) -> Iterator[None]:
     """Give `input` completion and a persistent history, if the platform has readline."""
     try:
         import readline  # not on every platform

@@ -55,17 +55,17 @@ def command(
     stop = threading.Event()
     for name in _STOPPING:
         signal.signal(getattr(signal, name), lambda *_: stop.set())
-    with _door(address) as door:
+    with _listen(address) as listener:
         prepare_folder(out, force)
         with Journal(JournalOptions(durability)).recording(out, header, None) as journal:
-            host, port = door.getsockname()[:2]
+            host, port = listener.getsockname()[:2]
             where = f"tcp://{Address(host, port)}"
             click.echo(
                 as_json(document_header("record") | {"url": where, "instrument": url}) if as_document else where,
                 nl=False,
             )
             click.echo("" if as_document else "\nready")
-            RecordingProxy(url, journal.on_link_event, WallClock(), stop).serve(door)
+            RecordingProxy(url, journal.on_link_event, WallClock(), stop).serve(listener)
 
 
 def _header(url: str, scenario: str | None, seed: int | None) -> Header:
@@ -77,7 +77,7 @@ def _header(url: str, scenario: str | None, seed: int | None) -> Header:
     return make_header("record", loaded, loaded.seed if seed is None else seed, instrument=url)
 
 
-def _door(address: Address) -> socket.socket:
+def _listen(address: Address) -> socket.socket:
     try:
         return socket.create_server((address.host, address.port), backlog=1)
     except OSError as error:

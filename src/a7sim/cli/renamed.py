@@ -5,12 +5,13 @@ from collections.abc import Mapping, Sequence
 import click
 
 
-def warn_renamed(old: str, new: str) -> None:
-    """Print on standard error that an option or a command has a new name."""
-    click.echo(f"a7sim: {old} is now called {new}; the old name will be removed in the next release", err=True)
+def warn_renamed(context: click.Context, old: str, new: str) -> None:
+    """Print on standard error that an option or a command has a new name; print nothing during completion."""
+    if not context.resilient_parsing:
+        click.echo(f"a7sim: {old} is now called {new}; the old name will be removed in the next release", err=True)
 
 
-def replace_renamed(arguments: Sequence[str], renamed: Mapping[str, str]) -> list[str]:
+def replace_renamed(context: click.Context, arguments: Sequence[str], renamed: Mapping[str, str]) -> list[str]:
     """Return the arguments with old option names, `--old` and `--old=value`, replaced; warn for each.
 
     Arguments after `--` are not options and stay.
@@ -21,7 +22,7 @@ def replace_renamed(arguments: Sequence[str], renamed: Mapping[str, str]) -> lis
             break
         name, equals, value = argument.partition("=")
         if name in renamed:
-            warn_renamed(name, renamed[name])
+            warn_renamed(context, name, renamed[name])
             replaced[index] = f"{renamed[name]}{equals}{value}"
     return replaced
 
@@ -31,6 +32,6 @@ def command_with_renamed_options(renamed: Mapping[str, str]) -> type[click.Comma
 
     class RenamedOptionsCommand(click.Command):
         def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-            return super().parse_args(ctx, replace_renamed(args, renamed))
+            return super().parse_args(ctx, replace_renamed(ctx, args, renamed))
 
     return RenamedOptionsCommand

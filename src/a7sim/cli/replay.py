@@ -33,18 +33,18 @@ _MAX_PARTS = 20
     type=click.Choice(["1", "10", "max"]),
     default="max",
     show_default=True,
-    help="How many times as fast as it happened.",
+    help="Speed relative to the recorded session.",
 )
 @click.option(
     "--from",
     "begin",
     metavar="T|@LINE|TEXT",
-    help="Tell from a time on (s, or h:mm:ss), a line, or the first note with a text, such as the name of a form.",
+    help="Start output at a time (s, h:mm:ss), @LINE or the first note that contains a text, such as a form.",
 )
 @options.instrument_of
 @options.new_folder("the journal of a script")
 @options.as_document
-@options.quiet(but="how it ended, with --verify")
+@options.quiet(but="the result, with --verify")
 def command(
     session: str,
     verify: bool,
@@ -60,25 +60,25 @@ def command(
 
     Example: a7sim replay runs/akwanga --verify --quiet
     """
-    pace = PlaybackClock(float("inf") if speed == "max" else float(speed))
+    playback = PlaybackClock(float("inf") if speed == "max" else float(speed))
     silent = quiet or as_document
     if _is_script(session):
         if begin is not None:
             raise A7SimError("--from: expected a journal to seek in, got a script")
         if scenario is not None:
-            raise A7SimError("--scenario: expected a journal, got a script, which says its own")
-        play_script(session, pace, out, force, silent, as_document)
+            raise A7SimError("--scenario: expected a journal, got a script, which names its own")
+        play_script(session, playback, out, force, silent, as_document)
         return
     if out is not None:
-        raise A7SimError("--out: expected a script, whose journal it keeps; a journal there is already")
+        raise A7SimError("--out: expected a script, got a session, which already has a journal")
     path = Path(session)
     journalled = read_journal(path / JOURNAL if path.is_dir() else path)
-    first = 2 if begin is None else _line(journalled, begin)
+    first = 2 if begin is None else _first_line(journalled, begin)
     if not (knows_scenario(journalled) or verify):
-        _told(journalled, first, pace, silent, as_document)
+        _print_recording(journalled, first, playback, silent, as_document)
     else:
         replay = Replay(journalled, load_scenario(scenario) if scenario is not None else None)
-        _replayed(replay, first, verify, pace, silent, as_document)
+        _print_replay(replay, first, verify, playback, silent, as_document)
 
 
 class PlaybackClock:
@@ -101,7 +101,7 @@ def _is_script(session: str) -> bool:
     return session.endswith(SUFFIX) or ("/" not in session and not Path(session).exists())
 
 
-def _line(journalled: JournalFile, begin: str) -> int:
+def _first_line(journalled: JournalFile, begin: str) -> int:
     """Return the first line to be printed. Raises A7SimError if there is none."""
     found = find_line(journalled, begin)
     if found is None:
@@ -109,46 +109,54 @@ def _line(journalled: JournalFile, begin: str) -> int:
     return found
 
 
-def _told(journalled: JournalFile, first: int, pace: PlaybackClock, silent: bool, as_document: bool) -> None:
+def _print_recording(
+    journalled: JournalFile, first: int, playback: PlaybackClock, silent: bool, as_document: bool
+) -> None:
     """Print the traffic of a journal whose instrument cannot be rebuilt."""
     for number in range(first, len(journalled) + 1):
         event = journalled.event(number)
-        pace.until(event.t)
+        playback.until(event.t)
         if not silent:
             click.echo(format_event(event))
-    _ended(journalled, 0, None, 0, as_document, silent)
+    _print_summary(journalled, 0, None, 0, as_document, silent)
 
 
-def _replayed(replay: Replay, first: int, verify: bool, pace: PlaybackClock, silent: bool, as_document: bool) -> None:
+def _print_replay(
+    replay: Replay, first: int, verify: bool, playback: PlaybackClock, silent: bool, as_document: bool
+) -> None:
     journalled = replay.journalled
-    begins = replay.seek(first) if first > 2 else 2
+    start = replay.seek(first) if first > 2 else 2
     known = len(replay.checkpoints)
     differing = 0
     difference: ReplayDifference | None = None
-    for number, event, differs in replay_lines(replay, begins):
+    for number, event, line_difference in replay_lines(replay, start):
         if number >= first:
-            pace.until(event.t)
+            playback.until(event.t)
             if not silent:
                 click.echo(format_event(event))
-        if differs is not None:
+        if line_difference is not None:
             differing += 1
-            difference = difference or differs
+            difference = difference or line_difference
             if verify:
                 break
             if not silent:
-                click.echo(f"{'differs':>10} {differs.replayed or 'nothing'}")
+                click.echo(f"{'differs':>10} {line_difference.replayed or 'nothing'}")
     if difference is None:
         difference = replay.final_difference()
         differing += difference is not None
     parts = () if difference is None else difference.parts or replay.state_differences(difference.line)
     if difference is not None and (verify or not silent):
-        _tell(journalled, difference, parts)
-    _ended(journalled, differing, difference, len(replay.checkpoints) - known, as_document, silent and not verify)
+        _print_difference(journalled, difference, parts)
+    _print_summary(
+        journalled, differing, difference, len(replay.checkpoints) - known, as_document, silent and not verify
+    )
     if difference is not None and verify:
         raise click.exceptions.Exit(EXIT_DIFFERS)
 
 
-def _tell(journalled: JournalFile, difference: ReplayDifference, parts: tuple[StateDifference, ...]) -> None:
+def _print_difference(
+    journalled: JournalFile, difference: ReplayDifference, parts: tuple[StateDifference, ...]
+) -> None:
     click.echo(f"a7sim: {journalled.location(difference.line)}: the first difference", err=True)
     click.echo(f"a7sim: the journal has      {difference.journalled or 'nothing'}", err=True)
     click.echo(f"a7sim: the instrument says  {difference.replayed or 'nothing'}", err=True)
@@ -156,7 +164,7 @@ def _tell(journalled: JournalFile, difference: ReplayDifference, parts: tuple[St
         click.echo(f"a7sim: state, {part.part}: {part.before} in the journal, {part.after} now", err=True)
 
 
-def _ended(
+def _print_summary(
     journalled: JournalFile,
     differing: int,
     difference: ReplayDifference | None,
@@ -165,7 +173,7 @@ def _ended(
     silent: bool,
 ) -> None:
     lines = len(journalled) - 1
-    torn = len(journalled.truncated_tail)
+    torn_bytes = len(journalled.truncated_tail)
     if as_document:
         found = None
         if difference is not None:
@@ -175,24 +183,26 @@ def _ended(
             "status": "differs" if differing else "same",
             "lines": lines,
             "checkpoints": checkpoints,
-            "torn_bytes": torn,
+            "torn_bytes": torn_bytes,
             "difference": found,
         }
         click.echo(as_json(document), nl=False)
     elif not silent:
-        came = f"{differing} different" if differing else "no difference"
-        rest = f"; a torn last line of {pluralize(torn, 'byte')} is left out" if torn else ""
-        click.echo(f"{pluralize(lines, 'line')}, {pluralize(checkpoints, 'checkpoint')}: {came}{rest}")
+        outcome = f"{differing} different" if differing else "no difference"
+        tail = f"; a torn last line of {pluralize(torn_bytes, 'byte')} is left out" if torn_bytes else ""
+        click.echo(f"{pluralize(lines, 'line')}, {pluralize(checkpoints, 'checkpoint')}: {outcome}{tail}")
 
 
 def play_script(
-    session: str, pace: PlaybackClock, out: Path | None, force: bool, silent: bool, as_document: bool
+    session: str, playback: PlaybackClock, out: Path | None, force: bool, silent: bool, as_document: bool
 ) -> None:
     """Run a script, and end with exit code 3 at a failed expectation."""
     script = read_script(find_script(session))
     journal = Journal()
-    told = TranscriptListener(lambda text: None if silent else click.echo(text), pace.until, journal.on_link_event)
-    runner = ScriptRunner(script, told.on_link_event)
+    listener = TranscriptListener(
+        lambda text: None if silent else click.echo(text), playback.until, journal.on_link_event
+    )
+    runner = ScriptRunner(script, listener.on_link_event)
     if out is not None:
         prepare_folder(out, force)
     header = make_header("replay", script.scenario, script.seed, script=script.file.name)

@@ -11,8 +11,8 @@ from a7sim.cli import options
 @click.command("report")
 @click.argument("folder", type=options.PLACE, metavar="DIR")
 @options.out_file("the page", "DIR/report.html")
-@click.option("--open", "shown", is_flag=True, help="Show it in the browser.")
-def command(folder: Path, out: Path | None, shown: bool) -> None:
+@click.option("--open", "opens_browser", is_flag=True, help="Open the page in the browser.")
+def command(folder: Path, out: Path | None, opens_browser: bool) -> None:
     """Write the report of the session in DIR: figures, tables and settings on one self-contained page.
 
     Example: a7sim report runs/akwanga --open
@@ -24,5 +24,5 @@ def command(folder: Path, out: Path | None, shown: bool) -> None:
     out = out or folder / REPORT
     write_atomic(out, render_report(read_session(folder)))
     click.echo(str(out))
-    if shown:
+    if opens_browser:
         webbrowser.open(out.resolve().as_uri())

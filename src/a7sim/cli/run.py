@@ -38,9 +38,9 @@ def command(
     case: str | None,
     method: str | None,
     strips: str,
-    asked: ScenarioOptions,
-    kept: OutputOptions,
-    told: DisplayOptions,
+    scenario_options: ScenarioOptions,
+    output: OutputOptions,
+    display: DisplayOptions,
 ) -> None:
     """Run the virtual operator on SCENARIO, a file or the name of one that comes with a7sim, through to the strip.
 
@@ -50,14 +50,14 @@ def command(
     from a7sim.session.all_methods import run_all_methods
     from a7sim.session.strip_combinations import run_combinations
 
-    order = resolve_request(scenario, asked, kept, {"plan.case": case, "plan.method": method})
-    every_case = order.setting("strips", strips) == "all"
+    request = resolve_request(scenario, scenario_options, output, {"plan.case": case, "plan.method": method})
+    every_case = request.setting("strips", strips) == "all"
     if every_case and case is not None:
         raise A7SimError("--strips all: expected no --case beside it, since every case is worked")
-    work = run_combinations if every_case else run_all_methods
-    sessions = len(CASES) if every_case else 1
-    with progress_bar(POINTS_A_MODEL * sessions * len(order.scenario.models), told) as watcher:
-        document = work(
-            order.scenario, order.seed, kept.folder, watcher, kept.force, journal_options=kept.journal_options
+    run_session = run_combinations if every_case else run_all_methods
+    session_count = len(CASES) if every_case else 1
+    with progress_bar(POINTS_A_MODEL * session_count * len(request.scenario.models), display) as watcher:
+        document = run_session(
+            request.scenario, request.seed, output.folder, watcher, output.force, journal_options=output.journal_options
         )
-    show_results(document, told, strips_table if every_case else session_tables)
+    show_results(document, display, strips_table if every_case else session_tables)

@@ -86,7 +86,7 @@ class DisplayOptions:
 
 
 scenario_options = options.group_options(
-    "asked",
+    "scenario_options",
     ScenarioOptions,
     options.seed(),
     click.option("--set", "settings", multiple=True, metavar="PATH=VALUE", help="Override a value of the scenario."),
@@ -97,7 +97,7 @@ scenario_options = options.group_options(
 
 orientation_options = options.combine_options(
     click.option("--case", type=CaseInsensitiveChoice("ABCDE"), help="Standard points used (thesis)."),
-    click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors turned: both, or one."),
+    click.option("--method", type=click.Choice(["independent", "dependent"]), help="Projectors rotated: both, or one."),
 )
 """--case, --method."""
 
@@ -106,17 +106,17 @@ SESSION = "journal, book, tables and results"
 
 def output_options(of: str = SESSION) -> options.Option[Any]:
     """Return --out, --force, --resume, --durability, as `output`, for a folder of `of`."""
-    return options.group_options("kept", OutputOptions, options.new_folder(of), _RESUME, DURABILITY)
+    return options.group_options("output", OutputOptions, options.new_folder(of), _RESUME, DURABILITY)
 
 
-display_options = options.group_options("told", DisplayOptions, options.as_document, options.quiet())
+display_options = options.group_options("display", DisplayOptions, options.as_document, options.quiet())
 """--json, --quiet, as `display`."""
 
-_NOT_OF_THE_RESULTS = {
+_NOT_IN_COMMAND_LINE = {
     *("seed", "out", "force", "resume", "durability", "as_document", "quiet"),
     *("url", "timeout", "token_file"),
 }
-_SAME_RESULTS_AS = {"operate": "run"}
+_EQUIVALENT_COMMANDS = {"operate": "run"}
 
 
 @dataclass(frozen=True)
@@ -127,36 +127,39 @@ class RunRequest:
     seed: int
     begun_with: Mapping[str, Any] | None = None
 
-    def setting(self, name: str, asked: Any) -> Any:
+    def setting(self, name: str, option_value: Any) -> Any:
         """Return the setting of a resumed session's journal, or the given one for a new session."""
-        return asked if self.begun_with is None else self.begun_with.get(name)
+        return option_value if self.begun_with is None else self.begun_with.get(name)
 
 
 def resolve_request(
-    scenario: str | None, asked: ScenarioOptions, kept: OutputOptions, others: Mapping[str, str | None] | None = None
+    scenario: str | None,
+    scenario_options: ScenarioOptions,
+    output: OutputOptions,
+    others: Mapping[str, str | None] | None = None,
 ) -> RunRequest:
     """Return the requested run: a new session, or with --resume the one in its folder. Raises A7SimError.
 
     `others` are overrides of the scenario as texts by path.
     """
-    if kept.resume is None:
-        return RunRequest(*resolve_scenario(scenario, asked, others))
-    session = resolve_resume(kept.resume)
+    if output.resume is None:
+        return RunRequest(*resolve_scenario(scenario, scenario_options, others))
+    session = resolve_resume(output.resume)
     return RunRequest(session.scenario, session.seed, session.settings)
 
 
 def resolve_scenario(
-    scenario: str | None, asked: ScenarioOptions, others: Mapping[str, str | None] | None = None
+    scenario: str | None, scenario_options: ScenarioOptions, others: Mapping[str, str | None] | None = None
 ) -> tuple[Scenario, int]:
     """Return the scenario and the seed of the options; `others` are texts by path. Raises A7SimError."""
     if scenario is None:
         raise A7SimError(f"{click.get_current_context().info_name}: expected SCENARIO or --resume DIR, got none")
-    overrides = _overrides(asked.settings, {**(others or {}), "observer.skill": asked.skill})
+    overrides = _overrides(scenario_options.settings, {**(others or {}), "observer.skill": scenario_options.skill})
     loaded = load_scenario(scenario, overrides)
-    if asked.perfect_observer:
+    if scenario_options.perfect_observer:
         loaded = msgspec.structs.replace(loaded, observer=Observer.faultless())
         overrides["observer"] = "perfect"
-    seed = loaded.seed if asked.seed is None else asked.seed
+    seed = loaded.seed if scenario_options.seed is None else scenario_options.seed
     return with_provenance(
         loaded, Provenance(command_line=_command_line(scenario_name(scenario), seed), settings=overrides)
     ), seed
@@ -166,11 +169,11 @@ def _command_line(scenario: str, seed: int) -> str:
     """Return a command line that repeats the results of the present command."""
     ctx = click.get_current_context()
     verb = ctx.info_name or ""
-    words = ["a7sim", _SAME_RESULTS_AS.get(verb, verb), scenario, "--seed", str(seed)]
+    words = ["a7sim", _EQUIVALENT_COMMANDS.get(verb, verb), scenario, "--seed", str(seed)]
     for option in ctx.command.params:
         name = option.name or ""
-        given = ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
-        if given and isinstance(option, click.Option) and name not in _NOT_OF_THE_RESULTS:
+        is_given = ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
+        if is_given and isinstance(option, click.Option) and name not in _NOT_IN_COMMAND_LINE:
             value = ctx.params[name]
             flag = max(option.opts, key=len)
             for each in value if option.multiple else [value]:
@@ -204,9 +207,9 @@ def _check_resume_alone(beside: tuple[str, ...]) -> None:
     allowed = {"resume", "durability", "as_document", "quiet", *beside}
     for name in ctx.params:
         if name not in allowed and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            said = next(each for each in ctx.command.params if each.name == name)
+            parameter = next(each for each in ctx.command.params if each.name == name)
             raise A7SimError(
-                f"--resume: expected no {parameter_label(said)} with it, because the journal contains the options"
+                f"--resume: expected no {parameter_label(parameter)} with it, because the journal contains the options"
             )
 
 
@@ -215,7 +218,7 @@ POINTS_A_MODEL = 130
 
 
 @contextmanager
-def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbacks]":
+def progress_bar(points: int, display: DisplayOptions) -> "Iterator[ProgressCallbacks]":
     """Show the progress of about `points` points on a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -223,8 +226,8 @@ def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbac
     from a7sim.session import ProgressCallbacks
 
     columns = (TextColumn("{task.description:<38}", markup=False), BarColumn(), TimeElapsedColumn())
-    unwatched = told.quiet or told.as_document or not sys.stderr.isatty()
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=unwatched) as progress:
+    is_hidden = display.quiet or display.as_document or not sys.stderr.isatty()
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=is_hidden) as progress:
         task = progress.add_task("starting", total=points)
         yield ProgressCallbacks(
             lambda activity: progress.update(task, description=activity),
@@ -232,15 +235,15 @@ def progress_bar(points: int, told: DisplayOptions) -> "Iterator[ProgressCallbac
         )
 
 
-def show_results(document: "Document", told: DisplayOptions, tables: "Callable[[Document], RenderableType]") -> None:
+def show_results(document: "Document", display: DisplayOptions, tables: "Callable[[Document], RenderableType]") -> None:
     """Print the results, and end with exit code 1 if the operator gave up."""
     from rich.console import Console
 
     from a7sim.result_documents import as_json
 
-    if told.as_document:
+    if display.as_document:
         click.echo(as_json(document), nl=False)
-    elif not told.quiet:
+    elif not display.quiet:
         Console().print(tables(document))
     if document["status"] != "complete":
         click.echo(f"a7sim: the operator gave up: {document['message']}", err=True)

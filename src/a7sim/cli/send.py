@@ -40,17 +40,17 @@ def command(
             run_prompt(url, client)
             return
         exchanges = []
-        for line in _given(lines):
+        for line in _lines(lines):
             exchange = send_line(client, line)
             exchanges.append(exchange)
             if not as_document and exchange.shown is not None:
                 click.echo(exchange.shown)
     if out is not None:
         out.write_bytes(b"".join(_blocks(exchanges)))
-    _ended(exchanges, as_document)
+    _report(exchanges, as_document)
 
 
-def _given(lines: tuple[str, ...]) -> Iterable[str]:
+def _lines(lines: tuple[str, ...]) -> Iterable[str]:
     source: Iterable[str] = (part for line in lines for part in line.splitlines()) if lines else sys.stdin
     return (line.strip() for line in source if line.strip())
 
@@ -59,7 +59,7 @@ def _blocks(exchanges: Iterable[Exchange]) -> Iterable[bytes]:
     return (part for exchange in exchanges for part in exchange.reply or () if isinstance(part, bytes))
 
 
-def _ended(exchanges: list[Exchange], as_document: bool) -> None:
+def _report(exchanges: list[Exchange], as_document: bool) -> None:
     errors = [error for exchange in exchanges for error in exchange.errors]
     if as_document:
         click.echo(msgspec.json.format(msgspec.json.encode(_document(exchanges, errors)), indent=2))
@@ -71,5 +71,5 @@ def _ended(exchanges: list[Exchange], as_document: bool) -> None:
 
 
 def _document(exchanges: list[Exchange], errors: list[str]) -> dict[str, Any]:
-    said = [{"sent": exchange.sent, "reply": exchange.shown} for exchange in exchanges]
-    return {"schema_version": 1, "command": "send", "exchanges": said, "errors": errors}
+    exchange_documents = [{"sent": exchange.sent, "reply": exchange.shown} for exchange in exchanges]
+    return {"schema_version": 1, "command": "send", "exchanges": exchange_documents, "errors": errors}

@@ -100,8 +100,8 @@ def command(
     idle: float,
     fault: str | None,
     fault_seed: int,
-    asked: ScenarioOptions,
-    kept: OutputOptions,
+    scenario_options: ScenarioOptions,
+    output: OutputOptions,
     as_document: bool,
     quiet: bool,
 ) -> None:
@@ -117,12 +117,12 @@ def command(
     limits = ServerLimits(
         baud, parse_faults(fault) if fault is not None else None, fault_seed, idle, max_clients=clients
     )
-    if kept.resume is not None:
-        served = _resumed_instrument(resolve_resume(kept.resume, *_SERVER_OPTIONS), token, kept.journal_options)
+    if output.resume is not None:
+        served = _resumed_instrument(resolve_resume(output.resume, *_SERVER_OPTIONS), token, output.journal_options)
     else:
-        loaded, seed = resolve_scenario(scenario, asked)
-        kept.journal_options.prepare(kept.out, kept.force)
-        served = _new_instrument(loaded, seed, token, realtime, kept)
+        loaded, seed = resolve_scenario(scenario, scenario_options)
+        output.journal_options.prepare(output.out, output.force)
+        served = _new_instrument(loaded, seed, token, realtime, output)
     with served.journal:
         run(serve(served, endpoints, limits, StartupMessages(served.head, as_document, quiet)))
 
@@ -138,32 +138,32 @@ class ServedInstrument:
 
 
 def _new_instrument(
-    scenario: Scenario, seed: int, token: str | None, realtime: bool, kept: OutputOptions
+    scenario: Scenario, seed: int, token: str | None, realtime: bool, output: OutputOptions
 ) -> ServedInstrument:
     autograph = Autograph.from_scenario(scenario, seed)
-    journal = Journal(kept.journal_options)
+    journal = Journal(output.journal_options)
     instrument = SharedInstrument(
-        autograph, journal.on_link_event if kept.out else None, token, 0.0 if realtime else POLL_SECONDS
+        autograph, journal.on_link_event if output.out else None, token, 0.0 if realtime else POLL_SECONDS
     )
     header = make_header("serve", scenario, seed, realtime=realtime, login=token is not None)
     return ServedInstrument(
-        _head(scenario, seed), instrument, _clock(realtime), journal.recording(kept.out, header, instrument)
+        _document(scenario, seed), instrument, _clock(realtime), journal.recording(output.out, header, instrument)
     )
 
 
 def _resumed_instrument(
-    begun: ResumableSession, token: str | None, journal_options: JournalOptions
+    session: ResumableSession, token: str | None, journal_options: JournalOptions
 ) -> ServedInstrument:
-    if begun.setting("login") != (token is not None):
-        asked, given = ("a", "none") if token is None else ("no", "one")
+    if session.setting("login") != (token is not None):
+        expected, found = ("a", "none") if token is None else ("no", "one")
         raise A7SimError(
-            f"{begun.journalled.location(1)}: expected {asked} token, as the session was begun with, got {given}"
+            f"{session.journalled.location(1)}: expected {expected} token, as the session was begun with, got {found}"
         )
     journal = Journal(journal_options)
-    instrument, now, _ = restore_instrument(begun, journal)
+    instrument, now, _ = restore_instrument(session, journal)
     instrument.token = token
     return ServedInstrument(
-        _head(begun.scenario, begun.seed), instrument, _clock(begun.setting("realtime"), now), journal
+        _document(session.scenario, session.seed), instrument, _clock(session.setting("realtime"), now), journal
     )
 
 
@@ -175,30 +175,30 @@ async def serve(
     served: ServedInstrument, endpoints: Endpoints, limits: ServerLimits, messages: "StartupMessages"
 ) -> None:
     """Serve an instrument until the process is stopped. Raises JournalWriteError if the journal cannot be written."""
-    stopped = asyncio.Event()
-    broken: list[JournalWriteError] = []
+    stop = asyncio.Event()
+    write_errors: list[JournalWriteError] = []
     loop = asyncio.get_running_loop()
 
     def fail(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         error = context.get("exception")
         if isinstance(error, JournalWriteError):
-            broken.append(error)
-            stopped.set()
+            write_errors.append(error)
+            stop.set()
         else:
             loop.default_exception_handler(context)
 
     loop.set_exception_handler(fail)
     for name in _STOPPING:
-        loop.add_signal_handler(getattr(signal, name), stopped.set)
+        loop.add_signal_handler(getattr(signal, name), stop.set)
     server = Server(served.instrument, served.clock, limits)
     opened = await server.open(endpoints)
     try:
         messages.print_ready(opened)
-        await stopped.wait()
+        await stop.wait()
     finally:
         await server.close()
-    if broken:
-        raise broken[0]
+    if write_errors:
+        raise write_errors[0]
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,7 @@ class StartupMessages:
         sys.stdout.flush()
 
 
-def _head(scenario: Scenario, seed: int) -> Document:
+def _document(scenario: Scenario, seed: int) -> Document:
     return document_header("serve") | {"scenario": scenario.title, "seed": seed, "variant": scenario.instrument.variant}
 
 
@@ -234,8 +234,8 @@ def _endpoints(tcp: tuple[str, ...], rfc2217: tuple[str, ...], pty: tuple[Path, 
 
 
 def _check_remote_access(endpoints: Endpoints, allow_remote: bool, token: str | None) -> None:
-    asked = [("--tcp", each) for each in endpoints.tcp] + [("--rfc2217", each) for each in endpoints.rfc2217]
-    for option, address in asked:
+    addresses = [("--tcp", each) for each in endpoints.tcp] + [("--rfc2217", each) for each in endpoints.rfc2217]
+    for option, address in addresses:
         if not address.loopback and not allow_remote:
             raise A7SimError(
                 f"{option} {address}: expected an address of this machine alone (--allow-remote allows others)"

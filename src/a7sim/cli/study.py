@@ -80,13 +80,13 @@ def command(
     loaded = load_study(study, replicates)
     with open_executor(executor, workers, scheduler) as (others, at_once):
         tally = open_tally(loaded, out, force)
-        with _watched(loaded, tally, as_document or quiet) as (progress, task):
+        with _progress_bar(loaded, tally, as_document or quiet) as (progress, task):
             checkpoint = checkpoint_path(out) if out is not None else None
             run_study(loaded, tally, others, at_once, checkpoint, lambda done: progress.advance(task, done))
     document = findings_document(loaded, tally)
     if out is not None:
         write_results(out, loaded, tally, document)
-        _leave_page(out, document)
+        _write_page(out, document)
     if as_document:
         click.echo(as_json(document), nl=False)
     elif not quiet:
@@ -95,7 +95,7 @@ def command(
         _audit(loaded, tally, audit, as_document or quiet)
 
 
-def _leave_page(out: Path, document: Document) -> None:
+def _write_page(out: Path, document: Document) -> None:
     """Write the page; without matplotlib only a message is printed."""
     try:
         write_page(out, document)
@@ -105,12 +105,12 @@ def _leave_page(out: Path, document: Document) -> None:
 
 def _audit(loaded: LoadedStudy, tally: Tally, picks: int, silent: bool) -> None:
     differences = audit_study(loaded, tally, picks)
-    worked = pluralize(min(picks, sum(tally.sample(i).shape[1] for i in range(len(loaded.cells)))), "session")
+    sessions = pluralize(min(picks, sum(tally.sample(i).shape[1] for i in range(len(loaded.cells)))), "session")
     if differences:
-        click.echo(f"a7sim: {len(differences)} of {worked} differ over the link; {differences[0]}", err=True)
+        click.echo(f"a7sim: {len(differences)} of {sessions} differ over the link; {differences[0]}", err=True)
         raise click.exceptions.Exit(EXIT_DIFFERS)
     if not silent:
-        click.echo(f"{worked} run again over the link: same digits.")
+        click.echo(f"{sessions} run again over the link: same digits.")
 
 
 class _Rate(ProgressColumn):
@@ -122,7 +122,7 @@ class _Rate(ProgressColumn):
 
 
 @contextmanager
-def _watched(loaded: LoadedStudy, tally: Tally, silent: bool) -> Iterator[tuple[Progress, TaskID]]:
+def _progress_bar(loaded: LoadedStudy, tally: Tally, silent: bool) -> Iterator[tuple[Progress, TaskID]]:
     """Show the progress of the sessions on a terminal, with rate and remaining time."""
     title = TextColumn(loaded.study.title, markup=False)
     columns = (title, BarColumn(), MofNCompleteColumn(), _Rate(), TimeRemainingColumn())

@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 import click
 
-_WORDS = (
+_REWORDINGS = (
     (
         r"(?P<got>.+) is not in the range (?P<low>[^<>=]+)<=?x<=?(?P<known>[^<>=]+)",
         "expected {low} to {known}, got {got}",
@@ -24,27 +24,27 @@ _WORDS = (
 def format_usage_error(error: click.ClickException) -> str:
     """Return the error message of a command, without a line end."""
     context = error.ctx if isinstance(error, click.UsageError) else None
-    more = f" ({context.command_path} --help says more)" if context else ""
-    return f"{_said(error, context)}{more}"
+    hint = f" ({context.command_path} --help says more)" if context else ""
+    return f"{_sentence(error, context)}{hint}"
 
 
-def _said(error: click.ClickException, context: click.Context | None) -> str:
+def _sentence(error: click.ClickException, context: click.Context | None) -> str:
     verb = context.command_path.removeprefix("a7sim").strip() if context else ""
-    told = f"{verb}: " if verb else ""
+    prefix = f"{verb}: " if verb else ""
     unknown = re.match(r"No such command '(.*)'", error.message, re.DOTALL)
     if unknown and context and isinstance(context.command, click.Group):
-        return f"{told}expected a command, got {unknown[1]!r}{_or_like(unknown[1], context)}"
+        return f"{prefix}expected a command, got {unknown[1]!r}{_suggestion(unknown[1], context)}"
     if isinstance(error, click.NoSuchOption):
-        meant = f"; did you mean {', '.join(sorted(error.possibilities))}?" if error.possibilities else ""
-        return f"{told}expected an option of this command, got {error.option_name}{meant}"
+        suggestion = f"; did you mean {', '.join(sorted(error.possibilities))}?" if error.possibilities else ""
+        return f"{prefix}expected an option of this command, got {error.option_name}{suggestion}"
     if isinstance(error, click.MissingParameter) and error.param is not None:
-        return f"{told}expected {parameter_label(error.param)}, got none"
+        return f"{prefix}expected {parameter_label(error.param)}, got none"
     if isinstance(error, click.BadParameter) and error.param is not None:
-        return f"{parameter_label(error.param)}: {_of_bounds(error) or _reworded(error.message)}"
-    return f"{told}{_reworded(error.format_message())}"
+        return f"{parameter_label(error.param)}: {_describe_bounds(error) or _reword(error.message)}"
+    return f"{prefix}{_reword(error.format_message())}"
 
 
-def _of_bounds(error: click.BadParameter) -> str | None:
+def _describe_bounds(error: click.BadParameter) -> str | None:
     """Return expected and actual value of a choice or a range, None for another error."""
     kind = error.param.type if error.param is not None else None
     got, refused, _ = error.message.partition(" is not ")
@@ -67,10 +67,10 @@ def describe_range(bounds: click.IntRange | click.FloatRange) -> str:
     return ", ".join(filter(None, (above, below)))
 
 
-def _or_like(word: str, context: click.Context) -> str:
+def _suggestion(word: str, context: click.Context) -> str:
     assert isinstance(context.command, click.Group)
-    like = get_close_matches(word, context.command.list_commands(context), 1)
-    return f"; did you mean {like[0]}?" if like else ""
+    similar = get_close_matches(word, context.command.list_commands(context), 1)
+    return f"; did you mean {similar[0]}?" if similar else ""
 
 
 def parameter_label(parameter: click.Parameter) -> str:
@@ -80,9 +80,9 @@ def parameter_label(parameter: click.Parameter) -> str:
     return parameter.metavar or parameter.human_readable_name.upper()
 
 
-def _reworded(message: str) -> str:
+def _reword(message: str) -> str:
     plain = message.strip().removesuffix(".")
-    for pattern, words in _WORDS:
+    for pattern, words in _REWORDINGS:
         found = re.fullmatch(pattern, plain, re.DOTALL)
         if found:
             parts = found.groupdict()

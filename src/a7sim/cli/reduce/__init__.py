@@ -51,22 +51,26 @@ def command() -> None:
     type=click.Choice(["conformal", "affine", "projective"]),
     default="affine",
     show_default=True,
-    help="How counts become mm: turned and scaled, with a scale in each axis and a shear, or in perspective.",
+    help="Transformation of counts to mm: rotation and scale; a scale in each axis and a shear; or perspective.",
 )
 @click.option(
     "--count-mm",
     type=NumberType(min=0.0, min_open=True, max=10.0),
-    help="Size of a count, mm (1 for counts in mm): tells how the film has shrunk, and the principal distance to set.",
+    help="Size of a count, mm (1 for counts in mm); gives the film shrinkage and the principal distance to set.",
 )
 @click.option(
     "--correct",
     type=click.Choice(processing.CORRECTIONS),
     multiple=True,
-    help="Correct the points and bring them to the principal point; may be given several times.",
+    help="Correct the points and refer them to the principal point; repeatable.",
 )
-@click.option("--flying-height", type=NumberType(1.0, 30000.0), help="Of the camera above the sea, m.")
+@click.option("--flying-height", type=NumberType(1.0, 30000.0), help="Height of the camera above the sea, m.")
 @click.option(
-    "--ground-height", type=NumberType(-500.0, 9000.0), default=0.0, show_default=True, help="Above the sea, m."
+    "--ground-height",
+    type=NumberType(-500.0, 9000.0),
+    default=0.0,
+    show_default=True,
+    help="Height of the ground above the sea, m.",
 )
 @options.documented
 def interior(
@@ -105,14 +109,14 @@ def interior(
     type=click.Choice(["independent", "dependent"]),
     default="dependent",
     show_default=True,
-    help="Photographs turned: both, or the right one alone.",
+    help="Photographs rotated: both, or the right one alone.",
 )
 @click.option(
     "--method",
     type=click.Choice(processing.RELATIVE_METHODS),
     default="coplanarity",
     show_default=True,
-    help="robust takes out the points with blunders and names them; all sets the methods side by side.",
+    help="robust removes the points with blunders and lists them; all compares the methods.",
 )
 @options.documented
 def relative(
@@ -139,7 +143,11 @@ def relative(
 @command.command("centres")
 @click.argument("pointings", type=FILE)
 @click.option(
-    "--method", type=click.Choice(processing.CENTRE_METHODS), default="two-levels", show_default=True, help="See above."
+    "--method",
+    type=click.Choice(processing.CENTRE_METHODS),
+    default="two-levels",
+    show_default=True,
+    help="Method and columns, as listed above.",
 )
 @click.option("--z1", type=HEIGHT, default=4900.0, show_default=True, help="Z-counter reading of X1, Y1.")
 @click.option("--z2", type=HEIGHT, default=5100.0, show_default=True, help="Z-counter reading of X2, Y2.")
@@ -174,7 +182,7 @@ def centres(
     type=click.Choice(processing.SIMILARITY_METHODS),
     default="iteration",
     show_default=True,
-    help="both sets the methods side by side.",
+    help="both compares the methods.",
 )
 @options.documented
 def similarity(common: Path, method: processing.SimilarityMethod, out: Path | None, as_document: bool) -> None:
@@ -218,7 +226,7 @@ def strip(
     ground: Path | None,
     method: JoinMethod,
     polynomial: str | None,
-    against: Path | None,
+    reference: Path | None,
     out: Path | None,
     as_document: bool,
 ) -> None:
@@ -229,14 +237,14 @@ def strip(
     models   model,point,X,Y,Z        needs --ground; centres are points PHOTO:centre
     cards    of the N.R.C. program    with their own ground control
 
-    Models named LEFT-RIGHT may come in any order; other pairs are taken as they stand in the file. --out writes
-    output cards (strip.crd) and PAT-M free format (strip.pat) too, where names and numbers fit them.
+    Models named LEFT-RIGHT may come in any order; other pairs keep the order of the file. --out also writes
+    output cards (strip.crd) and PAT-M free format (strip.pat), if names and numbers fit the formats.
 
     Example: a7sim reduce strip pairs.csv --c 153.84 --ground ground.csv
     """
     degree: Literal[2, 3] | None = None if polynomial is None else 2 if polynomial == "2" else 3
     camera = None if c is None else PairCamera(c, (x0, y0), bx)
-    outcome = processing.strip(file, ground, camera, method, degree, against)
+    outcome = processing.strip(file, ground, camera, method, degree, reference)
     _deliver(outcome, as_document, out, tables.strip_tables)
 
 
@@ -245,12 +253,12 @@ def strip(
 @options.ground(required=True)
 @options.reference
 @options.documented
-def absolute(model: Path, ground: Path, against: Path | None, out: Path | None, as_document: bool) -> None:
+def absolute(model: Path, ground: Path, reference: Path | None, out: Path | None, as_document: bool) -> None:
     """Orient one MODEL or strip (point,X,Y,Z) to the ground.
 
     Example: a7sim reduce absolute model.csv --ground ground.csv
     """
-    _deliver(processing.absolute(model, ground, against), as_document, out, tables.absolute_tables)
+    _deliver(processing.absolute(model, ground, reference), as_document, out, tables.absolute_tables)
 
 
 @command.command("block", cls=_WITH_REFERENCE)
@@ -269,7 +277,7 @@ def block(
     models: tuple[Path, ...],
     ground: Path,
     height_weight: float,
-    against: Path | None,
+    reference: Path | None,
     out: Path | None,
     as_document: bool,
 ) -> None:
@@ -279,11 +287,11 @@ def block(
 
     Example: a7sim reduce block strip1.csv strip2.csv --ground ground.csv
     """
-    _deliver(processing.block(models, ground, height_weight, against), as_document, out, tables.block_tables)
+    _deliver(processing.block(models, ground, height_weight, reference), as_document, out, tables.block_tables)
 
 
 def _deliver(
-    outcome: ProcessingResult, as_document: bool, out: Path | None, shown: Callable[[Document], list[Any]]
+    outcome: ProcessingResult, as_document: bool, out: Path | None, to_tables: Callable[[Document], list[Any]]
 ) -> None:
     """Write a result to its folder, if any, and print it as JSON or as tables."""
     document = outcome.document if out is None else processing.write_result(outcome, out)
@@ -292,5 +300,5 @@ def _deliver(
         return
     console = Console(markup=False, highlight=False, emoji=False)
     console.width = max(console.width, MIN_WIDTH)
-    for each in [*shown(document), *tables.warning_lines(document)]:
+    for each in [*to_tables(document), *tables.warning_lines(document)]:
         console.print(each)

@@ -19,38 +19,38 @@ Tables = list[Any]
 def interior_tables(document: Document) -> Tables:
     """Return fits, residuals, and film deformations, photograph by photograph."""
     camera = document["camera"]
-    shown: Tables = [
+    tables: Tables = [
         f"Interior orientation, {document['method']}, {camera['name']}, c {camera['c_mm']:.3f} mm",
-        f"points in mm about the {document['about']}{_of_corrections(document['corrections'])}",
+        f"points in mm about the {document['about']}{_corrections_text(document['corrections'])}",
     ]
     for picture in document["photographs"]:
         unknowns = [(name, f"{u['value']:.9g}", f"{u['sigma']:.2g}") for name, u in picture["unknowns"].items()]
         residuals = [(name, *(1e3 * v for v in each)) for name, each in picture["residuals_mm"].items()]
-        shown += [
+        tables += [
             "",
             f"Photograph {picture['photo']}: {pluralize(len(picture['points']), 'point')}, "
             f"s0 {1e3 * picture['s0_mm']:.1f} um, redundancy {picture['statistics']['redundancy']}",
             _table(("unknown", "value", "±"), unknowns),
             _table(("fiducial", "vx, um", "vy, um"), residuals, 1),
-            *_of_film(picture["film"]),
+            *_film_lines(picture["film"]),
         ]
-    return shown
+    return tables
 
 
-def _of_corrections(corrections: Sequence[str]) -> str:
+def _corrections_text(corrections: Sequence[str]) -> str:
     return f", corrected for {', '.join(corrections)}" if corrections else ""
 
 
-def _of_film(film: Document) -> list[str]:
+def _film_lines(film: Document) -> list[str]:
     x, y = film["mm_per_count"]
-    said = [f"film: {x:.9g} and {y:.9g} mm a count in x and y, axes {film['shear_gon']:.4f} gon off square"]
+    lines = [f"film: {x:.9g} and {y:.9g} mm a count in x and y, axes {film['shear_gon']:.4f} gon off square"]
     if "scale" in film:
         x, y = film["shrinkage_ppm"]
-        said.append(
+        lines.append(
             f"film: shrunk by {x:.0f} and {y:.0f} ppm, principal distance for the plotter "
             f"{film['principal_distance_mm']:.3f} mm"
         )
-    return said
+    return lines
 
 
 def relative_tables(document: Document) -> Tables:
@@ -64,7 +64,7 @@ def relative_tables(document: Document) -> Tables:
         (name, *place, f"{1e3 * parallaxes[name]:.1f}" if name in parallaxes else "taken out")
         for name, place in document["points"].items()
     ]
-    shown: Tables = [
+    tables: Tables = [
         f"Relative orientation by {document['method']}",
         "",
         _table(("element", "", "value", "±"), elements),
@@ -76,15 +76,15 @@ def relative_tables(document: Document) -> Tables:
         f"condition {document['condition']:.2g}",
     ]
     if document["method"] == "robust":
-        shown += _of_blunders(document)
+        tables += _blunder_lines(document)
     if "compare" in document:
         coordinates = [row for row in document["compare"]["rows"] if row["unit"] != "mm of the model"]
-        shown += ["", "Side by side", _of_methods(coordinates), *_of_largest(document["compare"])]
-        shown += _of_blunders(document["robust"])
-    return shown
+        tables += ["", "Side by side", _methods_table(coordinates), *_largest_difference_lines(document["compare"])]
+        tables += _blunder_lines(document["robust"])
+    return tables
 
 
-def _of_blunders(document: Document) -> list[str]:
+def _blunder_lines(document: Document) -> list[str]:
     if not document["searchable"] and not document["blunders"]:
         return ["too few points to name one with a blunder: seven are the fewest"]
     return [
@@ -97,14 +97,14 @@ def _of_blunders(document: Document) -> list[str]:
 def centres_tables(document: Document) -> Tables:
     """Return centres with their precision, and the residuals of the points."""
     method = document["method"]
-    shown: Tables = [f"Perspective centres, {method}", ""]
+    tables: Tables = [f"Perspective centres, {method}", ""]
     if method == "a8":
         rows = [(name, side, *each[side]) for name, each in document["models"].items() for side in ("left", "right")]
-        return [*shown, _table(("model", "centre", "X, units", "Y, units", "Z, mm"), rows, 3)]
+        return [*tables, _table(("model", "centre", "X, units", "Y, units", "Z, mm"), rows, 3)]
     rows = [(name, document[name], document[f"sigma_{name}"]) for name in ("X0", "Y0", "Z0", "T0") if name in document]
     angles = [(f"{name}, gon", each["value"], each["sigma"]) for name, each in document.get("angles", {}).items()]
     names = ("vx, mm", "vy, mm") if method == "grid" else ("vX", "vY")
-    shown += [
+    tables += [
         _table(("", "value", "±"), rows + angles),
         "",
         _table(("point", *names), [(point, *v) for point, v in document["residuals"].items()]),
@@ -112,11 +112,11 @@ def centres_tables(document: Document) -> Tables:
     ]
     if method == "grid":
         return [
-            *shown,
+            *tables,
             f"s0 {1e3 * document['s0_mm']:.2f} um on the plate, {pluralize(document['iterations'], 'iteration')}",
         ]
-    of_pointing = f", a pointing {document['pointing_rms']:.4f}" if "pointing_rms" in document else ""
-    return [*shown, f"rms {document['rms']:.4f}{of_pointing}, redundancy {document['redundancy']}"]
+    pointing_text = f", a pointing {document['pointing_rms']:.4f}" if "pointing_rms" in document else ""
+    return [*tables, f"rms {document['rms']:.4f}{pointing_text}, redundancy {document['redundancy']}"]
 
 
 def similarity_tables(document: Document) -> Tables:
@@ -124,7 +124,7 @@ def similarity_tables(document: Document) -> Tables:
     sigma = document["sigma"]
     values = {"scale": document["scale"]} | {f"{name}, gon": value for name, value in document["angles"].items()}
     values |= dict(zip(SHIFTS, document["translation"], strict=True))
-    shown: Tables = [
+    tables: Tables = [
         f"Similarity by {document['method']}",
         "",
         _table(("", "value", "±"), [(name, v, sigma[name.split(",")[0]]) for name, v in values.items()], 6),
@@ -134,9 +134,9 @@ def similarity_tables(document: Document) -> Tables:
         f"s0 {document['s0']:.5f}, redundancy {document['statistics']['redundancy']}",
     ]
     if "compare" in document:
-        compared = document["compare"]
-        shown += ["", "Side by side", _of_methods(compared["rows"]), *_of_largest(compared)]
-    return shown
+        comparison = document["compare"]
+        tables += ["", "Side by side", _methods_table(comparison["rows"]), *_largest_difference_lines(comparison)]
+    return tables
 
 
 def connection_tables(document: Document) -> Tables:
@@ -146,7 +146,7 @@ def connection_tables(document: Document) -> Tables:
         f"Models {', '.join(document['models'])} joined on {document['method']}",
         f"in the system and unit of {document['system']}",
         "",
-        *_of_joins(document["joins"], differences=True),
+        *_join_tables(document["joins"], differences=True),
         "",
         _table(("point", "X", "Y", "Z"), points),
     ]
@@ -154,18 +154,18 @@ def connection_tables(document: Document) -> Tables:
 
 def strip_tables(document: Document) -> Tables:
     """Return joins, absolute orientation, residuals, and the deformation found by the polynomials."""
-    shown: Tables = [
+    tables: Tables = [
         f"Strip of {pluralize(len(document['models']), 'model')} from {document['input']}, "
         f"joined on {document['method']}",
         f"joins in the unit of model {document['models'][0]['model']}{', mm' if document['input'] == 'pairs' else ''}",
         "",
-        *_of_joins(document["joins"]),
+        *_join_tables(document["joins"]),
         "",
         *absolute_tables(document, "Absolute orientation of the strip"),
     ]
     if "polynomial" in document:
-        shown += ["", *_of_polynomial(document["polynomial"])]
-    return shown
+        tables += ["", *_polynomial_tables(document["polynomial"])]
+    return tables
 
 
 def absolute_tables(document: Document, title: str = "Absolute orientation") -> Tables:
@@ -173,15 +173,15 @@ def absolute_tables(document: Document, title: str = "Absolute orientation") -> 
     precision = f", s0 {document['s0_m']:.4f} m" if "s0_m" in document else ""
     return [
         f"{title}: scale {document['absolute']['scale']:.9f}{precision}",
-        *_of_ground(document),
-        *_of_comparison(document),
+        *_ground_tables(document),
+        *_comparison_tables(document),
     ]
 
 
 def block_tables(document: Document) -> Tables:
     """Return the models' scales, the tie residuals, and the residuals and accuracies at the ground points."""
     models = [
-        (each["model"], f"{each['scale']:.6f}", *_rms_of(each["residuals_m"].values()), len(each["residuals_m"]))
+        (each["model"], f"{each['scale']:.6f}", *_rms(each["residuals_m"].values()), len(each["residuals_m"]))
         for each in document["models"]
     ]
     return [
@@ -190,73 +190,79 @@ def block_tables(document: Document) -> Tables:
         f"in height {document['s0_height_m']:.4f}, redundancy {document['redundancy']}",
         "",
         _table(("model", "scale", "rms vX, m", "vY", "vZ", "points"), models, 3),
-        *_of_ground(document),
-        *_of_comparison(document),
+        *_ground_tables(document),
+        *_comparison_tables(document),
     ]
 
 
 def warning_lines(document: Document) -> list[str]:
     """Return the warnings."""
-    said = [f"warning: {warning}" for warning in document.get("warnings", [])]
-    return said + [f"{name} is not written: {why}" for name, why in document.get("not_written", {}).items()]
+    lines = [f"warning: {warning}" for warning in document.get("warnings", [])]
+    return lines + [f"{name} is not written: {why}" for name, why in document.get("not_written", {}).items()]
 
 
-def _of_joins(joins: Sequence[Document], differences: bool = False) -> Tables:
+def _join_tables(joins: Sequence[Document], differences: bool = False) -> Tables:
     rows = [
         (" - ".join(join["models"]), len(join["points"]), join["scale"], *join["rms_mm"], join["max_residual_mm"])
         for join in joins
     ]
-    shown: Tables = [_table(("join", "points", "scale", "rms dX", "dY", "dZ", "largest"), rows)]
+    tables: Tables = [_table(("join", "points", "scale", "rms dX", "dY", "dZ", "largest"), rows)]
     if differences:
         closing = [
             (" - ".join(join["models"]), point, *each)
             for join in joins
             for point, each in join["differences_mm"].items()
         ]
-        shown += ["", _table(("closing differences", "point", "dX", "dY", "dZ"), closing)]
-    return shown
+        tables += ["", _table(("closing differences", "point", "dX", "dY", "dZ"), closing)]
+    return tables
 
 
-def _of_ground(document: Document) -> Tables:
+def _ground_tables(document: Document) -> Tables:
     residuals = document["residuals_m"]
     rows = [(point, each["role"], each["X"], each["Y"], each["Z"]) for point, each in residuals.items()]
-    return ["", _table(("ground point", "role", "vX, m", "vY", "vZ"), rows, 3), *_of_accuracy(document["accuracy_m"])]
-
-
-def _of_accuracy(accuracy: Document) -> list[str]:
     return [
-        f"{which}, {pluralize(each['points'], 'point')}: rms X {_metres(each['rms']['X'])}, "
-        f"Y {_metres(each['rms']['Y'])}, Z {_metres(each['rms']['Z'])} m; "
-        f"plan {_metres(each['plan'])}, height {_metres(each['height'])} m"
-        for which, each in accuracy.items()
+        "",
+        _table(("ground point", "role", "vX, m", "vY", "vZ"), rows, 3),
+        *_accuracy_lines(document["accuracy_m"]),
     ]
 
 
-def _of_polynomial(document: Document) -> Tables:
-    found = document["deformation"]
+def _accuracy_lines(accuracy: Document) -> list[str]:
+    return [
+        f"{points}, {pluralize(each['points'], 'point')}: rms X {_metres(each['rms']['X'])}, "
+        f"Y {_metres(each['rms']['Y'])}, Z {_metres(each['rms']['Z'])} m; "
+        f"plan {_metres(each['plan'])}, height {_metres(each['height'])} m"
+        for points, each in accuracy.items()
+    ]
+
+
+def _polynomial_tables(document: Document) -> Tables:
+    deformation = document["deformation"]
     return [
         f"Polynomials of degree {document['degree']}: "
         f"s0 in plan {document['s0_plan']:.4f} m, in height {document['s0_height']:.4f} m",
-        f"the strip's bow: {found['horizontal_sag_m']:.3f} m in plan, {found['vertical_sag_m']:.3f} m in height",
-        f"its twist: {found['twist_gon_per_km']:.5f} gon/km, scale drift {found['scale_drift_ppm_per_km']:.2f} ppm/km",
-        *_of_ground(document),
+        f"the strip's bow: {deformation['horizontal_sag_m']:.3f} m in plan, "
+        f"{deformation['vertical_sag_m']:.3f} m in height",
+        f"its twist: {deformation['twist_gon_per_km']:.5f} gon/km, "
+        f"scale drift {deformation['scale_drift_ppm_per_km']:.2f} ppm/km",
+        *_ground_tables(document),
     ]
 
 
-def _of_comparison(document: Document) -> Tables:
+def _comparison_tables(document: Document) -> Tables:
     if "compare" not in document:
         return []
-    compared = document["compare"]
-    rows: list[tuple[Any, ...]] = [(point, *each) for point, each in compared["differences"].items()]
-    rows += [(name, *compared[key].values()) for name, key in (("mean square", "rms"), ("largest", "largest"))]
+    comparison = document["compare"]
+    rows: list[tuple[Any, ...]] = [(point, *each) for point, each in comparison["differences"].items()]
+    rows += [(name, *comparison[key].values()) for name, key in (("mean square", "rms"), ("largest", "largest"))]
     return [
         "",
-        f"Computed minus given, {pluralize(compared['points'], 'point')}",
+        f"Computed minus given, {pluralize(comparison['points'], 'point')}",
         _table(("point", "dX", "dY", "dZ"), rows, 3),
     ]
 
 
-def _of_methods(rows: Sequence[Document]) -> Table:
+def _methods_table(rows: Sequence[Document]) -> Table:
     methods = list(rows[0]["values"])
     return _table(
         ("", *methods, "difference"),
@@ -271,12 +277,12 @@ def _of_methods(rows: Sequence[Document]) -> Table:
     )
 
 
-def _of_largest(compared: Document) -> list[str]:
-    each = (f"{value:.1e} {unit}".rstrip() for unit, value in compared["largest_difference"].items())
+def _largest_difference_lines(comparison: Document) -> list[str]:
+    each = (f"{value:.1e} {unit}".rstrip() for unit, value in comparison["largest_difference"].items())
     return [f"largest difference: {', '.join(each)}"]
 
 
-def _rms_of(residuals: Iterable[Sequence[float]]) -> list[float]:
+def _rms(residuals: Iterable[Sequence[float]]) -> list[float]:
     columns = list(zip(*residuals, strict=True))
     return [float((sum(v * v for v in column) / len(column)) ** 0.5) for column in columns] or [0.0] * 3
 

@@ -5,7 +5,7 @@ import click
 from a7sim.cli.lazy_group import LazyCommand, LazyGroup
 
 _COMMANDS = {
-    "list": LazyCommand("a7sim.cli.train.reports:list_", "List the exercises and how far they are done."),
+    "list": LazyCommand("a7sim.cli.train.reports:list_", "List the exercises and your progress."),
     "start": LazyCommand("a7sim.cli.train.start:start_", "Start an exercise: console, script or client."),
     "hint": LazyCommand("a7sim.cli.train.attempt:hint_", "Give the next hint, which costs points."),
     "answer": LazyCommand("a7sim.cli.train.attempt:answer_", "Give the requested answers."),

@@ -31,8 +31,8 @@ def hint_(exercise: str | None, as_document: bool, home: Path | None, student: s
         number, hint = progress.next_hint(attempt, find_exercise(attempt.exercise).exercise)
         write_hint(attempt.folder, number, hint.cost)
     if as_document:
-        told = {"exercise": attempt.exercise, "hint": number, "cost": hint.cost, "text": hint.text}
-        click.echo(as_json(document_header("train hint") | told), nl=False)
+        document = {"exercise": attempt.exercise, "hint": number, "cost": hint.cost, "text": hint.text}
+        click.echo(as_json(document_header("train hint") | document), nl=False)
     else:
         click.echo(f"hint {number} (-{pluralize(hint.cost, 'point')}): {hint.text}")
 
@@ -43,7 +43,7 @@ def hint_(exercise: str | None, as_document: bool, home: Path | None, student: s
     "--exercise",
     metavar="EXERCISE",
     shell_complete=exercise_argument,
-    help="Of which exercise  [default: the last one started]",
+    help="Exercise of the answers  [default: the last one started]",
 )
 @options.as_document
 @student_options
@@ -58,16 +58,16 @@ def answer_(
         attempt = last_attempt(progress, student_name(student), exercise)
     if attempt.closed:
         raise A7SimError(f"{attempt.exercise}: expected an attempt that is open, got one that is closed")
-    asked = find_exercise(attempt.exercise).exercise.answers
+    expected_answers = find_exercise(attempt.exercise).exercise.answers
     for word in answers:
         given = parse_answers([word])
-        if not given or next(iter(given)) not in asked:
-            known = ", ".join(f"{key}=... ({about})" for key, about in asked.items()) or "no answers at all"
+        if not given or next(iter(given)) not in expected_answers:
+            known = ", ".join(f"{key}=... ({about})" for key, about in expected_answers.items()) or "no answers"
             raise A7SimError(f"{attempt.exercise}: expected {known}, got {word!r}")
     written = write_answers(attempt.folder, parse_answers(answers))
     if as_document:
-        told = {"exercise": attempt.exercise, "answers": dict(written)}
-        click.echo(as_json(document_header("train answer") | told), nl=False)
+        document = {"exercise": attempt.exercise, "answers": dict(written)}
+        click.echo(as_json(document_header("train answer") | document), nl=False)
     else:
         click.echo(", ".join(f"{key}={value}" for key, value in written.items()))
 

@@ -19,27 +19,25 @@ EXIT_FAULTY = 1
 @click.argument("exercises", nargs=-1, metavar="[EXERCISE]...", shell_complete=exercise_argument)
 @options.as_document
 def check_(exercises: tuple[str, ...], as_document: bool) -> None:
-    """Check that exercises are consistent:
-
-    the reference passes, each faulty run fails for its reason, each criterion counts.
+    """Check exercises: the reference passes, each faulty run fails for its reason, each criterion counts.
 
     All that come with a7sim, or the named ones. Exit code 1 if one is not consistent.
 
     Example: a7sim train check-exercise 4 my-exercises/20-clouds
     """
-    found = [check_exercise(each) for each in (map(find_exercise, exercises) if exercises else all_exercises())]
+    checks = [check_exercise(each) for each in (map(find_exercise, exercises) if exercises else all_exercises())]
     if as_document:
-        told = [{"exercise": each.name, "faults": list(each.faults)} for each in found]
-        click.echo(as_json(document_header("train check") | {"exercises": told}), nl=False)
+        documents = [{"exercise": each.name, "faults": list(each.faults)} for each in checks]
+        click.echo(as_json(document_header("train check") | {"exercises": documents}), nl=False)
     else:
-        for each in found:
+        for each in checks:
             points = (
                 "" if each.reference_points is None else f" (reference {pluralize(each.reference_points, 'point')})"
             )
             click.echo(f"{each.name}: {'holds' if not each.faults else f'{len(each.faults)} to mend'}{points}")
             for fault in each.faults:
                 click.echo(f"  {fault}")
-    if any(each.faults for each in found):
+    if any(each.faults for each in checks):
         raise click.exceptions.Exit(EXIT_FAULTY)
 
 

@@ -30,9 +30,9 @@ EXIT_PASSED, EXIT_NOT_PASSED = 0, 1
     type=click.Path(path_type=Path, file_okay=False, exists=True),
     metavar="DIR",
     multiple=True,
-    help="Grade the attempts handed in as a folder, or in its folders; nothing is recorded. May be repeated.",
+    help="Grade the attempts submitted in a folder or its subfolders; nothing is recorded. Repeatable.",
 )
-@options.seed("that of each attempt handed in")
+@options.seed("that of each submitted attempt")
 @options.as_document
 @student_options
 def grade_(
@@ -48,16 +48,18 @@ def grade_(
     Example: a7sim train grade 4
     """
     if folders:
-        raise click.exceptions.Exit(_tell_of_many(grade_submissions(find_submissions(folders), seed), as_document))
+        raise click.exceptions.Exit(
+            _report_submissions(grade_submissions(find_submissions(folders), seed), as_document)
+        )
     with progress_in(home) as progress:
         attempt = last_attempt(progress, student_name(student), exercise)
-        given = progress.first_grade(attempt) if attempt.mode == EXAM else None
+        exam_grade = progress.first_grade(attempt) if attempt.mode == EXAM else None
         try:
-            grade = given or _graded(progress, attempt)
+            grade = exam_grade or _grade_attempt(progress, attempt)
         except UnreliableJournalError as unreliable:
             click.echo(f"a7sim: {unreliable}", err=True)
             raise click.exceptions.Exit(EXIT_DIFFERS) from unreliable
-        if given is None:
+        if exam_grade is None:
             progress.record_grade(attempt, grade)
     if as_document:
         click.echo(as_json(document_header("train verify") | msgspec.to_builtins(grade)), nl=False)
@@ -66,23 +68,23 @@ def grade_(
     raise click.exceptions.Exit(EXIT_PASSED if grade.passed else EXIT_NOT_PASSED)
 
 
-def _tell_of_many(handed_in: list[Submission], as_document: bool) -> int:
+def _report_submissions(submissions: list[Submission], as_document: bool) -> int:
     """Print the results of attempts that were handed in; return the exit code."""
     if as_document:
-        documents = [msgspec.to_builtins(each) for each in handed_in]
+        documents = [msgspec.to_builtins(each) for each in submissions]
         click.echo(as_json(document_header("train verify") | {"handed_in": documents}), nl=False)
-    for each in handed_in:
+    for each in submissions:
         if each.grade is None:
             click.echo(f"a7sim: {each.error}", err=True)
         elif not as_document:
             click.echo(f"{each.folder}: {each.student}")
             click.echo("\n".join(grade_lines(each.grade)))
-    if any(each.grade is None for each in handed_in):
+    if any(each.grade is None for each in submissions):
         return EXIT_DIFFERS
-    return EXIT_PASSED if all(each.grade and each.grade.passed for each in handed_in) else EXIT_NOT_PASSED
+    return EXIT_PASSED if all(each.grade and each.grade.passed for each in submissions) else EXIT_NOT_PASSED
 
 
-def _graded(progress: Progress, attempt: Attempt) -> Grade:
+def _grade_attempt(progress: Progress, attempt: Attempt) -> Grade:
     return grade_folder(find_exercise(attempt.exercise), attempt.seed, attempt.folder, progress.hints_taken(attempt))
 
 
@@ -94,7 +96,7 @@ def _graded(progress: Progress, attempt: Attempt) -> Grade:
     default=1.0,
     show_default=True,
     metavar="SECONDS",
-    help="How often it is looked whether the journal has grown.",
+    help="Interval between looks at the journal.",
 )
 @student_options
 def watch_(exercise: str | None, every: float, home: Path | None, student: str | None) -> None:
@@ -106,12 +108,12 @@ def watch_(exercise: str | None, every: float, home: Path | None, student: str |
         attempt = last_attempt(progress, student_name(student), exercise)
         if attempt.mode == EXAM:
             raise A7SimError(f"{attempt.exercise}: expected an attempt for practice, got an exam")
-        seen: tuple[int, ...] = ()
+        last_sizes: tuple[int, ...] = ()
         while True:
-            now = _sizes(attempt)
-            if now != seen:
-                seen = now
-                grade = _graded(progress, attempt)
+            sizes = _sizes(attempt)
+            if sizes != last_sizes:
+                last_sizes = sizes
+                grade = _grade_attempt(progress, attempt)
                 click.clear()
                 click.echo("\n".join(grade_lines(grade)))
                 if grade.passed:

@@ -37,11 +37,11 @@ def open_console(environment: AttemptEnvironment, checklist: Checklist, plain: b
     from a7sim.console.keymap import default_keymap, load_keymap
 
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        raise A7SimError("start: expected a terminal to sit at, got a file or a pipe (--script and --link need none)")
-    began, clock, so_far = time.monotonic(), environment.clock, environment.clock.now
+        raise A7SimError("start: expected a terminal, got a file or a pipe (--script and --link need none)")
+    began, clock, start_time = time.monotonic(), environment.clock, environment.clock.now
 
-    def at_the_instrument() -> float:
-        clock.advance_to(so_far + time.monotonic() - began)
+    def advance_clock() -> float:
+        clock.advance_to(start_time + time.monotonic() - began)
         return clock.now
 
     own_keys = data_folder() / KEYMAP
@@ -49,7 +49,7 @@ def open_console(environment: AttemptEnvironment, checklist: Checklist, plain: b
     Console(
         ConsoleConfig(
             lambda: Client(InProcessSerial(instrument=environment.instrument, clock=clock, timeout=TIMEOUT_S)),
-            at_the_instrument,
+            advance_clock,
             where=title,
             sheet=JobSheet(title, environment.scenario.camera),
             keymap=load_keymap(own_keys) if own_keys.exists() else default_keymap(),
@@ -57,15 +57,15 @@ def open_console(environment: AttemptEnvironment, checklist: Checklist, plain: b
             theme="contrast" if plain else "enamel",
             tasks=checklist.lines,
             exercise_goal=fill(" ".join(checklist.exercise.goal.split()), GOAL_WIDTH),
-            history=lambda: [LoggedLine(each.text, each.dir == "<") for each in _past(checklist)],
+            history=lambda: [LoggedLine(each.text, each.dir == "<") for each in _history(checklist)],
         )
     ).run()
 
 
-def _past(checklist: Checklist) -> Iterator[Event]:
+def _history(checklist: Checklist) -> Iterator[Event]:
     """Yield the lines and replies of an attempt so far, without its opening."""
-    there = read_journal(checklist.attempt.folder / JOURNAL)
-    for number in range(2, len(there) + 1):
-        event = there.event(number)
+    journal = read_journal(checklist.attempt.folder / JOURNAL)
+    for number in range(2, len(journal) + 1):
+        event = journal.event(number)
         if event.dir in ("<", ">") and event.client != OPENING:
             yield event

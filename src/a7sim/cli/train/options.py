@@ -27,7 +27,7 @@ _STUDENT = click.option(
     "--student",
     metavar="NAME",
     envvar=STUDENT_VARIABLE,
-    help=f"Whose progress; also {STUDENT_VARIABLE}  [default: who is logged in]",
+    help=f"Name of the student; also {STUDENT_VARIABLE}  [default: the user logged in]",
 )
 
 student_options = combine_options(_HOME, _STUDENT)

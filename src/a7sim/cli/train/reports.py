@@ -30,7 +30,10 @@ def list_(exercise: str | None, as_document: bool, home: Path | None, student: s
     """
     if exercise is not None:
         exercise_folder = find_exercise(exercise)
-        click.echo(as_json(_of_exercise(exercise_folder)) if as_document else f"{_shown(exercise_folder)}\n", nl=False)
+        click.echo(
+            as_json(_exercise_document(exercise_folder)) if as_document else f"{_exercise_text(exercise_folder)}\n",
+            nl=False,
+        )
         return
     name = student_name(student)
     with progress_in(home) as progress:
@@ -38,23 +41,23 @@ def list_(exercise: str | None, as_document: bool, home: Path | None, student: s
         attempts = progress.attempts(name)
     rows = []
     for exercise_folder in all_exercises():
-        mine = [each for each in attempts if each.exercise == exercise_folder.name]
+        tried = [each for each in attempts if each.exercise == exercise_folder.name]
         grade = best.get((name, exercise_folder.name))
-        state = "passed" if grade and grade.grade.passed else "under way" if mine and not mine[-1].closed else ""
+        state = "passed" if grade and grade.grade.passed else "under way" if tried and not tried[-1].closed else ""
         points = grade.grade.points if grade else None
-        rows.append((exercise_folder.exercise.number, exercise_folder.exercise.title, state, points, len(mine)))
+        rows.append((exercise_folder.exercise.number, exercise_folder.exercise.title, state, points, len(tried)))
     if as_document:
         keys = ("number", "title", "state", "points", "attempts")
         exercises = [dict(zip(keys, row, strict=True)) for row in rows]
         click.echo(as_json(document_header("train list") | {"student": name, "exercises": exercises}), nl=False)
         return
     table = text_table("", "exercise", "state", "points", "attempts", left=(1, 2), fold=(1,))
-    for number, title, state, points, tries in rows:
-        table.add_row(str(number), title, state, "" if points is None else f"{points:g}", str(tries or ""))
+    for number, title, state, points, count in rows:
+        table.add_row(str(number), title, state, "" if points is None else f"{points:g}", str(count or ""))
     Console().print(table)
 
 
-def _of_exercise(exercise_folder: ExerciseFolder) -> Document:
+def _exercise_document(exercise_folder: ExerciseFolder) -> Document:
     exercise = exercise_folder.exercise
     return document_header("train list") | {
         "exercise": exercise_folder.name,
@@ -69,7 +72,7 @@ def _of_exercise(exercise_folder: ExerciseFolder) -> Document:
     }
 
 
-def _shown(exercise_folder: ExerciseFolder) -> str:
+def _exercise_text(exercise_folder: ExerciseFolder) -> str:
     exercise = exercise_folder.exercise
     steps = [f"  - {each.text}" for each in exercise.steps]
     criteria = [f"  {each.weight:4g}  {each.title}" for each in exercise.criteria]
@@ -82,11 +85,11 @@ def _shown(exercise_folder: ExerciseFolder) -> str:
 @click.option("--class", "whole_class", is_flag=True, help="All students instead of one.")
 @click.option(
     "--format",
-    "to",
+    "file_format",
     type=click.Choice(["html", "csv", "json", "xapi"]),
     default="html",
     show_default=True,
-    help="A page, nbgrader's table, a document, or statements for a learning record store.",
+    help="HTML page, nbgrader table, JSON document, or xAPI statements for a learning record store.",
 )
 @options.out_file("the page", "standard output")
 @click.option(
@@ -98,30 +101,28 @@ def _shown(exercise_folder: ExerciseFolder) -> str:
 )
 @student_options
 def report_(
-    whole_class: bool, to: str, out: Path | None, home_page: str, home: Path | None, student: str | None
+    whole_class: bool, file_format: str, out: Path | None, home_page: str, home: Path | None, student: str | None
 ) -> None:
     """Write the page of a student or of the class: HTML with figures, CSV as nbgrader's, JSON, or xAPI statements.
 
     Example: a7sim train report --class --format html --out class.html
     """
-    whose = None if whole_class else student_name(student)
+    name = None if whole_class else student_name(student)
     with progress_in(home) as progress:
-        graded, best, attempts = progress.grades(whose), progress.best(whose), progress.attempts(whose)
+        graded, best, attempts = progress.grades(name), progress.best(name), progress.attempts(name)
     if not attempts:
-        raise A7SimError(f"{f'student {whose}' if whose else 'the class'}: expected attempts to report on, found none")
-    if to == "csv":
+        raise A7SimError(f"{f'student {name}' if name else 'the class'}: expected attempts to report on, found none")
+    if file_format == "csv":
         text = to_nbgrader(best)
-    elif to == "json":
+    elif file_format == "json":
         text = as_json(to_class_document(graded, best, attempts))
-    elif to == "xapi":
+    elif file_format == "xapi":
         text = to_xapi(graded, home_page)
     else:
         from a7sim.training.html_sheets import class_sheet, student_sheet  # only pages need figures
 
         catalogue = all_exercises()
-        text = (
-            class_sheet(catalogue, best, attempts) if whose is None else student_sheet(whose, catalogue, best, graded)
-        )
+        text = class_sheet(catalogue, best, attempts) if name is None else student_sheet(name, catalogue, best, graded)
     if out is None:
         click.echo(text, nl=False)
     else:

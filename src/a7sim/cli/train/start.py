@@ -39,7 +39,7 @@ EXAMINATION = "exam"
     is_flag=True,
     help="No hints and no ticks, one grading, another seed. Without EXERCISE, the examination.",
 )
-@click.option("--new", "anew", is_flag=True, help="Start a new attempt; a present one is closed and kept.")
+@click.option("--new", is_flag=True, help="Start a new attempt; a present one is closed and kept.")
 @options.seed("your own")
 @click.option("--script", type=options.FILE, help="Run a script (.a7s).")
 @click.option("--link", metavar="tcp://HOST:PORT", help="Serve it at this address instead of opening the console.")
@@ -49,7 +49,7 @@ EXAMINATION = "exam"
 def start_(
     exercise: str | None,
     exam: bool,
-    anew: bool,
+    new: bool,
     seed: int | None,
     script: Path | None,
     link: str | None,
@@ -69,16 +69,16 @@ def start_(
     if sum((script is not None, link is not None, serves)) > 1:
         raise A7SimError("train start: expected one of --script, --link and --serve, got several")
     address = _address(link) if link is not None else DEFAULT_ADDRESS if serves else None
-    played = read_script(script) if script is not None else None
+    statements = read_script(script) if script is not None else None
     exercise_folder = find_exercise(exercise or EXAMINATION)
     with progress_in(home) as progress:
-        attempt = _attempt(progress, exercise_folder, student_name(student), EXAM if exam else PRACTICE, anew, seed)
-    with _entered(exercise_folder, attempt) as environment:
+        attempt = _attempt(progress, exercise_folder, student_name(student), EXAM if exam else PRACTICE, new, seed)
+    with _environment(exercise_folder, attempt) as environment:
         checklist = Checklist(environment, attempt)
-        if exercise_folder.exercise.paper and played is None:
-            _tell_of_papers(checklist)
-        elif played is not None:
-            error = play_script(environment, played)
+        if exercise_folder.exercise.paper and statements is None:
+            _print_paper_exercise(checklist)
+        elif statements is not None:
+            error = play_script(environment, statements)
             click.echo("\n".join(checklist.lines()))
             if error:
                 raise A7SimError(error)
@@ -87,24 +87,24 @@ def start_(
             _serve(environment, address)
         else:
             open_console(environment, checklist, plain)
-    click.echo(f"a7sim train grade {exercise_folder.exercise.number} grades it; a7sim train start resumes it")
+    click.echo(f"a7sim train grade {exercise_folder.exercise.number} grades the attempt; a7sim train start resumes it")
 
 
 def _attempt(
-    progress: Progress, exercise_folder: ExerciseFolder, student: str, mode: str, anew: bool, seed: int | None
+    progress: Progress, exercise_folder: ExerciseFolder, student: str, mode: str, new: bool, seed: int | None
 ) -> Attempt:
-    there = progress.open_attempt(student, exercise_folder.name)
-    if there is not None and not anew:
-        if there.mode == mode and seed in (None, there.seed):
-            return there
-        if there.mode == EXAM:
+    open_attempt = progress.open_attempt(student, exercise_folder.name)
+    if open_attempt is not None and not new:
+        if open_attempt.mode == mode and seed in (None, open_attempt.seed):
+            return open_attempt
+        if open_attempt.mode == EXAM:
             raise A7SimError(
                 f"{exercise_folder.name}: expected --exam, because an exam is open (grade ends it, --new closes it)"
             )
     return progress.begin(student, exercise_folder, mode, seed)
 
 
-def _entered(exercise_folder: ExerciseFolder, attempt: Attempt) -> AbstractContextManager[AttemptEnvironment]:
+def _environment(exercise_folder: ExerciseFolder, attempt: Attempt) -> AbstractContextManager[AttemptEnvironment]:
     journal = attempt.folder / JOURNAL
     if journal.exists() and b"\n" in journal.read_bytes():
         return resume_attempt(exercise_folder, attempt.seed, attempt.folder)
@@ -115,22 +115,22 @@ def _address(text: str) -> Address:
     url = re.fullmatch("tcp:(//)?(?P<address>.+)", text)
     if not url:
         raise A7SimError(f"--link: expected tcp://HOST:PORT, got {text!r}")
-    found = parse_address(url["address"], "--link")
-    if not found.loopback:
+    parsed = parse_address(url["address"], "--link")
+    if not parsed.loopback:
         raise A7SimError(f"--link {text}: expected an address of this machine alone")
-    return found
+    return parsed
 
 
-def _tell_of_papers(checklist: Checklist) -> None:
+def _print_paper_exercise(checklist: Checklist) -> None:
     click.echo("\n".join([*checklist.lines(), "", checklist.environment.exercise_folder.text.strip(), ""]))
     for key, about in checklist.exercise.answers.items():
         click.echo(f"a7sim train answer {key}=...   {about}")
 
 
 def _serve(environment: AttemptEnvironment, address: Address) -> None:
-    first = document_header("train start") | {
+    head = document_header("train start") | {
         "scenario": environment.exercise_folder.exercise.title,
         "variant": environment.scenario.instrument.variant,
     }
-    served = ServedInstrument(first, environment.instrument, environment.clock, Journal())
-    run(serve(served, Endpoints([address]), ServerLimits(), StartupMessages(first, as_document=False, quiet=False)))
+    instrument = ServedInstrument(head, environment.instrument, environment.clock, Journal())
+    run(serve(instrument, Endpoints([address]), ServerLimits(), StartupMessages(head, as_document=False, quiet=False)))
