@@ -1,4 +1,4 @@
-"""Some among many: arrays whose last axis are all sessions of a crowd, or all instruments of a fleet."""
+"""Batch arrays: the last axis contains all sessions of a batch, and `active` selects some of them."""
 
 from typing import TypeVar
 
@@ -6,14 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 Indices = npt.NDArray[np.intp]
-"""Indices ``(m,)`` of those that are meant, ascending, each once: as many as there are mean everybody."""
+"""Sorted unique indices ``(m,)`` into the batch axis. If m equals the batch size, all sessions are selected."""
 
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def exclude(active: Indices, others: Indices) -> Indices:
-    """Return those of some that are not among others, in their order."""
+    """Return the indices of `active` that are not in `others`, in order."""
     if not active.size or not others.size:
         return active
     stays = np.ones(max(int(active.max()), int(others.max())) + 1, dtype=bool)
@@ -22,15 +22,15 @@ def exclude(active: Indices, others: Indices) -> Indices:
 
 
 def take(values: npt.NDArray[Scalar], active: Indices) -> npt.NDArray[Scalar]:
-    """Return the values ``(..., m)`` of some among those ``(..., all)``, to be read at once and not written to.
+    """Return the values ``(..., m)`` of the active sessions from ``(..., all)``, read-only.
 
-    They are laid out as these, where indexing transposes; everybody's are not copied.
+    The memory layout is that of `values`, where indexing would transpose it; if all are active nothing is copied.
     """
     return values if active.size == values.shape[-1] else values.take(active, axis=-1)
 
 
 def put(values: npt.NDArray[np.float64], active: Indices, into: npt.NDArray[np.float64]) -> None:
-    """Put values ``(m,)`` or ``(k, m)`` of some among those ``(all,)`` or ``(k, all)`` of all."""
+    """Write values ``(m,)`` or ``(k, m)`` of the active sessions into arrays ``(all,)`` or ``(k, all)``."""
     if active.size == into.shape[-1]:
         into[...] = values
     elif into.ndim == 1:
@@ -41,7 +41,7 @@ def put(values: npt.NDArray[np.float64], active: Indices, into: npt.NDArray[np.f
 
 
 def add_at(amount: float, active: Indices, to: npt.NDArray[np.float64]) -> None:
-    """Add an amount to the values of some among those ``(all,)`` of all."""
+    """Add an amount to the values of the active sessions in an array ``(all,)``."""
     if active.size == to.size:
         to += amount
     else:

@@ -1,4 +1,4 @@
-"""The operator: a person who works the instrument through its line and knows only what can be seen and read."""
+"""The virtual operator, who operates the instrument over its link and has no information but views and readings."""
 
 from a7sim.operator.driving.job import Job, ModelJob
 from a7sim.operator.people.person import OperatorGaveUp, Person

@@ -1,4 +1,4 @@
-"""Hands of a crowd: on instruments held as arrays, numbers crossing as the command language would print them."""
+"""Driver of a batch of instruments as arrays; numbers are rounded as the command language prints them."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,7 +12,7 @@ from a7sim.operator.driving.driver import BoolArray
 
 
 class BatchDriver:
-    """`Hands` on a fleet: numbers cross as the command language would print them."""
+    """`InstrumentDriver` of an `AutographBatch`; numbers are rounded as the command language prints them."""
 
     def __init__(self, batch: AutographBatch) -> None:
         self._batch = batch
@@ -97,10 +97,10 @@ class BatchDriver:
         return self._batch.both_eyepieces(active, point).round(2)
 
     def record(self, active: Indices, point: str) -> None:
-        """Nobody keeps what a crowd registers."""
+        """Do nothing: a batch has no recorder."""
 
     def note(self, active: Indices, text: str) -> None:
-        """Nobody keeps what a crowd notes."""
+        """Do nothing: a batch has no journal."""
 
     def pop_errors(self, active: Indices) -> dict[int, list[str]]:
         return self._batch.pop_errors(active)

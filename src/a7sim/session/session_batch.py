@@ -1,4 +1,4 @@
-"""Many sessions of a scenario at once: the operator's procedures on a fleet of instruments held as arrays."""
+"""Batch of sessions of a scenario: the operator's procedures on a batch of instruments as arrays."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from a7sim.strip_methods.strip import ground_control
 
 @dataclass(frozen=True)
 class SessionBatch:
-    """Sessions of a scenario, one a seed, ready to begin."""
+    """Sessions of a scenario, one per seed, ready to start."""
 
     scenario: Scenario
     seeds: tuple[int, ...]
@@ -31,14 +31,17 @@ class SessionBatch:
     job: Job
 
     def measure_models(self) -> Iterator[ModelRecordBatch]:
-        """Yield the models as they are done; what a session gives up for stands in `bench.crew.reasons`."""
+        """Yield the models as they are measured;
+
+        the reasons of sessions that give up are in `workstation.operators.reasons`.
+        """
         return measure_models_batch(self.workstation)
 
     def run(self, strips: bool = True, whole: bool = True) -> list[Document]:
-        """Work to the end and return a document a seed, as `run` gives it, without what is told of line and book.
+        """Run to the end and return a document per seed, as `run` does, without lines and book.
 
-        Without strips they say nothing of the strip on the ground either, which costs as much as the rest; where they
-        are not whole, of the models only what is in `of_model_in_brief`.
+        Without `strips` they do not contain the strip on the ground, which doubles the time; unless `whole`,
+        the models contain only the keys of `brief_model_document`.
         """
         found: list[list[Document]] = [[] for _ in self.seeds]
         for records in self.measure_models():
@@ -54,7 +57,7 @@ class SessionBatch:
         return [self._document(session, models, strips) for session, models in enumerate(found)]
 
     def _beside(self, records: ModelRecordBatch, truth: RelativeTruth | None) -> TruthComparison:
-        """Return the truth about a model of those who did it; their instruments stand as they left them."""
+        """Return the truth about a model of the sessions that measured it; their instruments are in the final state."""
         active, model, batch = records.sessions, records.model, self.batch
         centres = {
             hand: {
@@ -80,7 +83,7 @@ class SessionBatch:
 
 
 def open_batch(scenario: Scenario, seeds: Sequence[int]) -> SessionBatch:
-    """Return sessions of a scenario, one a seed, each to the digit what `run` gives for that seed."""
+    """Return sessions of a scenario, one per seed, each equal to the digit to `run` for that seed."""
     flight = SharedScene.of(scenario)
     scenes = tuple(flight.scene(seed) for seed in seeds)
     batch = build_batch(scenario.instrument, [scene.mountable for scene in scenes], seeds)

@@ -1,4 +1,4 @@
-"""The truth beside what the operator found. It is compared here and nowhere crosses the link."""
+"""Comparison of the operator's results with the truth, which nowhere crosses the link."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ from a7sim.plotters import Variant
 from a7sim.scene import RelativeTruth
 
 ElementValues = Mapping[str, Any]
-"""What counters show: of one session, or ``(m,)`` of many."""
+"""Counter readings of one session, or ``(m,)`` of a batch."""
 
 
 @dataclass(frozen=True)
 class RelativePose:
-    """The right-hand photograph in the left-hand one's frame: rotation ``(3, 3, ...)`` and unit base ``(3, ...)``."""
+    """Right-hand photograph in the left-hand one's frame: rotation ``(3, 3, ...)`` and unit base ``(3, ...)``."""
 
     rotation: Array
     base: Array
 
     @classmethod
     def from_counters(cls, elements: ElementValues, model: ModelJob, variant: Variant) -> "RelativePose":
-        """Return the relative orientation that the counters ``(...)`` of a model describe."""
+        """Return the relative orientation described by the counters ``(...)`` of a model."""
         left, right = model.left_projector, model.right_projector
 
         def turned(n: int) -> Array:
@@ -40,11 +40,11 @@ class RelativePose:
         return cls(truth.rotation, truth.base / length_of(truth.base))
 
     def batch(self) -> "RelativePose":
-        """Return the same for any number of sessions, with an axis of theirs at the end."""
+        """Return the same for any number of sessions, with a batch axis at the end."""
         return RelativePose(self.rotation[..., None], self.base[..., None])
 
     def differences_gon(self, other: "RelativePose") -> tuple[Array, Array]:
-        """Return by what angles ``(...)`` the rotations and the bases differ."""
+        """Return the angles ``(...)`` between the rotations and between the bases."""
         turn = turn_of(mxm(transposed(self.rotation), other.rotation))
         return turn / GON, angle_between(self.base, other.base) / GON
 
@@ -52,11 +52,11 @@ class RelativePose:
 def true_elements(
     truth: RelativePose, method: str, elements: ElementValues, model: ModelJob, variant: Variant
 ) -> dict[str, Array]:
-    """Return what the counters ``(m,)`` of the elements that a method turns would show if the truth were set.
+    """Return the counter readings ``(m,)`` of the elements that a method turns if the truth were set.
 
-    The other elements stay as they are. Independent: the left-hand camera brings the true base onto the set one and
-    is turned about it until omega" shows what it shows. Dependent: the left-hand camera stays, the right-hand one and
-    its by and bz follow.
+    The other elements keep their readings. Independent: the left-hand camera is rotated from the set base to the true
+    one, and about it until omega" has its reading. Dependent: the left-hand camera stays, the right-hand one and its by
+    and bz follow.
     """
     left, right = model.left_projector, model.right_projector
     set_base = _base_of(elements, model)
@@ -95,7 +95,7 @@ def _base_of(elements: ElementValues, model: ModelJob) -> Array:
 
 
 def _about(axis: Array, angle: Array) -> Array:
-    """Return the rotations ``(3, 3, m)`` through angles about axes ``(3, m)`` (Rodrigues); none about no axis."""
+    """Return the rotations ``(3, 3, m)`` by angles about axes ``(3, m)`` (Rodrigues); none about a zero axis."""
     length = length_of(axis)
     x, y, z = axis / np.where(length > 0.0, length, 1.0)
     zero = np.zeros_like(x)
@@ -104,33 +104,33 @@ def _about(axis: Array, angle: Array) -> Array:
 
 
 def _laid_onto(vector: Array, other: Array) -> Array:
-    """Return the smallest rotations ``(3, 3, m)`` that bring vectors into the direction of others."""
+    """Return the smallest rotations ``(3, 3, m)`` that turn vectors into the direction of others."""
     return _about(np.cross(vector, other, axis=0), angle_between(vector, other))
 
 
 @dataclass(frozen=True)
 class RelativeComparison:
-    """The true relative orientation of m sessions beside that which their counters describe."""
+    """True relative orientation of m sessions compared with that of their counters."""
 
     source: str
     true: RelativePose
     """One for all."""
     found: RelativePose
     rotation_gon: Array
-    """By what angles ``(m,)`` the rotations differ."""
+    """Angles ``(m,)`` between the rotations."""
     base_gon: Array
     elements: Mapping[str, Array]
-    """What the counters ``(m,)`` would show if the truth were set."""
+    """Counter readings ``(m,)`` if the truth were set."""
 
 
 @dataclass(frozen=True)
 class TruthComparison:
-    """The truth about a model in m sessions; arrays have the sessions last."""
+    """Truth about a model in m sessions; the last axis of arrays contains the sessions."""
 
     centres: Mapping[int, Mapping[str, Array]]
-    """Where the centres really stand ``(m,)``, in counter units, by hand (1 left, 2 right)."""
+    """True centres ``(m,)``, in counter units, by side (1 left, 2 right)."""
     relative: RelativeComparison | None
-    """None where no truth is known."""
+    """None if no truth is known."""
 
     @classmethod
     def of(
@@ -142,7 +142,7 @@ class TruthComparison:
         model: ModelJob,
         variant: Variant,
     ) -> "TruthComparison":
-        """Return the truth beside the elements ``(m,)`` of sessions that turned them by a method."""
+        """Return the truth for the elements ``(m,)`` of sessions that turned them by a method."""
         if truth is None:
             return cls(centres, None)
         true, found = RelativePose.from_truth(truth), RelativePose.from_counters(elements, model, variant)
@@ -151,7 +151,7 @@ class TruthComparison:
 
     @classmethod
     def from_record(cls, record: ModelRecord, standing: "TruePose", truth: RelativeTruth | None) -> "TruthComparison":
-        """Return the truth about one session, whose instrument stands as the operator left it."""
+        """Return the truth about one session, with its instrument in the final state."""
         model = record.model
         centres = {
             hand: {name: np.array([value]) for name, value in true_centre(standing, projector).items()}
@@ -162,7 +162,7 @@ class TruthComparison:
 
 
 class TruePose(Protocol):
-    """An instrument as the truth sees it: where its projectors and its mark really stand."""
+    """True state of an instrument: poses of its projectors and position of its mark."""
 
     variant: Variant
 
@@ -170,11 +170,11 @@ class TruePose(Protocol):
         """Return centre ``(3,)`` in mm and rotation ``(3, 3)`` of a projector."""
 
     def readings_at(self, place: Array) -> dict[str, float]:
-        """Return what the counters would show, unrounded, with the mark at a place ``(3,)``."""
+        """Return the counter readings, unrounded, with the mark at a position ``(3,)``."""
 
 
 def true_centre(autograph: TruePose, projector: int) -> dict[str, float]:
-    """Return where a projection centre really stands, in counter units."""
+    """Return the true position of a projection centre, in counter units."""
     centre, _ = autograph.pose(projector)
     readings = autograph.readings_at(centre)
     return {f"{axis}0": readings[axis] for axis in "XYZ"}

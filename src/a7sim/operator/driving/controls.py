@@ -1,4 +1,4 @@
-"""The chair at the instrument: elements, counters and carriages, and where the mark is by what they show."""
+"""Controls of the instruments: elements, counters and carriages, and the position of the mark by their readings."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,20 +12,19 @@ from a7sim.operator.people.operator_batch import OperatorBatch
 from a7sim.plotters import LEAST_COUNT, VARIANTS, Variant
 
 STEADY = ("kappa1", "kappa2", "by1", "by2", "bx")
-"""Elements on which the places of images depend to first order."""
+"""Elements on which the positions of images depend to first order."""
 
 ROUNDED_AWAY = 0.51
-"""Of a count: by no more can a counter and the drum beneath it differ."""
+"""Maximum difference of a counter and the drum beneath it, in counts."""
 
 TURNED_DECIMALS = 5
-"""With which a drum is turned."""
+"""Decimals of drum turns."""
 
 
 class Controls:
-    """The hands of a crew on their instruments. Lengths in mm at instrument scale, readings as counters show them.
+    """Controls of a batch of instruments. Lengths in mm at instrument scale, readings as counters show them.
 
-    Arrays have the sessions as their last axis: all of them in what is kept here, those that act in what is handed
-    over.
+    The last axis of stored arrays contains all sessions, the last axis of parameters the active sessions.
     """
 
     def __init__(self, operators: OperatorBatch, driver: InstrumentDriver, job: Job) -> None:
@@ -35,19 +34,19 @@ class Controls:
         self.model: ModelJob
         self.manual: Variant = VARIANTS["A7"]
         self.units_per_mm = 1.0
-        """Of the Z counter."""
+        """Units of the Z counter."""
         self.z = np.zeros(operators.size)
-        """How far the mark stood below the base line when the counters were last read."""
+        """Depth of the mark below the base line at the last reading of the counters."""
         self.c = job.certificate.c
         self._plane = _by_dimensions(np.ones(2))
-        """Units of the X and Y counters a mm."""
+        """Units of the X and Y counters per mm."""
         self._settings = {name: np.zeros(operators.size) for name in STEADY}
         self._left_at: dict[str, Array] = {}
-        """Where drums were left by these hands ``(sessions,)``, between two counts too; nan where that is not known."""
+        """Drum positions set by this object ``(sessions,)``, between two counts too; nan if unknown."""
         self._offset = np.zeros((3, operators.size))
 
     def prepare(self, active: Indices) -> None:
-        """Bring the instruments to their zeros, engage the gears, set base and projection height."""
+        """Move the instruments to their zeros, engage the gears, set base and projection height."""
         plan, driver = self.job.plan, self.driver
         gear = self._learn_manual()
         driver.set_height_gear(active, 1.0, plan.plan_gear)
@@ -64,13 +63,13 @@ class Controls:
         self._offset[2, active] = driver.counter(active, "Z") - self.units_per_mm * height
 
     def take_over(self, active: Indices) -> None:
-        """Sit down at instruments that somebody else has prepared by the job sheet, their counters not yet preset."""
+        """Take over instruments that are prepared by the job sheet, with counters not yet preset."""
         self._learn_manual()
         self._left_at.clear()
         self._count_from_origin(active, "XYZ")
 
     def _learn_manual(self) -> str | float:
-        """Read up on the plotter; return the height gear that the job sheet asks for."""
+        """Read the data of the plotter; return the height gear of the job sheet."""
         gear = self.job.plan.height_gear
         self.manual = VARIANTS[self.driver.variant()]
         self.units_per_mm = self.manual.height_gears[gear].units_per_mm if isinstance(gear, str) else gear
@@ -82,12 +81,12 @@ class Controls:
             self._offset["XYZ".index(axis), active] = self.manual.scales[axis].at_origin
 
     def begin(self, active: Indices, model: ModelJob) -> None:
-        """Take up a model whose pictures are mounted."""
+        """Start a model whose pictures are mounted."""
         self.model = model
         self.read_settings(active)
 
     def preset(self, active: Indices, readings: tuple[float, float, float]) -> None:
-        """Make the counters that can be preset show these readings where the mark stands."""
+        """Preset the counters that can be preset to these readings at the mark."""
         wanted = {a: reading for a, reading in zip("XYZ", readings, strict=True) if self.manual.scales[a].preset}
         before = self.driver.counters(active)
         self.spend_setting(active)
@@ -97,7 +96,7 @@ class Controls:
             self._offset["XYZ".index(axis), active] += reading - before["XYZ".index(axis)]
 
     def shift_counter(self, active: Indices, axis: str, by: Array) -> Array:
-        """Make a counter read so much more ``(m,)``, its carriage on a full count; return by how much it does."""
+        """Change a counter reading by an amount ``(m,)``, the carriage on a full count; return the actual change."""
         self.drive(active, {axis: self.driver.counter(active, axis)})
         before = self.driver.counter(active, axis)
         self.spend_setting(active)
@@ -108,7 +107,7 @@ class Controls:
         return np.asarray(more)
 
     def set_height_gear(self, active: Indices, gear: str | float) -> None:
-        """Engage a height gear; the Z counter goes on from what it shows, the carriage standing on a full count."""
+        """Engage a height gear; the Z counter continues from its reading, the carriage on a full count."""
         self.drive(active, {"Z": self.driver.counter(active, "Z")})
         height = (self.driver.counter(active, "Z") - self._offset[2, active]) / self.units_per_mm
         self.spend_setting(active)
@@ -118,19 +117,22 @@ class Controls:
         self._offset[2, active] = self.driver.counter(active, "Z") - self.units_per_mm * height
 
     def spend_setting(self, active: Indices, times: int = 1) -> None:
-        """Let the time of setting something go by."""
+        """Add the duration of a setting."""
         self.operators.spend(active, times * self.operators.observer.seconds_to_set, "setting")
 
     # --- elements -------------------------------------------------------------------------------------
 
     def elements(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
-        """Read the counters of elements ``(m,)``; one that the instrument has not stands at nothing."""
+        """Read the counters of elements ``(m,)``; an element that the instrument does not have reads zero."""
         there = [name for name in names if name in self.manual.elements]
         seen = self.driver.elements(active, there) if there else {}
         return {name: seen.get(name, np.zeros(active.size)) for name in names}
 
     def elements_from_zero(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
-        """Read the counters of elements ``(m,)`` from their zeros; one that the instrument has not stands there."""
+        """Read the counters of elements ``(m,)`` from their zeros;
+
+        an element that the instrument does not have reads zero.
+        """
         return {
             name: counts - (self.manual.elements[name].zero if name in self.manual.elements else 0.0)
             for name, counts in self.elements(active, names).items()
@@ -138,11 +140,11 @@ class Controls:
 
     @property
     def has_parallax_elements(self) -> bool:
-        """Whether y-parallaxes can be measured: with by' and by", which not every plotter has."""
+        """Whether y-parallaxes can be measured with by' and by", which not all plotters have."""
         return not self.manual.missing_elements("by1", "by2")
 
     def set_elements(self, active: Indices, settings: Mapping[str, Array]) -> None:
-        """Set elements through their counters to values ``(m,)``, and enter them in the book."""
+        """Set elements by their counters to values ``(m,)``, and add them to the book."""
         for name, value in settings.items():
             counts = counter_value(name, value)
             self.spend_setting(active)
@@ -152,7 +154,7 @@ class Controls:
         self.read_settings(self.operators.remaining(active))
 
     def set_if_changed(self, active: Indices, settings: Mapping[str, Array]) -> None:
-        """Set those elements whose counters do not yet show the values ``(m,)`` that they have to."""
+        """Set the elements whose counters do not yet show the values ``(m,)``."""
         for name, wanted in settings.items():
             if not active.size:
                 return
@@ -162,12 +164,12 @@ class Controls:
                 self.set_elements(active[changed], {name: wanted[changed]})
 
     def run_element(self, active: Indices, name: str, counts: Array) -> None:
-        """Run an element to counts ``(m,)``, and bear in mind that it stands there."""
+        """Move an element to counts ``(m,)``, and record its position."""
         self.driver.set_element(active, name, counts)
         self._leave(active, name, counts)
 
     def exact_values(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
-        """Read where elements stand ``(m,)``, between two counts too where these hands have left them there."""
+        """Read the positions of elements ``(m,)``, between two counts too if they were set by this object."""
         found = {}
         for name, shown in self.elements(active, names).items():
             left = self._left_at.get(name, np.full(self.operators.size, np.nan))[active]
@@ -176,7 +178,7 @@ class Controls:
         return found
 
     def turn_elements(self, active: Indices, settings: Mapping[str, Array]) -> None:
-        """Turn elements until they stand at values ``(m,)``, between two counts too, and enter what they show."""
+        """Turn elements to values ``(m,)``, between two counts too, and add their readings to the book."""
         for name, wanted in settings.items():
             amounts = _difference(name, wanted, self.grab_drum(active, name))
             self.spend_setting(active)
@@ -187,7 +189,7 @@ class Controls:
         self.read_settings(self.operators.remaining(active))
 
     def turn_if_changed(self, active: Indices, settings: Mapping[str, Array]) -> None:
-        """Turn those elements that do not yet stand at the values ``(m,)`` at which they have to."""
+        """Turn the elements that are not yet at the values ``(m,)``."""
         for name, wanted in settings.items():
             if not active.size:
                 return
@@ -197,13 +199,13 @@ class Controls:
                 self.turn_elements(active[changed], {name: wanted[changed]})
 
     def grab_drum(self, active: Indices, name: str) -> Array:
-        """Take a drum in hand to turn it; return where it stands ``(m,)``."""
+        """Take a drum in hand to turn it; return its position ``(m,)``."""
         stands = self.exact_values(active, [name])[name]
         self._leave(active, name, stands)
         return stands
 
     def held_position(self, active: Indices, name: str) -> Array:
-        """Return where a drum that these hands have turned stands ``(m,)``."""
+        """Return the position ``(m,)`` of a drum that was turned by this object."""
         return self._left_at[name][active]
 
     def _leave(self, active: Indices, name: str, at: Array) -> None:
@@ -213,7 +215,7 @@ class Controls:
         self._left_at[name][active] += amounts.round(TURNED_DECIMALS)
 
     def read_settings(self, active: Indices) -> None:
-        """Read off what the places of images depend on."""
+        """Read the settings on which the positions of images depend."""
         for name, counts in self.elements(active, [name for name in STEADY if name in self.manual.elements]).items():
             self._settings[name][active] = counts
 
@@ -222,19 +224,19 @@ class Controls:
         return self.model.left_projector if side == 1 else self.model.right_projector
 
     def bx(self, active: Indices) -> Array:
-        """Return the base as it is set ``(m,)``, mm."""
+        """Return the base as set ``(m,)``, mm."""
         return take(self._settings["bx"], active)
 
     # --- places ---------------------------------------------------------------------------------------
 
     def counters(self, active: Indices) -> Array:
-        """Read X, Y and Z ``(3, m)``, and bear in mind how deep the mark stands."""
+        """Read X, Y and Z ``(3, m)``, and record the depth of the mark."""
         readings = self.driver.counters(active)
         put((take(self._offset[2], active) - readings[2]) / self.units_per_mm, active, self.z)
         return readings
 
     def displayed_levels(self, active: Indices, levels: Sequence[float]) -> Array:
-        """Return Z readings ``(k, m)`` as the counters show them when they are driven there."""
+        """Return Z readings ``(k, m)`` as the counters show them after driving there."""
         shown = []
         for level in levels:
             self.drive(active, {"Z": np.full(active.size, level)})
@@ -243,23 +245,23 @@ class Controls:
         return np.array(shown)
 
     def drive(self, active: Indices, readings: Mapping[str, Array]) -> BoolArray:
-        """Run carriages to readings ``(m,)``; return which instruments let them go there."""
+        """Drive carriages to readings ``(m,)``; return which instruments reached them."""
         self.operators.spend(active, self.operators.observer.seconds_to_drive, "driving")
         return self.driver.drive(active, readings)
 
     def drive_z_to(self, active: Indices, height: Array) -> BoolArray:
-        """Run the mark to heights ``(m,)`` above the base line, mm, hence negative."""
+        """Drive the mark to heights ``(m,)`` above the base line, mm, hence negative."""
         return self.drive(active, {"Z": self._offset[2, active] + height * self.units_per_mm})
 
     def turn(self, active: Indices, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
-        """Turn the handwheels ``(2 or 3, m)`` in counter units and with them an element that is in hand."""
+        """Turn the handwheels ``(2 or 3, m)`` in counter units, and an element in hand with them."""
         self.operators.spend(active, self.operators.observer.seconds_to_turn, "turning")
         self.driver.turn(active, wheels, element, amounts)
         if element is not None and amounts is not None:
             self._turned(active, element, amounts)
 
     def give_up_on_errors(self, active: Indices, doing: str) -> None:
-        """Give up where an instrument has refused anything since the last look."""
+        """Give up in sessions whose instrument rejected a command since the last check."""
         refused = self.driver.pop_errors(active)
         if refused:
             sessions = np.array(sorted(refused), dtype=np.intp)
@@ -275,29 +277,29 @@ class Controls:
         return np.array([x - self._share(1) * self.bx(active), y, z])
 
     def frame_positions(self, active: Indices, readings: Array, level: Array) -> Array:
-        """Return X, Y readings ``(2, n, m)`` at Z readings ``(m,)`` as places x, y, z ``(3, n, m)`` in mm."""
+        """Return X, Y readings ``(2, n, m)`` at Z readings ``(m,)`` as positions x, y, z ``(3, n, m)`` in mm."""
         x, y = self.to_mm(readings - self._offset[:2, None, active])
         x = x - self._share(1) * self.bx(active)
         z = np.broadcast_to((self._offset[2, active] - level) / self.units_per_mm, x.shape)
         return np.array([x, y, z])
 
     def under_centre(self, active: Indices, side: int) -> Array:
-        """Return the X and Y readings ``(2, m)`` straight below a photograph's centre, as far as by and bx tell."""
+        """Return the X and Y readings ``(2, m)`` vertically below a photograph's centre, as given by by and bx."""
         below = np.array([self._share(side) * self.bx(active), -self._settings[f"by{self.projector(side)}"][active]])
         return self.to_counter_units(below) + self._offset[:2, active]
 
     def centre(self, active: Indices, side: int) -> Array:
-        """Return the readings ``(3, m)`` of a photograph's centre, as far as elements and scales tell (P 3.1, 3.2)."""
+        """Return the readings ``(3, m)`` of a photograph's centre, as given by elements and scales (P 3.1, 3.2)."""
         heights = self.elements_from_zero(active, [f"bz{self.projector(side)}"])[f"bz{self.projector(side)}"]
         below = self.under_centre(active, side)
         return np.array([*below, self._offset[2, active] + self.units_per_mm * heights])
 
     def _share(self, side: int) -> float:
-        """Return where a centre stands along X from the frame's origin, as a share of bx."""
+        """Return the X position of a centre from the origin of the frame, as a share of bx."""
         return self.manual.centres_on_base[side - 1]
 
     def to_counter_units(self, shift: Array) -> Array:
-        """Return shifts ``(2, ...)`` in mm as so much of the X and Y counters."""
+        """Return shifts ``(2, ...)`` in mm in units of the X and Y counters."""
         return np.asarray(self._plane[shift.ndim] * shift)
 
     def to_mm(self, counted: Array) -> Array:
@@ -306,17 +308,17 @@ class Controls:
 
     @property
     def counter_units_per_mm(self) -> Array:
-        """Units a mm ``(3,)`` of the X, Y and Z counters."""
+        """Units per mm ``(3,)`` of the X, Y and Z counters."""
         return np.array([*self._plane[1], self.units_per_mm])
 
     def rotate_by_swing(self, active: Indices, side: int, print_place: Array) -> Array:
-        """Return places of paper prints ``(2, m)`` as the swing of their photograph turns them."""
+        """Return positions on paper prints ``(2, m)`` rotated by the swing of their photograph."""
         swing = wrap_gon(self._settings[f"kappa{self.projector(side)}"][active]) * GON
         return mxv(plane_rotation(swing), print_place)
 
 
 def _by_dimensions(units: Array) -> Mapping[int, Array]:
-    """Return units a mm ``(2,)`` by how many dimensions what they go with has: points, sessions of each, or neither."""
+    """Return units per mm ``(2,)`` in shapes that broadcast with points, sessions of each, or neither."""
     return {1: units, 2: units[:, None], 3: units[:, None, None]}
 
 
@@ -326,15 +328,15 @@ def wrap_gon(gon: Array) -> Array:
 
 
 def counter_value(name: str, value: Array) -> Array:
-    """Return what the counter of an element must show, kappa brought to 0..400."""
+    """Return the required counter reading of an element, kappa in 0..400."""
     return np.asarray(np.round(value % 400.0, 2) % 400.0 if name.startswith("kappa") else np.round(value, 2))
 
 
 def _difference(name: str, value: Array, other: Array) -> Array:
-    """Return one value of an element minus another, the shorter way round for kappa."""
+    """Return the difference of two values of an element, the shorter way round for kappa."""
     return wrap_gon(value - other) if name.startswith("kappa") else np.asarray(value - other)
 
 
 def side_name(side: int) -> str:
-    """Return left or right for a hand."""
+    """Return left or right for a side."""
     return "left" if side == 1 else "right"

@@ -1,4 +1,4 @@
-"""What hands and eyes do at the instruments of a crew, one instrument a session."""
+"""Driver protocol: the actions and readings at the instruments of a batch of sessions, one instrument per session."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -13,16 +13,16 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 class InstrumentDriver(Protocol):
-    """Handles, counters and eyepieces. `who` are the m sessions that act; their axis comes last.
+    """Elements, counters and eyepieces of instruments. `active` are the m active sessions; their axis is the last one.
 
-    What an instrument cannot do it does not do, and says so when asked by `refused`.
+    An instrument that rejects a command does nothing; `pop_errors` returns the errors.
     """
 
     def variant(self) -> str:
         """Return the type of the instruments."""
 
     def reset(self, active: Indices) -> None:
-        """Run all elements to their zeros, base inside, fittings for a positive, presets off."""
+        """Move all elements to their zeros, base inside, fittings for a positive, presets off."""
 
     def set_height_gear(self, active: Indices, height_gear: str | float, plan_gear: str) -> None:
         """Engage the gears."""
@@ -31,28 +31,28 @@ class InstrumentDriver(Protocol):
         """Set base inside or outside."""
 
     def set_fitting(self, active: Indices, name: str, position: str) -> None:
-        """Put a fitting into a position."""
+        """Set a fitting to a position."""
 
     def fitting(self, active: Indices, name: str) -> npt.NDArray[np.str_]:
-        """Return the positions ``(m,)`` in which a fitting stands."""
+        """Return the positions ``(m,)`` of a fitting."""
 
     def set_element(self, active: Indices, name: str, values: Array) -> None:
-        """Set an element through its counter to values ``(m,)``, gon or mm, two decimals."""
+        """Set an element by its counter to values ``(m,)``, gon or mm, two decimals."""
 
     def turn_element(self, active: Indices, name: str, amounts: Array) -> None:
         """Turn the drum of an element by amounts ``(m,)``, gon or mm, five decimals."""
 
     def preset(self, active: Indices, readings: Mapping[str, float]) -> None:
-        """Make counters show these readings, by axis."""
+        """Preset counters to these readings, by axis."""
 
     def preset_one(self, active: Indices, axis: str, readings: Array) -> None:
-        """Make one counter show readings ``(m,)``."""
+        """Preset one counter to readings ``(m,)``."""
 
     def load(self, active: Indices, projector: int, photograph: str) -> None:
-        """Put a photograph into a projector."""
+        """Mount a photograph in a projector."""
 
     def unload(self, active: Indices, projector: int) -> None:
-        """Take the photograph out of a projector."""
+        """Remove the photograph from a projector."""
 
     def loaded(self, active: Indices, projector: int) -> str:
         """Return the name of the photograph in a projector, empty for none."""
@@ -61,37 +61,39 @@ class InstrumentDriver(Protocol):
         """Return names of n fiducials and their displacements ``(2, n, m)`` from the collimating marks, mm."""
 
     def centring(self, active: Indices, projector: int) -> Array:
-        """Return how pictures were shifted and turned on their carrier ``(3, m)``, mm and gon."""
+        """Return shift and rotation of the pictures on their carrier ``(3, m)``, mm and gon."""
 
     def centre(self, active: Indices, projector: int, values: Array) -> None:
-        """Shift and turn pictures on their carrier ``(3, m)``, three decimals."""
+        """Shift and rotate pictures on their carrier ``(3, m)``, three decimals."""
 
     def prints(self, active: Indices, projector: int) -> dict[str, Array]:
-        """Return the places ``(2, m)`` mm of points on the paper prints, nan where a print has it not."""
+        """Return the positions ``(2, m)`` in mm of points on the paper prints, nan where a print does not show them."""
 
     def elements(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
-        """Return what the counters of elements show ``(m,)``."""
+        """Return the counter readings of elements ``(m,)``."""
 
     def counters(self, active: Indices) -> Array:
-        """Return what the X, Y and Z counters show ``(3, m)``."""
+        """Return the readings of the X, Y and Z counters ``(3, m)``."""
 
     def counter(self, active: Indices, axis: str) -> Array:
-        """Return what one of them shows ``(m,)``."""
+        """Return the readings of one of them ``(m,)``."""
 
     def drive(self, active: Indices, readings: Mapping[str, Array]) -> BoolArray:
-        """Run carriages to readings ``(m,)`` by axis, two decimals; return which went ``(m,)``."""
+        """Drive carriages to readings ``(m,)`` by axis, two decimals; return which reached them ``(m,)``."""
 
     def turn(self, active: Indices, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
-        """Turn the handwheels of X, Y and perhaps Z by ``(2 or 3, m)``, four decimals, and with them an element.
+        """Turn the handwheels of X, Y and optionally Z by ``(2 or 3, m)``, four decimals, and an element with them.
 
-        The drum of the element is turned by amounts ``(m,)``, five decimals.
+        The drum of the element turns by amounts ``(m,)``, five decimals.
         """
 
     def view_point(self, active: Indices, eye: int, point: str) -> Array:
-        """Return where an eye sees a point from the mark ``(2, m)``, um at photo scale, nan where it does not."""
+        """Return the position of a point relative to the mark in one eyepiece ``(2, m)``, um at photo scale, nan if not
+        visible.
+        """
 
     def view_point_stereo(self, active: Indices, point: str) -> Array:
-        """Return the same for the left and the right eye together ``(4, m)``."""
+        """Return the same for the left and the right eyepiece together ``(4, m)``."""
 
     def record(self, active: Indices, point: str) -> None:
         """Register the counters under a point."""
@@ -100,4 +102,4 @@ class InstrumentDriver(Protocol):
         """Write a note into the journals of the instruments."""
 
     def pop_errors(self, active: Indices) -> dict[int, list[str]]:
-        """Return what was refused since the last asking, by session."""
+        """Return the errors since the last call, by session."""

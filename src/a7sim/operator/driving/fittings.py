@@ -1,4 +1,4 @@
-"""The levers, prisms and collars: where they belong, and looking at them when the picture is plainly wrong."""
+"""Fittings (levers, prisms and collars): required positions, and their check when the view is plainly wrong."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -22,15 +22,16 @@ FITTING_NAMES: Mapping[str, str] = MappingProxyType(
 
 
 def required_fittings(manual: Variant, polarity: str, base: str) -> dict[str, str]:
-    """Return by name where the fittings that a plotter has belong, for pictures of a polarity and a base."""
+    """Return the required positions of a plotter's fittings by name, for a polarity of pictures and a base."""
     words = REQUIRED_FITTINGS[polarity, base].as_words()
     return {name: position for name, position in words.items() if name in manual.fittings}
 
 
 def correct_fittings(controls: Controls, active: Indices) -> BoolArray:
-    """Look at every lever and put right those that were forgotten, with a remark.
+    """Check all fittings and correct the forgotten ones, with a remark.
 
-    Return for whom there was one ``(m,)`` and all now stands as the table asks; a lever that does not stay is no help.
+    Return the sessions ``(m,)`` where a fitting was wrong and all are now as required; a fitting that does not stay
+    does not count.
     """
     operators, driver, model = controls.operators, controls.driver, controls.model
     mended, astray = np.zeros((2, active.size), dtype=bool)

@@ -1,4 +1,4 @@
-"""Both eyes: setting the floating mark on a point, and clearing its y-parallax with an element."""
+"""Stereoscopic setting of the floating mark on a point, and clearing of its y-parallax with an element."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from a7sim.operator.driving.fittings import correct_fittings
 from a7sim.operator.driving.pointing import MAX_LOOKS, DivergenceMonitor, Pointing
 
 MAX_RISE_MM = 20.0
-"""The foot disc is not turned further than this between two looks."""
+"""Maximum rotation of the foot disc between two looks."""
 
 RISES_TO_FUSE_MM = (0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0)
-"""Where the mark is taken to find the height at which the right eye sees the point as well."""
+"""Heights at which the point is looked for in the right eyepiece as well."""
 
 
 @dataclass(frozen=True)
 class SettingErrors:
-    """By how much a crew misjudges where the mark stands: in plan ``(2, sessions)`` and in x-parallax, um."""
+    """Errors of setting of a batch: in plan ``(2, sessions)`` and in x-parallax, um."""
 
     plan: Array
     height: Array
@@ -29,17 +29,17 @@ class SettingErrors:
 
 @dataclass(frozen=True)
 class Clearing:
-    """An element that is turned on vanishing y-parallax."""
+    """Element that clears a y-parallax."""
 
     element: str
     gain: Array
-    """What one unit of its counter adds to the parallax ``(sessions,)``, mm."""
+    """Change of the parallax by one unit of its counter ``(sessions,)``, mm."""
     error: Array
-    """By how much the parallax is misjudged ``(sessions,)``, um at photo scale."""
+    """Error of the perceived parallax ``(sessions,)``, um at photo scale."""
 
 
 class FloatingMark:
-    """The mark as both eyes see it."""
+    """The mark in both eyepieces."""
 
     def __init__(self, pointing: Pointing) -> None:
         self.pointing = pointing
@@ -47,7 +47,7 @@ class FloatingMark:
         self.operators = pointing.operators
 
     def fuse(self, active: Indices, point: str, judgement: SettingErrors) -> Indices:
-        """Set the mark on a point, first with the left eye, then with both; return those who could fuse it."""
+        """Set the mark on a point, first with the left eye, then with both; return the sessions that fused it."""
         controls, pointing, operators = self.controls, self.pointing, self.operators
         pointing.bring_into_view(active, 1, point)
         active = operators.remaining(active)
@@ -78,9 +78,9 @@ class FloatingMark:
     def settle(
         self, active: Indices, point: str, judgement: SettingErrors, clearing: Clearing | None = None
     ) -> Indices:
-        """Turn X, Y, Z, and an element where one is to clear the y-parallax, until the mark seems to stand there.
+        """Turn X, Y, Z, and an element if one clears the y-parallax, until the mark appears to be on the point.
 
-        Return those for whom it does; the others have given up, lost the point or come to the element's end.
+        Return the sessions that succeeded; the others gave up, lost the point or reached the element's end.
         """
         controls, pointing, operators = self.controls, self.pointing, self.operators
         drum = _Drum(self, active, clearing) if clearing is not None else None
@@ -135,7 +135,7 @@ class FloatingMark:
         return _together(settled)
 
     def view(self, active: Indices, point: str) -> Array:
-        """Return what both eyes see ``(4, m)``: x and y from the mark (mean of both), px, py, um; nan if lost."""
+        """Return the view of both eyes ``(4, m)``: x and y from the mark (mean of both), px, py, um; nan if lost."""
         self.operators.spend(active, self.operators.observer.seconds_to_look, "looking")
         lx, ly, rx, ry = self.operators.view_points(active, point, self.controls.driver.view_point_stereo)
         return np.array([(lx + rx) / 2.0, (ly + ry) / 2.0, lx - rx, ly - ry])
@@ -149,7 +149,7 @@ class FloatingMark:
         begun: Array,
         clearing: Clearing | None,
     ) -> None:
-        """Put right the levers of those whose parallaxes grow, as far as these are wrong, else let them give up."""
+        """Correct the fittings of sessions whose parallaxes grow if these are wrong, otherwise give up."""
         unseen = np.isnan(seen)
         vanished = watch.has_grown(active) & unseen.any(axis=0)
         running_away = watch.is_diverging(active, np.where(unseen, 0.0, seen))
@@ -163,9 +163,9 @@ class FloatingMark:
     def _look_again_with_levers_right(
         self, active: Indices, point: str, seen: Array, parallaxes_grow: BoolArray, begun: Array
     ) -> npt.NDArray[np.intp]:
-        """Put right the levers of those whose parallaxes grow, go back to where it began and look again, in place.
+        """Correct the fittings of sessions whose parallaxes grow, return to the start and look again, in place.
 
-        Return whose levers were put right, as indices into `who`.
+        Return the sessions whose fittings were corrected, as indices into `active`.
         """
         away = np.flatnonzero(parallaxes_grow.any(axis=0))
         mended = away[correct_fittings(self.controls, active[away])]
@@ -196,7 +196,7 @@ def _together(parts: Sequence[Indices]) -> Indices:
 
 
 class _Drum:
-    """The drum of an element that is being turned."""
+    """Drum of an element that is being turned."""
 
     def __init__(self, mark: FloatingMark, active: Indices, clearing: Clearing) -> None:
         self._controls = mark.controls
@@ -205,7 +205,7 @@ class _Drum:
         mark.controls.grab_drum(active, clearing.element)
 
     def to_turn(self, active: Indices, parallax: Array, scale: Array, at_rest: float) -> tuple[Array, BoolArray]:
-        """Return by how much to turn, nothing where it is clear, and where that is out of range ``(m,)``."""
+        """Return the required turn, zero if the parallax is clear, and where it is out of range ``(m,)``."""
         left = parallax + take(self._clearing.error, active) * scale
         amounts = np.where(np.abs(left) < at_rest, 0.0, -left / take(self._clearing.gain, active))
         if self._element.endless:

@@ -1,4 +1,4 @@
-"""What the operator is told: the job sheet. Nothing of it is the truth about a photograph."""
+"""Job sheet of the operator. It contains no truth about a photograph."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from a7sim.standard_points import CASES
 
 @dataclass(frozen=True)
 class ModelJob:
-    """A model to be set up: its two photographs, the base, and its standard points by position, and others."""
+    """Model to be set up: its two photographs, the base, and its standard points by position, and others."""
 
     name: str
     left: str
@@ -18,16 +18,16 @@ class ModelJob:
     polarity: str
     standard_points: Mapping[str, str]
     other_points: tuple[str, ...] = ()
-    """Control, check and other points, to be measured where both prints show them."""
+    """Control, check and other points, measured if both prints show them."""
 
     @property
     def left_projector(self) -> int:
-        """The projector of the left-hand photograph: 1 with base in, 2 with base out."""
+        """Projector of the left-hand photograph: 1 with base in, 2 with base out."""
         return 1 if self.base == "inside" else 2
 
     @property
     def right_projector(self) -> int:
-        """The projector of the right-hand photograph."""
+        """Projector of the right-hand photograph."""
         return 3 - self.left_projector
 
     def side_of(self, projector: int) -> int:
@@ -45,16 +45,16 @@ class ModelJob:
 
 @dataclass(frozen=True)
 class Job:
-    """The camera's certificate, the settings, the models in order, and what is known of the grid plate."""
+    """Camera certificate, settings, models in order, and the data of the grid plate."""
 
     certificate: Camera
     plan: Plan
     models: tuple[ModelJob, ...]
     grid_plate: GridPlate = field(default_factory=GridPlate)
     control: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
-    """X, Y, Z in m of ground control, nan for what is not given, where models are levelled at the instrument."""
+    """X, Y, Z in m of ground control, nan if not given, for models that are levelled at the instrument."""
 
     @property
     def tolerated_parallax_mm(self) -> float:
-        """Rms of the residual y-parallaxes at the scale of the model beyond which a model does not fit."""
+        """Rms of the residual y-parallaxes at the scale of the model above which a model does not fit."""
         return 1e-3 * self.plan.tolerated_parallax_um * self.plan.projection_height / self.certificate.c

@@ -1,4 +1,4 @@
-"""One eye: finding the image of a point from the paper print, and setting the mark on it."""
+"""Monocular pointing: finding the image of a point by the paper print, and setting the mark on it."""
 
 from collections.abc import Iterator, Mapping
 
@@ -14,22 +14,24 @@ MAX_LOOKS = 40
 """At one setting of the mark."""
 
 FINEST_MM, FINEST_SHARE = 0.0003, 0.15
-"""A handwheel, or a drum, is let go when the image would move by less than this, or this share of what the eye sees."""
+"""A handwheel or drum is released when the image would move by less than this, or by less than this share of the
+displacement.
+"""
 
 PATIENT_LOOKS, IMPATIENT_MM = 12, 0.0015
-"""Where play keeps the mark from coming to rest, more is borne with after so many looks."""
+"""If play keeps the mark moving, a larger displacement is accepted after this number of looks."""
 
 SEARCH_RINGS = 3
 SEARCH_STEP_MM = 14.0
-"""At photo scale: how far the operator looks around for a point that is not where the print shows it."""
+"""At photo scale: step of the search for a point that is not at the position of the print."""
 
 DIVERGENCE_UM = 150.0
 DIVERGENCE_LOOKS = 3
-"""What grows in so many looks in a row, though it is turned down, runs away."""
+"""A displacement that grows in this number of successive looks while it is being reduced diverges."""
 
 
 class Pointing:
-    """The eyes of a crew, each looking at its own photograph."""
+    """Pointing of a batch of operators, each at their own photograph."""
 
     def __init__(self, controls: Controls) -> None:
         self.controls = controls
@@ -37,18 +39,18 @@ class Pointing:
         observer = controls.operators.observer
         eye = min(observer.monocular_um, observer.stereo_um, observer.height_um, observer.parallax_um)
         self.finest_mm = max(FINEST_MM, FINEST_SHARE * 1e-3 * eye * controls.job.plan.projection_height / controls.c)
-        """What handwheels and drums are not turned by any more."""
+        """Smallest displacement for which handwheels and drums are turned."""
         self._prints: Mapping[int, Mapping[str, Array]] = {}
         self._strayed = np.zeros((3, 2, controls.operators.size))
         self._seen_from = np.zeros((2, controls.operators.size))
 
     def set_prints(self, prints: Mapping[int, Mapping[str, Array]]) -> None:
-        """Take up the paper prints by hand (1 left, 2 right): places ``(2, sessions)`` of points in mm."""
+        """Set the paper prints by side (1 left, 2 right): positions ``(2, sessions)`` of points in mm."""
         self._prints = prints
         self._strayed[:] = 0.0
 
     def bring_into_view(self, active: Indices, side: int, point: str) -> None:
-        """Drive to where the print shows a point and look around until it is in the field of view."""
+        """Drive to the position of a point on the print and search until it is in the field of view."""
         controls = self.controls
         printed = self.operators.print_position(self._prints[side], point)
         nowhere = np.isnan(printed[0, active])
@@ -88,11 +90,11 @@ class Pointing:
         )
 
     def at_rest_mm(self, looks: int) -> float:
-        """Return what is not turned any more after so many looks, mm."""
+        """Return the accepted displacement after a number of looks, mm."""
         return self.finest_mm if looks < PATIENT_LOOKS else max(self.finest_mm, IMPATIENT_MM)
 
     def measure_drift(self, active: Indices, side: int, point: str, readings: Array) -> None:
-        """Bear in mind how far from where the print showed it a point was found, by its readings ``(2 or 3, m)``."""
+        """Record the distance of a point from its position on the print, by its readings ``(2 or 3, m)``."""
         controls = self.controls
         expected = controls.rotate_by_swing(
             active, side, self.operators.print_position(self._prints[side], point)[:, active]
@@ -101,14 +103,14 @@ class Pointing:
         self._strayed[side][:, active] = away * controls.c / controls.z[active] - expected
 
     def view_point(self, active: Indices, side: int, point: str) -> Array:
-        """Look: where the image stands from the mark ``(2, m)`` in um, nan where it is not in the field of view."""
+        """Return the position of the image relative to the mark ``(2, m)`` in um, nan outside the field of view."""
         self.operators.spend(active, self.operators.observer.seconds_to_look, "looking")
         return self.operators.view_points(
             active, point, lambda them, name: self.controls.driver.view_point(them, side, name)
         )
 
     def bisect(self, active: Indices, side: int, point: str, errors: Array) -> None:
-        """Turn X and Y until the image seems to lie at the mark; errors ``(2, sessions)`` in um."""
+        """Turn X and Y until the image appears to be at the mark; errors ``(2, sessions)`` in um."""
         controls = self.controls
         watch = DivergenceMonitor(2, self.operators.size)
         for looks in range(MAX_LOOKS):
@@ -134,7 +136,7 @@ class Pointing:
     def _look_again_with_levers_right(
         self, active: Indices, side: int, point: str, seen: Array, lost: BoolArray
     ) -> None:
-        """Put right the levers of those from whom a point ran away, go back to where it was seen and look, in place."""
+        """Correct the fittings of sessions that lost a point, return to where it was seen and look again, in place."""
         away = np.flatnonzero(lost)
         mended = away[correct_fittings(self.controls, active[away])]
         if mended.size:
@@ -155,7 +157,7 @@ class Pointing:
             )
 
     def _why_it_ran_away(self, one: Indices, side: int, point: str) -> str:
-        """Go back to where the point was seen and try each wheel to find out what is wrong."""
+        """Return to where the point was seen and try each wheel to find the cause."""
         controls = self.controls
         reasons = []
         for axis, mirror, fitting in (
@@ -174,7 +176,7 @@ class Pointing:
 
 
 class DivergenceMonitor:
-    """Watches whether displacements grow though they are being turned down."""
+    """Monitor of displacements that grow while they are being reduced."""
 
     def __init__(self, displacements: int, sessions: int) -> None:
         self._before = np.full((displacements, sessions), np.inf)
@@ -182,7 +184,7 @@ class DivergenceMonitor:
         self._any_grew = False
 
     def is_converging(self, active: Indices, seen: Array) -> bool:
-        """Whether all displacements ``(k, m)`` in um are seen and small, and none ever grew; if not, ask on."""
+        """Return whether all displacements ``(k, m)`` in um are visible and small, and none ever grew."""
         now = np.abs(seen)
         well = not self._any_grew and bool(now.max(initial=0.0) <= DIVERGENCE_UM)
         if well:
@@ -190,11 +192,11 @@ class DivergenceMonitor:
         return well
 
     def has_grown(self, active: Indices) -> BoolArray:
-        """Return which of the displacements ``(k, m)`` had grown when they were last seen."""
+        """Return which of the displacements ``(k, m)`` had grown at the last look."""
         return take(self._times, active) > 0
 
     def is_diverging(self, active: Indices, seen: Array) -> BoolArray:
-        """Return which of the displacements ``(k, m)`` in um have grown in look after look."""
+        """Return which of the displacements ``(k, m)`` in um grew in successive looks."""
         now = np.abs(seen)
         grown = (now > 1.4 * take(self._before, active)) & (now > DIVERGENCE_UM)
         put(now, active, self._before)

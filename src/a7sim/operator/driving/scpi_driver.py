@@ -1,4 +1,4 @@
-"""Hands at the end of a line: one person's, in lines of text over the link."""
+"""Driver of one instrument by lines of text over the link."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ _NOT_VISIBLE = float(NOT_VISIBLE)
 
 
 class ScpiDriver:
-    """`Hands` of one person, by lines of text over the link."""
+    """`InstrumentDriver` of one operator, by lines of text over the link."""
 
     def __init__(self, person: Person) -> None:
         self._person = person

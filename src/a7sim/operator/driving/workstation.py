@@ -1,7 +1,7 @@
-"""Working the instruments of a crew: what a procedure asks of those who sit there.
+"""Workstation: the operations that a procedure requests of the operators of a batch.
 
-The same code works one real link (`LineHands`) and a batch of instruments held as arrays. Arrays that go in and out
-have all sessions as their last axis; `who` are the indices of those that act, and those who give up act no more.
+The same code drives one instrument over the link (`ScpiDriver`) and a batch of instruments as arrays. The last axis of
+arrays contains all sessions; `active` are the indices of the active ones. Sessions that give up are no longer active.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -22,20 +22,20 @@ from a7sim.operator.people.slips import neighbours
 
 MAX_POINTINGS = 12
 AGREEMENT_MM = 0.01
-"""Two pointings of a model point agree within this (thesis 3.5)."""
+"""Maximum difference of two accepted pointings of a model point (thesis 3.5)."""
 
 MIN_SLIP_MM = 0.03
-"""A reading of by that differs less than this from its fellows is not taken for a blunder."""
+"""A reading of by that differs less than this from the others is not taken for a blunder."""
 
 Numbers = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)
 class Parallaxes:
-    """Y-parallaxes ``(n, sessions)`` in mm, left-hand minus right-hand, and the places ``(3, n, sessions)``.
+    """Y-parallaxes ``(n, sessions)`` in mm, left-hand minus right-hand, and the positions ``(3, n, sessions)``.
 
-    x is counted from the left-hand centre, y from the base line, z below the centres, all in mm. `apart` names the
-    point whose images could not be brought together, where there was one; nothing else holds there.
+    x is counted from the left-hand centre, y from the base line, z below the centres, all in mm. `disagreement` is the
+    point whose images could not be fused, if any; then the other values are invalid.
     """
 
     parallax_mm: Array
@@ -43,29 +43,29 @@ class Parallaxes:
     disagreement: npt.NDArray[np.object_]
 
     def disagrees(self, active: Indices) -> Indices:
-        """Return those for whom the images of a point could not be brought together."""
+        """Return the sessions that could not fuse the images of a point."""
         parted = np.array([self.disagreement[session] is not None for session in active], dtype=bool)
         return np.asarray(active[parted])
 
 
 @dataclass(frozen=True)
 class ClearedPoint:
-    """What clearing a y-parallax with an element came to; arrays ``(sessions,)``, zero for those not in `who`."""
+    """Result of clearing a y-parallax with an element; arrays ``(sessions,)``, zero for inactive sessions."""
 
     sessions: Indices
-    """Those who found it clear, or cleared it."""
+    """Sessions in which it was clear or was cleared."""
     disagreement: Indices
-    """Those to whom the two images did not come together."""
+    """Sessions in which the images could not be fused."""
     arrival_parallax_mm: Array
-    """The y-parallax in mm as it seemed on arriving."""
+    """Apparent y-parallax in mm on arrival."""
     model_position_mm: Array
-    """Where ``(3, sessions)``: x from the left-hand centre, y from the base line, z below the centres, mm."""
+    """Position ``(3, sessions)``: x from the left-hand centre, y from the base line, z below the centres, mm."""
     element_change: Array
-    """The turn that cleared the point, gon or mm, as it is written down."""
+    """Turn that cleared the point, gon or mm, as written."""
 
 
 class Workstation:
-    """A crew at work."""
+    """Batch of operators at their instruments."""
 
     def __init__(
         self, operators: OperatorBatch, driver: InstrumentDriver, job: Job, tick: Callable[[], None] = lambda: None
@@ -83,14 +83,14 @@ class Workstation:
     # --- setting up -----------------------------------------------------------------------------------
 
     def begin(self, active: Indices, model: ModelJob, prints: Mapping[int, Mapping[str, Array]]) -> None:
-        """Take up a model whose pictures are mounted; `prints` by hand (1 left, 2 right), places ``(2, sessions)``."""
+        """Start a model whose pictures are mounted; `prints` by side (1 left, 2 right), positions ``(2, sessions)``."""
         self.pointing.set_prints(prints)
         self._prints = prints
         self._entries.clear()
         self.controls.begin(active, model)
 
     def preset(self, active: Indices, point: str) -> None:
-        """Point at a point in the left-hand photograph and make the counters show the plan's numbers there."""
+        """Point at a point in the left-hand photograph and preset the counters to the plan's numbers there."""
         plan = self.job.plan
         self.controls.drive_z_to(active, np.full(active.size, -plan.projection_height))
         errors = self.operators.draw_setting_errors(active, self.operators.observer.monocular_um, (2,))
@@ -99,17 +99,17 @@ class Workstation:
         self.controls.preset(self.operators.remaining(active), plan.preset)
 
     def begin_round(self, active: Indices, number: int) -> None:
-        """Begin a round of a procedure: what is read now is entered under its number."""
+        """Start a round of a procedure: the next readings are entered under its number."""
         self.operators.begin_round(active, number)
         if self.operators.person is not None:
             self.driver.note(active, f"{self.controls.model.name}: {self.operators.person.book.form}, round {number}")
 
     def compute(self, active: Indices) -> None:
-        """Spend the time of one computation."""
+        """Add the duration of one computation."""
         self.operators.spend(active, self.operators.observer.seconds_to_compute, "computing")
 
     def has_point(self, active: Indices, point: str, hands: Sequence[int] = (1, 2)) -> BoolArray:
-        """Return which of those who act find a point pricked on both prints, or on that of one photograph."""
+        """Return which active sessions find a point pricked on both prints, or on that of one photograph."""
         prints = [self._prints[side].get(point) for side in hands]
         if any(each is None for each in prints):
             return np.zeros(active.size, dtype=bool)
@@ -118,9 +118,9 @@ class Workstation:
     def group_by_points(
         self, active: Indices, points: Sequence[str], hands: Sequence[int] = (1, 2)
     ) -> Iterator[tuple[Indices, list[str]]]:
-        """Yield those who find the same of some points pricked, on the prints of these photographs, and what they find.
+        """Yield groups of sessions that find the same subset of points pricked on the prints of these photographs.
 
-        Everybody who acts comes once, the list in the order of `points` and perhaps empty.
+        Each active session occurs once, the subset in the order of `points`, possibly empty.
         """
         if not points:
             yield active, []
@@ -131,7 +131,7 @@ class Workstation:
             yield them, [point for point, there in zip(points, pattern, strict=True) if there]
 
     def _come_to(self, active: Indices, point: str) -> None:
-        """Go to a point, or by mistake to a standard point near it."""
+        """Select a point, or by mistake a standard point near it."""
         near = neighbours(self.controls.model.standard_points, point) if self.operators.may_mistake_points else []
         self.operators.select_point(active, point, {name: self.has_point(active, name) for name in near})
 
@@ -151,7 +151,7 @@ class Workstation:
         return readings
 
     def repeat_pointing(self, active: Indices, side: int, point: str, level: float, why: str) -> Array:
-        """Strike out a pointing and make it once more; X, Y ``(2, sessions)``."""
+        """Strike out a pointing and repeat it; X, Y ``(2, sessions)``."""
         operators = self.operators
         for numbers in self._entries[side, point, level]:
             operators.strike(active, numbers, why)
@@ -183,7 +183,7 @@ class Workstation:
         self._tick()
 
     def _read(self, active: Indices, point: str, item: str, slips: Array) -> Array:
-        """Read the counter ``(m,)`` that an item begins with, with what is misread ``(sessions,)``."""
+        """Read the counter ``(m,)`` named at the start of an item, with misreadings ``(sessions,)``."""
         self.operators.spend(active, self.operators.observer.seconds_to_read, "reading")
         return self.operators.transcribe(active, point, item, self.driver.counter(active, item[0]), slips)
 
@@ -192,7 +192,7 @@ class Workstation:
     def parallaxes(
         self, active: Indices, points: Sequence[str], readings: int, projectors: Sequence[int] = (1, 2)
     ) -> Parallaxes:
-        """Measure y-parallaxes with by' or by" or both, so many readings of each."""
+        """Measure y-parallaxes with by' or by" or both, `readings` times with each."""
         operators, observer, n = self.operators, self.operators.observer, len(points)
         plan_errors = operators.draw_setting_errors(active, observer.stereo_um, (2, n))
         height_errors = operators.draw_setting_errors(active, observer.height_um, (n,))
@@ -244,7 +244,7 @@ class Workstation:
         slips: Array,
         into: Array,
     ) -> Indices:
-        """Clear the parallax of a point with by of projectors; put the mean readings ``(sessions,)`` into place."""
+        """Clear the parallax of a point with by of projectors; write the mean readings ``(sessions,)`` into `out`."""
         values = np.zeros(errors.shape)
         numbers = np.zeros(errors.shape, dtype=np.intp)
         for i, projector in enumerate(projectors):
@@ -294,9 +294,9 @@ class Workstation:
         values: Array,
         numbers: Numbers,
     ) -> Indices:
-        """Strike out readings that their fellows contradict and make them again, in place.
+        """Strike out readings that contradict the others and repeat them, in place.
 
-        Of two that contradict each other nobody knows which is wrong: they are made again in turn.
+        Of two contradicting readings it is unknown which one is wrong: they are repeated in turn.
         """
         operators, observer = self.operators, self.operators.observer
         tolerance = MIN_SLIP_MM + 5e-3 * observer.parallax_um * self.controls.z / self.controls.c
@@ -339,10 +339,10 @@ class Workstation:
         gain_at: Callable[[Indices, Array], Array],
         unless_within: float = 0.0,
     ) -> ClearedPoint:
-        """Clear the y-parallax of a point by turning an element, unless it seems to be within so many mm already.
+        """Clear the y-parallax of a point by turning an element, unless it already appears to be within a limit in mm.
 
-        `gain_at` tells what one unit of the element's counter adds to the parallax ``(m,)`` in mm at places
-        ``(3, m)``. What is found and what the element then shows goes into the book.
+        `gain_at` returns the change of the parallax ``(m,)`` in mm by one unit of the element's counter at positions
+        ``(3, m)``. The parallax and the final reading of the element are added to the book.
         """
         operators = self.operators
         judgement, error = self._judgement(active)
@@ -359,7 +359,7 @@ class Workstation:
         return ClearedPoint(exclude(fused, exclude(turning, turned)), apart, found, place, turn)
 
     def look_at_parallaxes(self, active: Indices, points: Sequence[str]) -> Parallaxes:
-        """Look at what y-parallax is left at points, without turning anything but the handwheels."""
+        """Look at the remaining y-parallax at points, turning only the handwheels."""
         operators = self.operators
         p, places = np.zeros((len(points), operators.size)), np.zeros((3, len(points), operators.size))
         apart = np.full(operators.size, None, dtype=object)
@@ -374,7 +374,7 @@ class Workstation:
         return Parallaxes(p, places, apart)
 
     def _judgement(self, active: Indices) -> tuple[SettingErrors, Array]:
-        """Draw by how much one arrival at a point is misjudged, and its y-parallax ``(sessions,)`` in um."""
+        """Draw the setting errors of one arrival at a point, and the error of its y-parallax ``(sessions,)`` in um."""
         observer = self.operators.observer
         x, y, height, parallax = self.operators.draw_setting_errors(active, 1.0, (4,))
         plan = observer.stereo_um * np.array([x, y])
@@ -383,7 +383,7 @@ class Workstation:
     def _arrive(
         self, active: Indices, point: str, judgement: SettingErrors, error: Array, place: Array, found: Array
     ) -> Indices:
-        """Set the mark on a point; put into place where it is and what y-parallax it seems to have, and enter that."""
+        """Set the mark on a point; write its position and its apparent y-parallax into the arrays and the book."""
         controls = self.controls
         self._come_to(active, point)
         fused = self.mark.fuse(active, point, judgement)
@@ -396,14 +396,14 @@ class Workstation:
         return fused
 
     def _seen_parallax(self, active: Indices, point: str, error: Array) -> Array:
-        """Return the y-parallax ``(m,)`` in mm as it seems."""
+        """Return the apparent y-parallax ``(m,)`` in mm."""
         seen = self.mark.view(active, point)[3] + error[active]
         return np.asarray(1e-3 * seen * self.controls.z[active] / self.controls.c)
 
     def _turn_until_clear(
         self, active: Indices, point: str, judgement: SettingErrors, clearing: Clearing, turn: Array
     ) -> Indices:
-        """Turn an element until a point is clear, enter what it shows, and put the turn into place."""
+        """Turn an element until a point is clear, add its reading to the book, and write the turn into the array."""
         operators, controls, element = self.operators, self.controls, clearing.element
         slips = operators.draw_misreadings(active, (1,))[0]
         before = np.zeros(operators.size)
@@ -426,7 +426,7 @@ class Workstation:
     def measure_points(self, active: Indices, points: Sequence[str]) -> Array:
         """Measure model points stereoscopically, two pointings that agree; X, Y, Z readings ``(3, n, sessions)``.
 
-        A point whose images cannot be fused is remarked upon and comes out as nan.
+        A point whose images cannot be fused gets a remark and nan.
         """
         operators, observer, n = self.operators, self.operators.observer, len(points)
         at_point = operators.draw_setting_errors(active, 1.0, (3, n)) * np.sqrt(1.0 - observer.repeat_share**2)
@@ -442,7 +442,7 @@ class Workstation:
         return measured
 
     def _measure(self, active: Indices, point: str, at_point: Array, anew: Array, slips: Array, into: Array) -> None:
-        """Put the mean of two pointings that agree into place, or else the median of all."""
+        """Write the mean of two pointings that agree, or else the median of all, into `out`."""
         operators, observer = self.operators, self.operators.observer
         sigmas = np.array([observer.stereo_um, observer.stereo_um, observer.height_um])[:, None]
         pointings: list[Array] = []

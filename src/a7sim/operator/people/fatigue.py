@@ -1,4 +1,4 @@
-"""How a person's eyes and attention change over the day: warm-up, fatigue, breaks (docs/decisions/0008-skill.md)."""
+"""Fatigue and breaks of an operator (docs/decisions/0008-operator-skill.md)."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ MINUTE = 60.0
 
 
 def acuity_factor(observer: Observer, since_start: Array, since_rest: Array) -> Array:
-    """Return by what factor settings are worse than the observer's best, from seconds at work and since a rest."""
+    """Return the factor of setting errors relative to the observer's best, from seconds at work and since a rest."""
     still_cold = np.maximum(1.0 - since_start / (MINUTE * observer.warm_up_minutes), 0.0)
     return (1.0 + observer.warm_up * still_cold) * (
         1.0 + observer.fatigue_per_hour * _tired_hours(observer, since_rest)
@@ -18,12 +18,12 @@ def acuity_factor(observer: Observer, since_start: Array, since_rest: Array) -> 
 
 
 def slip_factor(observer: Observer, since_rest: Array) -> Array:
-    """Return by what factor slips are more frequent than in a fresh person, from seconds since a rest."""
+    """Return the factor of the frequency of slips relative to a rested operator, from seconds since a rest."""
     return np.asarray(1.0 + observer.slip_fatigue_per_hour * _tired_hours(observer, since_rest))
 
 
 def needs_a_break(observer: Observer, since_rest: Array) -> Array:
-    """Return who takes a break before beginning anything new, from seconds since the last."""
+    """Return which operators take a break before the next task, from seconds since the last one."""
     return np.asarray(observer.takes_breaks & (since_rest >= HOUR * observer.break_every_hours))
 
 

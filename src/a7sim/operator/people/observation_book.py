@@ -1,4 +1,4 @@
-"""The observation book: what the operator wrote down, in order; a struck entry stays."""
+"""Observation book: the entries of the operator in order; an entry that is struck out stays."""
 
 import csv
 import io
@@ -10,7 +10,7 @@ COLUMNS = ("number", "time_s", "model", "form", "round", "point", "item", "readi
 
 @dataclass(frozen=True)
 class BookEntry:
-    """A line of the book; `reading` is the text of a counter, `struck` why it was struck out."""
+    """Entry of the book; `reading` is the text of a counter, `struck` the reason for which it was struck out."""
 
     number: int
     time: float
@@ -26,21 +26,21 @@ class BookEntry:
 
 @dataclass
 class ObservationBook:
-    """The entries, and the heading under which the next ones go."""
+    """Entries, and the heading of the next ones."""
 
     entries: list[BookEntry] = field(default_factory=list)
     model: str = ""
     form: str = ""
     round: int = 0
     listener: Callable[[BookEntry], None] | None = None
-    """Is told of every entry as it is written, and again as it is struck out."""
+    """Called with each entry when it is written, and again when it is struck out."""
 
     def set_heading(self, model: str, form: str, round: int = 0) -> None:
-        """Begin a form; what follows is entered under it."""
+        """Start a form; the next entries belong to it."""
         self.model, self.form, self.round = model, form, round
 
     def add(self, time: float, point: str, item: str, reading: str, remark: str = "") -> int:
-        """Enter a reading and return its number."""
+        """Add a reading and return its number."""
         number = len(self.entries) + 1
         entry = BookEntry(number, time, self.model, self.form, self.round, point, item, reading, remark)
         self.entries.append(entry)
@@ -58,7 +58,7 @@ class ObservationBook:
             self.listener(entry)
 
     def remark(self, time: float, text: str) -> None:
-        """Enter a remark."""
+        """Add a remark."""
         self.add(time, "", "remark", "", text)
 
     @property

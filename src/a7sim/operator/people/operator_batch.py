@@ -1,4 +1,4 @@
-"""The people at a batch of instruments, one a session: what they get wrong, how long they take, what they write."""
+"""Operators of a batch of sessions, one per session: their errors, their time and their entries."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -17,14 +17,14 @@ from a7sim.scenario import Observer
 
 
 class AllGaveUpError(Exception):
-    """All of a crew have given up."""
+    """All operators of a batch have given up."""
 
 
 class OperatorBatch:
-    """Persons of equal skill at their instruments. Arrays have the sessions, all of them, as their last axis.
+    """Operators of equal skill at their instruments. The last axis of arrays contains all sessions.
 
-    A single person at a line writes a book and gives up by raising DoesNotFit; in a crowd whoever gives up is left
-    behind: `still` tells who goes on, `reasons` why others do not.
+    A single operator at a link keeps a book and gives up by raising OperatorGaveUp; in a batch, sessions that give up
+    are no longer active: `remaining` returns the active ones, `reasons` contains the reasons of the others.
     """
 
     def __init__(self, observer: Observer, dice: Sequence[OperatorRandom], person: Person | None = None) -> None:
@@ -34,7 +34,7 @@ class OperatorBatch:
         self.reasons: dict[int, str] = {}
         self.timesheet = person.timesheet if person is not None else Timesheet(len(dice))
         self.slip_log = [person.slips] if person is not None else [[] for _ in dice]
-        """The truth about every slip, by session; no procedure looks at it."""
+        """True record of all slips, by session; no procedure reads it."""
         self._dice = dice
         self._given_up = np.zeros(len(dice), dtype=bool)
         self._slips = Slips(observer, dice, self.slip_log)
@@ -43,31 +43,31 @@ class OperatorBatch:
 
     @classmethod
     def single(cls, person: Person) -> "OperatorBatch":
-        """Return the crew that is one person at a line."""
+        """Return the batch of one operator at a link."""
         return cls(person.observer, [person.random], person)
 
     @property
     def size(self) -> int:
-        """How many they are."""
+        """Number of sessions."""
         return len(self._dice)
 
     @property
     def active(self) -> Indices:
-        """Indices of all sessions that go on."""
+        """Indices of all active sessions."""
         return np.flatnonzero(~self._given_up)
 
     def is_active(self, active: Indices) -> npt.NDArray[np.bool_]:
-        """Return which have not given up."""
+        """Return which sessions have not given up."""
         return np.asarray(~self._given_up[active])
 
     def remaining(self, active: Indices) -> Indices:
-        """Return those who have not given up."""
+        """Return the sessions that have not given up."""
         return active[~self._given_up[active]]
 
     # --- headings -------------------------------------------------------------------------------------
 
     def begin(self, active: Indices, model: str, form: str) -> None:
-        """Begin a form of a model, after a break where one is due."""
+        """Start a form of a model, after a break if one is due."""
         self._rest(active)
         self._slips.recheck_points(active.tolist())
         self._model, self._form, self._round = model, form, 0
@@ -75,7 +75,7 @@ class OperatorBatch:
             self.person.book.set_heading(model, form)
 
     def begin_round(self, active: Indices, number: int) -> None:
-        """Begin a round of the form, after a break where one is due."""
+        """Start a round of the form, after a break if one is due."""
         self._rest(active)
         self._slips.recheck_points(active.tolist())
         self._round = number
@@ -94,28 +94,28 @@ class OperatorBatch:
     # --- chance ---------------------------------------------------------------------------------------
 
     def draw_setting_errors(self, active: Indices, sigma: float, shape: tuple[int, ...]) -> Array:
-        """Return the errors of planned settings ``(*shape, sessions)``, zero for those who do not act."""
+        """Return the errors of planned settings ``(*shape, sessions)``, zero for inactive sessions."""
         return self._among_all(
             active, self._acuity_factors(active, sigma) * self._drawn(active, shape, OperatorRandom.fill_setting_errors)
         )
 
     def draw_misreadings(self, active: Indices, shape: tuple[int, ...]) -> Array:
-        """Return what is misread at planned readings ``(*shape, sessions)``, in counter units."""
+        """Return the misreadings of planned readings ``(*shape, sessions)``, in counter units."""
         luck = self._drawn(active, (3, *shape), OperatorRandom.fill_reading_draws)
         return self._among_all(active, misreading(self.observer, luck, self._slip_factors(active)))
 
     def redraw_setting_errors(self, active: Indices, sigma: float, count: int) -> Array:
-        """Return the errors ``(count, sessions)`` of settings made once more."""
+        """Return the errors ``(count, sessions)`` of repeated settings."""
         drawn = self._drawn(active, (count,), OperatorRandom.refill_setting_errors)
         return self._among_all(active, self._acuity_factors(active, sigma) * drawn)
 
     def redraw_misreadings(self, active: Indices, count: int) -> Array:
-        """Return what is misread ``(count, sessions)`` at readings made once more."""
+        """Return the misreadings ``(count, sessions)`` of repeated readings."""
         luck = self._drawn(active, (3, count), OperatorRandom.refill_reading_draws)
         return self._among_all(active, misreading(self.observer, luck, self._slip_factors(active)))
 
     def _drawn(self, active: Indices, shape: tuple[int, ...], draw: Callable[[OperatorRandom, Array], None]) -> Array:
-        """Return what the dice of those who act draw ``(*shape, m)``."""
+        """Return random draws of the active sessions ``(*shape, m)``."""
         drawn = np.empty((active.size, *shape))
         for session, into in zip(active.tolist(), drawn, strict=True):
             draw(self._dice[session], into)
@@ -138,11 +138,14 @@ class OperatorBatch:
 
     @property
     def may_mistake_points(self) -> bool:
-        """Whether anybody may go to another point than the one that is meant."""
+        """Whether any operator may select another point than the intended one."""
         return self._slips.possible("wrong point")
 
     def select_point(self, active: Indices, point: str, near: Mapping[str, npt.NDArray[np.bool_]]) -> None:
-        """Go to a point, or by mistake to one near it; who can find which of these ``(m,)`` on their prints."""
+        """Select a point, or by mistake a neighbour;
+
+        `near` gives the sessions ``(m,)`` that find each neighbour on their prints.
+        """
         self.recheck_points(active)
         if not self.may_mistake_points:
             return
@@ -152,11 +155,11 @@ class OperatorBatch:
             self._slips.select_point(self._occasion(session, point), candidates, factors[i])
 
     def recheck_points(self, active: Indices) -> None:
-        """Look once more which point it is."""
+        """Check again which point is selected."""
         self._slips.recheck_points(active.tolist())
 
     def pointing_groups(self, active: Indices, point: str) -> Iterator[tuple[Indices, str]]:
-        """Yield who of those at a point really looks at which, as groups."""
+        """Yield groups of sessions at a point by the point that they actually measure."""
         if self._slips.no_point_mistaken:
             yield active, point
             return
@@ -165,7 +168,7 @@ class OperatorBatch:
             yield active[names == name], name
 
     def view_points(self, active: Indices, point: str, look: Callable[[Indices, str], Array]) -> Array:
-        """Return what `look` gives ``(..., m)`` of the points that those at a point really look at."""
+        """Return the values of `look` ``(..., m)`` at the points that the sessions at a point actually measure."""
         if self._slips.no_point_mistaken:
             return look(active, point)
         groups = [(them, look(them, name)) for them, name in self.pointing_groups(active, point)]
@@ -177,7 +180,7 @@ class OperatorBatch:
         return np.asarray(seen[..., active])
 
     def print_position(self, prints: Mapping[str, Array], point: str) -> Array:
-        """Return the place ``(2, sessions)`` on the prints of what everybody takes for a point, nan where it is not."""
+        """Return the positions ``(2, sessions)`` on the prints of the measured points, nan where not pricked."""
         nowhere = np.full((2, self.size), np.nan)
         if self._slips.no_point_mistaken:
             return prints.get(point, nowhere)
@@ -185,7 +188,10 @@ class OperatorBatch:
         return np.stack([each[:, session] for session, each in enumerate(taken)], axis=-1)
 
     def transcribe(self, active: Indices, point: str, item: str, shown: Array, misread: Array) -> Array:
-        """Return what is written ``(m,)`` of what counters show; `misread` ``(sessions,)`` is what chance adds."""
+        """Return the written values ``(m,)`` of counter readings.
+
+        `misread` ``(sessions,)`` are the random misreadings.
+        """
         wrongly = take(misread, active)
         written = np.asarray(shown + wrongly).round(4)
         tempted = np.arange(active.size) if self._slips.possible(*OF_READINGS) else np.flatnonzero(wrongly)
@@ -196,7 +202,10 @@ class OperatorBatch:
         return written
 
     def fitting_positions(self, active: Indices, fitting: str, position: str) -> Iterator[tuple[Indices, str]]:
-        """Yield who puts a fitting into which position: the right one, but where it is forgotten the other."""
+        """Yield sessions by the position in which they put a fitting:
+
+        the required one, or the other if it is forgotten.
+        """
         if not self._slips.possible("forgotten lever"):
             yield active, position
             return
@@ -214,7 +223,7 @@ class OperatorBatch:
     def noted_elements(
         self, active: Indices, now: Mapping[str, Array], before: Mapping[str, Array]
     ) -> Mapping[str, Array]:
-        """Return the elements ``(sessions,)`` as they are noted: where one is not re-read, what it was before."""
+        """Return the elements ``(sessions,)`` as noted: the previous value of an element that is not read again."""
         if not self._slips.possible("element not re-read"):
             return now
         noted = {name: each.copy() for name, each in now.items()}
@@ -233,7 +242,7 @@ class OperatorBatch:
     # --- time, book, patience -------------------------------------------------------------------------
 
     def spend(self, active: Indices, seconds: float, act: Act = "other") -> None:
-        """Let the time of an act go by, so many seconds at an ordinary pace."""
+        """Add the duration of an act: `seconds` at the usual pace."""
         self._let_go_by(active, seconds * self.observer.pace, act)
 
     def _let_go_by(self, active: Indices, seconds: float, act: Act) -> None:
@@ -243,7 +252,7 @@ class OperatorBatch:
             self.person.clock.advance(seconds)
 
     def enter(self, active: Indices, point: str, item: str, readings: Array) -> npt.NDArray[np.intp]:
-        """Enter readings ``(m,)`` in the book and return the numbers ``(sessions,)`` of the entries."""
+        """Add readings ``(m,)`` to the book and return the numbers ``(sessions,)`` of the entries."""
         numbers = np.zeros(self.size, dtype=np.intp)
         if self.person is not None:
             for session, reading in zip(active, readings, strict=True):
@@ -263,7 +272,7 @@ class OperatorBatch:
             self.person.remark(text)
 
     def give_up(self, active: Indices, why: str | Callable[[int], str]) -> None:
-        """Give up. Raises DoesNotFit for a person at a line."""
+        """Give up. Raises OperatorGaveUp for a single operator at a link."""
         for session in active:
             self.reasons[int(session)] = why if isinstance(why, str) else why(int(session))
             if self.person is not None:

@@ -1,4 +1,4 @@
-"""The person in the chair: a line, a book, a watch and patience."""
+"""Operator at a link, with a book, a clock and random numbers."""
 
 from dataclasses import dataclass, field
 
@@ -14,12 +14,12 @@ MAX_NOTE_LENGTH = 900
 
 
 class OperatorGaveUp(Exception):
-    """The operator gives up: what is seen cannot be what was ordered. The text is the remark in the book."""
+    """The operator gives up because the view contradicts the job sheet. The text is the remark in the book."""
 
 
 @dataclass
 class Person:
-    """An operator at a line to the instrument, with a book and a watch."""
+    """Operator at a link to the instrument, with an observation book and a clock."""
 
     client: Client
     clock: Clock
@@ -28,7 +28,7 @@ class Person:
     book: ObservationBook = field(default_factory=ObservationBook)
     timesheet: Timesheet = field(default_factory=lambda: Timesheet(1))
     slips: list[Slip] = field(default_factory=list)
-    """The truth about every slip, which this person does not have."""
+    """True record of all slips, unknown to the operator."""
 
     def __post_init__(self) -> None:
         self.random = OperatorRandom(self.observer, self.seed)
@@ -44,6 +44,6 @@ class Person:
         self.client.send(f'NOTE "{printable[:MAX_NOTE_LENGTH]}"')
 
     def give_up(self, text: str) -> OperatorGaveUp:
-        """Write what does not fit into the book and return it as an error to raise."""
+        """Write the contradiction into the book and return it as an error to raise."""
         self.remark(f"does not fit: {text}")
         return OperatorGaveUp(text)

@@ -1,4 +1,4 @@
-"""What chance does to a person: errors of settings and slips of reading."""
+"""Random draws of an operator: setting errors and reading slips."""
 
 import numpy as np
 
@@ -10,15 +10,15 @@ OPERATOR_STREAM = 4
 
 _LAST_DIGITS = 0.01 * np.array([-1.0, 1.0])
 _GROSS_SLIPS = np.array([-1.0, -0.5, -0.1, 0.1, 0.5, 1.0])
-"""A digit read wrong further up, in counter units."""
+"""Errors of a misread higher digit, in counter units."""
 
 
 class OperatorRandom:
-    """The random numbers of one session's operator.
+    """Random numbers of the operator of one session.
 
-    Errors come in blocks, one draw for each setting that a step of the procedure makes, so that the same
-    seed gives the same errors however long the closed loop of turning and looking takes. Lapses, of which most
-    persons have none, come one by one from a stream of their own. What is drawn is put into the arrays handed over.
+    Errors are drawn in blocks, one number per setting of a step of the procedure, so that the same seed gives the same
+    errors however many looks and turns the closed loop takes. Slips, which most operators do not make, are drawn one by
+    one from a stream of their own. The draws are written into the given arrays.
     """
 
     def __init__(self, observer: Observer, seed: int) -> None:
@@ -33,24 +33,24 @@ class OperatorRandom:
         into[...] = self._planned.standard_normal(into.shape)
 
     def refill_setting_errors(self, into: Array) -> None:
-        """Draw the errors ``(count,)`` of settings that have to be made once more, in the same unit."""
+        """Draw the errors ``(count,)`` of repeated settings, in the same unit."""
         into[:] = self._again.standard_normal(into.size)
 
     def fill_reading_draws(self, into: Array) -> None:
-        """Draw the luck ``(3, ...)`` with which planned readings are read, for `misread`."""
+        """Draw the uniform numbers ``(3, ...)`` of planned readings, for `misreading`."""
         _luck(self._planned, into)
 
     def refill_reading_draws(self, into: Array) -> None:
-        """Draw the luck ``(3, count)`` with which readings are made once more."""
+        """Draw the uniform numbers ``(3, count)`` of repeated readings."""
         for i in range(into.shape[1]):
             _luck(self._again, into[:, i : i + 1])
 
     def slip_draws(self, rate: float) -> bool:
-        """Return whether something happens that does so with this rate."""
+        """Return whether an event of this rate happens."""
         return rate > 0.0 and bool(self._lapses.random() < rate)
 
     def choice(self, count: int) -> int:
-        """Return which of so many ways a lapse takes."""
+        """Return the index of one of `count` alternatives."""
         return int(self._lapses.integers(count))
 
 
@@ -62,9 +62,9 @@ def _luck(rng: np.random.Generator, into: Array) -> None:
 
 
 def misreading(observer: Observer, luck: Array, factor: Array) -> Array:
-    """Return what is misread ``(*shape, m)``, in counter units, with a luck ``(3, *shape, m)``; zero mostly.
+    """Return the misreadings ``(*shape, m)`` in counter units for uniform numbers ``(3, *shape, m)``; mostly zero.
 
-    Slips are so many times as frequent ``(m,)`` as the observer's rates say.
+    The slip rates of the observer are multiplied by `factor` ``(m,)``.
     """
     chance, (last_digit, gross) = luck[0], luck[1:].astype(np.intp)
     blunders = factor * observer.blunder_rate

@@ -1,4 +1,4 @@
-"""Slips: what a person takes, sets, reads or writes wrongly, and the record of it that the person does not have."""
+"""Slips: points, settings, readings and entries that are wrong, and their true record, unknown to the operator."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,19 +13,19 @@ from a7sim.standard_points import PLACES
 
 LAST_DIGIT = 0.01
 CERTAIN_GROSS = 0.5
-"""Counter units by which a planted gross slip is off."""
+"""Error of a planned gross slip, counter units."""
 
 MIN_CERTAIN = 0.05
-"""A slip other than of the last digit is not planted where it changes the reading by less, in counter units."""
+"""A planned slip, except of the last digit, is skipped where it changes the reading by less, counter units."""
 
 PLAUSIBLE = 10.0
-"""What is off by more counter units is noticed while it is being written."""
+"""A larger error is noticed while it is written, counter units."""
 
 _LATELY = 8
-"""So many of the last slips may still wait for their entry in the book."""
+"""Number of the latest slips that may still get an entry in the book."""
 
 NEIGHBOUR_COUNT = 2
-"""So many standard points are near enough to be taken for another."""
+"""Number of nearest standard points that may be confused with a point."""
 
 
 _RATES: Mapping[SlipKind, str] = MappingProxyType(
@@ -37,14 +37,14 @@ _RATES: Mapping[SlipKind, str] = MappingProxyType(
         "element not re-read": "not_reread_rate",
     }
 )
-"""Where an observer says how often; what is misread has its rates in the dice."""
+"""Rates of an observer by kind of slip; misreadings have their rates in the random draws."""
 
 OF_READINGS: tuple[SlipKind, ...] = ("last digit", "gross", "wrong sign", "transposed digits")
 
 
 @dataclass(frozen=True)
 class Slip:
-    """A slip as it happened: what was written, taken or set, and what was right."""
+    """Slip with the written or chosen value and the right one."""
 
     time: float
     """Simulated seconds."""
@@ -57,10 +57,10 @@ class Slip:
     written: str
     right: str
     entry: int = 0
-    """Number of the first entry in the book that suffers from it; 0 where there is none."""
+    """Number of the first entry of the book with this slip; 0 if there is none."""
 
     def affects(self, point: str, item: str) -> bool:
-        """Return whether a reading of an item at a point suffers from this slip."""
+        """Return whether a reading of an item at a point is affected by this slip."""
         if self.kind == "element not re-read":
             return item == f"set {self.point}"
         return point == self.point and (item == self.item or self.kind == "wrong point")
@@ -68,7 +68,7 @@ class Slip:
 
 @dataclass(frozen=True)
 class SlipContext:
-    """Where a slip can happen: whose instrument, when, under which heading, at what."""
+    """Context in which a slip can happen: session, time, heading, point and item."""
 
     session: int
     time: float
@@ -83,7 +83,7 @@ class SlipContext:
         return Slip(self.time, self.model, self.form, self.round, self.point, self.item, kind, written, right)
 
     def matches(self, certain: PlannedSlip) -> bool:
-        """Return whether a planted slip belongs here."""
+        """Return whether a planned slip applies here."""
         return (
             certain.model in ("", self.model)
             and certain.form in ("", self.form)
@@ -92,7 +92,7 @@ class SlipContext:
 
 
 class Slips:
-    """The slips of a crew: drawn by their rates or planted, and written down by session."""
+    """Slips of a batch of operators: drawn by their rates or planned, recorded by session."""
 
     def __init__(self, observer: Observer, dice: Sequence[OperatorRandom], log: list[list[Slip]]) -> None:
         self.log = log
@@ -103,14 +103,17 @@ class Slips:
         self._taken: dict[int, tuple[str, str]] = {}
 
     def possible(self, *kinds: SlipKind) -> bool:
-        """Return whether anybody may make a slip of these kinds, by its rate or since one is planted."""
+        """Return whether a slip of these kinds can happen, by its rate or because one is planned."""
         drawn = any(getattr(self._observer, _RATES[kind]) > 0.0 for kind in kinds if kind in _RATES)
         return drawn or any(certain.kind in kinds for certain in self._observer.certain_slips)
 
     # --- points ---------------------------------------------------------------------------------------
 
     def select_point(self, each: SlipContext, near: Sequence[str], factor: float) -> None:
-        """Take one of the points near for the point of the occasion, if that happens; `factor` is that of the rate."""
+        """Select one of the near points instead of the point of the context, if that happens;
+
+        `factor` multiplies the rate.
+        """
         if not near:
             return
         planted, random = self._planted_here(each, ("wrong point",)), self._dice[each.session]
@@ -120,25 +123,25 @@ class Slips:
             self._happened(each, "wrong point", each.point, other)
 
     def recheck_points(self, sessions: Sequence[int]) -> None:
-        """Take the right points again."""
+        """Select the right points again."""
         if self._taken:
             for session in sessions:
                 self._taken.pop(session, None)
 
     def mistaken_point(self, session: int, point: str) -> str:
-        """Return the point that somebody really looks at for another."""
+        """Return the point that a session actually measures instead of another."""
         meant, other = self._taken.get(session, (point, point))
         return other if meant == point else point
 
     @property
     def no_point_mistaken(self) -> bool:
-        """Whether everybody looks at the right points."""
+        """Whether all sessions measure the right points."""
         return not self._taken
 
     # --- readings -------------------------------------------------------------------------------------
 
     def transcribe(self, each: SlipContext, shown: float, misread: float, factor: float) -> float:
-        """Return what somebody writes of what a counter shows; `misread` is what chance makes of it already."""
+        """Return the written value of a counter reading; `misread` is the random misreading already included."""
         kind, written = self._written(each, shown, misread, factor)
         if kind is not None:
             self._happened(each, kind, f"{written:.2f}", f"{shown:.2f}")
@@ -159,7 +162,7 @@ class Slips:
         return None, misread
 
     def note_entry(self, session: int, point: str, item: str, number: int) -> None:
-        """Bear in mind under which number a slip stands in the book."""
+        """Record the number of the entry of a slip in the book."""
         log = self.log[session]
         for i in range(len(log) - 1, max(len(log) - 1 - _LATELY, -1), -1):
             if not log[i].entry and log[i].affects(point, item):
@@ -168,11 +171,11 @@ class Slips:
     # --- levers and elements --------------------------------------------------------------------------
 
     def forgets_fitting(self, each: SlipContext, right: str, other: str, factor: float) -> bool:
-        """Return whether somebody leaves the fitting of the occasion in the other position."""
+        """Return whether a session leaves the fitting of the context in the other position."""
         return self._lapses(each, "forgotten lever", factor, other, right)
 
     def uses_stale_reading(self, each: SlipContext, old: float, now: float, factor: float) -> bool:
-        """Return whether somebody goes on with an old reading of the element of the occasion."""
+        """Return whether a session continues with an old reading of the element of the context."""
         return old != now and self._lapses(each, "element not re-read", factor, f"{old:.2f}", f"{now:.2f}")
 
     def _lapses(self, each: SlipContext, kind: SlipKind, factor: float, written: str, right: str) -> bool:
@@ -188,7 +191,7 @@ class Slips:
         return float(getattr(self._observer, _RATES[kind]))
 
     def _planted_here(self, each: SlipContext, kinds: Collection[str]) -> PlannedSlip | None:
-        """Return the first planted slip of these kinds that belongs here; it does not come again."""
+        """Return the first planned slip of these kinds that applies here; it does not happen again."""
         planted = self._planted[each.session]
         for certain in planted:
             if certain.kind in kinds and each.matches(certain):
@@ -201,7 +204,7 @@ class Slips:
 
 
 def _written_wrongly(shown: float, item: str) -> dict[SlipKind, list[float]]:
-    """Return what may become of a reading by every kind of slip that it can suffer."""
+    """Return the possible wrong values of a reading by kind of slip."""
     wrong: dict[SlipKind, list[float]] = {
         "last digit": [round(shown + LAST_DIGIT, 4)],
         "gross": [round(shown + CERTAIN_GROSS, 4)],
@@ -216,9 +219,9 @@ def _plain_to_see(wrong: Mapping[SlipKind, Sequence[float]], shown: float) -> li
 
 
 def transpositions(shown: float) -> list[float]:
-    """Return the readings that come of exchanging two neighbouring digits of one, as 49.21 of 49.12.
+    """Return the values after exchange of two neighbouring digits of a reading, such as 49.21 of 49.12.
 
-    Those that are further off than anybody would write down are left out.
+    Implausibly large errors are left out.
     """
     text = f"{shown:.2f}"
     pairs = [i for i in range(len(text) - 1) if text[i : i + 2].isdigit() and text[i] != text[i + 1]]
@@ -227,7 +230,7 @@ def transpositions(shown: float) -> list[float]:
 
 
 def neighbours(standard_points: Mapping[str, str], point: str) -> list[str]:
-    """Return the names of the standard points nearest to one, none for any other point."""
+    """Return the names of the standard points nearest to a standard point, empty for any other point."""
     positions = {name: position for position, name in standard_points.items()}
     if point not in positions:
         return []

@@ -1,4 +1,4 @@
-"""Where the time of a crew went: simulated seconds by activity and by act."""
+"""Timesheet of a batch of operators: simulated seconds by activity and by act."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -24,24 +24,24 @@ _OF_FORM: Mapping[str, str] = MappingProxyType(
         "right perspective centre": "perspective centres",
     }
 )
-"""Forms that count as one activity; every other form is an activity by its own name."""
+"""Forms that count as one activity; each other form is an activity of its own name."""
 
 
 class Timesheet:
-    """Seconds ``(sessions,)`` by activity and by act; either sums to all the time that was spent."""
+    """Seconds ``(sessions,)`` by activity and by act; each adds up to the total time."""
 
     def __init__(self, sessions: int) -> None:
         self.by_activity: dict[str, Array] = defaultdict(partial(np.zeros, sessions))
         self.by_act: dict[str, Array] = defaultdict(partial(np.zeros, sessions))
 
     def add(self, active: Indices, seconds: float, form: str, act: Act) -> None:
-        """Write down that those who act spent so many seconds each."""
+        """Add seconds of the active sessions."""
         activity = _OF_ACT.get(act) or _OF_FORM.get(form, form)
         add_at(seconds, active, self.by_activity[activity])
         add_at(seconds, active, self.by_act[act])
 
     def activities_of(self, session: int) -> dict[str, float]:
-        """Return the seconds of one session by activity, in the order in which they were first taken up."""
+        """Return the seconds of one session by activity, in order of first occurrence."""
         return _of(self.by_activity, session)
 
     def acts_of(self, session: int) -> dict[str, float]:
