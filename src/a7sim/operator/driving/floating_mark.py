@@ -156,7 +156,7 @@ class FloatingMark:
         start_readings: Array,
         clearing: Clearing | None,
     ) -> None:
-        """Correct the fittings of sessions whose parallaxes grow if these are wrong, otherwise give up."""
+        """Correct the fittings of sessions whose parallaxes grow where fittings are wrong, otherwise give up."""
         is_unseen = np.isnan(seen)
         has_vanished = monitor.has_grown(active) & is_unseen.any(axis=0)
         is_diverging = monitor.is_diverging(active, np.where(is_unseen, 0.0, seen))
