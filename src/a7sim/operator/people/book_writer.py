@@ -13,7 +13,7 @@ from a7sim.operator.people.timesheet import Timesheet
 
 
 class BookWriter(Protocol):
-    """Writer of the entries of an operator batch. The last axis of arrays contains all sessions, or the m active ones."""
+    """Writer of the entries of an operator batch. The last axis of arrays contains all sessions or the m active."""
 
     timesheet: Timesheet
     slip_log: list[list[Slip]]
