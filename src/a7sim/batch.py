@@ -16,9 +16,9 @@ def exclude(active: Indices, others: Indices) -> Indices:
     """Return the indices of `active` that are not in `others`, in order."""
     if not active.size or not others.size:
         return active
-    stays = np.ones(max(int(active.max()), int(others.max())) + 1, dtype=bool)
-    stays[others] = False
-    return np.asarray(active[stays[active]])
+    remains = np.ones(max(int(active.max()), int(others.max())) + 1, dtype=bool)
+    remains[others] = False
+    return np.asarray(active[remains[active]])
 
 
 def take(values: npt.NDArray[Scalar], active: Indices) -> npt.NDArray[Scalar]:
@@ -29,20 +29,20 @@ def take(values: npt.NDArray[Scalar], active: Indices) -> npt.NDArray[Scalar]:
     return values if active.size == values.shape[-1] else values.take(active, axis=-1)
 
 
-def put(values: npt.NDArray[np.float64], active: Indices, into: npt.NDArray[np.float64]) -> None:
+def put(values: npt.NDArray[np.float64], active: Indices, out: npt.NDArray[np.float64]) -> None:
     """Write values ``(m,)`` or ``(k, m)`` of the active sessions into arrays ``(all,)`` or ``(k, all)``."""
-    if active.size == into.shape[-1]:
-        into[...] = values
-    elif into.ndim == 1:
-        into[active] = values
+    if active.size == out.shape[-1]:
+        out[...] = values
+    elif out.ndim == 1:
+        out[active] = values
     else:
-        for row, new in zip(into, values, strict=True):
-            row[active] = new
+        for row, new_row in zip(out, values, strict=True):
+            row[active] = new_row
 
 
-def add_at(amount: float, active: Indices, to: npt.NDArray[np.float64]) -> None:
+def add_at(amount: float, active: Indices, out: npt.NDArray[np.float64]) -> None:
     """Add an amount to the values of the active sessions in an array ``(all,)``."""
-    if active.size == to.size:
-        to += amount
+    if active.size == out.size:
+        out += amount
     else:
-        to[active] += amount
+        out[active] += amount

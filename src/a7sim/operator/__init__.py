@@ -1,4 +1,4 @@
-"""The virtual operator, who operates the instrument over its link and has no information but views and readings."""
+"""Virtual operator: operates the instrument over its link and knows only views and readings."""
 
 from a7sim.operator.driving.job import Job, ModelJob
 from a7sim.operator.people.person import OperatorGaveUp, Person

@@ -82,8 +82,8 @@ class BatchDriver:
         return self._batch.counter(active, axis)
 
     def drive(self, active: Indices, readings: Mapping[str, Array]) -> BoolArray:
-        went = [self._batch.drive(active, axis, each.round(2)) for axis, each in readings.items()]
-        return np.asarray(np.all(went, axis=0))
+        reached = [self._batch.drive(active, axis, reading.round(2)) for axis, reading in readings.items()]
+        return np.asarray(np.all(reached, axis=0))
 
     def turn(self, active: Indices, wheels: Array, element: str | None = None, amounts: Array | None = None) -> None:
         self._batch.turn_handwheels(active, wheels.round(4))

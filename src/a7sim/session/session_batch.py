@@ -31,9 +31,9 @@ class SessionBatch:
     job: Job
 
     def measure_models(self) -> Iterator[ModelRecordBatch]:
-        """Yield the models as they are measured;
+        """Yield the models as they are measured.
 
-        the reasons of sessions that give up are in `workstation.operators.reasons`.
+        `workstation.operators.reasons` contains the reasons of the sessions that give up.
         """
         return measure_models_batch(self.workstation)
 
@@ -43,41 +43,42 @@ class SessionBatch:
         Without `strips` they do not contain the strip on the ground, which doubles the time; unless `whole`,
         the models contain only the keys of `brief_model_document`.
         """
-        found: list[list[Document]] = [[] for _ in self.seeds]
+        model_documents: list[list[Document]] = [[] for _ in self.seeds]
         for records in self.measure_models():
-            plan = next(model for model in self.scenario.models if model.name == records.model.name)
-            beside = self._beside(records, self.scenes[0].relative_truth(plan))
+            planned_model = next(model for model in self.scenario.models if model.name == records.model.name)
+            comparison = self._compare_with_truth(records, self.scenes[0].relative_truth(planned_model))
             for member, session in enumerate(records.sessions.tolist()):
                 record = records.of(session)
-                found[session].append(
-                    results.model_document(record, beside, member, plan.published)
+                model_documents[session].append(
+                    results.model_document(record, comparison, member, planned_model.published)
                     if whole
-                    else results.brief_model_document(record, beside, member)
+                    else results.brief_model_document(record, comparison, member)
                 )
-        return [self._document(session, models, strips) for session, models in enumerate(found)]
+        return [self._document(session, models, strips) for session, models in enumerate(model_documents)]
 
-    def _beside(self, records: ModelRecordBatch, truth: RelativeTruth | None) -> TruthComparison:
+    def _compare_with_truth(self, records: ModelRecordBatch, truth: RelativeTruth | None) -> TruthComparison:
         """Return the truth about a model of the sessions that measured it; their instruments are in the final state."""
         active, model, batch = records.sessions, records.model, self.batch
         centres = {
-            hand: {
-                f"{axis}0": each for axis, each in batch.readings_at(active, batch.pose(active, projector)[0]).items()
+            side: {
+                f"{axis}0": readings
+                for axis, readings in batch.readings_at(active, batch.pose(active, projector)[0]).items()
             }
-            for hand, projector in ((1, model.left_projector), (2, model.right_projector))
+            for side, projector in ((1, model.left_projector), (2, model.right_projector))
         }
         elements = {name: counts[active] for name, counts in records.orientation.elements.items()}
         return TruthComparison.of(truth, centres, records.orientation.method, elements, model, batch.variant)
 
     def _document(self, session: int, models: list[Document], strips: bool) -> Document:
         operators, scenario = self.workstation.operators, self.scenario
-        why = operators.reasons.get(session)
+        reason = operators.reasons.get(session)
         document: Document = results.results_header(scenario, self.seeds[session]) | {
-            "status": "complete" if why is None else "does not fit",
-            "message": why or "",
+            "status": "complete" if reason is None else "does not fit",
+            "message": reason or "",
             "models": models,
             "operator": results.hours_document(float(operators.seconds[session]), operators.timesheet, session),
         }
-        if strips and why is None:
+        if strips and reason is None:
             document["strip"], _ = strip_document(scenario, ground_control(scenario, self.scenes[session]), models)
         return document
 

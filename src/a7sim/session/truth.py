@@ -27,12 +27,12 @@ class RelativePose:
         """Return the relative orientation described by the counters ``(...)`` of a model."""
         left, right = model.left_projector, model.right_projector
 
-        def turned(n: int) -> Array:
+        def rotation_of(n: int) -> Array:
             return rotation(*(tilt * GON for tilt in variant.tilts(elements, n)))
 
-        base = _base_of(elements, model)
-        to_left = transposed(turned(left))
-        return cls(mxm(to_left, turned(right)), mxv(to_left, base) / length_of(base))
+        base = _base_vector(elements, model)
+        to_left = transposed(rotation_of(left))
+        return cls(mxm(to_left, rotation_of(right)), mxv(to_left, base) / length_of(base))
 
     @classmethod
     def from_truth(cls, truth: RelativeTruth) -> "RelativePose":
@@ -54,47 +54,47 @@ def true_elements(
 ) -> dict[str, Array]:
     """Return the counter readings ``(m,)`` of the elements that a method turns if the truth were set.
 
-    The other elements keep their readings. Independent: the left-hand camera is rotated from the set base to the true
-    one, and about it until omega" has its reading. Dependent: the left-hand camera stays, the right-hand one and its by
-    and bz follow.
+    The other elements keep their readings. Independent: the left-hand camera is rotated so that the true base falls on
+    the set one, and then about the base until omega" has its reading. Dependent: the left-hand camera stays, the
+    right-hand one and its by and bz follow.
     """
     left, right = model.left_projector, model.right_projector
-    set_base = _base_of(elements, model)
+    set_base = _base_vector(elements, model)
 
     if method == "dependent":
-        turned_left = rotation(*(tilt * GON for tilt in variant.tilts(elements, left)))
-        base = mxv(turned_left, truth.base)
+        left_rotation = rotation(*(tilt * GON for tilt in variant.tilts(elements, left)))
+        base = mxv(left_rotation, truth.base)
         base *= elements["bx"] / base[0]
         true = {
             f"by{right}": elements[f"by{left}"] - base[1],
             f"bz{right}": elements[f"bz{left}"] + base[2],
         }
-        cameras = {right: mxm(turned_left, truth.rotation)}
+        cameras = {right: mxm(left_rotation, truth.rotation)}
     else:
-        turned_left = _laid_onto(truth.base, set_base)
+        left_rotation = _rotation_onto(truth.base, set_base)
         omega2 = variant.tilts(elements, 2)[0] * GON
         for _ in range(_MAX_TURNS):
-            cameras = {left: turned_left, right: mxm(turned_left, truth.rotation)}
-            turned_left = mxm(_about(set_base, omega2 - angles_of(cameras[2])[0]), turned_left)
+            cameras = {left: left_rotation, right: mxm(left_rotation, truth.rotation)}
+            left_rotation = mxm(_rotation_about(set_base, omega2 - angles_of(cameras[2])[0]), left_rotation)
         true = {}
-    for n, turned in cameras.items():
-        for name, radians in zip(("omega", "phi", "kappa"), angles_of(turned), strict=True):
-            shown = radians / GON + variant.elements[f"{name}{n}"].zero
-            true[f"{name}{n}"] = shown % 400.0 if name == "kappa" else shown
+    for n, camera in cameras.items():
+        for name, radians in zip(("omega", "phi", "kappa"), angles_of(camera), strict=True):
+            counter = radians / GON + variant.elements[f"{name}{n}"].zero
+            true[f"{name}{n}"] = counter % 400.0 if name == "kappa" else counter
     return true
 
 
 _MAX_TURNS = 12
 
 
-def _base_of(elements: ElementValues, model: ModelJob) -> Array:
+def _base_vector(elements: ElementValues, model: ModelJob) -> Array:
     left, right = model.left_projector, model.right_projector
     across = elements.get(f"by{left}", 0.0) - elements.get(f"by{right}", 0.0)
     rise = elements.get(f"bz{right}", 0.0) - elements.get(f"bz{left}", 0.0)
     return np.array(np.broadcast_arrays(elements["bx"], across, rise), dtype=float)
 
 
-def _about(axis: Array, angle: Array) -> Array:
+def _rotation_about(axis: Array, angle: Array) -> Array:
     """Return the rotations ``(3, 3, m)`` by angles about axes ``(3, m)`` (Rodrigues); none about a zero axis."""
     length = length_of(axis)
     x, y, z = axis / np.where(length > 0.0, length, 1.0)
@@ -103,9 +103,9 @@ def _about(axis: Array, angle: Array) -> Array:
     return np.asarray(np.eye(3)[:, :, None] + np.sin(angle) * skew + (1.0 - np.cos(angle)) * mxm(skew, skew))
 
 
-def _laid_onto(vector: Array, other: Array) -> Array:
+def _rotation_onto(vector: Array, other: Array) -> Array:
     """Return the smallest rotations ``(3, 3, m)`` that turn vectors into the direction of others."""
-    return _about(np.cross(vector, other, axis=0), angle_between(vector, other))
+    return _rotation_about(np.cross(vector, other, axis=0), angle_between(vector, other))
 
 
 @dataclass(frozen=True)
@@ -150,15 +150,15 @@ class TruthComparison:
         return cls(centres, RelativeComparison(truth.source, true, found, *found.differences_gon(true.batch()), exact))
 
     @classmethod
-    def from_record(cls, record: ModelRecord, standing: "TruePose", truth: RelativeTruth | None) -> "TruthComparison":
+    def from_record(cls, record: ModelRecord, pose: "TruePose", truth: RelativeTruth | None) -> "TruthComparison":
         """Return the truth about one session, with its instrument in the final state."""
         model = record.model
         centres = {
-            hand: {name: np.array([value]) for name, value in true_centre(standing, projector).items()}
-            for hand, projector in ((1, model.left_projector), (2, model.right_projector))
+            side: {name: np.array([value]) for name, value in true_centre(pose, projector).items()}
+            for side, projector in ((1, model.left_projector), (2, model.right_projector))
         }
         elements = {name: np.array([value]) for name, value in record.orientation.elements.items()}
-        return cls.of(truth, centres, record.orientation.method, elements, model, standing.variant)
+        return cls.of(truth, centres, record.orientation.method, elements, model, pose.variant)
 
 
 class TruePose(Protocol):

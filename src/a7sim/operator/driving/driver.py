@@ -76,7 +76,7 @@ class InstrumentDriver(Protocol):
         """Return the readings of the X, Y and Z counters ``(3, m)``."""
 
     def counter(self, active: Indices, axis: str) -> Array:
-        """Return the readings of one of them ``(m,)``."""
+        """Return the readings of one counter ``(m,)``."""
 
     def drive(self, active: Indices, readings: Mapping[str, Array]) -> BoolArray:
         """Drive carriages to readings ``(m,)`` by axis, two decimals; return which reached them ``(m,)``."""

@@ -34,15 +34,15 @@ def correct_fittings(controls: Controls, active: Indices) -> BoolArray:
     does not count.
     """
     operators, driver, model = controls.operators, controls.driver, controls.model
-    mended, astray = np.zeros((2, active.size), dtype=bool)
+    is_corrected, is_still_wrong = np.zeros((2, active.size), dtype=bool)
     for name, position in required_fittings(controls.manual, model.polarity, model.base).items():
         operators.spend(active, operators.observer.seconds_to_look, "looking")
-        wrong = driver.fitting(active, name) != position
-        if wrong.any():
-            them = active[wrong]
-            controls.spend_setting(them)
-            driver.set_fitting(them, name, position)
-            astray[wrong] |= driver.fitting(them, name) != position
-            mended |= wrong
-            operators.remark(them, f"{model.name}: the {FITTING_NAMES[name]} had been forgotten: put {position}")
-    return mended & ~astray
+        is_wrong = driver.fitting(active, name) != position
+        if is_wrong.any():
+            sessions = active[is_wrong]
+            controls.spend_setting(sessions)
+            driver.set_fitting(sessions, name, position)
+            is_still_wrong[is_wrong] |= driver.fitting(sessions, name) != position
+            is_corrected |= is_wrong
+            operators.remark(sessions, f"{model.name}: the {FITTING_NAMES[name]} had been forgotten: put {position}")
+    return is_corrected & ~is_still_wrong

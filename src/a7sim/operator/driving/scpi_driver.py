@@ -45,8 +45,8 @@ class ScpiDriver:
         self._send(f"FITT:{FITTING_NODES[name]} {short_form(position)}")
 
     def fitting(self, active: Indices, name: str) -> npt.NDArray[np.str_]:
-        shown = self._person.client.ask(f"FITT:{FITTING_NODES[name]}?")
-        return np.array([each for each in POSITIONS_OF[name] if short_form(each) == shown])
+        reply = self._person.client.ask(f"FITT:{FITTING_NODES[name]}?")
+        return np.array([position for position in POSITIONS_OF[name] if short_form(position) == reply])
 
     def set_element(self, active: Indices, name: str, values: Array) -> None:
         self._send(f"{header(name)} {values[0]:.2f}")
@@ -85,8 +85,8 @@ class ScpiDriver:
         return dict(zip(fields[0::3], places, strict=False))
 
     def elements(self, active: Indices, names: Sequence[str]) -> dict[str, Array]:
-        answer = np.array(self._numbers(";:".join(f"{header(name)}?" for name in names)))[:, None]
-        return dict(zip(names, answer, strict=True))
+        replies = np.array(self._numbers(";:".join(f"{header(name)}?" for name in names)))[:, None]
+        return dict(zip(names, replies, strict=True))
 
     def counters(self, active: Indices) -> Array:
         return np.array(self._numbers("COUN?"))[:, None]
@@ -107,13 +107,13 @@ class ScpiDriver:
         self._send(line)
 
     def view_point(self, active: Indices, eye: int, point: str) -> Array:
-        return self._looked(f'EYEP{eye}? "{point}"')
+        return self._view(f'EYEP{eye}? "{point}"')
 
     def view_point_stereo(self, active: Indices, point: str) -> Array:
-        return self._looked(f'EYEP1? "{point}";:EYEP2? "{point}"')
+        return self._view(f'EYEP1? "{point}";:EYEP2? "{point}"')
 
-    def _looked(self, question: str) -> Array:
-        return np.array([[math.nan if each == _NOT_VISIBLE else each] for each in self._numbers(question)])
+    def _view(self, query: str) -> Array:
+        return np.array([[math.nan if value == _NOT_VISIBLE else value] for value in self._numbers(query)])
 
     def record(self, active: Indices, point: str) -> None:
         self._send(f'REC "{point}"')

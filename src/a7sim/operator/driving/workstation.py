@@ -27,7 +27,7 @@ AGREEMENT_MM = 0.01
 MIN_SLIP_MM = 0.03
 """A reading of by that differs less than this from the others is not taken for a blunder."""
 
-Numbers = npt.NDArray[np.intp]
+EntryNumbers = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Parallaxes:
 
     def disagrees(self, active: Indices) -> Indices:
         """Return the sessions that could not fuse the images of a point."""
-        parted = np.array([self.disagreement[session] is not None for session in active], dtype=bool)
-        return np.asarray(active[parted])
+        has_disagreement = np.array([self.disagreement[session] is not None for session in active], dtype=bool)
+        return np.asarray(active[has_disagreement])
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Workstation:
         self.mark = FloatingMark(self.pointing)
         self._tick = tick
         self._prints: Mapping[int, Mapping[str, Array]] = {}
-        self._entries: dict[tuple[int, str, float], tuple[Numbers, Numbers]] = {}
+        self._entries: dict[tuple[int, str, float], tuple[EntryNumbers, EntryNumbers]] = {}
 
     # --- setting up -----------------------------------------------------------------------------------
 
@@ -101,22 +101,23 @@ class Workstation:
     def begin_round(self, active: Indices, number: int) -> None:
         """Start a round of a procedure: the next readings are entered under its number."""
         self.operators.begin_round(active, number)
-        if self.operators.person is not None:
-            self.driver.note(active, f"{self.controls.model.name}: {self.operators.person.book.form}, round {number}")
+        self.driver.note(active, f"{self.controls.model.name}: {self.operators.form}, round {number}")
 
     def compute(self, active: Indices) -> None:
         """Add the duration of one computation."""
         self.operators.spend(active, self.operators.observer.seconds_to_compute, "computing")
 
-    def has_point(self, active: Indices, point: str, hands: Sequence[int] = (1, 2)) -> BoolArray:
+    def has_point(self, active: Indices, point: str, sides: Sequence[int] = (1, 2)) -> BoolArray:
         """Return which active sessions find a point pricked on both prints, or on that of one photograph."""
-        prints = [self._prints[side].get(point) for side in hands]
-        if any(each is None for each in prints):
+        prints = [self._prints[side].get(point) for side in sides]
+        if any(positions is None for positions in prints):
             return np.zeros(active.size, dtype=bool)
-        return np.asarray(~np.isnan([each[0, active] for each in prints if each is not None]).any(axis=0))
+        return np.asarray(
+            ~np.isnan([positions[0, active] for positions in prints if positions is not None]).any(axis=0)
+        )
 
     def group_by_points(
-        self, active: Indices, points: Sequence[str], hands: Sequence[int] = (1, 2)
+        self, active: Indices, points: Sequence[str], sides: Sequence[int] = (1, 2)
     ) -> Iterator[tuple[Indices, list[str]]]:
         """Yield groups of sessions that find the same subset of points pricked on the prints of these photographs.
 
@@ -125,12 +126,12 @@ class Workstation:
         if not points:
             yield active, []
             return
-        shown = np.array([self.has_point(active, point, hands) for point in points])
-        for pattern in np.unique(shown, axis=1).T:
-            them = active[(shown == pattern[:, None]).all(axis=0)]
-            yield them, [point for point, there in zip(points, pattern, strict=True) if there]
+        shown = np.array([self.has_point(active, point, sides) for point in points])
+        for is_shown in np.unique(shown, axis=1).T:
+            sessions = active[(shown == is_shown[:, None]).all(axis=0)]
+            yield sessions, [point for point, found in zip(points, is_shown, strict=True) if found]
 
-    def _come_to(self, active: Indices, point: str) -> None:
+    def _select_point(self, active: Indices, point: str) -> None:
         """Select a point, or by mistake a standard point near it."""
         near = neighbours(self.controls.model.standard_points, point) if self.operators.may_mistake_points else []
         self.operators.select_point(active, point, {name: self.has_point(active, name) for name in near})
@@ -141,26 +142,26 @@ class Workstation:
         """Point with the eye of photograph 1 (left-hand) or 2 at a Z reading; X, Y readings ``(2, n, sessions)``."""
         operators = self.operators
         errors = operators.draw_setting_errors(active, operators.observer.monocular_um, (2, len(points)))
-        slips = operators.draw_misreadings(active, (2, len(points)))
+        misreadings = operators.draw_misreadings(active, (2, len(points)))
         self._drive_to_level(active, level)
         readings = np.zeros((2, len(points), operators.size))
         for i, point in enumerate(points):
             active = operators.remaining(active)
-            self._come_to(active, point)
-            self._point_once(active, side, point, level, errors[:, i], slips[:, i], readings[:, i])
+            self._select_point(active, point)
+            self._point_once(active, side, point, level, errors[:, i], misreadings[:, i], readings[:, i])
         return readings
 
-    def repeat_pointing(self, active: Indices, side: int, point: str, level: float, why: str) -> Array:
+    def repeat_pointing(self, active: Indices, side: int, point: str, level: float, reason: str) -> Array:
         """Strike out a pointing and repeat it; X, Y ``(2, sessions)``."""
         operators = self.operators
         for numbers in self._entries[side, point, level]:
-            operators.strike(active, numbers, why)
+            operators.strike(active, numbers, reason)
         operators.recheck_points(active)
         self._drive_to_level(active, level)
         errors = operators.redraw_setting_errors(active, operators.observer.monocular_um, 2)
-        slips = operators.redraw_misreadings(active, 2)
+        misreadings = operators.redraw_misreadings(active, 2)
         readings = np.zeros((2, operators.size))
-        self._point_once(active, side, point, level, errors, slips, readings)
+        self._point_once(active, side, point, level, errors, misreadings, readings)
         return readings
 
     def _drive_to_level(self, active: Indices, level: float) -> None:
@@ -168,7 +169,7 @@ class Workstation:
         self.controls.give_up_on_errors(active, f"driving Z to {level:.2f}")
 
     def _point_once(
-        self, active: Indices, side: int, point: str, level: float, errors: Array, slips: Array, readings: Array
+        self, active: Indices, side: int, point: str, level: float, errors: Array, misreadings: Array, readings: Array
     ) -> None:
         operators = self.operators
         self.pointing.bring_into_view(active, side, point)
@@ -176,16 +177,16 @@ class Workstation:
         active = operators.remaining(active)
         items = [f"{name} {side_name(side)} at Z {level:.2f}" for name in "XY"]
         for axis, item in enumerate(items):
-            readings[axis, active] = self._read(active, point, item, slips[axis])
+            readings[axis, active] = self._read(active, point, item, misreadings[axis])
         self.pointing.measure_drift(active, side, point, readings[:, active])
         numbers = [operators.enter(active, point, item, readings[axis, active]) for axis, item in enumerate(items)]
         self._entries[side, point, level] = (numbers[0], numbers[1])
         self._tick()
 
-    def _read(self, active: Indices, point: str, item: str, slips: Array) -> Array:
+    def _read(self, active: Indices, point: str, item: str, misreadings: Array) -> Array:
         """Read the counter ``(m,)`` named at the start of an item, with misreadings ``(sessions,)``."""
         self.operators.spend(active, self.operators.observer.seconds_to_read, "reading")
-        return self.operators.transcribe(active, point, item, self.driver.counter(active, item[0]), slips)
+        return self.operators.transcribe(active, point, item, self.driver.counter(active, item[0]), misreadings)
 
     # --- y-parallaxes ---------------------------------------------------------------------------------
 
@@ -197,52 +198,55 @@ class Workstation:
         plan_errors = operators.draw_setting_errors(active, observer.stereo_um, (2, n))
         height_errors = operators.draw_setting_errors(active, observer.height_um, (n,))
         errors = operators.draw_setting_errors(active, observer.parallax_um, (n, len(projectors), readings))
-        slips = operators.draw_misreadings(active, (n, len(projectors), readings))
-        rest = self._at_rest(active)
-        p, places = np.zeros((n, operators.size)), np.zeros((3, n, operators.size))
-        apart = np.full(operators.size, None, dtype=object)
+        misreadings = operators.draw_misreadings(active, (n, len(projectors), readings))
+        initial_by = self._read_by(active)
+        parallax_mm, places = np.zeros((n, operators.size)), np.zeros((3, n, operators.size))
+        disagreement = np.full(operators.size, None, dtype=object)
         measuring = active
         for i, point in enumerate(points):
-            self._come_to(measuring, point)
-            judgement = SettingErrors(plan_errors[:, i], height_errors[i])
-            fused = self.mark.fuse(measuring, point, judgement)
-            readings_there = self.controls.counters(fused) if fused.size else np.zeros((3, 0))
-            places[:, i, fused] = self.controls.model_position(fused, readings_there)
-            self.pointing.measure_drift(fused, 1, point, readings_there) if fused.size else None
-            cleared = self._parallax(fused, point, judgement, projectors, rest, errors[i], slips[i], p[i])
+            self._select_point(measuring, point)
+            setting_errors = SettingErrors(plan_errors[:, i], height_errors[i])
+            fused = self.mark.fuse(measuring, point, setting_errors)
+            if fused.size:
+                counter_readings = self.controls.counters(fused)
+                places[:, i, fused] = self.controls.model_position(fused, counter_readings)
+                self.pointing.measure_drift(fused, 1, point, counter_readings)
+            cleared = self._measure_parallax(
+                fused, point, setting_errors, projectors, initial_by, errors[i], misreadings[i], parallax_mm[i]
+            )
             lost = exclude(operators.remaining(measuring), cleared)
-            apart[lost] = point
+            disagreement[lost] = point
             if lost.size:
-                self._turn_back(lost, ("by1", "by2"), rest)
+                self._return_elements(lost, ("by1", "by2"), initial_by)
             measuring = cleared
             if not measuring.size:
                 break
             self._tick()
         if measuring.size:
             self.controls.give_up_on_errors(measuring, f"{self.controls.model.name}: measuring y-parallaxes")
-        return Parallaxes(p, places, apart)
+        return Parallaxes(parallax_mm, places, disagreement)
 
-    def _at_rest(self, active: Indices) -> dict[str, Array]:
-        rest = {name: np.zeros(self.operators.size) for name in ("by1", "by2")}
+    def _read_by(self, active: Indices) -> dict[str, Array]:
+        initial_by = {name: np.zeros(self.operators.size) for name in ("by1", "by2")}
         for name, counts in self.controls.elements(active, ["by1", "by2"]).items():
-            rest[name][active] = counts
-        return rest
+            initial_by[name][active] = counts
+        return initial_by
 
-    def _turn_back(self, active: Indices, names: Sequence[str], rest: Mapping[str, Array]) -> None:
+    def _return_elements(self, active: Indices, names: Sequence[str], initial_by: Mapping[str, Array]) -> None:
         self.operators.spend(active, self.operators.observer.seconds_to_turn, "turning")
         for name in names:
-            self.controls.run_element(active, name, rest[name][active])
+            self.controls.run_element(active, name, initial_by[name][active])
 
-    def _parallax(
+    def _measure_parallax(
         self,
         active: Indices,
         point: str,
-        judgement: SettingErrors,
+        setting_errors: SettingErrors,
         projectors: Sequence[int],
-        rest: Mapping[str, Array],
+        initial_by: Mapping[str, Array],
         errors: Array,
-        slips: Array,
-        into: Array,
+        misreadings: Array,
+        out: Array,
     ) -> Indices:
         """Clear the parallax of a point with by of projectors; write the mean readings ``(sessions,)`` into `out`."""
         values = np.zeros(errors.shape)
@@ -250,12 +254,20 @@ class Workstation:
         for i, projector in enumerate(projectors):
             for k in range(errors.shape[1]):
                 active = self._clear_with_by(
-                    active, projector, point, judgement, errors[i, k], slips[i, k], rest, values[i, k], numbers[i, k]
+                    active,
+                    projector,
+                    point,
+                    setting_errors,
+                    errors[i, k],
+                    misreadings[i, k],
+                    initial_by,
+                    values[i, k],
+                    numbers[i, k],
                 )
             if active.size:
-                self._turn_back(active, (f"by{projector}",), rest)
-        active = self._without_slips(active, point, judgement, projectors, rest, values, numbers)
-        into[active] = values[:, :, active].mean(axis=1).mean(axis=0)
+                self._return_elements(active, (f"by{projector}",), initial_by)
+        active = self._repeat_doubtful_readings(active, point, setting_errors, projectors, initial_by, values, numbers)
+        out[active] = values[:, :, active].mean(axis=1).mean(axis=0)
         return active
 
     def _clear_with_by(
@@ -263,36 +275,38 @@ class Workstation:
         active: Indices,
         projector: int,
         point: str,
-        judgement: SettingErrors,
+        setting_errors: SettingErrors,
         errors: Array,
-        slips: Array,
-        rest: Mapping[str, Array],
+        misreadings: Array,
+        initial_by: Mapping[str, Array],
         values: Array,
-        numbers: Numbers,
+        numbers: EntryNumbers,
     ) -> Indices:
         if not active.size:
             return active
         by, sense = f"by{projector}", self._sense_of_by(projector)
-        active = self.mark.settle(active, point, judgement, Clearing(by, np.full(self.operators.size, -sense), errors))
+        active = self.mark.settle(
+            active, point, setting_errors, Clearing(by, np.full(self.operators.size, -sense), errors)
+        )
         if active.size:
             self.operators.spend(active, self.operators.observer.seconds_to_read, "reading")
-            counts = self.operators.transcribe(active, point, by, self.driver.elements(active, [by])[by], slips)
+            counts = self.operators.transcribe(active, point, by, self.driver.elements(active, [by])[by], misreadings)
             numbers[active] = self.operators.enter(active, point, by, counts)[active]
-            values[active] = sense * (counts - rest[by][active])
+            values[active] = sense * (counts - initial_by[by][active])
         return active
 
     def _sense_of_by(self, projector: int) -> float:
         return 1.0 if self.controls.model.side_of(projector) == 1 else -1.0
 
-    def _without_slips(
+    def _repeat_doubtful_readings(
         self,
         active: Indices,
         point: str,
-        judgement: SettingErrors,
+        setting_errors: SettingErrors,
         projectors: Sequence[int],
-        rest: Mapping[str, Array],
+        initial_by: Mapping[str, Array],
         values: Array,
-        numbers: Numbers,
+        numbers: EntryNumbers,
     ) -> Indices:
         """Strike out readings that contradict the others and repeat them, in place.
 
@@ -302,31 +316,33 @@ class Workstation:
         tolerance = MIN_SLIP_MM + 5e-3 * observer.parallax_um * self.controls.z / self.controls.c
         doubtful, lost = active, active[:0]
         readings = values.shape[1]
-        bys = " and ".join("by'" if projector == 1 else 'by"' for projector in projectors)
+        by_names = " and ".join("by'" if projector == 1 else 'by"' for projector in projectors)
         for number in range(MAX_POINTINGS):
             flat = values.reshape(-1, operators.size)[:, doubtful]
             deviations = np.abs(flat - np.median(flat, axis=0))
             worst = deviations.argmax(axis=0) if len(flat) > 2 else np.full(doubtful.size, number % len(flat))
-            off = deviations.max(axis=0) > tolerance[doubtful]
-            doubtful, worst = doubtful[off], worst[off]
+            is_doubtful = deviations.max(axis=0) > tolerance[doubtful]
+            doubtful, worst = doubtful[is_doubtful], worst[is_doubtful]
             if not doubtful.size:
                 return exclude(operators.remaining(active), lost)
             for i in np.unique(worst // readings):
-                of_this = worst // readings == i
-                again, k = doubtful[of_this], np.zeros(operators.size, dtype=np.intp)
-                k[again] = worst[of_this] % readings
-                value, entry = (np.take_along_axis(each[i], k[None], axis=0)[0] for each in (values, numbers))
+                is_same_projector = worst // readings == i
+                repeating, k = doubtful[is_same_projector], np.zeros(operators.size, dtype=np.intp)
+                k[repeating] = worst[is_same_projector] % readings
+                value, entry = (np.take_along_axis(array[i], k[None], axis=0)[0] for array in (values, numbers))
                 by = f"by{projectors[i]}"
-                operators.strike(again, entry, f"does not agree with the other readings of {bys} at {point}")
-                errors = operators.redraw_setting_errors(again, observer.parallax_um, 1)[0]
-                slips = operators.redraw_misreadings(again, 1)[0]
-                found = self._clear_with_by(again, projectors[i], point, judgement, errors, slips, rest, value, entry)
-                values[i, k[found], found], numbers[i, k[found], found] = value[found], entry[found]
-                lost = np.concatenate([lost, exclude(again, found)])
-                if found.size:
-                    self._turn_back(found, (by,), rest)
+                operators.strike(repeating, entry, f"does not agree with the other readings of {by_names} at {point}")
+                errors = operators.redraw_setting_errors(repeating, observer.parallax_um, 1)[0]
+                misreadings = operators.redraw_misreadings(repeating, 1)[0]
+                cleared = self._clear_with_by(
+                    repeating, projectors[i], point, setting_errors, errors, misreadings, initial_by, value, entry
+                )
+                values[i, k[cleared], cleared], numbers[i, k[cleared], cleared] = value[cleared], entry[cleared]
+                lost = np.concatenate([lost, exclude(repeating, cleared)])
+                if cleared.size:
+                    self._return_elements(cleared, (by,), initial_by)
             doubtful = exclude(doubtful, lost)
-        operators.give_up(doubtful, f"{self.controls.model.name}: the readings of {bys} at {point} do not agree")
+        operators.give_up(doubtful, f"{self.controls.model.name}: the readings of {by_names} at {point} do not agree")
         return exclude(operators.remaining(active), lost)
 
     # --- clearing -------------------------------------------------------------------------------------
@@ -337,7 +353,7 @@ class Workstation:
         point: str,
         element: str,
         gain_at: Callable[[Indices, Array], Array],
-        unless_within: float = 0.0,
+        tolerance_mm: float = 0.0,
     ) -> ClearedPoint:
         """Clear the y-parallax of a point by turning an element, unless it already appears to be within a limit in mm.
 
@@ -345,78 +361,92 @@ class Workstation:
         ``(3, m)``. The parallax and the final reading of the element are added to the book.
         """
         operators = self.operators
-        judgement, error = self._judgement(active)
-        found, turn, gain = np.zeros((3, operators.size))
-        place = np.zeros((3, operators.size))
-        fused = self._arrive(active, point, judgement, error, place, found)
-        apart = exclude(operators.remaining(active), fused)
+        setting_errors, error = self._draw_setting_errors(active)
+        arrival_parallax_mm, element_change, gain = np.zeros((3, operators.size))
+        model_position_mm = np.zeros((3, operators.size))
+        fused = self._arrive_at_point(active, point, setting_errors, error, model_position_mm, arrival_parallax_mm)
+        disagreement = exclude(operators.remaining(active), fused)
         if not fused.size:
-            return ClearedPoint(fused, apart, found, place, turn)
-        gain[fused] = gain_at(fused, place[:, fused])
-        turning = fused[np.abs(found[fused]) > unless_within]
-        turned = self._turn_until_clear(turning, point, judgement, Clearing(element, gain, error), turn)
+            return ClearedPoint(fused, disagreement, arrival_parallax_mm, model_position_mm, element_change)
+        gain[fused] = gain_at(fused, model_position_mm[:, fused])
+        turning = fused[np.abs(arrival_parallax_mm[fused]) > tolerance_mm]
+        turned = self._turn_until_clear(turning, point, setting_errors, Clearing(element, gain, error), element_change)
         self._tick()
-        return ClearedPoint(exclude(fused, exclude(turning, turned)), apart, found, place, turn)
+        return ClearedPoint(
+            exclude(fused, exclude(turning, turned)),
+            disagreement,
+            arrival_parallax_mm,
+            model_position_mm,
+            element_change,
+        )
 
     def look_at_parallaxes(self, active: Indices, points: Sequence[str]) -> Parallaxes:
         """Look at the remaining y-parallax at points, turning only the handwheels."""
         operators = self.operators
-        p, places = np.zeros((len(points), operators.size)), np.zeros((3, len(points), operators.size))
-        apart = np.full(operators.size, None, dtype=object)
+        parallax_mm, places = np.zeros((len(points), operators.size)), np.zeros((3, len(points), operators.size))
+        disagreement = np.full(operators.size, None, dtype=object)
         for i, point in enumerate(points):
-            judgement, error = self._judgement(active)
-            fused = self._arrive(active, point, judgement, error, places[:, i], p[i])
-            apart[exclude(operators.remaining(active), fused)] = point
+            setting_errors, error = self._draw_setting_errors(active)
+            fused = self._arrive_at_point(active, point, setting_errors, error, places[:, i], parallax_mm[i])
+            disagreement[exclude(operators.remaining(active), fused)] = point
             active = fused
             if not active.size:
                 break
             self._tick()
-        return Parallaxes(p, places, apart)
+        return Parallaxes(parallax_mm, places, disagreement)
 
-    def _judgement(self, active: Indices) -> tuple[SettingErrors, Array]:
+    def _draw_setting_errors(self, active: Indices) -> tuple[SettingErrors, Array]:
         """Draw the setting errors of one arrival at a point, and the error of its y-parallax ``(sessions,)`` in um."""
         observer = self.operators.observer
         x, y, height, parallax = self.operators.draw_setting_errors(active, 1.0, (4,))
         plan = observer.stereo_um * np.array([x, y])
         return SettingErrors(plan, observer.height_um * height), observer.parallax_um * parallax
 
-    def _arrive(
-        self, active: Indices, point: str, judgement: SettingErrors, error: Array, place: Array, found: Array
+    def _arrive_at_point(
+        self,
+        active: Indices,
+        point: str,
+        setting_errors: SettingErrors,
+        error: Array,
+        model_position_mm: Array,
+        parallax_mm: Array,
     ) -> Indices:
         """Set the mark on a point; write its position and its apparent y-parallax into the arrays and the book."""
         controls = self.controls
-        self._come_to(active, point)
-        fused = self.mark.fuse(active, point, judgement)
+        self._select_point(active, point)
+        fused = self.mark.fuse(active, point, setting_errors)
         if fused.size:
             readings = controls.counters(fused)
-            place[:, fused] = controls.model_position(fused, readings)
+            model_position_mm[:, fused] = controls.model_position(fused, readings)
             self.pointing.measure_drift(fused, 1, point, readings)
-            found[fused] = self._seen_parallax(fused, point, error)
-            self.operators.enter(fused, point, "parallax seen", found[fused])
+            parallax_mm[fused] = self._apparent_parallax(fused, point, error)
+            self.operators.enter(fused, point, "parallax seen", parallax_mm[fused])
         return fused
 
-    def _seen_parallax(self, active: Indices, point: str, error: Array) -> Array:
+    def _apparent_parallax(self, active: Indices, point: str, error: Array) -> Array:
         """Return the apparent y-parallax ``(m,)`` in mm."""
         seen = self.mark.view(active, point)[3] + error[active]
         return np.asarray(1e-3 * seen * self.controls.z[active] / self.controls.c)
 
     def _turn_until_clear(
-        self, active: Indices, point: str, judgement: SettingErrors, clearing: Clearing, turn: Array
+        self, active: Indices, point: str, setting_errors: SettingErrors, clearing: Clearing, element_change: Array
     ) -> Indices:
         """Turn an element until a point is clear, add its reading to the book, and write the turn into the array."""
         operators, controls, element = self.operators, self.controls, clearing.element
-        slips = operators.draw_misreadings(active, (1,))[0]
+        misreadings = operators.draw_misreadings(active, (1,))[0]
         before = np.zeros(operators.size)
         before[active] = controls.exact_values(active, [element])[element] if active.size else 0.0
-        active = self.mark.settle(active, point, judgement, clearing) if active.size else active
+        active = self.mark.settle(active, point, setting_errors, clearing) if active.size else active
         if not active.size:
             return active
         operators.spend(active, operators.observer.seconds_to_read, "reading")
         shown = controls.elements(active, [element])[element]
-        written = operators.transcribe(active, point, element, shown, slips)
+        written = operators.transcribe(active, point, element, shown, misreadings)
         operators.enter(active, point, element, written)
-        turned = controls.held_position(active, element) - before[active]
-        turn[active] = (wrap_gon(turned) if controls.manual.elements[element].endless else turned) + written - shown
+        change = controls.held_position(active, element) - before[active]
+        element_change[active] = (
+            (wrap_gon(change) if controls.manual.elements[element].endless else change) + written - shown
+        )
         controls.read_settings(active)
         controls.give_up_on_errors(active, f"{controls.model.name}: clearing {point} with {element}")
         return operators.remaining(active)
@@ -429,66 +459,72 @@ class Workstation:
         A point whose images cannot be fused gets a remark and nan.
         """
         operators, observer, n = self.operators, self.operators.observer, len(points)
-        at_point = operators.draw_setting_errors(active, 1.0, (3, n)) * np.sqrt(1.0 - observer.repeat_share**2)
-        anew = operators.draw_setting_errors(active, 1.0, (3, n, 2)) * observer.repeat_share
-        slips = operators.draw_misreadings(active, (3, n, 2))
+        point_errors = operators.draw_setting_errors(active, 1.0, (3, n)) * np.sqrt(1.0 - observer.repeat_share**2)
+        pointing_errors = operators.draw_setting_errors(active, 1.0, (3, n, 2)) * observer.repeat_share
+        misreadings = operators.draw_misreadings(active, (3, n, 2))
         measured = np.full((3, n, operators.size), np.nan)
         for i, point in enumerate(points):
             active = operators.remaining(active)
-            self._come_to(active, point)
-            self._measure(active, point, at_point[:, i], anew[:, i], slips[:, i], measured[:, i])
+            self._select_point(active, point)
+            self._measure_point(
+                active, point, point_errors[:, i], pointing_errors[:, i], misreadings[:, i], measured[:, i]
+            )
             self._tick()
         self.controls.give_up_on_errors(active, f"{self.controls.model.name}: measuring model coordinates")
         return measured
 
-    def _measure(self, active: Indices, point: str, at_point: Array, anew: Array, slips: Array, into: Array) -> None:
+    def _measure_point(
+        self, active: Indices, point: str, point_errors: Array, pointing_errors: Array, misreadings: Array, out: Array
+    ) -> None:
         """Write the mean of two pointings that agree, or else the median of all, into `out`."""
         operators, observer = self.operators, self.operators.observer
         sigmas = np.array([observer.stereo_um, observer.stereo_um, observer.height_um])[:, None]
         pointings: list[Array] = []
-        entries: list[Numbers] = []
+        entries: list[EntryNumbers] = []
         repeating = active
         while len(pointings) < MAX_POINTINGS and repeating.size:
             k = len(pointings)
             if k < 2:
-                error, slip = anew[:, k], slips[:, k]
+                error, misreading = pointing_errors[:, k], misreadings[:, k]
             else:
-                self._strike(repeating, entries[-2])
+                self._strike_pointing(repeating, entries[-2])
                 error = operators.redraw_setting_errors(repeating, observer.repeat_share, 3)
-                slip = operators.redraw_misreadings(repeating, 3)
+                misreading = operators.redraw_misreadings(repeating, 3)
             readings = np.full((3, operators.size), np.nan)
-            found, numbers = self._pointing(repeating, point, sigmas * (at_point + error), slip, readings)
-            apart = exclude(operators.remaining(repeating), found)
-            operators.remark(apart, f"point {point}: its two images cannot be fused, not measured")
+            fused, numbers = self._point_stereoscopically(
+                repeating, point, sigmas * (point_errors + error), misreading, readings
+            )
+            not_fused = exclude(operators.remaining(repeating), fused)
+            operators.remark(not_fused, f"point {point}: its two images cannot be fused, not measured")
             pointings.append(readings)
             entries.append(numbers)
-            repeating = found
+            repeating = fused
             if k:
-                agreed = found[self._agree(pointings[-2][:, found], readings[:, found])]
-                into[:, agreed] = (pointings[-2][:, agreed] + readings[:, agreed]) / 2.0
-                repeating = exclude(found, agreed)
+                agreed = fused[self._is_in_agreement(pointings[-2][:, fused], readings[:, fused])]
+                out[:, agreed] = (pointings[-2][:, agreed] + readings[:, agreed]) / 2.0
+                repeating = exclude(fused, agreed)
         if repeating.size:
-            into[:, repeating] = np.median([each[:, repeating] for each in pointings], axis=0)
+            out[:, repeating] = np.median([pointing[:, repeating] for pointing in pointings], axis=0)
         operators.remark(repeating, f"point {point}: no two of {MAX_POINTINGS} pointings agree, median taken")
 
-    def _pointing(
-        self, active: Indices, point: str, error: Array, slips: Array, readings: Array
-    ) -> tuple[Indices, Numbers]:
+    def _point_stereoscopically(
+        self, active: Indices, point: str, error: Array, misreadings: Array, readings: Array
+    ) -> tuple[Indices, EntryNumbers]:
         operators = self.operators
         active = self.mark.fuse(active, point, SettingErrors(error[:2], error[2]))
         numbers = np.zeros((3, operators.size), dtype=np.intp)
         if active.size:
             for axis, name in enumerate("XYZ"):
-                readings[axis, active] = self._read(active, point, name, slips[axis])
+                readings[axis, active] = self._read(active, point, name, misreadings[axis])
             self.driver.record(active, point)
             for axis, name in enumerate("XYZ"):
                 numbers[axis] = operators.enter(active, point, name, readings[axis, active])
         return active, numbers
 
-    def _agree(self, first: Array, second: Array) -> npt.NDArray[np.bool_]:
+    def _is_in_agreement(self, first: Array, second: Array) -> npt.NDArray[np.bool_]:
         difference = np.abs(first - second) / self.controls.counter_units_per_mm[:, None]
         return np.asarray((difference <= AGREEMENT_MM + 1e-9).all(axis=0))
 
-    def _strike(self, active: Indices, numbers: Numbers) -> None:
-        for each in numbers:
-            self.operators.strike(active, each, "two pointings differ by more than 0.01 mm")
+    def _strike_pointing(self, active: Indices, numbers: EntryNumbers) -> None:
+        for entry_numbers in numbers:
+            self.operators.strike(active, entry_numbers, "two pointings differ by more than 0.01 mm")

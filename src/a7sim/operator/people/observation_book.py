@@ -44,16 +44,16 @@ class ObservationBook:
         number = len(self.entries) + 1
         entry = BookEntry(number, time, self.model, self.form, self.round, point, item, reading, remark)
         self.entries.append(entry)
-        self._tell(entry)
+        self._notify_listener(entry)
         return number
 
-    def strike_out(self, number: int, why: str) -> None:
+    def strike_out(self, number: int, reason: str) -> None:
         """Strike an entry out; it stays, marked."""
-        struck = replace(self.entries[number - 1], struck=why)
+        struck = replace(self.entries[number - 1], struck=reason)
         self.entries[number - 1] = struck
-        self._tell(struck)
+        self._notify_listener(struck)
 
-    def _tell(self, entry: BookEntry) -> None:
+    def _notify_listener(self, entry: BookEntry) -> None:
         if self.listener is not None:
             self.listener(entry)
 

@@ -43,7 +43,7 @@ class Person:
         printable = "".join(c if " " <= c <= "~" else "?" for c in text.replace('"', "'"))
         self.client.send(f'NOTE "{printable[:MAX_NOTE_LENGTH]}"')
 
-    def give_up(self, text: str) -> OperatorGaveUp:
+    def give_up(self, reason: str) -> OperatorGaveUp:
         """Write the contradiction into the book and return it as an error to raise."""
-        self.remark(f"does not fit: {text}")
-        return OperatorGaveUp(text)
+        self.remark(f"does not fit: {reason}")
+        return OperatorGaveUp(reason)

@@ -23,50 +23,50 @@ class OperatorRandom:
 
     def __init__(self, observer: Observer, seed: int) -> None:
         self.observer = observer
-        planned, again, lapses = np.random.SeedSequence(seed, spawn_key=(OPERATOR_STREAM,)).spawn(3)
+        planned, repeated, slips = np.random.SeedSequence(seed, spawn_key=(OPERATOR_STREAM,)).spawn(3)
         self._planned = np.random.default_rng(planned)
-        self._again = np.random.default_rng(again)
-        self._lapses = np.random.default_rng(lapses)
+        self._repeated = np.random.default_rng(repeated)
+        self._slips = np.random.default_rng(slips)
 
-    def fill_setting_errors(self, into: Array) -> None:
+    def fill_setting_errors(self, out: Array) -> None:
         """Draw the errors of planned settings, in units of their standard deviation."""
-        into[...] = self._planned.standard_normal(into.shape)
+        out[...] = self._planned.standard_normal(out.shape)
 
-    def refill_setting_errors(self, into: Array) -> None:
+    def refill_setting_errors(self, out: Array) -> None:
         """Draw the errors ``(count,)`` of repeated settings, in the same unit."""
-        into[:] = self._again.standard_normal(into.size)
+        out[:] = self._repeated.standard_normal(out.size)
 
-    def fill_reading_draws(self, into: Array) -> None:
+    def fill_reading_draws(self, out: Array) -> None:
         """Draw the uniform numbers ``(3, ...)`` of planned readings, for `misreading`."""
-        _luck(self._planned, into)
+        _fill_draws(self._planned, out)
 
-    def refill_reading_draws(self, into: Array) -> None:
+    def refill_reading_draws(self, out: Array) -> None:
         """Draw the uniform numbers ``(3, count)`` of repeated readings."""
-        for i in range(into.shape[1]):
-            _luck(self._again, into[:, i : i + 1])
+        for i in range(out.shape[1]):
+            _fill_draws(self._repeated, out[:, i : i + 1])
 
     def slip_draws(self, rate: float) -> bool:
         """Return whether an event of this rate happens."""
-        return rate > 0.0 and bool(self._lapses.random() < rate)
+        return rate > 0.0 and bool(self._slips.random() < rate)
 
     def choice(self, count: int) -> int:
         """Return the index of one of `count` alternatives."""
-        return int(self._lapses.integers(count))
+        return int(self._slips.integers(count))
 
 
-def _luck(rng: np.random.Generator, into: Array) -> None:
-    shape = into.shape[1:]
-    into[0] = rng.random(shape)
-    into[1] = rng.integers(len(_LAST_DIGITS), size=shape)
-    into[2] = rng.integers(len(_GROSS_SLIPS), size=shape)
+def _fill_draws(rng: np.random.Generator, out: Array) -> None:
+    shape = out.shape[1:]
+    out[0] = rng.random(shape)
+    out[1] = rng.integers(len(_LAST_DIGITS), size=shape)
+    out[2] = rng.integers(len(_GROSS_SLIPS), size=shape)
 
 
-def misreading(observer: Observer, luck: Array, factor: Array) -> Array:
+def misreading(observer: Observer, draws: Array, factor: Array) -> Array:
     """Return the misreadings ``(*shape, m)`` in counter units for uniform numbers ``(3, *shape, m)``; mostly zero.
 
     The slip rates of the observer are multiplied by `factor` ``(m,)``.
     """
-    chance, (last_digit, gross) = luck[0], luck[1:].astype(np.intp)
+    chance, (last_digit, gross) = draws[0], draws[1:].astype(np.intp)
     blunders = factor * observer.blunder_rate
-    slipped = np.where(chance < blunders + factor * observer.last_digit_slip, _LAST_DIGITS[last_digit], 0.0)
-    return np.where(chance < blunders, _GROSS_SLIPS[gross], slipped)
+    small_errors = np.where(chance < blunders + factor * observer.last_digit_slip, _LAST_DIGITS[last_digit], 0.0)
+    return np.where(chance < blunders, _GROSS_SLIPS[gross], small_errors)

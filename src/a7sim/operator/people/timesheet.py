@@ -13,9 +13,9 @@ from a7sim.geometry import Array
 
 Act = Literal["looking", "turning", "reading", "setting", "driving", "mounting", "computing", "resting", "other"]
 
-_OF_ACT: Mapping[str, str] = MappingProxyType({"computing": "computing", "resting": "breaks"})
+_ACTIVITY_OF_ACT: Mapping[str, str] = MappingProxyType({"computing": "computing", "resting": "breaks"})
 
-_OF_FORM: Mapping[str, str] = MappingProxyType(
+_ACTIVITY_OF_FORM: Mapping[str, str] = MappingProxyType(
     {
         "": "mounting and interior orientation",
         "preparation": "mounting and interior orientation",
@@ -36,18 +36,18 @@ class Timesheet:
 
     def add(self, active: Indices, seconds: float, form: str, act: Act) -> None:
         """Add seconds of the active sessions."""
-        activity = _OF_ACT.get(act) or _OF_FORM.get(form, form)
+        activity = _ACTIVITY_OF_ACT.get(act) or _ACTIVITY_OF_FORM.get(form, form)
         add_at(seconds, active, self.by_activity[activity])
         add_at(seconds, active, self.by_act[act])
 
     def activities_of(self, session: int) -> dict[str, float]:
         """Return the seconds of one session by activity, in order of first occurrence."""
-        return _of(self.by_activity, session)
+        return _seconds_of(self.by_activity, session)
 
     def acts_of(self, session: int) -> dict[str, float]:
         """Return the seconds of one session by act."""
-        return _of(self.by_act, session)
+        return _seconds_of(self.by_act, session)
 
 
-def _of(column: Mapping[str, Array], session: int) -> dict[str, float]:
-    return {name: float(seconds[session]) for name, seconds in column.items() if seconds[session]}
+def _seconds_of(seconds_by_name: Mapping[str, Array], session: int) -> dict[str, float]:
+    return {name: float(seconds[session]) for name, seconds in seconds_by_name.items() if seconds[session]}
