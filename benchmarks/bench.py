@@ -89,7 +89,7 @@ BENCHMARKS = (
 def outcome(benchmark: Benchmark, settings: Settings, peers: Path | None) -> Outcome:
     """Run a benchmark to its end or its limit."""
     program, arguments = benchmark.program, settings.arguments
-    if benchmark.needs and not there(benchmark.needs):
+    if benchmark.needs and not is_installed(benchmark.needs):
         return Outcome(program, arguments, absent=benchmark.needs)
     with tempfile.TemporaryDirectory() as scratch:
         began = time.perf_counter()
@@ -101,7 +101,7 @@ def outcome(benchmark: Benchmark, settings: Settings, peers: Path | None) -> Out
             start_new_session=True,
         )
         try:
-            lines, said = process.communicate(timeout=settings.longest)
+            lines, output = process.communicate(timeout=settings.longest)
         except subprocess.TimeoutExpired:
             return Outcome(program, arguments, failure=f"not done after {settings.longest:.0f} s")
         finally:
@@ -109,7 +109,7 @@ def outcome(benchmark: Benchmark, settings: Settings, peers: Path | None) -> Out
     took = time.perf_counter() - began
     if lines:
         return Outcome(program, arguments, tuple(figures.read(lines)), took)
-    last = (said.strip().splitlines() or [f"exit code {process.returncode}, and nothing said"])[-1]
+    last = (output.strip().splitlines() or [f"exit code {process.returncode}, and nothing said"])[-1]
     return Outcome(program, arguments, failure=last, seconds=took)
 
 
@@ -124,7 +124,7 @@ def ended(process: subprocess.Popen[str]) -> None:
     process.communicate()
 
 
-def there(module: str) -> bool:
+def is_installed(module: str) -> bool:
     """Return whether a module can be imported, tested in a subprocess."""
     return subprocess.run([sys.executable, "-c", f"import {module}"], capture_output=True, check=False).returncode == 0
 
@@ -138,10 +138,10 @@ def run_all(chosen: Sequence[tuple[Benchmark, Settings]], peers: Path | None) ->
     """Run benchmarks one after the other and print their progress."""
     outcomes = []
     for number, (each, settings) in enumerate(chosen, start=1):
-        said = f"{number} of {len(chosen)}  {each.program} {settings.arguments}".rstrip()
-        print(f"{said}  (about {settings.seconds:.0f} s)", flush=True)
+        output = f"{number} of {len(chosen)}  {each.program} {settings.arguments}".rstrip()
+        print(f"{output}  (about {settings.seconds:.0f} s)", flush=True)
         come = outcome(each, settings, peers)
-        print(f"    {come.told}", flush=True)
+        print(f"    {come.summary}", flush=True)
         outcomes.append(come)
     return outcomes
 

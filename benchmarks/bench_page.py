@@ -28,7 +28,7 @@ class Outcome:
     """Required module that is not installed."""
 
     @property
-    def told(self) -> str:
+    def summary(self) -> str:
         """Return a short description."""
         if self.failure:
             return f"failed: {self.failure}"

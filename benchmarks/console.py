@@ -164,7 +164,7 @@ def floor_app(columns: int, rows: int) -> None:
     Floor().run()
 
 
-def first_paint(command: list[str], columns: int, rows: int, there: bytes, times: int = 5) -> tuple[float, float]:
+def first_paint(command: list[str], columns: int, rows: int, awaited: bytes, times: int = 5) -> tuple[float, float]:
     """Return the shortest time of several starts to the first paint, and the least CPU time of one, s.
 
     A start before them compiles the byte code, as the first start of an installed console does.
@@ -172,19 +172,19 @@ def first_paint(command: list[str], columns: int, rows: int, there: bytes, times
     taken = []
     for _ in range(times + 1):
         terminal = Terminal(command, columns, rows)
-        taken.append((terminal.until(there), terminal.cpu()))
+        taken.append((terminal.until(awaited), terminal.cpu()))
         terminal.end()
     wall, cpu = zip(*taken[1:], strict=True)
     return min(wall), min(cpu)
 
 
 def measured(
-    command: list[str], columns: int, rows: int, there: bytes, load: bool
+    command: list[str], columns: int, rows: int, awaited: bytes, load: bool
 ) -> tuple[float, float, float, float, float, int]:
     """Return first paint s, its CPU s, key to frame ms, CPU share at 20 keys/s, kB/s, and bytes drawn in 3 idle s."""
-    paint, spent = first_paint(command, columns, rows, there)
+    paint, spent = first_paint(command, columns, rows, awaited)
     terminal = Terminal(command, columns, rows)
-    terminal.until(there)
+    terminal.until(awaited)
     terminal.drained(1.5)
     if load:
         for line in ('PHOT1:LOAD "101";:PHOT2:LOAD "102"', "BASE:BX 194.99;:DRIV:X 97;Z -320"):
@@ -203,7 +203,7 @@ def measured(
 def asked_of(name: str, console: tuple[float, ...], floor: tuple[float, ...]) -> list[Figure]:
     """Return the console's figures compared with the bare widget's."""
     against = "bare Textual widget"
-    told = (
+    row = (
         ("first paint", "s", 1.0, Target("below", 0.8)),
         ("CPU until first paint", "s", 1.0, None),
         ("key to frame", "ms", 1.0, Target("below", 60)),
@@ -212,7 +212,7 @@ def asked_of(name: str, console: tuple[float, ...], floor: tuple[float, ...]) ->
     )
     figures = [
         Figure(f"{name}, {what}", scale * ours, unit, against, ours / bare if bare else None, target)
-        for (what, unit, scale, target), ours, bare in zip(told, console, floor, strict=False)
+        for (what, unit, scale, target), ours, bare in zip(row, console, floor, strict=False)
     ]
     return [*figures, Figure(f"{name}, drawn in 3 idle s", console[-1], "bytes", target=Target("at most", 0))]
 
@@ -233,13 +233,13 @@ def main() -> list[Figure]:
     floor = [sys.executable, __file__, FLOOR, str(2 * 29), "13"]
     print(f"{'':<22}first paint   its CPU   key to frame   CPU at 20/s     drawn    idle 3 s")
     seen = []
-    for name, command, there, load in (
+    for name, command, awaited, load in (
         ("console", console, b"elements", True),
         ("bare Textual widget", floor, "▀".encode(), False),
     ):
-        paint, spent, frame, share, kilobytes, idle = numbers = measured(command, columns, rows, there, load)
-        told = f"{paint:9.2f} s {spent:7.2f} s {frame:11.0f} ms {share:11.0%} {kilobytes:7.0f} kB/s {idle:7d} B"
-        print(f"  {name:<20}{told}")
+        paint, spent, frame, share, kilobytes, idle = numbers = measured(command, columns, rows, awaited, load)
+        row = f"{paint:9.2f} s {spent:7.2f} s {frame:11.0f} ms {share:11.0%} {kilobytes:7.0f} kB/s {idle:7d} B"
+        print(f"  {name:<20}{row}")
         seen.append(numbers)
     return figures + asked_of(f"{columns} x {rows}", *seen)
 

@@ -10,7 +10,7 @@ import sys
 import threading
 import tty
 
-LARGEST_READ = 16 * 1024
+MAX_READ = 16 * 1024
 
 
 def threads():
@@ -24,7 +24,7 @@ def threads():
 
 def _echoed(connection):
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    while heard := connection.recv(LARGEST_READ):
+    while heard := connection.recv(MAX_READ):
         connection.sendall(heard)
 
 
@@ -32,7 +32,7 @@ class Echo(asyncio.BufferedProtocol):
     """A protocol that writes what it receives, quicker than asyncio.Protocol, which allocates 256 KiB for each read."""
 
     def __init__(self):
-        self._buffer = bytearray(LARGEST_READ)
+        self._buffer = bytearray(MAX_READ)
 
     def connection_made(self, transport):
         """Remember where to write."""
@@ -60,7 +60,7 @@ def pty():
     tty.setraw(far)
     print(os.ttyname(far), flush=True)
     while True:
-        os.write(near, os.read(near, LARGEST_READ))
+        os.write(near, os.read(near, MAX_READ))
 
 
 if __name__ == "__main__":

@@ -74,8 +74,8 @@ class Figure:
         """Return the cells of the `COLUMNS` of a table."""
         ratio = NOT_THERE if self.against and self.ratio is None else number(self.ratio)
         verdict = {None: "", True: "met", False: "missed"}[self.met]
-        told = str(self.target) if self.target else ""
-        return self.name, f"{number(self.value)} {self.unit}".rstrip(), self.against, ratio, told, verdict
+        wanted = str(self.target) if self.target else ""
+        return self.name, f"{number(self.value)} {self.unit}".rstrip(), self.against, ratio, wanted, verdict
 
 
 def number(value: float | None) -> str:

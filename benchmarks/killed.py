@@ -133,9 +133,12 @@ def killed_server(folder, whole, took, dice):
     process.wait()
     process = Forked(serve, "--resume", folder, "--tcp", "127.0.0.1:0", "--json")
     port = process.port()
-    there = {number: len(each) for number, each in registered(folder).items()}
-    assert all(there[number] - 1 <= acknowledged[number] <= there[number] for number in (1, 2)), (there, acknowledged)
-    worked(port, there, dice)
+    recorded = {number: len(each) for number, each in registered(folder).items()}
+    assert all(recorded[number] - 1 <= acknowledged[number] <= recorded[number] for number in (1, 2)), (
+        recorded,
+        acknowledged,
+    )
+    worked(port, recorded, dice)
     assert process.kill(signal.SIGTERM) == 0
     assert registered(folder) == whole, folder
     return sum(acknowledged.values()) / (2 * STEPS)

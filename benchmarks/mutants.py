@@ -25,7 +25,7 @@ import click
 
 SEED = 1985
 MUTANTS = Path("mutants")
-LONGEST_LOOK = 600
+MAX_LOOK = 600
 """Seconds; a mutant that takes longer has been noticed."""
 
 SURVIVED, NO_TEST = 0, 33
@@ -94,7 +94,7 @@ def noticed_by(name: str) -> str:
     command = [sys.executable, "-m", "pytest", *options, *tests]
     try:
         done = subprocess.run(
-            command, cwd=MUTANTS, env=environment, capture_output=True, text=True, timeout=LONGEST_LOOK, check=False
+            command, cwd=MUTANTS, env=environment, capture_output=True, text=True, timeout=MAX_LOOK, check=False
         )
     except subprocess.TimeoutExpired:
         return "time out"

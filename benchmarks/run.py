@@ -31,19 +31,19 @@ class Parrot:
 
 def floor_of(scenario, seed):
     """Return the seconds of the session's traffic without an instrument."""
-    said = []
-    session = open_session(scenario, seed, lambda event: said.append((event.direction, event.text)))
+    exchanged = []
+    session = open_session(scenario, seed, lambda event: exchanged.append((event.direction, event.text)))
     list(measure_models(session.person, session.job))
-    answers = [text.encode() + b"\n" for direction, text in said if direction == "<"]
+    answers = [text.encode() + b"\n" for direction, text in exchanged if direction == "<"]
     client = Client(Parrot(answers))
     began = time.perf_counter()
-    for i, (direction, text) in enumerate(said):
+    for i, (direction, text) in enumerate(exchanged):
         if direction == ">":
-            if i + 1 < len(said) and said[i + 1][0] == "<":
+            if i + 1 < len(exchanged) and exchanged[i + 1][0] == "<":
                 client.ask(text)
             else:
                 client.send(text)
-    return time.perf_counter() - began, len(said)
+    return time.perf_counter() - began, len(exchanged)
 
 
 def main():

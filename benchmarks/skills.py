@@ -119,7 +119,7 @@ def summed(shelved, profile, attempts):
     )
 
 
-def told(rows):
+def print_rows(rows):
     print(f"{'exercise':<26}{'profile':<13}{'passed':>9}  {'asked':<14}{'points':>7}{'minutes':>9}  failed")
     for each in rows:
         target, met = each.figure.target, each.figure.met
@@ -204,7 +204,7 @@ def main():
     began = time.perf_counter()
     seeds = range(given.first_seed, given.first_seed + given.seeds)
     rows = tried([each for each in named if procedure_of(each) is not None], seeds, given.workers)
-    told(rows)
+    print_rows(rows)
     print(f"seeds {seeds.start} to {seeds.stop - 1}, {given.workers} processes: {time.perf_counter() - began:.0f} s")
     kept(rows, table)
     drawn(rows, figure)

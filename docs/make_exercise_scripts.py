@@ -316,11 +316,11 @@ def one_projector(driver, otherwise):
                 _, y, z = driver.client.numbers("COUN?")
                 n = (1.0 + (z / y) ** 2) / 2.0
                 driver.client.send(f"{header(element)}:TURN {(n - 1.0) * amount:.4f}")
-                told = f"point 6 needs {amount:.4f}; multiplied by {n:.2f}"
+                explanation = f"point 6 needs {amount:.4f}; multiplied by {n:.2f}"
                 amount *= n
             else:
-                told = f"clears point {position}"
-            driver.lines.append(f"{f'{header(element)}:TURN {amount:.4f}':<34}# {told}")
+                explanation = f"clears point {position}"
+            driver.lines.append(f"{f'{header(element)}:TURN {amount:.4f}':<34}# {explanation}")
     if otherwise == "last point":
         driver.remark("An accidental turn")
         driver.say("PROJ2:PHI:TURN 0.06")

@@ -177,7 +177,7 @@ WHEN = {
 }
 """Cause of each error."""
 
-LONGEST_SHOWN = 56
+MAX_SHOWN = 56
 
 
 @cache
@@ -210,15 +210,15 @@ def example_of(command):
     variant = "A8" if command.header.startswith("COMMon") else "A7"
     instrument = Instrument(variant)
     instrument.say(BEFORE.get(command.header, ""))
-    line = _said(command)
+    line = _description(command)
     if not command.query:
         own = next((each for each in COMMANDS.commands if each.header == f"{command.header}?"), None)
-        shown = SHOWN_BY.get(command.header) or (own and _said(own))
+        shown = SHOWN_BY.get(command.header) or (own and _description(own))
         line = f"{line};{'' if shown is None or shown.startswith('*') else ':'}{shown}" if shown else line
     return line, instrument.say(line)
 
 
-def _said(command):
+def _description(command):
     header = re.sub(r"\[[^\]]*\]", "", command.header).replace("<n>", "1")
     return f"{short_form(header)} {GIVEN.get(command.header, '')}".strip()
 
@@ -230,7 +230,7 @@ def ranges_of(command, variant):
     instrument = Instrument(variant)
     instrument.say(BEFORE.get(command.header, ""))
     instrument.errors()
-    instrument.say(_said(command))
+    instrument.say(_description(command))
     if -221 in instrument.errors():
         return "not on it"
     if command.header == "GEAR:HEIGht":
@@ -315,7 +315,7 @@ def _group(command):
 
 def _row(command: Command):
     line, reply = example_of(command)
-    shown = reply if len(reply) <= LONGEST_SHOWN else reply[:LONGEST_SHOWN] + " ..."
+    shown = reply if len(reply) <= MAX_SHOWN else reply[:MAX_SHOWN] + " ..."
     example = f"`{line}`" + (f" gives `{shown}`" if reply else "")
     cells = (
         _code(command.syntax()),

@@ -161,7 +161,7 @@ def test_a_missed_target_and_what_is_printed_for_people_do_not_make_a_benchmark_
     )
     assert come.failure == ""
     assert come.figures == (Figure("--rounds 3", 2.0, target=Target("below", 1)),)
-    assert come.told.endswith("0 met, 1 missed")
+    assert come.summary.endswith("0 met, 1 missed")
 
 
 def test_a_benchmark_that_fails_is_told_by_its_last_words(tried):

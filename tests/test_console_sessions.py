@@ -97,7 +97,7 @@ def test_who_left_is_asked_and_goes_on_where_it_stood(data: Path) -> None:
     async def second(person: Person) -> None:
         await person.until(lambda: person.console.screen.query(OptionList))
         assert "at the instrument, left 20" in "\n".join(await person.frame())
-        await person.choose("go on where it stood")
+        await person.choose("resume the session")
         await person.until(lambda: len(person.console.entries) == 2)
         await person.settle()
         assert standing(person.console) == left[0]
@@ -116,7 +116,7 @@ def test_who_begins_anew_keeps_the_old_session(data: Path) -> None:
     bytes_of_old = (old / JOURNAL).read_bytes()
 
     async def anew(person: Person) -> None:
-        await person.choose("begin anew")
+        await person.choose("start a new session")
         await person.settle()
         assert person.console.entries == () and person.console.dials.pictures == ("", "")
         await person.press("right")

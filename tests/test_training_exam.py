@@ -116,10 +116,10 @@ def test_what_a_student_wrote_is_none_of_the_papers(train, tmp_path):
 def test_an_exam_keeps_its_first_grade_whatever_is_written_afterwards(train, tmp_path):
     script = EXERCISES / "01-counters" / "faulty-misread.a7s"
     train("start", 1, "--exam", "--seed", 1, "--script", script)
-    code, out, _ = train("verify", 1)
+    code, out, _ = train("grade", 1)
     assert code == 1
     with Progress(tmp_path / "home") as progress:
         (progress.last("ada").folder / "answers.txt").write_text("play=0.07\n")
-    assert train("verify", 1) == (code, out, "")
+    assert train("grade", 1) == (code, out, "")
     with Progress(tmp_path / "home") as progress:
         assert len(progress.grades("ada")) == 1

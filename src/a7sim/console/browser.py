@@ -107,7 +107,7 @@ async def _this_machine_alone(request: web.Request, handler: Callable[[web.Reque
     return response
 
 
-def serve(command: Sequence[str], port: int, idle_s: float, told: Callable[[str], None]) -> bool:
+def serve(command: Sequence[str], port: int, idle_s: float, announce: Callable[[str], None]) -> bool:
     """Serve a command at a port, 0 for any free one, until a signal ends it; return whether it ended as idle.
 
     `told` is called with the address. It also ends when no page has been open for `idle_s` seconds.
@@ -117,10 +117,10 @@ def serve(command: Sequence[str], port: int, idle_s: float, told: Callable[[str]
     except OSError as error:
         raise A7SimError(f"--port {port}: expected a port that is free: {os.strerror(error.errno or 0)}") from error
     with door:
-        return asyncio.run(_serving(command, door, idle_s, told))
+        return asyncio.run(_serving(command, door, idle_s, announce))
 
 
-async def _serving(command: Sequence[str], door: socket.socket, idle_s: float, told: Callable[[str], None]) -> bool:
+async def _serving(command: Sequence[str], door: socket.socket, idle_s: float, announce: Callable[[str], None]) -> bool:
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
     alone = False
 
@@ -140,7 +140,7 @@ async def _serving(command: Sequence[str], door: socket.socket, idle_s: float, t
     try:
         await web.SockSite(runner, door).start()
         visitors.watch()
-        told(f"http://{LOOPBACK}:{port}/")
+        announce(f"http://{LOOPBACK}:{port}/")
         await ended.wait()
     finally:
         await runner.cleanup()

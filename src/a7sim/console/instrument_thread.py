@@ -75,11 +75,11 @@ class InstrumentThread:
     def send(self, *lines: str) -> None:
         """Send lines without queries."""
 
-        def said(client: Client) -> None:
+        def run(client: Client) -> None:
             for line in lines:
                 client.send(line)
 
-        self.submit(said)
+        self.submit(run)
 
     def look(self, look: ViewRequest) -> None:
         """Change the requested view of the eyepieces."""

@@ -365,9 +365,9 @@ class Autograph:
     ) -> None:
         """Raise an error for a change that moves a rod beyond its limit, or further beyond it after `reset`."""
         here = [each.at for each in self._carriages.values()]
-        there = [carriages.get(axis, each.at) for axis, each in self._carriages.items()] if carriages else here
+        reached = [carriages.get(axis, each.at) for axis, each in self._carriages.items()] if carriages else here
         for projector in (1, 2):
-            inclination = self._rod_inclination(projector, there, elements or {}, base_mode or self.base_mode)
+            inclination = self._rod_inclination(projector, reached, elements or {}, base_mode or self.base_mode)
             if inclination <= self.variant.rod_limit_gon:
                 continue
             if inclination > self._rod_inclination(projector, here, {}, self.base_mode):

@@ -112,7 +112,7 @@ class AutographBatch:
         """Distance of the axes from the centre, in the frame (see `pose`)."""
         self._common = np.zeros((3, 3, self.instruments))
         """Rotation by the common Phi, if any."""
-        self._told = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
+        self._projection_centres = {n: np.zeros((3, self.instruments)) for n in (1, 2)}
         """Positions of the centres by the drums."""
         for n in (1, 2):
             self._stand(everywhere, n)
@@ -182,18 +182,18 @@ class AutographBatch:
         drums = self._drums[name]
         allowed = drums.within_range(targets)
         moved = [n for n in (1, 2) if name in ("bx", "common_phi") or name.endswith(str(n))]
-        told: dict[int, Array] = {}
+        reached_centres: dict[int, Array] = {}
         if name in MOVE_CENTRES:
-            told = {n: self._centres_told(active, n, {name: targets}) for n in moved}
-            allowed &= self._rods_can(active, told)
+            reached_centres = {n: self._centres_told(active, n, {name: targets}) for n in moved}
+            allowed &= self._rods_can(active, reached_centres)
         if not allowed.all():
             self._refuse(active[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
             active, targets = active[allowed], targets[allowed]
-            told = {n: each.compress(allowed, axis=-1) for n, each in told.items()}
+            reached_centres = {n: each.compress(allowed, axis=-1) for n, each in reached_centres.items()}
         drums.turn_to(active, targets, rngs)
         for n in moved:
             if name in SHIFTS:
-                self._shift(active, n, told[n])
+                self._shift(active, n, reached_centres[n])
             else:
                 self._stand(active, n)
 
@@ -340,13 +340,13 @@ class AutographBatch:
         mark = now if mark is None else mark
         able = np.ones(active.size, dtype=bool)
         for n in (1, 2) if centres is None else centres:
-            beside, below = _reach(take(self._told[n], active) if centres is None else centres[n], mark)
+            beside, below = _reach(take(self._projection_centres[n], active) if centres is None else centres[n], mark)
             if (beside < self._surely_within * below).all():
                 continue
             then = np.arctan2(beside, below) / GON
             beyond = then > self.variant.rod_limit_gon
             if beyond.any():
-                able &= ~beyond | (then <= np.arctan2(*_reach(take(self._told[n], active), now)) / GON)
+                able &= ~beyond | (then <= np.arctan2(*_reach(take(self._projection_centres[n], active), now)) / GON)
         return able
 
     def _rods_surely_can(self, active: Indices, before: Array, low: Array, high: Array) -> bool:
@@ -358,8 +358,8 @@ class AutographBatch:
         lowest, highest = before.min(axis=1), before.max(axis=1)
         lowest[:k], highest[:k] = np.minimum(lowest[:k], low), np.maximum(highest[:k], high)
         for n in (1, 2):
-            told = take(self._told[n], active)
-            least, most = told.min(axis=1), told.max(axis=1)
+            reached_centres = take(self._projection_centres[n], active)
+            least, most = reached_centres.min(axis=1), reached_centres.max(axis=1)
             x, y, _ = np.maximum(highest - least, most - lowest)
             if not math.hypot(x, y) < self._surely_within * (least[2] - highest[2]):
                 return False
@@ -440,7 +440,7 @@ class AutographBatch:
         put(self._drums[f"c{n}"].position(active), active, bundles.c)
         self._shift(active, n, self._centres_told(active, n))
 
-    def _shift(self, active: Indices, n: int, told: Array) -> None:
+    def _shift(self, active: Indices, n: int, reached_centres: Array) -> None:
         """Move the projectors, with unchanged rotation, to the positions by base, by and bz, given as ``(3, m)``."""
         base = (self._really(active, name) for name in ("bx", f"by{n}", f"bz{n}"))
         place = projection_centre(self._shares(n, take(self._base_inside, active)), *base)
@@ -448,7 +448,7 @@ class AutographBatch:
         if "common_phi" in self._drums:
             centre = mxv(take(self._common, active), centre)
         put(centre, active, self._bundles[n].centre)
-        put(told, active, self._told[n])
+        put(reached_centres, active, self._projection_centres[n])
 
     def _really(self, active: Indices, name: str) -> Array:
         if name not in self._drums:

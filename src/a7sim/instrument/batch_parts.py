@@ -210,7 +210,7 @@ def _places_of(prints: Sequence[NamedPoints]) -> dict[str, Array]:
     for i, each in enumerate(prints):
         alike.setdefault(each.names, []).append(i)
     places = {name: np.full((2, len(prints)), np.nan) for names in alike for name in names}
-    for names, those in alike.items():
-        for name, place in zip(names, np.stack([prints[i].xy for i in those], axis=-1).swapaxes(0, 1), strict=True):
-            places[name][:, those] = place
+    for names, members in alike.items():
+        for name, place in zip(names, np.stack([prints[i].xy for i in members], axis=-1).swapaxes(0, 1), strict=True):
+            places[name][:, members] = place
     return places

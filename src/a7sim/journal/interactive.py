@@ -61,10 +61,10 @@ class InteractiveSession:
 
     def history(self) -> Iterator[Event]:
         """Yield the lines and replies of the resumed session."""
-        there = self.begun.journalled if self.begun else None
-        for number in range(2, len(there) + 1 if there else 0):
-            assert there is not None
-            event = there.event(number)
+        existing = self.begun.journalled if self.begun else None
+        for number in range(2, len(existing) + 1 if existing else 0):
+            assert existing is not None
+            event = existing.event(number)
             if event.dir in ("<", ">"):
                 yield event
 

@@ -22,7 +22,7 @@ from a7sim.link.client.ports import TIMEOUT_S
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.scenario import Scenario
 
-_SAID = (">", "!")
+_EXCHANGED = (">", "!")
 
 _DRAWS = re.compile(r"EYEP\w*:PICT\w*\?|COUN\?;:PROJ1:", re.IGNORECASE)
 """Line that draws a screen: it is replayed, and is not a step."""
@@ -83,7 +83,7 @@ class Recording:
     def _list(self, number: int, event: Event) -> None:
         if event.kind == "state":
             self._checkpoints.append(number)
-        elif event.dir in _SAID and not _DRAWS.match(event.text):
+        elif event.dir in _EXCHANGED and not _DRAWS.match(event.text):
             self._numbers.append(number)
             self._times.append(event.t)
             if is_registration(event.text):
@@ -152,14 +152,14 @@ class Recording:
 
     def _framed(self, step: int) -> Frame:
         scales = self._front.autograph.counter_scales
-        said = ""
+        line_text = ""
         if step:
             event = self.journalled.event(self._numbers[step - 1])
-            said = f"{event.client}: {event.text}"
+            line_text = f"{event.client}: {event.text}"
         return Frame(
             step,
             self._times[step - 1] if step else 0.0,
-            said,
+            line_text,
             self._point_at(step),
             {axis: origin for axis, (origin, _) in scales.items()},
             {axis: units for axis, (_, units) in scales.items()},

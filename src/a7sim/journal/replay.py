@@ -108,12 +108,12 @@ class Replay:
         self.checkpoints: list[Checkpoint] = []
         """Passed checkpoints with their states in the replay."""
         self._clock = Clock() if header.get("command") == RECORDED else None
-        self._said: deque[LinkEvent] = deque()
+        self._replayed: deque[LinkEvent] = deque()
         self._changes = 0
 
     def _heard(self, event: LinkEvent) -> None:
         if self._clock is None or event.direction == "<":
-            self._said.append(event)
+            self._replayed.append(event)
 
     def seek(self, line: int) -> int:
         """Move to the last checkpoint before a line with a known state; return the next line."""
@@ -158,7 +158,7 @@ class Replay:
         if event.dir == "<":
             return self._expected(number, event)
         if event.dir == "-":
-            self._said.clear()
+            self._replayed.clear()
         self._happen(event)
         return None
 
@@ -168,24 +168,24 @@ class Replay:
 
     def pending_events(self) -> list[LinkEvent]:
         """Return the instrument's further events at the end of the journal, which stopped before they were written."""
-        left = list(self._said)
-        self._said.clear()
+        left = list(self._replayed)
+        self._replayed.clear()
         return left
 
     def _left_over(self, number: int) -> ReplayDifference | None:
-        if not self._said:
+        if not self._replayed:
             return None
-        said = self._said.popleft()
-        self._said.clear()
-        return ReplayDifference(number, "", _shown(said.client, said.direction, said.text))
+        exchanged = self._replayed.popleft()
+        self._replayed.clear()
+        return ReplayDifference(number, "", _shown(exchanged.client, exchanged.direction, exchanged.text))
 
     def _expected(self, number: int, event: Event) -> ReplayDifference | None:
-        said = self._said.popleft() if self._said else None
-        if said is not None:
-            same = (said.direction, said.text) == (event.dir, event.text)
-            if same and (self._clock is not None or (said.time, said.client) == (event.t, event.client)):
+        exchanged = self._replayed.popleft() if self._replayed else None
+        if exchanged is not None:
+            same = (exchanged.direction, exchanged.text) == (event.dir, event.text)
+            if same and (self._clock is not None or (exchanged.time, exchanged.client) == (event.t, event.client)):
                 return None
-        replayed = "" if said is None else _shown(said.client, said.direction, said.text)
+        replayed = "" if exchanged is None else _shown(exchanged.client, exchanged.direction, exchanged.text)
         return ReplayDifference(number, _shown(event.client, event.dir, event.text), replayed)
 
     def _happen(self, event: Event) -> None:

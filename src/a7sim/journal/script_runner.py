@@ -44,7 +44,7 @@ class ScriptRunner:
         for done, after in zip(self._script.statements, [*self._script.statements[1:], None], strict=False):
             failed = self._carry_out(engine, done)
             if failed is None and not _asks_for_errors(after) and engine.errors:
-                failed = ExpectationFailed(done.place, f"{_said(done)} to be obeyed", engine.errors[0])
+                failed = ExpectationFailed(done.place, f"{_line_of(done)} to be obeyed", engine.errors[0])
             if failed is not None:
                 return failed
         self.instrument.close(engine.client, self._clock.now)
@@ -54,7 +54,7 @@ class ScriptRunner:
         if isinstance(statement, Wait):
             self._clock.advance(statement.seconds)
             return None
-        reply = feed_until_idle(engine, _said(statement).encode("latin-1", "replace") + b"\n", self._clock)
+        reply = feed_until_idle(engine, _line_of(statement).encode("latin-1", "replace") + b"\n", self._clock)
         if isinstance(statement, SendLine):
             return None
         taken = parse_reply(reply)
@@ -70,7 +70,7 @@ def _fresh(script: Script, listener: Listener | None) -> SharedInstrument:
     return SharedInstrument(build_autograph(script.scenario.instrument, scene.mountable, script.seed), listener)
 
 
-def _said(statement: Statement) -> str:
+def _line_of(statement: Statement) -> str:
     if isinstance(statement, Wait):
         return f"wait {statement.seconds:g}"
     return (statement.query if isinstance(statement, Expect) else statement.text)[: MAX_LINE_LENGTH + 1]

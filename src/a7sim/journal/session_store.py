@@ -35,8 +35,8 @@ class SavedSession:
         """Return whether anything was changed, and not only viewed."""
         if self.begun is None:
             return False
-        there = self.begun.journalled
-        events = (there.event(number) for number in range(len(there), 1, -1))
+        journals = self.begun.journalled
+        events = (journals.event(number) for number in range(len(journals), 1, -1))
         return any(event.dir == ">" and _does(event.text) for event in events)
 
     @property
@@ -56,8 +56,8 @@ def last_session(folder: Path, scenario: Scenario, seed: int) -> SavedSession | 
 
 
 def _latest_first(folder: Path) -> list[Path]:
-    there = [each for each in _numbered(folder).values() if (each / JOURNAL).is_file()]
-    return sorted(there, key=lambda each: (each / JOURNAL).stat().st_mtime, reverse=True)
+    journals = [each for each in _numbered(folder).values() if (each / JOURNAL).is_file()]
+    return sorted(journals, key=lambda each: (each / JOURNAL).stat().st_mtime, reverse=True)
 
 
 def _left_in(folder: Path, scenario_hash: str, seed: int) -> SavedSession | None:

@@ -67,7 +67,7 @@ def make_header_without_scenario(command: str, **settings: Any) -> Header:
 
 @dataclass(frozen=True)
 class JournalOptions:
-    """Options of a journal: its durability, and whether it continues an existing one."""
+    """Options of a journal: its durability, and whether it continues a kept one."""
 
     durability: Durability = "records"
     resumes: bool = False
@@ -88,7 +88,7 @@ class JournalOptions:
 class Journal:
     """Journal, a listener from its creation and a writer from its opening as a context.
 
-    A resumed session runs again from its start: up to the end of the existing journal, its events are compared with it;
+    A resumed session runs again from its start: up to the end of the kept journal, its events are compared with it;
     then writing continues.
     """
 
@@ -99,7 +99,7 @@ class Journal:
         self._file: AppendOnlyFile | None = None
         self._states: Path | None = None
         self._instrument: SharedInstrument | None = None
-        self._there: JournalFile | None = None
+        self._existing: JournalFile | None = None
         self._chain = ChecksumChain()
         self._line = 0
         self._time = 0.0
@@ -114,11 +114,11 @@ class Journal:
         self._instrument = instrument
         if folder is not None:
             if self._journal_options.resumes:
-                self._there = read_journal(folder / JOURNAL)
-                save_truncated_tail(self._there)
-            self._begin(folder, self._there.size if self._there else 0, b"")
+                self._existing = read_journal(folder / JOURNAL)
+                save_truncated_tail(self._existing)
+            self._begin(folder, self._existing.size if self._existing else 0, b"")
             try:
-                if self._there is None:
+                if self._existing is None:
                     _leave_scenario(folder, header)
                 self._write(header.line)
                 for event in self._unwritten:
@@ -129,14 +129,14 @@ class Journal:
         self._unwritten.clear()
         return self
 
-    def resume_at(self, there: JournalFile, instrument: SharedInstrument, checkpoints: list[Checkpoint]) -> "Journal":
+    def resume_at(self, kept: JournalFile, instrument: SharedInstrument, checkpoints: list[Checkpoint]) -> "Journal":
         """Continue a journal whose session is restored in an instrument. Raises A7SimError if it cannot be written."""
-        save_truncated_tail(there)
+        save_truncated_tail(kept)
         self._instrument = instrument
-        self._begin(there.path.parent, there.size, to_lines(checkpoints))
-        self._chain.crc, self._line = there.crc, len(there)
+        self._begin(kept.path.parent, kept.size, to_lines(checkpoints))
+        self._chain.crc, self._line = kept.crc, len(kept)
         last = checkpoints[-1].line if checkpoints else 1
-        self._since_checkpoint = sum(not there.event(number).kind for number in range(last + 1, len(there) + 1))
+        self._since_checkpoint = sum(not kept.event(number).kind for number in range(last + 1, len(kept) + 1))
         self._changes = sum(len(each.state["autograph"]["registered"]) for each in checkpoints)
         return self
 
@@ -201,8 +201,8 @@ class Journal:
         try:
             if error is None and self._instrument is not None and self._instrument.is_idle and self._since_checkpoint:
                 self._checkpoint(self._time, self._instrument)
-            if error is None and self._there is not None and self._line < len(self._there):
-                over = self._there.location(self._line + 1)
+            if error is None and self._existing is not None and self._line < len(self._existing):
+                over = self._existing.location(self._line + 1)
                 raise A7SimError(f"{over}: expected the end of the session, got a line that is left over")
         finally:
             self._close()
@@ -230,9 +230,9 @@ class Journal:
             return
         line = self._chain.line(data)
         self._line += 1
-        if self._there is not None and self._line <= len(self._there):
-            if line != self._there.lines[self._line - 1]:
-                raise A7SimError(_not_the_same(self._there, self._line, line))
+        if self._existing is not None and self._line <= len(self._existing):
+            if line != self._existing.lines[self._line - 1]:
+                raise A7SimError(_not_the_same(self._existing, self._line, line))
         else:
             self._file.add(line + b"\n", at_once)
 
@@ -264,19 +264,19 @@ def _leave_scenario(folder: Path, header: Header) -> None:
             file.close()
 
 
-def save_truncated_tail(there: JournalFile) -> None:
+def save_truncated_tail(kept: JournalFile) -> None:
     """Write the truncated tail of a journal beside it. Raises A7SimError if that fails."""
-    if there.truncated_tail:
+    if kept.truncated_tail:
         try:
-            (there.path.parent / TORN).write_bytes(there.truncated_tail)
+            (kept.path.parent / TORN).write_bytes(kept.truncated_tail)
         except OSError as error:
-            raise A7SimError(f"{there.path}: expected a journal that can be written: {error.strerror}") from error
+            raise A7SimError(f"{kept.path}: expected a journal that can be written: {error.strerror}") from error
 
 
-def _not_the_same(there: JournalFile, number: int, line: bytes) -> str:
-    was, is_now = (each[:_MAX_SHOWN_LENGTH].decode("utf-8", "replace") for each in (there.lines[number - 1], line))
+def _not_the_same(kept: JournalFile, number: int, line: bytes) -> str:
+    was, is_now = (each[:_MAX_SHOWN_LENGTH].decode("utf-8", "replace") for each in (kept.lines[number - 1], line))
     if number == 1:
         return (
-            f"{there.location(number)}: expected a session of {software_version()} and its scenario, got another: {was}"
+            f"{kept.location(number)}: expected a session of {software_version()} and its scenario, got another: {was}"
         )
-    return f"{there.location(number)}: expected what this session does again, {is_now}, got another's, {was}"
+    return f"{kept.location(number)}: expected what this session does again, {is_now}, got another's, {was}"

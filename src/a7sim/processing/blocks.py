@@ -74,8 +74,8 @@ def _of_models(found: BlockAdjustment) -> list[Document]:
 
 
 def _missing(given: Sequence[str], found: BlockAdjustment) -> list[str]:
-    there = set(found.points)
-    missing = [name for name in given if name not in there]
+    present = set(found.points)
+    missing = [name for name in given if name not in present]
     return [f"ground points that no model has: {', '.join(missing)}"] if missing else []
 
 

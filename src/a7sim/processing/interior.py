@@ -139,15 +139,15 @@ def _corrected(image: Array, camera: Camera, corrections: Sequence[str], flight:
 
 
 def _warnings(picture: _Picture, camera: Camera) -> list[str]:
-    said = []
+    warnings = []
     if np.linalg.det(_at_the_centre(picture.fit.matrix)) < 0.0:
-        said.append(
+        warnings.append(
             f"photo {picture.name}: the counts are mirrored against the camera's axes, or fiducials are confused"
         )
     missing = [fiducial.name for fiducial in camera.fiducials if fiducial.name not in picture.fiducials]
     if missing:
-        said.append(f"photo {picture.name}: fiducials without counts: {', '.join(missing)}")
-    return said
+        warnings.append(f"photo {picture.name}: fiducials without counts: {', '.join(missing)}")
+    return warnings
 
 
 def _of_picture(picture: _Picture, camera: Camera, count_mm: float | None) -> Document:

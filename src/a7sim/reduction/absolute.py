@@ -140,12 +140,12 @@ def absolute_orientation(model: Model | Strip, ground: Ground) -> AbsoluteOrient
     similarity, fit = fitted_to_ground(model, ground)
     oriented = Model(model.name, model.points, similarity.applied_to(model.coordinates))
     points = model.at(fit.ground.points)
-    said = [
+    notes = [
         *_missing(ground, fit.ground),
         *_in_a_line(points, fit.ground),
         *_left_handed(model, similarity, points, fit),
     ]
-    return AbsoluteOrientation(similarity, fit, oriented, tuple(said))
+    return AbsoluteOrientation(similarity, fit, oriented, tuple(notes))
 
 
 def fitted_to_ground(model: Model, ground: Ground) -> tuple[Similarity, GroundFit]:
@@ -184,8 +184,8 @@ def _fitted(points: Array, given: Array, used: Array) -> Similarity:
 
 
 def _missing(ground: Ground, known: Ground) -> list[str]:
-    there = set(known.points)
-    missing = [name for name in ground.points if name not in there]
+    present = set(known.points)
+    missing = [name for name in ground.points if name not in present]
     return [f"ground points that the model has not: {', '.join(missing)}"] if missing else []
 
 
@@ -209,7 +209,7 @@ def _left_handed(model: Model, similarity: Similarity, points: Array, fit: Groun
     """Return warnings about axes X north, Y east: with Z up a left-handed system, which no rotation can reach."""
     advice = "X east, Y north and Z up are expected: swap the columns X and Y if X is north"
     known = fit.ground
-    said = []
+    notes = []
     upside_down = _upside_down(model, similarity)
     swapped = Ground(known.points, known.coordinates[[1, 0, 2]], known.roles)
     try:
@@ -220,19 +220,19 @@ def _left_handed(model: Model, similarity: Similarity, points: Array, fit: Groun
         other_fit = GroundFit(swapped, other.applied_to(points))
         upside_down = upside_down & ~_upside_down(model, other)
         extent = np.nanstd(known.coordinates, axis=1).max()
-        here, there = _misfit(fit), _misfit(other_fit)
-        worse = (here > MUCH_WORSE * there) & (here > NOTHING * extent)
+        here, present = _misfit(fit), _misfit(other_fit)
+        worse = (here > MUCH_WORSE * present) & (here > NOTHING * extent)
         if worse.any():
-            ratio = float(np.max(here / np.maximum(there, NOTHING * extent)))
-            said.append(
+            ratio = float(np.max(here / np.maximum(present, NOTHING * extent)))
+            notes.append(
                 f"the ground axes look left-handed: the control fits {ratio:.0f} times better with X and Y swapped; "
                 f"{advice}"
             )
-    if not said and upside_down.any():
-        said.append(
+    if not notes and upside_down.any():
+        notes.append(
             f"the ground axes look left-handed: the model comes out upside down, its heights inverted; {advice}"
         )
-    return said
+    return notes
 
 
 def _upside_down(model: Model, similarity: Similarity) -> npt.NDArray[np.bool_]:

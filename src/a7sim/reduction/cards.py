@@ -298,8 +298,8 @@ def _check_pairs(path: Path, ties: Sequence[Sequence[Card]]) -> None:
                 f"{path}, line {second[0].line}, columns 5-9: expected the common centre {first[0].point} first, "
                 f"got {second[0].point}"
             )
-        here, there = {card.point for card in first[1:]}, {card.point for card in second[1:]}
-        for cards, others, model in ((first, there, second[0].model), (second, here, first[0].model)):
+        here, second_points = {card.point for card in first[1:]}, {card.point for card in second[1:]}
+        for cards, others, model in ((first, second_points, second[0].model), (second, here, first[0].model)):
             alone = next((card for card in cards[1:] if card.point not in others), None)
             if alone:
                 raise A7SimError(

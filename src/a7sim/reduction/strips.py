@@ -153,8 +153,8 @@ def joined(before: Model, new: Model, method: JoinMethod = "points") -> Join:
     Raises A7SimError for fewer than three common points, or without a common centre if the method needs it;
     Undetermined for common points in a line.
     """
-    there = set(before.points)
-    common = tuple(sorted(name for name in new.points if name in there))
+    present = set(before.points)
+    common = tuple(sorted(name for name in new.points if name in present))
     if len(common) < MIN_COMMON:
         raise A7SimError(
             f"models {before.name} and {new.name}: expected at least {MIN_COMMON} common points with the centre, "

@@ -12,8 +12,8 @@ from a7sim.strip_methods.strip import models_from_documents, orient_strip, strip
 
 def strip_deck(kept: SessionFolder, way: str | None = None) -> str:
     """Return the deck of a session's strip, or of the strip by a method. Raises A7SimError if there is none."""
-    if way is None and (there := kept.text(CARDS)):
-        return there
+    if way is None and (present := kept.text(CARDS)):
+        return present
     with kept.reading_results():
         strip, models, points = _measured(kept, way)
         ground = _ground(kept, strip, points)

@@ -131,9 +131,9 @@ def _inline(svg: str, name: str, title: str, description: str) -> str:
     svg = svg.replace("'DejaVu Sans', sans-serif", "'DejaVu Sans', 'Liberation Sans', Arial, sans-serif")
     for colour, variable in _VARIABLES.items():
         svg = svg.replace(colour, f"var(--{variable})")
-    said = f'<title id="{name}-title">{escape(title)}</title><desc id="{name}-desc">{escape(description)}</desc>'
+    written = f'<title id="{name}-title">{escape(title)}</title><desc id="{name}-desc">{escape(description)}</desc>'
     named = f'<svg role="img" aria-labelledby="{name}-title {name}-desc"'
-    return re.sub(r"<svg([^>]*)>", rf"{named}\1>{_safe(said)}", svg, count=1)
+    return re.sub(r"<svg([^>]*)>", rf"{named}\1>{_safe(written)}", svg, count=1)
 
 
 def standalone(picture: PageFigure) -> tuple[str, str]:

@@ -44,14 +44,14 @@ def session_tables(document: dict[str, Any]) -> RenderableType:
 def hours_table(operator: dict[str, Any]) -> Text:
     """Return the time spent by an operator; for a session of a batch, without lines and book."""
     activities = (f"{name} {hours:.1f}" for name, hours in operator["time_by_activity_h"].items())
-    told = [f"{operator['hours']:.1f} hours at the instrument"]
+    described = [f"{operator['hours']:.1f} hours at the instrument"]
     if "book_entries" in operator:
-        told += [
+        described += [
             pluralize(operator["lines_over_the_link"], "line") + " over the link",
             pluralize(operator["book_entries"], "reading") + " in the book",
             f"{operator['struck_out']} struck out",
         ]
-    return Text(f"{', '.join(told)}\nWhere they went: {', '.join(activities)}")
+    return Text(f"{', '.join(described)}\nWhere they went: {', '.join(activities)}")
 
 
 def strips_table(document: dict[str, Any]) -> RenderableType:
@@ -62,13 +62,13 @@ def strips_table(document: dict[str, Any]) -> RenderableType:
         cells = [f"{accuracy[on][what]:.3f}" if on in accuracy else "" for on in ON for what in WHAT]
         table.add_row(str(strip["number"]), " ".join(strip["cases"]), f"{_worst_join(strip):.3f}", *cells)
     hours = sum(session["hours"] for session in document["sessions"].values())
-    said = f"{document['status']}: {document['message']}" if document["message"] else ""
+    described_as = f"{document['status']}: {document['message']}" if document["message"] else ""
     first = document["strips"][0]["in_words"] if document["strips"] else ""
     return Group(
         _titled("Strips of all cases, rms residuals in m", table),
         Text(f"\n{first}", overflow="fold"),
         Text(f"{hours:.1f} hours at the instrument in {pluralize(len(document['sessions']), 'session')}"),
-        *([Text(said, style="bold")] if said else []),
+        *([Text(described_as, style="bold")] if described_as else []),
     )
 
 

@@ -86,6 +86,6 @@ PROFILES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 )
 
 
-def observer_of_skill(skill: str, **said: Any) -> Observer:
+def observer_of_skill(skill: str, **described: Any) -> Observer:
     """Return an observer of a skill, with the values stated for this one."""
-    return msgspec.convert({"skill": skill, **PROFILES[skill], **said}, Observer)
+    return msgspec.convert({"skill": skill, **PROFILES[skill], **described}, Observer)

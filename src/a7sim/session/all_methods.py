@@ -41,8 +41,8 @@ def run_all_methods(
         document = results.results_header(scenario, seed) | {"status": "complete", "message": ""}
         if out is not None:
             prepare_folder(out, force)
-    strips, said = _measured(scenario, build_scene(scenario, seed), seed, bridge_over_link)
-    _add(document, strips, said)
+    strips, messages = _measured(scenario, build_scene(scenario, seed), seed, bridge_over_link)
+    _add(document, strips, messages)
     if out is not None and strips:
         for name, each in strips.items():
             write_atomic(out / MODELS_OF_WAY.format(name.lower()), results.models_csv(each.models))

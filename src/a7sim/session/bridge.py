@@ -209,7 +209,7 @@ def _of_model(bridged: BridgedModels) -> Document:
 
 def bridge_tables(document: Document) -> RenderableType:
     """Return the tables of a bridged strip and of the independent models, for a terminal."""
-    said = f"{document['status']}: {document['message']}" if document["message"] else ""
+    messages = f"{document['status']}: {document['message']}" if document["message"] else ""
     parts: list[RenderableType] = [_models(document["bridged"]["models"])]
     if "independent" in document:
         parts += [Text(), _beside(document)]
@@ -219,7 +219,7 @@ def bridge_tables(document: Document) -> RenderableType:
                 f"{document['independent']['hours']:.1f} with independent models and their perspective centres"
             )
         )
-    return Group(*parts, *([Text(said, style="bold")] if said else []))
+    return Group(*parts, *([Text(messages, style="bold")] if messages else []))
 
 
 def _models(models: Sequence[Document]) -> RenderableType:

@@ -37,7 +37,7 @@ class AuditDifference:
         more = f" ({self.others} values more differ)" if self.others else ""
         return (
             f"cell {self.cell}, replicate {self.replicate}, seed {self.seed}: {self.place} is "
-            f"{_said(self.batch_value)} on the batch bench and {_said(self.link_value)} over the link{more}"
+            f"{_describe(self.batch_value)} on the batch bench and {_describe(self.link_value)} over the link{more}"
         )
 
 
@@ -74,11 +74,11 @@ def audit_study(
 
 def _picked(loaded: LoadedStudy, tally: Tally, picks: int) -> Mapping[int, list[int]]:
     """Return the selected replicates by the index of their cell."""
-    there = [(i, replicate) for i in range(len(loaded.cells)) for replicate in range(tally.sample(i).shape[1])]
+    existing = [(i, replicate) for i in range(len(loaded.cells)) for replicate in range(tally.sample(i).shape[1])]
     rng = np.random.default_rng(np.random.SeedSequence(loaded.study.seed, spawn_key=(_STREAM,)))
     picked = defaultdict(list)
-    for pick in rng.permutation(len(there))[:picks].tolist():
-        i, replicate = there[pick]
+    for pick in rng.permutation(len(existing))[:picks].tolist():
+        i, replicate = existing[pick]
         picked[i].append(replicate)
     return picked
 
@@ -102,5 +102,5 @@ def _different(bench: Any, link: Any, place: str = "") -> Iterator[tuple[str, An
         yield place, bench, link
 
 
-def _said(value: Any) -> str:
+def _describe(value: Any) -> str:
     return f"{value:.{SIGNIFICANT}g}" if isinstance(value, float) else str(value)[:60]

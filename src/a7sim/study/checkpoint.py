@@ -55,8 +55,8 @@ def checkpoint_path(folder: Path) -> Path:
 
 def newest_checkpoint(folder: Path) -> Path | None:
     """Return the newest checkpoint of any format in a folder; None if there is none."""
-    there = [folder / name for name in KINDS if (folder / name).exists()]
-    return max(there, key=lambda path: path.stat().st_mtime_ns, default=None)
+    existing = [folder / name for name in KINDS if (folder / name).exists()]
+    return max(existing, key=lambda path: path.stat().st_mtime_ns, default=None)
 
 
 def save(tally: Tally, path: Path, identity: str) -> None:
@@ -130,7 +130,7 @@ def _tally(columns: _Columns) -> Tally:
 
 
 def _npz(columns: _Columns, whose: Mapping[str, str]) -> bytes:
-    arrays = {name: np.array(said) for name, said in whose.items()}
+    arrays = {name: np.array(stated) for name, stated in whose.items()}
     for name, column in columns.items():
         if isinstance(column, _Ragged):
             arrays |= {f"{name}.values": column.values, f"{name}.ends": column.ends}
@@ -164,7 +164,7 @@ def _parquet(columns: _Columns, whose: Mapping[str, str]) -> bytes:
 def _of_parquet(path: Path) -> tuple[_Columns, Mapping[str, str]]:
     pa, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
     table = parquet.read_table(pa.BufferReader(path.read_bytes()), use_threads=False).combine_chunks()
-    whose = {key.decode(): said.decode() for key, said in (table.schema.metadata or {}).items()}
+    whose = {key.decode(): stated.decode() for key, stated in (table.schema.metadata or {}).items()}
     columns: dict[str, Any] = {}
     for name, column in zip(table.column_names, table.columns, strict=True):
         if pa.types.is_large_list(column.type):

@@ -161,14 +161,14 @@ def _in_words(test: Document, responses: Mapping[str, Document]) -> str:
             f"The {response['meaning']}, on the {other['meaning']}: slope {test['slope']:.3g} ({low:.3g} to {high:.3g})"
             f"{per}, r = {test['correlation']:.2f} ({r_low:.2f} to {r_high:.2f}), "
             f"{format_probability(test['p_adjusted'])}; it "
-            f"explains {100.0 * test['correlation'] ** 2:.1f} % of the variance: {_said(test)}."
+            f"explains {100.0 * test['correlation'] ** 2:.1f} % of the variance: {_describe(test)}."
         )
     one, other_level = test["levels"]
     (low, high), (d_low, d_high) = test["interval"], test["effect_interval"]
     return (
         f"The {response['meaning']}, {other_level} minus {one}: {test['difference']:+.3g} ({low:+.3g} to {high:+.3g})"
         f"{unit}, {_share(test)}, d = {test['effect']:.2f} ({d_low:.2f} to {d_high:.2f}), "
-        f"{format_probability(test['p_adjusted'])}: {_said(test)}."
+        f"{format_probability(test['p_adjusted'])}: {_describe(test)}."
     )
 
 
@@ -176,7 +176,7 @@ def _a(unit: str) -> str:
     return f"a {unit.removesuffix('s')}" if unit.endswith("units") else f"a {unit}"
 
 
-def _said(test: Document) -> str:
+def _describe(test: Document) -> str:
     return {
         MATTERS: "it matters",
         LITTLE: "there is a difference, too small to matter" if "on" not in test else "a dependence too weak to matter",

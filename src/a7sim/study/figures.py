@@ -180,14 +180,14 @@ def _against(axes: "Axes", document: Document, name: str, factor: str) -> None:
     steep = lowest > 0.0 and highest >= _STEEP * lowest
     beside = 0.0 if steep else 0.02 * (highest - lowest)
     together = {place: [each for each in found if at[each["level"]] == place] for place in sorted(set(at.values()))}
-    means = [sum(each["mean"] for each in those) / len(those) for those in together.values()]
+    means = [sum(each["mean"] for each in members) / len(members) for members in together.values()]
     axes.plot(list(together), means, color=FAINT, linewidth=1.4, zorder=1)
-    for place, those in together.items():
-        for i, each in enumerate(those):
-            x = place + beside * (2 * i - len(those) + 1)
+    for place, members in together.items():
+        for i, each in enumerate(members):
+            x = place + beside * (2 * i - len(members) + 1)
             axes.vlines(x, *each["interval"], color=LEFT, linewidth=2.2)
             axes.plot(x, each["mean"], "o", color=LEFT, markersize=5.0)
-            label = each["level"] if len(those) > 1 or document["strips"] or each is found[0] else ""
+            label = each["level"] if len(members) > 1 or document["strips"] or each is found[0] else ""
             axes.annotate(label, (x, each["interval"][1]), (0, 4), textcoords="offset points", ha="center", color=SOFT)
     axes.set_xlabel(document["places"][factor]["counts"])
     if steep:

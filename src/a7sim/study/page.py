@@ -97,8 +97,8 @@ def _settings(settings: Document) -> str:
 def _response(document: Document, response: Document) -> Iterator[Part]:
     name, unit = response["name"], response["unit"]
     yield Paragraph(f"{response['meaning']}{f', {unit}' if unit else ''}")
-    there = [cell for cell in document["cells"] if cell["responses"][name]["count"]]
-    if not there:
+    present = [cell for cell in document["cells"] if cell["responses"][name]["count"]]
+    if not present:
         yield Paragraph("Every session gave up.", loud=True)
         return
     yield from figures.response_figures(document, response)
@@ -108,9 +108,9 @@ def _response(document: Document, response: Document) -> Iterator[Part]:
     for hypercube in document["main_effects"]:
         if hypercube["response"] == name:
             yield from _main_effects(hypercube)
-    if any("theory" in cell["responses"][name] for cell in there):
+    if any("theory" in cell["responses"][name] for cell in present):
         yield Paragraph(document["theory"])
-    sheets: list[Part] = [_spreads(there, name)]
+    sheets: list[Part] = [_spreads(present, name)]
     beside = [each for each in document["comparisons"] if each["response"] == name]
     if beside:
         sheets.append(_comparisons(beside, {cell["cell"]: cell_label(cell) for cell in document["cells"]}))

@@ -58,17 +58,17 @@ class Tally:
         room = max(0, SAMPLE - int(self.done[cell]))
         if room:
             self.samples[cell].append(values[:, :room])
-        there = np.isfinite(values)
-        for sketch, one, known in zip(self.sketches[cell], values[:, room:], there[:, room:], strict=True):
+        present = np.isfinite(values)
+        for sketch, one, known in zip(self.sketches[cell], values[:, room:], present[:, room:], strict=True):
             sketch.add(one[known])
-        begun = (self.count[cell] == 0) & there.any(axis=1)
-        self.origin[cell, begun] = values[begun, there[begun].argmax(axis=1)]
-        deviations = np.where(there, values - self.origin[cell][:, None], 0.0)
+        begun = (self.count[cell] == 0) & present.any(axis=1)
+        self.origin[cell, begun] = values[begun, present[begun].argmax(axis=1)]
+        deviations = np.where(present, values - self.origin[cell][:, None], 0.0)
         self.total[cell] = _one_by_one(self.total[cell], deviations)
         self.squares[cell] = _one_by_one(self.squares[cell], deviations**2)
-        self.low[cell] = np.minimum(self.low[cell], np.where(there, values, np.inf).min(axis=1, initial=np.inf))
-        self.high[cell] = np.maximum(self.high[cell], np.where(there, values, -np.inf).max(axis=1, initial=-np.inf))
-        self.count[cell] += there.sum(axis=1)
+        self.low[cell] = np.minimum(self.low[cell], np.where(present, values, np.inf).min(axis=1, initial=np.inf))
+        self.high[cell] = np.maximum(self.high[cell], np.where(present, values, -np.inf).max(axis=1, initial=-np.inf))
+        self.count[cell] += present.sum(axis=1)
         self.done[cell] += values.shape[1]
 
     def sample(self, cell: int) -> Array:

@@ -77,7 +77,7 @@ def theory_limits(scenario: Scenario) -> Sequence[str]:
         "slips, and what is read again because of them": observer.blunder_rate or observer.last_digit_slip,
         "tiring": observer.fatigue_per_hour or observer.warm_up,
     }
-    return [name for name, there in left_out.items() if there]
+    return [name for name, present in left_out.items() if present]
 
 
 def theory_comparison(scenario: Scenario, response: str, mean: float, sd: float) -> Document:

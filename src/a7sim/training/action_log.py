@@ -97,8 +97,8 @@ class ActionLog:
             self.began, self.opened = event.time, True
         if event.direction != ">":
             return
-        said = event.text.lower()
-        if "note" in said or "fid" in said:
+        line_text = event.text.lower()
+        if "note" in line_text or "fid" in line_text:
             for unit in parse_program(event.text.encode("latin-1", "replace")):
                 self._take_note(unit)
 

@@ -34,13 +34,15 @@ def find_exercise(name: str) -> ExerciseFolder:
     """Return an exercise by number, by the name of its folder or a part of it, or by a folder. Raises A7SimError."""
     if (Path(name) / FILE).is_file():
         return read_exercise(Path(name))
-    there = _folders()
+    present = _folders()
     if name.isdecimal():
-        found = [each for each in there if int(each.name.partition("-")[0]) == int(name)]
+        found = [each for each in present if int(each.name.partition("-")[0]) == int(name)]
     else:
-        found = [each for each in there if each.name == name] or [each for each in there if name and name in each.name]
+        found = [each for each in present if each.name == name] or [
+            each for each in present if name and name in each.name
+        ]
     if len(found) != 1:
-        known = ", ".join(each.name for each in found or there)
+        known = ", ".join(each.name for each in found or present)
         raise A7SimError(f"{name}: expected the number of an exercise, its folder, or one of {known}")
     return read_exercise(found[0])
 

@@ -180,10 +180,10 @@ def _half_of(script: Script) -> Script:
 def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
     reference = runs["reference"].grade(exercise)
     if not reference.passed:
-        told = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or pluralize(
+        remark = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or pluralize(
             reference.points, "point"
         )
-        yield f"reference: expected it to pass, got {told}"
+        yield f"reference: expected it to pass, got {remark}"
     for i, faulty in enumerate(exercise.faulty, start=1):
         grade = runs[f"faulty {i}"].grade(exercise)
         called = faulty.script or f"faulty {i} ({faulty.procedure})"

@@ -38,16 +38,16 @@ class Checklist:
 
     def lines(self) -> list[str]:
         """Return goal and checklist as lines of text."""
-        told = [self.head(), *(f"your papers: {paper}" for paper in self.papers())]
+        remark = [self.head(), *(f"your papers: {paper}" for paper in self.papers())]
         if self.attempt.mode == EXAM:
-            return [*told, *(f"  -  {each.text}" for each in self.exercise.steps)]
+            return [*remark, *(f"  -  {each.text}" for each in self.exercise.steps)]
         ticked = zip(self.ticks(), self.exercise.steps, strict=True)
-        return [*told, *(f" {TICKED if done else OPEN} {step.text}" for done, step in ticked)]
+        return [*remark, *(f" {TICKED if done else OPEN} {step.text}" for done, step in ticked)]
 
     def papers(self) -> list[Path]:
         """Return the handouts in the attempt's folder."""
-        there = sorted(self.attempt.folder.iterdir())
-        return [path for path in there if path.suffix in PAPERS and path.name not in (ANSWERS, HINTS)]
+        present = sorted(self.attempt.folder.iterdir())
+        return [path for path in present if path.suffix in PAPERS and path.name not in (ANSWERS, HINTS)]
 
     def head(self) -> str:
         """Return exercise and time as text."""

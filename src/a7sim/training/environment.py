@@ -123,15 +123,15 @@ def open_environment(
 @contextmanager
 def resume_environment(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
     """Open the environment of an attempt in the state of its journal. Raises UnreliableJournalError, A7SimError."""
-    there = read_journal(folder / JOURNAL)
-    if there.header.get("software") != software_version():
+    stored = read_journal(folder / JOURNAL)
+    if stored.header.get("software") != software_version():
         raise A7SimError(
-            f"{there.location(1)}: expected an attempt of {software_version()} to resume, got one of "
-            f"{there.header.get('software')} (a7sim train reset begins anew)"
+            f"{stored.location(1)}: expected an attempt of {software_version()} to resume, got one of "
+            f"{stored.header.get('software')} (a7sim train reset begins anew)"
         )
-    environment, replay = _replayed(exercise_folder, seed, there)
+    environment, replay = _replayed(exercise_folder, seed, stored)
     journal = Journal(JournalOptions(resumes=True, states=False)).resume_at(
-        there, environment.instrument, replay.checkpoints
+        stored, environment.instrument, replay.checkpoints
     )
     environment.instrument.listener = tee_listener(journal.on_link_event, environment.action_log.on_link_event)
     with journal:
@@ -142,29 +142,29 @@ def resume_environment(exercise_folder: ExerciseFolder, seed: int, folder: Path)
         yield environment
 
 
-def replay_environment(exercise_folder: ExerciseFolder, seed: int, there: JournalFile) -> AttemptEnvironment:
+def replay_environment(exercise_folder: ExerciseFolder, seed: int, stored: JournalFile) -> AttemptEnvironment:
     """Return the environment of an attempt in the state of its journal. Raises UnreliableJournalError."""
-    return _replayed(exercise_folder, seed, there)[0]
+    return _replayed(exercise_folder, seed, stored)[0]
 
 
-def _replayed(exercise_folder: ExerciseFolder, seed: int, there: JournalFile) -> tuple[AttemptEnvironment, Replay]:
+def _replayed(exercise_folder: ExerciseFolder, seed: int, stored: JournalFile) -> tuple[AttemptEnvironment, Replay]:
     scenario, scene, autograph = _built(exercise_folder, seed, {})
     expected = header_for(exercise_folder, scenario, seed, "", "").line
     for name in ("command", "scenario_hash", "seed"):
-        got = there.header.get(name)
+        got = stored.header.get(name)
         if got != expected[name]:
             raise UnreliableJournalError(
-                f"{there.location(1)}: expected an attempt with {name} {expected[name]}, got {got}"
+                f"{stored.location(1)}: expected an attempt with {name} {expected[name]}, got {got}"
             )
-    replay = Replay(there, autograph=autograph)
+    replay = Replay(stored, autograph=autograph)
     autograph.blind = True
     assert replay.instrument.listener is not None
     replay.instrument.listener = tee_listener(replay.instrument.listener, autograph.action_log.on_link_event)
     for number, _, difference in replay_lines(replay):
         if difference is not None and not _same_but_for_pictures(difference):
-            expected_, got = difference.replayed or "nothing", difference.journalled or "nothing"
+            wanted, got = difference.replayed or "nothing", difference.journalled or "nothing"
             raise UnreliableJournalError(
-                f"{there.location(number)}: expected what the instrument does again, {expected_[:200]}, got {got[:200]}"
+                f"{stored.location(number)}: expected what the instrument does again, {wanted[:200]}, got {got[:200]}"
             )
     autograph.blind = False
     return AttemptEnvironment(

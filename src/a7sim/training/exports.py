@@ -50,8 +50,8 @@ def to_class_document(
 ) -> Document:
     """Return all grades as a document, the best ones by student and exercise first."""
     return document_header("train report") | {
-        "best": [_told(each) for _, each in sorted(best.items())],
-        "grades": [_told(each) for each in graded],
+        "best": [_remark(each) for _, each in sorted(best.items())],
+        "grades": [_remark(each) for each in graded],
         "attempts": [
             {
                 "student": each.student,
@@ -66,7 +66,7 @@ def to_class_document(
     }
 
 
-def _told(each: GradeRecord) -> Document:
+def _remark(each: GradeRecord) -> Document:
     attempt = each.attempt
     where = {"student": attempt.student, "exercise": attempt.exercise, "mode": attempt.mode, "attempt": attempt.number}
     grade: Document = msgspec.to_builtins(each.grade)

@@ -72,8 +72,8 @@ def _points(catalogue: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord]
     numbers = [str(each.exercise.number) for each in catalogue]
     points = [mine[each.name].grade.points if each.name in mine else 0.0 for each in catalogue]
     colours = [LEFT if each.name in mine and mine[each.name].grade.passed else RIGHT for each in catalogue]
-    said = "; ".join(f"exercise {n}: {p:g}" for n, p in zip(numbers, points, strict=True))
-    with drawing("points", "Points of each exercise", said, size=(8.0, 3.2), wide=True) as drawn:
+    shown = "; ".join(f"exercise {n}: {p:g}" for n, p in zip(numbers, points, strict=True))
+    with drawing("points", "Points of each exercise", shown, size=(8.0, 3.2), wide=True) as drawn:
         axes = drawn.axes[0]
         axes.bar(numbers, points, color=colours, edgecolor=INK, width=0.65)
         _what_passes(axes, catalogue)
@@ -129,11 +129,11 @@ def _cell(each: GradeRecord | None) -> str:
 def _spread(catalogue: Sequence[ExerciseFolder], best: Best) -> PageFigure:
     by_exercise = [[each.grade.points for (_, name), each in best.items() if name == s.name] for s in catalogue]
     numbers = [str(each.exercise.number) for each in catalogue]
-    said = "; ".join(
+    shown = "; ".join(
         f"exercise {n}: median {median(some):g} of {pluralize(len(some), 'student')}" if some else f"exercise {n}: none"
         for n, some in zip(numbers, by_exercise, strict=True)
     )
-    with drawing("spread", "Points of the class by exercise", said, size=(8.0, 3.6), wide=True) as drawn:
+    with drawing("spread", "Points of the class by exercise", shown, size=(8.0, 3.6), wide=True) as drawn:
         axes = drawn.axes[0]
         for place, some in enumerate(by_exercise):
             axes.plot([place] * len(some), some, "o", color=LEFT, alpha=0.5, markersize=6)

@@ -59,23 +59,23 @@ class MessageHandlers(ActionBase):
         if self._console.main.is_there:
             done.then()
 
-    def on_station_update(self, told: StationUpdate) -> None:
+    def on_station_update(self, update: StationUpdate) -> None:
         """Show an update, unless the screen is closed."""
         console = self._console
         if not console.main.is_there:
             return
-        match told.news:
+        match update.news:
             case Connected():
-                self._meet(told.news)
+                self._meet(update.news)
             case Readouts():
-                self._read(told.news)
+                self._read(update.news)
             case ViewResult():
-                console.sight = told.news
+                console.sight = update.news
                 console.draw()
             case CommandsRejected():
-                console.say(" · ".join(describe_error(error) for error in told.news.errors), refused=True)
+                console.say(" · ".join(describe_error(error) for error in update.news.errors), refused=True)
             case ConnectionLost():
-                self._lose(told.news)
+                self._lose(update.news)
 
     def _meet(self, met: Connected) -> None:
         console = self._console

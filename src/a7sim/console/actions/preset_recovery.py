@@ -30,13 +30,13 @@ def recover_presets(variant: Variant, past: Iterable[LoggedLine], gear: str = ""
     presets = CounterOrigins()
     dials: Readouts | None = None
     asked, asks = readouts_query(variant), False
-    for said in past:
-        if asks and said.answers:
-            reply = parse_reply(said.text.encode() + b"\n")
+    for exchange in past:
+        if asks and exchange.answers:
+            reply = parse_reply(exchange.text.encode() + b"\n")
             dials = parse_readouts(variant, reply.parts) if reply else dials
-        asks = said.text == asked
-        if dials is not None and not said.answers:
-            update_presets(presets, variant, dials, said.text)
+        asks = exchange.text == asked
+        if dials is not None and not exchange.answers:
+            update_presets(presets, variant, dials, exchange.text)
     if gear:
         presets.units.setdefault("Z", gear_units(variant, gear))
     return presets

@@ -65,10 +65,10 @@ class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackAc
         reach = PointNavigator(variant, dials, console.presets, projector, console.sketches[projector])
         console.point = point
 
-        def arrived(there: bool) -> None:
+        def arrived(reached: bool) -> None:
             console.say(
-                f"near point {point}" if there else f"point {point} is not to be seen where the sketch shows it",
-                refused=not there,
+                f"near point {point}" if reached else f"point {point} is not to be seen where the sketch shows it",
+                refused=not reached,
             )
             console.look()
             console.refresh_panels()
@@ -78,9 +78,9 @@ class Actions(ControlActions, SetupActions, BookActions, ViewActions, PlaybackAc
 
     def do_say(self) -> None:
         """Send a line of the command language."""
-        self._console.push_screen(Ask("say", note="a line of the command language"), self._said)
+        self._console.push_screen(Ask("say", note="a line of the command language"), self._send_line)
 
-    def _said(self, line: str | None) -> None:
+    def _send_line(self, line: str | None) -> None:
         console = self._console
         if line is not None:
             variant, dials = self._at()

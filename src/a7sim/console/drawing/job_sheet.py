@@ -64,5 +64,5 @@ def _lie(
         return CentringResult("too few fiducials to centre it by"), (0.0, 0.0, 0.0)
     x, y = certificate.principal_point
     c = round(certificate.c * (1.0 + float(lie.scale)), 2)
-    said = f"centred by its {len(names)} fiducials; with the film's shrinkage c is {c:.2f}"
-    return CentringResult(said, c), (float(lie.dx) + x, float(lie.dy) + y, float(lie.turn) / GON)
+    summary = f"centred by its {len(names)} fiducials; with the film's shrinkage c is {c:.2f}"
+    return CentringResult(summary, c), (float(lie.dx) + x, float(lie.dy) + y, float(lie.turn) / GON)

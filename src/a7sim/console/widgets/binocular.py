@@ -106,8 +106,8 @@ class Binocular(Horizontal):
 
     def say(self, words: dict[int, str]) -> None:
         """Show the view of each eye in words."""
-        for eye, said in words.items():
-            self._eyes[eye].say(said)
+        for eye, text in words.items():
+            self._eyes[eye].say(text)
 
     def _other_eye(self) -> None:
         self._flicker_eye = 3 - self._flicker_eye

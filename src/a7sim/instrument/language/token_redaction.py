@@ -17,10 +17,10 @@ _QUOTED = re.compile(r"\"((?:[^\"]|\"\")*)\"\s*|'((?:[^']|'')*)'\s*")
 
 def redact_token(text: str, token: str | None) -> str:
     """Return a line without the token in it; None if it cannot be found and all may be the token."""
-    return ";".join(_told(unit, token) for unit in split_units(text)) if _LOGIN.search(text) else text
+    return ";".join(_replacement(unit, token) for unit in split_units(text)) if _LOGIN.search(text) else text
 
 
-def _told(unit: str, token: str | None) -> str:
+def _replacement(unit: str, token: str | None) -> str:
     header = _HEADER.match(unit)
     if header is None:
         return _SECRET if _LOGIN.search(unit) and (unit.count('"') % 2 or unit.count("'") % 2) else unit

@@ -144,5 +144,5 @@ class Telnet:
         return code
 
     def _tell(self, option: int, value: bytes) -> None:
-        told = self.escape(bytes([option + TO_THE_CLIENT]) + value)
-        self._answer += bytes([IAC, SB, COM_PORT]) + told + bytes([IAC, SE])
+        subnegotiation = self.escape(bytes([option + TO_THE_CLIENT]) + value)
+        self._answer += bytes([IAC, SB, COM_PORT]) + subnegotiation + bytes([IAC, SE])

@@ -39,7 +39,7 @@ from a7sim.operator.mapping.stereo_view import (
 from a7sim.operator.people.person import Person
 from a7sim.text import pluralize
 
-MAX_STEP_MM, SHORTEST_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
+MAX_STEP_MM, MIN_STEP_MM, FIRST_STEP_MM = 3.0, 0.3, 1.0
 """Step from vertex to vertex."""
 
 SPOTS_MM = 25.0
@@ -220,12 +220,12 @@ class Compilation:
         return lines
 
     def _both_ways(self, name: str, height: float, start: _Vertex, z: float, drawn: Sequence[TracedLine]) -> TracedLine:
-        there, ending = self._followed(name, start, drawn)
+        outward, ending = self._followed(name, start, drawn)
         if ending == "closed":
-            return TracedLine(name, CONTOUR, height, as_polyline([*there, there[0]]), ("closed", "closed"))
+            return TracedLine(name, CONTOUR, height, as_polyline([*outward, outward[0]]), ("closed", "closed"))
         self._drive(start.place, z)
         back, other = self._followed(name, _Vertex(start.place, -start.heading, start.surface), drawn)
-        return TracedLine(name, CONTOUR, height, as_polyline([*back[::-1], *there]), (other, ending))
+        return TracedLine(name, CONTOUR, height, as_polyline([*back[::-1], *outward]), (other, ending))
 
     def _followed(self, name: str, start: _Vertex, drawn: Sequence[TracedLine]) -> tuple[list[Array], Ending]:
         """Follow a contour from a position on it; return its vertices and how it ended."""
@@ -239,10 +239,10 @@ class Compilation:
             self._turn(at.place + cut - self._place())
             following = self._on_contour(self._place(), at, name, vertices)
             if following is None:
-                if step <= SHORTEST_STEP_MM:
+                if step <= MIN_STEP_MM:
                     return vertices, "lost"
                 self._turn(at.place - self._place())
-                step = max(step / 2.0, SHORTEST_STEP_MM)
+                step = max(step / 2.0, MIN_STEP_MM)
                 bend = 0.0
                 continue
             bend = _angle(at.heading, following.heading)
@@ -439,5 +439,5 @@ def _angle(before: Array, after: Array) -> float:
 
 def _next_step(step: float, bend: float) -> float:
     if abs(bend) > _SHARP_TURN:
-        return max(0.6 * step, SHORTEST_STEP_MM)
+        return max(0.6 * step, MIN_STEP_MM)
     return min(1.3 * step, MAX_STEP_MM) if abs(bend) < _GENTLE_TURN else step

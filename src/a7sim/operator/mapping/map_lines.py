@@ -82,8 +82,8 @@ class Area:
         """
 
         def along(axis: int, corners: str) -> list[float]:
-            there = [standard_points[label] for label in corners if label in standard_points]
-            return [places[name][axis] for name in there if name in places]
+            present = [standard_points[label] for label in corners if label in standard_points]
+            return [places[name][axis] for name in present if name in places]
 
         low = [max(along(0, "35")), max(along(1, "56"))]
         high = [min(along(0, "46")), min(along(1, "34"))]

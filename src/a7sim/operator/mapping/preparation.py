@@ -142,8 +142,8 @@ def choose_settings(flight: FlightPlan, variant: Variant, map_scale: float | Non
     scales = tuple(_scale(flight, variant, gear, map_scale) for gear in gears.values())
     possible = [scale for scale in scales if not scale.reason_rejected]
     if not possible:
-        said = "; ".join(f"1:{scale.number:.0f} {scale.reason_rejected[0]}" for scale in scales)
-        raise A7SimError(f"no model scale of an {variant.name} suits this flight: {said}")
+        texts = "; ".join(f"1:{scale.number:.0f} {scale.reason_rejected[0]}" for scale in scales)
+        raise A7SimError(f"no model scale of an {variant.name} suits this flight: {texts}")
     chosen = min(possible, key=lambda scale: (scale.interval, abs(scale.number - optimum)))
     return FlightSettings(flight, optimum, _base(flight, optimum), scales, chosen, _reason(chosen, possible))
 
@@ -183,21 +183,21 @@ def _plan_gear(number: float, map_scale: float | None) -> str:
 
 def _against(scale: ModelScale, variant: Variant, map_scale: float | None) -> list[str]:
     low, high = variant.carriages["Z"]
-    said = []
+    texts = []
     if not (-high <= scale.lowest and scale.highest <= -low):
-        said.append(f"needs Z {scale.lowest:.1f} to {scale.highest:.1f} mm, the range is {-high:.0f} to {-low:.0f} mm")
+        texts.append(f"needs Z {scale.lowest:.1f} to {scale.highest:.1f} mm, the range is {-high:.0f} to {-low:.0f} mm")
     most = variant.elements["bx"].high
     if scale.bx > most:
-        said.append(f"needs bx {scale.bx:.2f} mm, the range ends at {most:.0f} mm")
+        texts.append(f"needs bx {scale.bx:.2f} mm, the range ends at {most:.0f} mm")
     left, right = variant.centres_on_base
     reaches = {"X": (left * scale.bx, right * scale.bx), "Y": (-scale.width, scale.width)}
     for axis, (least, furthest) in reaches.items():
         first, last = variant.carriages[axis]
         if least < first or furthest > last:
-            said.append(f"needs {axis} {least:.1f} to {furthest:.1f} mm, the range is {first:.0f} to {last:.0f} mm")
+            texts.append(f"needs {axis} {least:.1f} to {furthest:.1f} mm, the range is {first:.0f} to {last:.0f} mm")
     if map_scale is not None and not scale.plan_gear:
-        said.append(f"has no horizontal gear to 1:{map_scale:.0f}")
-    return said
+        texts.append(f"has no horizontal gear to 1:{map_scale:.0f}")
+    return texts
 
 
 def _reason(chosen: ModelScale, possible: Sequence[ModelScale]) -> str:

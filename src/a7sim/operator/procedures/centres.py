@@ -139,15 +139,15 @@ def _by_levels(
     points = [model.standard_points[label] for label in model.all_positions()]
     corners_and_nadirs = {model.standard_points[label] for label in model.points_of_case("A")}
     groups = []
-    for them, there in workstation.group_by_points(active, points, (side,)):
-        usual = [name for name in there if name in corners_and_nadirs]
-        chosen = usual if len(usual) >= MIN_POINTS else there
+    for group, present in workstation.group_by_points(active, points, (side,)):
+        usual = [name for name in present if name in corners_and_nadirs]
+        chosen = usual if len(usual) >= MIN_POINTS else present
         if len(chosen) >= MIN_POINTS:
-            found = _of_points(workstation, them, model, side, chosen, levels)
-            groups.append((operators.remaining(them), chosen, found))
+            found = _of_points(workstation, group, model, side, chosen, levels)
+            groups.append((operators.remaining(group), chosen, found))
         else:
             operators.give_up(
-                them,
+                group,
                 f"{model.name}: {len(chosen)} of the standard points are pricked on the print of the {side_name(side)} "
                 f"photograph: there must be {MIN_POINTS} for its perspective centre",
             )

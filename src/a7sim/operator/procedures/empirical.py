@@ -136,8 +136,8 @@ def clearing_steps(method: str, model: ModelJob, usable: Sequence[str]) -> tuple
 
 
 def _ends(row: str, usable: Sequence[str]) -> tuple[str, str] | None:
-    there = [label for label in row if label in usable]
-    return (there[0], there[-1]) if there else None
+    present = [label for label in row if label in usable]
+    return (present[0], present[-1]) if present else None
 
 
 def _apart(ends: tuple[str, str] | None) -> bool:
@@ -218,9 +218,9 @@ def _assessed(
     if not active.size:
         return found
     workstation.begin_round(active, len(found.rounds) + 1)
-    there = [label for label in model.all_positions() if label not in missing]
-    there = [label for label in there if workstation.has_point(active, model.standard_points[label]).all()]
-    return assess_residuals(workstation, active, model, found, there, readings, tolerated_rms)
+    present = [label for label in model.all_positions() if label not in missing]
+    present = [label for label in present if workstation.has_point(active, model.standard_points[label]).all()]
+    return assess_residuals(workstation, active, model, found, present, readings, tolerated_rms)
 
 
 def _with_pricked(
@@ -231,7 +231,7 @@ def _with_pricked(
     pricked = {label: workstation.has_point(active, model.standard_points[label]) for label in labels}
     groups: dict[frozenset[str], list[int]] = {}
     for i, session in enumerate(active):
-        missing = absent | {label for label, there in pricked.items() if not there[i]}
+        missing = absent | {label for label, present in pricked.items() if not present[i]}
         groups.setdefault(missing, []).append(int(session))
     return {missing: np.array(sessions, dtype=np.intp) for missing, sessions in groups.items()}
 

@@ -94,12 +94,12 @@ def centre_picture(
             operators.give_up(centring, f"the fiducials of {photograph} do not tell how it lies: {undetermined}")
             return found
         off = np.array([lie.dx, lie.dy]) - wanted
-        there = (np.abs(off).max(axis=0) <= CENTRED_MM) & (np.abs(lie.turn) * np.abs(places).max() <= CENTRED_MM)
-        centred = centring[there]
+        is_centred = (np.abs(off).max(axis=0) <= CENTRED_MM) & (np.abs(lie.turn) * np.abs(places).max() <= CENTRED_MM)
+        centred = centring[is_centred]
         found.rounds[centred] = round_
-        found.film_scale[centred] = lie.scale[there]
-        found.residual_mm[centred] = _unexplained(displacements, places, lie)[there]
-        off, turn, centring = off[:, ~there], lie.turn[~there] / GON, centring[~there]
+        found.film_scale[centred] = lie.scale[is_centred]
+        found.residual_mm[centred] = _unexplained(displacements, places, lie)[is_centred]
+        off, turn, centring = off[:, ~is_centred], lie.turn[~is_centred] / GON, centring[~is_centred]
         if not centring.size:
             break
         now = driver.centring(centring, projector)

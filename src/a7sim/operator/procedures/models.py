@@ -158,8 +158,8 @@ def note_missing_points(workstation: Workstation, model: ModelJob) -> None:
     """Write into the book which points of the case are in water, or not pricked on both prints."""
     operators = workstation.operators
     listed = {label: model.standard_points.get(label, "") for label in CASES[workstation.job.plan.case]}
-    for active, there in workstation.group_by_points(operators.active, list(listed.values())):
-        absent = [f"{label} ({name})" if name else label for label, name in listed.items() if name not in there]
+    for active, present in workstation.group_by_points(operators.active, list(listed.values())):
+        absent = [f"{label} ({name})" if name else label for label, name in listed.items() if name not in present]
         if absent:
             operators.remark(active, f"{model.name}: not pricked on both prints, done without: {', '.join(absent)}")
 
@@ -173,8 +173,8 @@ def preset_counters(workstation: Workstation, model: ModelJob) -> None:
     waiting = operators.active
     for label in model.all_positions():
         point = model.standard_points[label]
-        there = workstation.has_point(waiting, point)
-        presetting, waiting = waiting[there], waiting[~there]
+        present = workstation.has_point(waiting, point)
+        presetting, waiting = waiting[present], waiting[~present]
         if presetting.size:
             if label != "1":
                 operators.remark(
@@ -224,8 +224,8 @@ def set_base_and_fittings(workstation: Workstation, base: str, polarity: str) ->
     workstation.controls.spend_setting(active, 1 + len(right))
     driver.set_base_mode(active, base)
     for name, position in right.items():
-        for them, put in workstation.operators.fitting_positions(active, name, position):
-            driver.set_fitting(them, name, put)
+        for group, put in workstation.operators.fitting_positions(active, name, position):
+            driver.set_fitting(group, name, put)
     workstation.controls.give_up_on_errors(active, f"setting base {base} and its fittings")
 
 

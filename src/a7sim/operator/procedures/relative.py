@@ -92,7 +92,7 @@ class RoundBatch:
         """Return the round of one session."""
         return Round(
             _picked(self.settings, session),
-            _there(_picked(self.parallaxes, session)),
+            _present(_picked(self.parallaxes, session)),
             float(self.mean[session]),
             float(self.rms[session]),
             _picked(self.sigmas, session) if session in self.corrected else {},
@@ -152,7 +152,7 @@ class OrientationRecordBatch:
     def of(self, session: int) -> OrientationRecord:
         """Return the orientation of one session."""
         listed = self._listed
-        residuals = _there(_picked(listed.residuals, session))
+        residuals = _present(_picked(listed.residuals, session))
         return OrientationRecord(
             self.method,
             self.case,
@@ -178,7 +178,7 @@ def _picked(values: Mapping[str, Array | Sequence[float]], session: int) -> dict
     return {name: float(each[session]) for name, each in values.items()}
 
 
-def _there(values: Mapping[str, float]) -> dict[str, float]:
+def _present(values: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in values.items() if not math.isnan(value)}
 
 
@@ -220,21 +220,21 @@ def relative_orientation(
         raise AllGaveUpError
     done = []
     positions = {model.standard_points[label]: label for label in model.all_positions()}
-    for them, points in workstation.group_by_points(active, list(positions)):
-        there = [positions[point] for point in points]
-        labels = [label for label in there if label in CASES[case]]
+    for group, points in workstation.group_by_points(active, list(positions)):
+        present = [positions[point] for point in points]
+        labels = [label for label in present if label in CASES[case]]
         if determine_orientation(labels):
-            found = _oriented(workstation, them, model, method, case, labels, readings, base)
+            found = _oriented(workstation, group, model, method, case, labels, readings, base)
             done.append(
                 (
-                    them,
+                    group,
                     assess_residuals(
-                        workstation, operators.remaining(them), model, found, there, readings, tolerated_rms
+                        workstation, operators.remaining(group), model, found, present, readings, tolerated_rms
                     ),
                 )
             )
         else:
-            operators.give_up(them, _too_few(model, case, labels))
+            operators.give_up(group, _too_few(model, case, labels))
     return merge_groups(done, method, case, operators.size, "numerical")
 
 
@@ -365,10 +365,10 @@ def assess_residuals(
         apart, lambda session: f"{model.name}: the images of {left.disagreement[session]} cannot be fused any more"
     )
     active = operators.remaining(active)
-    there = [name for name in ALL_ELEMENTS if name in workstation.controls.manual.elements]
+    present = [name for name in ALL_ELEMENTS if name in workstation.controls.manual.elements]
     orientations = replace(
         found,
-        elements=expand_to_batch(workstation.controls.elements(active, there), active, operators.size),
+        elements=expand_to_batch(workstation.controls.elements(active, present), active, operators.size),
         residuals=dict(zip(labels, left.parallax_mm, strict=True)),
         places=dict(zip(labels, np.moveaxis(left.places, 1, 0), strict=True)),
     )

@@ -22,9 +22,9 @@ def grid_residuals(rows: Sequence[Mapping[str, str]], projector: str, name: str)
     extent = max(x) - min(x) or 1.0
     length, step = 0.14 * extent / (largest or 1.0), nice_number(largest or 1.0)
     crosses = pluralize(len(set(zip(x, y, strict=True))), "cross", "crosses")
-    said = f"Arrows at {crosses} and {pluralize(len(levels), 'level')}; largest {largest:.1f} µm."
+    note = f"Arrows at {crosses} and {pluralize(len(levels), 'level')}; largest {largest:.1f} µm."
     with drawing(
-        name, f"{projector.capitalize()} projector: residuals at the crosses", said, size=(WIDTH_IN, 5.4)
+        name, f"{projector.capitalize()} projector: residuals at the crosses", note, size=(WIDTH_IN, 5.4)
     ) as drawn:
         axes = drawn.axes[0]
         for level, (colour, width) in zip(levels, _STYLES, strict=False):

@@ -47,8 +47,8 @@ def residual_parallaxes(model: Document, name: str) -> PageFigure:
     step = nice_number(largest or 1e-3)
     length = 0.26 * across / max(largest, 1e-3)
     title = f"Model {model['model']}: residual y-parallaxes, rms {orientation['rms_parallax_mm']:.4f} mm"
-    said = f"Arrows along y at {pluralize(len(residuals), 'standard point')}; the largest parallax is {largest:.3f} mm."
-    with drawing(name, title, said, size=(WIDTH_IN, 5.0)) as drawn:
+    note = f"Arrows along y at {pluralize(len(residuals), 'standard point')}; the largest parallax is {largest:.3f} mm."
+    with drawing(name, title, note, size=(WIDTH_IN, 5.0)) as drawn:
         axes = drawn.axes[0]
         labels = list(residuals)
         x, y = zip(*(places[label] for label in labels), strict=True)
@@ -96,8 +96,8 @@ def iterations(model: Document, name: str) -> PageFigure:
     last = orientation["rms_parallax_mm"]
     title = f"Model {model['model']}: y-parallaxes round by round"
     first = f"Rms {rounds[0]['rms_mm']:.4f} mm in the first of {pluralize(len(rounds), 'round')}"
-    said = f"{first}, {last:.4f} mm left at the end."
-    with drawing(name, title, said, size=(WIDTH_IN, 5.0)) as drawn:
+    note = f"{first}, {last:.4f} mm left at the end."
+    with drawing(name, title, note, size=(WIDTH_IN, 5.0)) as drawn:
         axes = drawn.axes[0]
         axes.set_yscale("log")
         axes.plot(numbers, _above_zero(each["rms_mm"] for each in rounds), "o-", color=LEFT, label="rms about the mean")
@@ -125,11 +125,11 @@ def perspective_centre(model: Document, side: str, rays: Mapping[str, tuple[floa
     found, true = model["perspective_centres"][side], model["truth"]["centres"][side]
     sign, colour, marker = OF_PROJECTOR[side if model["base"] == "inside" else OTHER[side]]
     title = f"Model {model['model']}: perspective centre O{sign}, {side} photograph {model[side]}"
-    said = (
+    note = (
         f"Found at X {found['X0']:.3f}, Y {found['Y0']:.3f}, Z {found['Z0']:.3f}; "
         f"standard deviations {found['sigma_X0']:.3f}, {found['sigma_Y0']:.3f}, {found['sigma_Z0']:.3f} counter units."
     )
-    with drawing(name, title, said, size=(WIDTH_IN, HEIGHT_IN), ratios=(3.6, 1.0), beside=True) as drawn:
+    with drawing(name, title, note, size=(WIDTH_IN, HEIGHT_IN), ratios=(3.6, 1.0), beside=True) as drawn:
         plan, height = drawn.axes
         _ellipses(plan, found, colour)
         for point, (x, y) in rays.items():

@@ -9,8 +9,8 @@ from a7sim.result_documents import Document
 
 def hours(spent: Mapping[str, float], name: str, title: str) -> PageFigure:
     """Return hours as bars, in order of first occurrence."""
-    said = "; ".join(f"{what} {each:.2f} hours" for what, each in spent.items())
-    with drawing(name, title, said, size=(WIDTH_IN, 1.3 + 0.5 * len(spent))) as drawn:
+    text = "; ".join(f"{what} {each:.2f} hours" for what, each in spent.items())
+    with drawing(name, title, text, size=(WIDTH_IN, 1.3 + 0.5 * len(spent))) as drawn:
         axes = drawn.axes[0]
         bars = axes.barh(_in_two_lines(spent), list(spent.values()), color=FILL, edgecolor=INK, height=0.65)
         axes.bar_label(bars, [f"{each:.2f} h" for each in spent.values()], padding=4)
@@ -30,9 +30,9 @@ def all_strips(strips: Sequence[Document], name: str) -> PageFigure:
     """Return the rms residuals at the checks, or at control if there are none, of each strip."""
     on = "checks" if all("checks" in strip["accuracy_m"] for strip in strips) else "control"
     title = f"Rms residuals at {on} by strip"
-    said = f"{len(strips)} strips, one for every combination of cases, numbered as in the thesis."
+    text = f"{len(strips)} strips, one for every combination of cases, numbered as in the thesis."
     numbers = [strip["number"] for strip in strips]
-    with drawing(name, title, said, size=(8.0, 4.4), wide=True) as drawn:
+    with drawing(name, title, text, size=(8.0, 4.4), wide=True) as drawn:
         axes = drawn.axes[0]
         for what, marker, colour, face in (("plan", "o", LEFT, LEFT), ("height", "s", RIGHT, PANEL)):
             values = [strip["accuracy_m"].get(on, {}).get(what) or float("nan") for strip in strips]

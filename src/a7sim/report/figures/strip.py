@@ -52,12 +52,12 @@ def residuals_in_plan(strip: Document, places: Places, name: str, of: str) -> Pa
     at = {point: (places[point][0] - origin[0], places[point][1] - origin[1]) for point in residuals}
     extent = _extent(at.values())
     step, length = nice_number(largest or 1e-3), 0.13 * extent / (largest or 1e-3)
-    said = (
+    note = (
         f"Arrows computed minus given at {pluralize(len(residuals), 'ground point')}; the longest is {largest:.3f} m."
     )
     long = len(residuals) > MANY
     size, width = ((8.0, 4.2), 0.004) if long else ((WIDTH_IN, 4.8), 0.008)
-    with drawing(name, f"{of}: residuals in plan", said, size=size, wide=long) as drawn:
+    with drawing(name, f"{of}: residuals in plan", note, size=size, wide=long) as drawn:
         axes = drawn.axes[0]
         for check in (False, True):
             marker, edge, face, word = _LOOKS[check]
@@ -86,10 +86,10 @@ def residuals_in_height(strip: Document, name: str, of: str) -> PageFigure | Non
         return None
     points = list(residuals)
     largest = max(abs(each["Z"]) for each in residuals.values())
-    said = f"Heights computed minus given at {pluralize(len(points), 'ground point')}; the largest is {largest:.3f} m."
+    note = f"Heights computed minus given at {pluralize(len(points), 'ground point')}; the largest is {largest:.3f} m."
     long = len(points) > MANY
     size = (8.0, 4.2) if long else (WIDTH_IN, 4.8)
-    with drawing(name, f"{of}: residuals in height", said, size=size, wide=long) as drawn:
+    with drawing(name, f"{of}: residuals in height", note, size=size, wide=long) as drawn:
         axes = drawn.axes[0]
         for check in (False, True):
             marker, edge, face, word = _LOOKS[check]
@@ -116,8 +116,8 @@ def plan_and_profile(places: Places, strip: Document, name: str, of: str) -> Pag
     roles = {point: each["role"] for point, each in _last(strip)["residuals_m"].items()}
     along = _along(centres)
     drawn_of = f"{pluralize(len(points), 'point')} and {pluralize(len(centres), 'perspective centre')}"
-    said = f"{drawn_of}, from above and from the side."
-    with drawing(name, f"{of}: plan and profile", said, size=(8.0, 8.6), ratios=(1.9, 0.8, 1.0), wide=True) as drawn:
+    note = f"{drawn_of}, from above and from the side."
+    with drawing(name, f"{of}: plan and profile", note, size=(8.0, 8.6), ratios=(1.9, 0.8, 1.0), wide=True) as drawn:
         plan, air, ground = drawn.axes
         plan.plot(*_flat(centres, origin), "-", color=FAINT, zorder=1)
         for check in (False, True, None):

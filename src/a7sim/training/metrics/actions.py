@@ -46,9 +46,9 @@ class ActionsOutOfOrder(Metric, frozen=True, kw_only=True):
                     early.append(f"{_plainly(deed)} (before {_plainly(before)})")
                 elif place > last:
                     last, before = place, deed
-        told = [f"not done: {join_words(dict.fromkeys(missing))}"] if missing else []
-        told += [f"done too early: {join_words(dict.fromkeys(early))}"] if early else []
-        return MetricResult(float(len(missing) + len(early)), "; ".join(told) or "everything was done, in its order")
+        remark = [f"not done: {join_words(dict.fromkeys(missing))}"] if missing else []
+        remark += [f"done too early: {join_words(dict.fromkeys(early))}"] if early else []
+        return MetricResult(float(len(missing) + len(early)), "; ".join(remark) or "everything was done, in its order")
 
     def _place(self, record: AttemptRecord, deed: str) -> int | None:
         what, _, name = deed.removesuffix("!").partition(" ")
@@ -80,8 +80,8 @@ class MotorDrivenReadings(Metric, frozen=True, kw_only=True):
         if not readings:
             return MetricResult(None, "nothing was registered")
         ran = [each for each in readings if any(self._ran(record, each, handle) for handle in self.handles)]
-        told = f"run there at {describe_points(ran, record)}" if ran else "turned there by hand every time"
-        return MetricResult(float(len(ran)), f"{join_words(map(handle_label, self.handles))}: {told}")
+        remark = f"run there at {describe_points(ran, record)}" if ran else "turned there by hand every time"
+        return MetricResult(float(len(ran)), f"{join_words(map(handle_label, self.handles))}: {remark}")
 
     def _ran(self, record: AttemptRecord, reading: Reading, handle: str) -> bool:
         before = [each for each in record.actions if each.name == handle and each.index < reading.place]
@@ -99,8 +99,8 @@ class MovedElements(Metric, frozen=True, kw_only=True):
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         moved = [handle for handle in self.handles if self._by_how_much(record, handle) > self.within + 1e-9]
-        told = f"{join_words(map(handle_label, moved))} moved" if moved else "all of it stands where it stood"
-        return MetricResult(float(len(moved)), told)
+        remark = f"{join_words(map(handle_label, moved))} moved" if moved else "all of it stands where it stood"
+        return MetricResult(float(len(moved)), remark)
 
     def _by_how_much(self, record: AttemptRecord, handle: str) -> float:
         actions = [each for each in record.actions if each.name == handle and each.what in PLAIN]
@@ -127,8 +127,8 @@ class UnviewedPoints(Metric, frozen=True, kw_only=True):
             levers = [each.index for each in before if each.what in ("fit", "base", "load")]
             if not readings or max(looks, default=-1) < max(levers, default=0):
                 blind.append(point)
-        told = f"at {join_words(blind)} without a look after the last fitting" if blind else "looked every time"
-        return MetricResult(float(len(blind)), told)
+        remark = f"at {join_words(blind)} without a look after the last fitting" if blind else "looked every time"
+        return MetricResult(float(len(blind)), remark)
 
 
 @register_metric("minutes")
@@ -203,9 +203,9 @@ class WrongFittings(Metric, frozen=True, kw_only=True):
         if self.base and base != self.base:
             wrong.append(f"the base is {base} and belongs {self.base}")
         wrong += [
-            f"{there or 'no picture'} lies in projector {projector} and {wanted} belongs there"
-            for projector, (there, wanted) in enumerate(zip(lying, self.pictures, strict=False), start=1)
-            if there != wanted
+            f"{present or 'no picture'} lies in projector {projector} and {wanted} belongs there"
+            for projector, (present, wanted) in enumerate(zip(lying, self.pictures, strict=False), start=1)
+            if present != wanted
         ]
         picture = f"{'at ' + self.point + ' ' if self.point else ''}for a {polarity} with base {self.base or base}"
         return MetricResult(float(len(wrong)), f"{picture}: {join_words(wrong) if wrong else 'all is as it belongs'}")

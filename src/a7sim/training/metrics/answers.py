@@ -48,8 +48,8 @@ class AnswerDeviation(Metric, frozen=True, kw_only=True):
         try:
             number = float(answered)
         except ValueError:
-            said = f"expected a number, got {answered!r}" if answered else "not answered"
-            return MetricResult(None, f"{self.key}: {said}")
+            answer_text = f"expected a number, got {answered!r}" if answered else "not answered"
+            return MetricResult(None, f"{self.key}: {answer_text}")
         value = abs(number - self._truth(record))
         return MetricResult(round(value, 4) if math.isfinite(value) else None, f"{self.key} was answered {answered}")
 
@@ -83,8 +83,8 @@ class MaxAnswerDeviation(Metric, frozen=True, kw_only=True):
                 off[key] = abs(float(record.answers.get(key, "")) - float(record.hidden[key]))
             except (ValueError, KeyError):
                 answered = record.answers.get(key, "")
-                said = f"expected a number, got {answered!r}" if answered else "not answered"
-                return MetricResult(None, f"{key}: {said}")
+                answer_text = f"expected a number, got {answered!r}" if answered else "not answered"
+                return MetricResult(None, f"{key}: {answer_text}")
         worst = max(off, key=lambda key: off[key])
         if not math.isfinite(off[worst]):
             return MetricResult(None, f"{worst}: expected a number, got {record.answers[worst]!r}")
@@ -107,9 +107,9 @@ class WrongAnswers(Metric, frozen=True, kw_only=True):
         """Return their number."""
         missing = [key for key in self.keys if not record.answers.get(key)]
         wrong = [key for key in self.keys if key not in missing and not self._right(record, key)]
-        told = [f"not answered: {join_words(missing)}"] if missing else []
-        told += [f"{key} is not {record.answers[key]}" for key in wrong]
-        return MetricResult(float(len(missing) + len(wrong)), "; ".join(told) or f"{join_words(self.keys)}: right")
+        remark = [f"not answered: {join_words(missing)}"] if missing else []
+        remark += [f"{key} is not {record.answers[key]}" for key in wrong]
+        return MetricResult(float(len(missing) + len(wrong)), "; ".join(remark) or f"{join_words(self.keys)}: right")
 
     def _right(self, record: AttemptRecord, key: str) -> bool:
         right = record.hidden.get(key, ())

@@ -69,9 +69,9 @@ class _Centres(Metric, frozen=True, kw_only=True):
         found = {element: self._centre(record, element) for element in self.elements}
         return {element: centre for element, centre in found.items() if centre is not None}
 
-    def _few(self, there: Mapping[str, object]) -> MetricResult:
+    def _few(self, present: Mapping[str, object]) -> MetricResult:
         lacking = [
-            f"the {'left' if each.endswith('1') else 'right'} one" for each in self.elements if each not in there
+            f"the {'left' if each.endswith('1') else 'right'} one" for each in self.elements if each not in present
         ]
         return MetricResult(None, f"too few points were registered at both levels for a centre: {join_words(lacking)}")
 
@@ -93,8 +93,8 @@ class MissingLevels(_Centres, frozen=True, kw_only=True):
         wanted = len(self.elements) * len(self.levels) * len(self.points)
         if not short:
             return MetricResult(0.0, "no registration is missing")
-        told = join_words(f"{point} with {handle_label(element)} at {level:.0f}" for element, level, point in short)
-        return MetricResult(float(len(short)), f"{len(short)} of {pluralize(wanted, 'registration')} missing: {told}")
+        remark = join_words(f"{point} with {handle_label(element)} at {level:.0f}" for element, level, point in short)
+        return MetricResult(float(len(short)), f"{len(short)} of {pluralize(wanted, 'registration')} missing: {remark}")
 
 
 @register_metric("pointing-rms")
@@ -123,9 +123,9 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
         if not off:
             return MetricResult(None, "nothing was registered at the levels")
         rms = math.sqrt(fmean(each**2 for each in off))
-        told = f"over {pluralize(len(off) // 2, 'pointing')} the images stood {rms:.1f} um (rms) beside the mark, "
-        told += f"most of all by {worst[0]:.0f} um at {worst[1]}"
-        return MetricResult(round(rms, 2), told)
+        remark = f"over {pluralize(len(off) // 2, 'pointing')} the images stood {rms:.1f} um (rms) beside the mark, "
+        remark += f"most of all by {worst[0]:.0f} um at {worst[1]}"
+        return MetricResult(round(rms, 2), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of the best eye."""
@@ -193,8 +193,8 @@ class _Answered(_Centres, frozen=True, kw_only=True):
                     return MetricResult(None, f"{key}: expected a number, got {record.answers.get(key) or 'no answer'}")
                 by = abs(number - coordinates[axis])
                 off.append((by, f"{key} was answered {number:.2f}, {rightly} {by:.2f} off"))
-        value, told = max(off)
-        return MetricResult(round(value, 4) if math.isfinite(value) else None, told)
+        value, remark = max(off)
+        return MetricResult(round(value, 4) if math.isfinite(value) else None, remark)
 
 
 @register_metric("centre-sums-off")

@@ -35,7 +35,7 @@ def projector_poses(record: AttemptRecord, reading: Reading) -> tuple[ProjectorP
     return stand(model.left_projector, 0.0), stand(model.right_projector, abs(reading.shown["bx"]))
 
 
-class _Clearing(Metric, frozen=True, kw_only=True):
+class _ClearingMetric(Metric, frozen=True, kw_only=True):
     """Steps by point and element, such as { "2" = "kappa1" }, in groups with free order."""
 
     steps: list[dict[str, str]]
@@ -53,7 +53,7 @@ class _Clearing(Metric, frozen=True, kw_only=True):
 
 
 @register_metric("steps-missing")
-class MissingSteps(_Clearing, frozen=True, kw_only=True):
+class MissingSteps(_ClearingMetric, frozen=True, kw_only=True):
     """Number of steps that were not registered, came before their predecessors, or had another element reading."""
 
     unit = "steps"
@@ -75,16 +75,16 @@ class MissingSteps(_Clearing, frozen=True, kw_only=True):
             places = {point: first[point] for point in group if point in first}
             early += [point for point, place in places.items() if place < before]
             before = max([before, *places.values()])
-        told = [f"not registered: {self._told(missing)}"] if missing else []
-        told += [f"registered before those it rests on: {self._told(early)}"] if early else []
-        told += [f"registered where it does not belong: {self._strayed(elsewhere, record)}"] if elsewhere else []
+        remark = [f"not registered: {self._remark(missing)}"] if missing else []
+        remark += [f"registered before those it rests on: {self._remark(early)}"] if early else []
+        remark += [f"registered where it does not belong: {self._strayed(elsewhere, record)}"] if elsewhere else []
         strays = len({(each.point, each.named) for each in elsewhere})
         return MetricResult(
             float(len(missing) + len(early) + strays),
-            "; ".join(told) or f"cleared in their order: {self._told(list(elements))}",
+            "; ".join(remark) or f"cleared in their order: {self._remark(list(elements))}",
         )
 
-    def _told(self, points: list[str]) -> str:
+    def _remark(self, points: list[str]) -> str:
         elements = self._elements()
         return join_words(f"{handle_label(elements[point])} at {point}" for point in points)
 
@@ -119,7 +119,7 @@ class OmegaTurn:
 
 
 @register_metric("over-correction-off")
-class OverCorrectionDeviation(_Clearing, frozen=True, kw_only=True):
+class OverCorrectionDeviation(_ClearingMetric, frozen=True, kw_only=True):
     """Share of the last point's parallax that remains after a round because omega was turned too far or too little.
 
     The last step is omega's. It counts if the clearing turn was `least` or more, and the worst of these. The clearing
@@ -201,9 +201,9 @@ class WrongMissingPoints(Metric, frozen=True, kw_only=True):
         answered = record.answers.get(self.key, "")
         if not answered:
             return MetricResult(None, f"{self.key}: not answered")
-        said = set(answered.replace(",", " ").replace("+", " ").split())
+        text = set(answered.replace(",", " ").replace("+", " ").split())
         gone = set(CASES["A"]) - set(record.model.standard_points)
-        wrong = sorted(said ^ gone)
+        wrong = sorted(text ^ gone)
         if not wrong:
             return MetricResult(0.0, f"{self.key} was answered {answered}: right")
         return MetricResult(float(len(wrong)), f"{self.key} was answered {answered}: {join_words(wrong)} is not so")

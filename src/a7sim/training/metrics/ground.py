@@ -51,8 +51,8 @@ def last_readings(record: AttemptRecord, points: Iterable[str], base: str = "") 
 def pointings(record: AttemptRecord, name: str, base: str = "") -> list[Reading]:
     """Return the registrations of a point's coordinates, without readings of an element just turned there."""
     actions = [each for each in record.actions if each.what in PLAIN]
-    there = [each for each in record.readings if each.point == name and base in ("", each.base)]
-    return [each for each in there if not _turned_there(actions, each)]
+    present = [each for each in record.readings if each.point == name and base in ("", each.base)]
+    return [each for each in present if not _turned_there(actions, each)]
 
 
 def _turned_there(actions: Sequence[StudentAction], reading: Reading) -> bool:
@@ -132,8 +132,8 @@ class HeightDeviation(Metric, frozen=True, kw_only=True):
         off = {name: float(mean_display(some)[2] - truth[name][2]) for name, some in readings.items()}
         worst = max(off, key=lambda name: abs(off[name]))
         rms = math.sqrt(sum(each**2 for each in off.values()) / len(off))
-        told = f"heights are off by {rms:.2f} m (rms), the largest {off[worst]:+.2f} m at {worst}"
-        return MetricResult(round(abs(off[worst]) if self.largest else rms, 4), told)
+        remark = f"heights are off by {rms:.2f} m (rms), the largest {off[worst]:+.2f} m at {worst}"
+        return MetricResult(round(abs(off[worst]) if self.largest else rms, 4), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the errors of the best eye and the film, and half a count."""
@@ -165,8 +165,8 @@ class DistanceDeviation(Metric, frozen=True, kw_only=True):
         if not shares:
             return MetricResult(None, f"no two of {join_words(self.points)} were registered")
         share = 1e3 * sum(shares) / len(shares)
-        told = f"the model is {abs(share):.2f} per mille too {'large' if share > 0 else 'small'}"
-        return MetricResult(round(abs(share), 4), told)
+        remark = f"the model is {abs(share):.2f} per mille too {'large' if share > 0 else 'small'}"
+        return MetricResult(round(abs(share), 4), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of two pointings over the width of the model."""
@@ -208,8 +208,8 @@ class ElementChange(Metric, frozen=True, kw_only=True):
             off = record.autograph.element(name) - element_at(record, name, change.index)
             moved[name] = abs((off + 200.0) % 400.0 - 200.0) if name.startswith("kappa") else abs(off)
         worst = max(moved, key=lambda name: moved[name])
-        told = [f"{handle_label(name)} by {amount:.2f}" for name, amount in moved.items() if amount > HALF_A_COUNT]
-        return MetricResult(round(moved[worst], 4), f"moved since: {join_words(told)}")
+        remark = [f"{handle_label(name)} by {amount:.2f}" for name, amount in moved.items() if amount > HALF_A_COUNT]
+        return MetricResult(round(moved[worst], 4), f"moved since: {join_words(remark)}")
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -241,8 +241,8 @@ class TiePointDisagreement(Metric, frozen=True, kw_only=True):
                 if axis in self.axes:
                     mm = by / units.get(axis, 1.0)
                     apart.append((abs(mm), f"{axis} at {name} reads {mm:+.3f} mm more than in the model before"))
-        worst, told = max(apart)
-        return MetricResult(round(worst, 4), told)
+        worst, remark = max(apart)
+        return MetricResult(round(worst, 4), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of the best eye in heights of two models."""
@@ -269,8 +269,8 @@ class ScaleTransferDeviation(Metric, frozen=True, kw_only=True):
         before = self._scale(record, models[self.first], change.index)
         after = self._scale(record, models[record.model.name], record.action_log.actions[-1].index + 1)
         share = 1e3 * (after / before - 1.0)
-        told = f"the second model is {abs(share):.2f} per mille {'larger' if share > 0 else 'smaller'} than the first"
-        return MetricResult(round(abs(share), 4), told)
+        remark = f"the second model is {abs(share):.2f} per mille {'larger' if share > 0 else 'smaller'} than the first"
+        return MetricResult(round(abs(share), 4), remark)
 
     def _scale(self, record: AttemptRecord, model: ModelPlan, place: int) -> float:
         at = {

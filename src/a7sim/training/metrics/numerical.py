@@ -49,10 +49,10 @@ class MeasuredRound:
         """Return the y-parallaxes in mm by position, from the means of by' and by" minus their rest positions."""
         found = {}
         for label, name in self.record.model.standard_points.items():
-            there = [each for each in self.readings if each.point == name]
-            read = {by: [each.shown[by] for each in there if by in each.named] for by in BYS}
+            present = [each for each in self.readings if each.point == name]
+            read = {by: [each.shown[by] for each in present if by in each.named] for by in BYS}
             if all(read.values()):
-                rest = {by: fmean(each.shown[by] for each in there if by not in each.named) for by in BYS}
+                rest = {by: fmean(each.shown[by] for each in present if by not in each.named) for by in BYS}
                 sense = 1.0 if self.record.model.left_projector == 1 else -1.0
                 moved = {by: fmean(read[by]) - rest[by] for by in BYS}
                 found[label] = sense * (moved["by1"] - moved["by2"]) / 2.0
@@ -163,8 +163,8 @@ class ComputationDeviation(Metric, frozen=True, kw_only=True):
         off, name, right = _apart(found.answered or found.set, found.sums)
         given = (found.answered or found.set)[name]
         how = "answered" if found.answered else "set"
-        told = f"case {self.case}: {handle_label(name)} was {how} as {given:+.2f} and your readings give {right:+.2f}"
-        return MetricResult(round(off, 4), told)
+        remark = f"case {self.case}: {handle_label(name)} was {how} as {given:+.2f} and your readings give {right:+.2f}"
+        return MetricResult(round(off, 4), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -181,18 +181,18 @@ class SettingDeviation(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the difference."""
-        there = {case: each for case in self.cases if (each := answered_case(record, case)) is not None}
-        if len(there) < len(self.cases):
-            return MetricResult(None, f"case {join_words(set(self.cases) - set(there))} was not measured whole")
+        present = {case: each for case in self.cases if (each := answered_case(record, case)) is not None}
+        if len(present) < len(self.cases):
+            return MetricResult(None, f"case {join_words(set(self.cases) - set(present))} was not measured whole")
         all_off = [
-            (_apart(each.set, [each.answered] if each.answered else each.sums), case) for case, each in there.items()
+            (_apart(each.set, [each.answered] if each.answered else each.sums), case) for case, each in present.items()
         ]
         (off, name, right), case = max(all_off)
-        told = (
-            f"case {case}: {handle_label(name)} was turned by {there[case].set[name]:+.2f} and should be by "
+        remark = (
+            f"case {case}: {handle_label(name)} was turned by {present[case].set[name]:+.2f} and should be by "
             f"{right:+.2f}"
         )
-        return MetricResult(round(off, 4), told)
+        return MetricResult(round(off, 4), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return a count: both the old and the new setting are full counts."""

@@ -82,11 +82,13 @@ class WrongApproach(Metric, frozen=True, kw_only=True):
         if not bad:
             return MetricResult(0.0, f"{join_words(map(handle_label, self.handles))} always came from the same side")
         from_where = "larger" if self.side > 0 else "smaller"
-        told = [f"{handle_label(handle)} at {describe_points(some, record)}" for handle, some in wrong.items() if some]
+        remark = [
+            f"{handle_label(handle)} at {describe_points(some, record)}" for handle, some in wrong.items() if some
+        ]
         return MetricResult(
             float(len(bad)),
             f"{len(bad)} of {pluralize(len(readings), 'registration')} came from {from_where} readings: "
-            f"{join_words(told)}",
+            f"{join_words(remark)}",
         )
 
 
@@ -104,13 +106,13 @@ class OneSidedReadings(Metric, frozen=True, kw_only=True):
         if not readings:
             return MetricResult(None, f"nothing was registered at {self.point}")
         lacking = {handle: {each.sides.get(handle, 0) for each in readings} for handle in self.handles}
-        told = [
+        remark = [
             f"{handle_label(handle)} never came from {'smaller' if 1 not in sides else 'larger'} readings"
             for handle, sides in lacking.items()
             if not {1, -1} <= sides
         ]
         return MetricResult(
-            float(len(told)), f"at {self.point}: {join_words(told) if told else 'both sides were registered'}"
+            float(len(remark)), f"at {self.point}: {join_words(remark) if remark else 'both sides were registered'}"
         )
 
 
@@ -174,8 +176,8 @@ class TargetDeviation(Metric, frozen=True, kw_only=True):
                     )
         if missing:
             return MetricResult(None, f"nothing was registered at {join_words(missing)}")
-        worst, told = max(off)
-        return MetricResult(round(worst, 4), told)
+        worst, remark = max(off)
+        return MetricResult(round(worst, 4), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -194,14 +196,14 @@ class OtherElementDisplaced(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        told, count, all_read = [], 0, 0
+        remark, count, all_read = [], 0, 0
         for read, other in self.pairs.items():
             readings = [each for each in readings_with(record, read) if other not in each.named]
             all_read += len(readings)
             wrong = [each for each in readings if abs(each.shown[other] - self.at) > self.within]
             count += len(wrong)
             if wrong:
-                told.append(
+                remark.append(
                     f"{handle_label(other)} was never returned to {self.at:g} before reading {handle_label(read)} "
                     f"at {describe_points(wrong, record)}"
                 )
@@ -209,7 +211,7 @@ class OtherElementDisplaced(Metric, frozen=True, kw_only=True):
             return MetricResult(None, f"no reading of {join_words(map(handle_label, self.pairs))} was registered")
         return MetricResult(
             float(count),
-            join_words(told) if told else f"the other one stood at rest at {pluralize(all_read, 'reading')}",
+            join_words(remark) if remark else f"the other one stood at rest at {pluralize(all_read, 'reading')}",
         )
 
 
@@ -233,11 +235,11 @@ class ReadingSpread(Metric, frozen=True, kw_only=True):
                 read = [each.shown[handle] for each in group]
                 if len(read) > 1:
                     spread = max(read) - min(read)
-                    told = (
+                    remark = (
                         f"{handle_label(handle)} at {describe_points(group, record)} read from {min(read):.2f} "
                         f"to {max(read):.2f}"
                     )
-                    spreads.append((round(spread, 4), told))
+                    spreads.append((round(spread, 4), remark))
         if not spreads:
             return MetricResult(None, "nothing was read twice")
         return MetricResult(*max(spreads))
@@ -265,8 +267,8 @@ class OppositionDeviation(Metric, frozen=True, kw_only=True):
                 left = fmean(each.shown[self.one] for each in ones)
                 right = fmean(each.shown[self.other] for each in others)
                 read = f"{handle_label(self.one)} reads {left:+.3f} and {handle_label(self.other)} {right:+.3f}"
-                told = f"at {describe_points(ones, record)} {read}"
-                sums.append((round(abs(left + right), 4), told))
+                remark = f"at {describe_points(ones, record)} {read}"
+                sums.append((round(abs(left + right), 4), remark))
         if not sums:
             return MetricResult(
                 None, f"no point was read with both {handle_label(self.one)} and {handle_label(self.other)}"

@@ -175,8 +175,8 @@ class ResidualParallax(Metric, frozen=True, kw_only=True):
             return MetricResult(None, "the pictures of the model do not lie in their projectors")
         worst = max(seen, key=lambda point: abs(seen[point]))
         rms = math.sqrt(sum(each**2 for each in seen.values()) / len(seen))
-        told = f"y-parallaxes of {rms:.0f} um (rms) are left, the largest {seen[worst]:+.0f} um at point {worst}"
-        return MetricResult(round(abs(seen[worst]) if self.largest else rms, 1), told)
+        remark = f"y-parallaxes of {rms:.0f} um (rms) are left, the largest {seen[worst]:+.0f} um at point {worst}"
+        return MetricResult(round(abs(seen[worst]) if self.largest else rms, 1), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of the best eye, the film's irregular deformation, and half a count."""
@@ -203,8 +203,8 @@ class CentringDeviation(Metric, frozen=True, kw_only=True):
             shift, turned, _ = _lie(record, projector)
             left.append((shift, f"{name} lies {shift:.3f} mm beside the principal point"))
             left.append((turned, f"{name} is turned by {turned:.3f} mm at its fiducials"))
-        value, told = max(left)
-        return MetricResult(round(value, 4), told)
+        value, remark = max(left)
+        return MetricResult(round(value, 4), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the precision of the mean of four fiducials."""
@@ -243,13 +243,13 @@ class PrincipalDistanceDeviation(Metric, frozen=True, kw_only=True):
             wanted = record.scenario.camera.c * (1.0 + _lie(record, projector)[2])
             shown = record.autograph.element(f"c{projector}")
             side = "long" if shown > wanted else "short"
-            told = (
+            remark = (
                 f"{handle_label(f'c{projector}')} stands at {shown:.2f}: {abs(shown - wanted):.3f} mm too {side} "
                 "for the film"
             )
-            off.append((abs(shown - wanted), told))
-        value, told = max(off)
-        return MetricResult(round(value, 4), told)
+            off.append((abs(shown - wanted), remark))
+        value, remark = max(off)
+        return MetricResult(round(value, 4), remark)
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count, and the precision of a scale from four fiducials."""
