@@ -158,7 +158,7 @@ def test_cards_of_a_strip_measured_in_several_ways(finished, typed):
     assert code == 0
     assert len(printed.splitlines()) > 100
     code, _, complaint = typed("export", out, "--to", "cards")
-    assert code == 2 and "(--way comparator or A8 has one)" in complaint
+    assert code == 2 and "(--method comparator or A8 has one)" in complaint
     code, _, complaint = typed("export", out, "--to", "cards", "--method", "A9")
     assert code == 2 and "(comparator, A8), got A9" in complaint
     code, _, complaint = typed("export", out, "--to", "asciicast")

@@ -21,9 +21,9 @@ _HOMES = {
     "Study": "a7sim.api",
     "connect": "a7sim.api",
 }
-_PACKAGES = ("processing", "reduction")
-_RENAMED = {"InstrumentRefused": "InstrumentError", "Mistake": "A7SimError", "computing": "processing"}
-"""Public names of release 0.1.0: each still works and warns."""
+_PACKAGES = ("computing", "processing", "reduction")
+_RENAMED = {"InstrumentRefused": "InstrumentError", "Mistake": "A7SimError"}
+"""Public names of release 0.1.0: each still works and warns. The module `a7sim.computing` warns itself."""
 
 __all__ = [
     "A7SimError",

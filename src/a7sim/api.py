@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
-from a7sim.deprecation import warn_renamed
+from a7sim.deprecation import RenamedMember
 from a7sim.errors import A7SimError
 from a7sim.instrument import Autograph
 from a7sim.instrument.language import SharedInstrument
@@ -98,10 +98,7 @@ class Operator:
                 self.scenario, self.seed, folder, watcher, force, lambda twin: TwinCheckedPort(served, twin, link)
             )
 
-    def work(self, *args: Any, **kwargs: Any) -> Document:
-        """Call `run`: the name of this method in release 0.1.0. Warns."""
-        warn_renamed("Operator.work", "Operator.run")
-        return self.run(*args, **kwargs)
+    work = RenamedMember("run")
 
 
 @dataclass(frozen=True)
@@ -136,16 +133,8 @@ class Study:
             write_results(folder, self.loaded, tally, document)
         return document
 
-    def work(self, *args: Any, **kwargs: Any) -> Document:
-        """Call `run`: the name of this method in release 0.1.0. Warns."""
-        warn_renamed("Study.work", "Study.run")
-        return self.run(*args, **kwargs)
-
-    @property
-    def laid(self) -> LoadedStudy:
-        """`loaded`: its name in release 0.1.0. Warns."""
-        warn_renamed("Study.laid", "Study.loaded")
-        return self.loaded
+    work = RenamedMember("run")
+    laid = RenamedMember("loaded")
 
 
 def _chosen(scenario: Name | Scenario, seed: int | None) -> tuple[Scenario, int]:

@@ -30,3 +30,18 @@ def renamed_attributes(module: str, renames: Mapping[str, str]) -> Callable[[str
         return getattr(import_module(home or module), new)
 
     return getattribute
+
+
+class RenamedMember:
+    """Old name of a method, class method or property: `old = RenamedMember("new")` in the body of the class."""
+
+    def __init__(self, new: str) -> None:
+        self._new = new
+        self._names = (new, new)
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._names = (f"{owner.__name__}.{name}", f"{owner.__name__}.{self._new}")
+
+    def __get__(self, instance: object, owner: type) -> Any:
+        warn_renamed(*self._names)
+        return getattr(owner if instance is None else instance, self._new)

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from a7sim.deprecation import RenamedMember
 from a7sim.geometry import GON, Array, length_of, mxv, transposed
 from a7sim.instrument.carriers import Carrier
 from a7sim.instrument.condition import INSTRUMENT_STREAM, draw_condition, local_coefficients, zero_error
@@ -113,6 +114,12 @@ class Autograph:
     def from_scenario(cls, scenario: Scenario, seed: int) -> Self:
         """Return the instrument of a scenario, with the photographs and faults that a seed draws. Raises A7SimError."""
         return cls.from_parts(scenario.instrument, build_scene(scenario, seed).mountable, seed)
+
+    of = RenamedMember("from_parts")
+    of_scenario = RenamedMember("from_scenario")
+    wheel = RenamedMember("turn_handwheel")
+    time_taken = RenamedMember("pop_travel_times")
+    register_again = RenamedMember("restore_registrations")
 
     def _element_spindle(self, name: str, element: Element) -> Spindle:
         condition = self._condition

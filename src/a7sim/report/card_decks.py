@@ -42,7 +42,7 @@ def _measured(kept: SessionFolder, way: str | None) -> tuple[Document, list[Mode
 def _hint(document: Document) -> str:
     if "strips" in document:
         return ": each of its folders case-A to case-E has its own"
-    return f" (--way {' or '.join(document['ways'])} has one)" if "ways" in document else ""
+    return f" (--method {' or '.join(document['ways'])} has one)" if "ways" in document else ""
 
 
 def _models(kept: SessionFolder, name: str) -> list[Model]:

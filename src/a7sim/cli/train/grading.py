@@ -96,7 +96,7 @@ def _grade_attempt(progress: Progress, attempt: Attempt) -> Grade:
     default=1.0,
     show_default=True,
     metavar="SECONDS",
-    help="Interval between looks at the journal.",
+    help="Interval between checks of the journal.",
 )
 @student_options
 def watch_(exercise: str | None, every: float, home: Path | None, student: str | None) -> None:
