@@ -5,7 +5,8 @@ import shutil
 import pytest
 from msgspec.structs import replace as changed
 
-from a7sim.training.catalogue import find_exercise
+from a7sim.training import checking, template
+from a7sim.training.catalogue import find_exercise, read_exercise
 from a7sim.training.checking import check_exercise
 from a7sim.training.exercise import ChecklistItem, ExerciseFolder, FaultyRun, PlayedRun
 
@@ -94,9 +95,42 @@ def test_limits_below_what_the_eye_can_do_and_bands_the_wrong_way_round_are_foun
     for fault, band in zip(faults[:2], ("excellent", "pass"), strict=True):
         assert fault.startswith(f"cleared: expected {band} no better than eye and least count, ")
     assert faults[2] == "on-the-ground: expected excellent no worse than pass, got 50 and 40"
-    assert faults[3].startswith("reference: expected it to come to its end: ")
+    assert faults[3].startswith("reference: expected it to finish: ")
 
 
 def test_a_reference_that_fails_is_told_with_what_it_fails(parallax):
     (fault, *_) = faults_of(wrong(parallax, reference=PlayedRun(script="faulty-half.a7s"), faulty=[]))[1:]
     assert fault.startswith("reference: expected it to pass, got complete: ")
+
+
+def test_text_of_the_template_that_the_author_left_is_named(parallax):
+    first, *others = parallax.exercise.criteria
+    unfinished = wrong(
+        parallax,
+        goal=template.GOAL,
+        criteria=[changed(first, feedback=template.FEEDBACK), *others],
+        hints=[changed(parallax.exercise.hints[0], text=template.HINT), *parallax.exercise.hints[1:]],
+    )
+    faults = list(checking._template_text(unfinished))
+    assert [fault.partition(": expected")[0] for fault in faults] == ["goal", f"{first.id}: feedback", "hint 1"]
+    assert list(checking._template_text(parallax)) == []
+
+
+def test_a_new_template_is_refused_for_its_own_text(tmp_path):
+    folder = template.write_template(tmp_path / "20-clouds", 20)
+    faults = list(checking._template_text(read_exercise(folder)))
+    places = {fault.partition(": expected")[0] for fault in faults}
+    assert places == {"goal", "complete: feedback", "pointed: feedback", "hint 1", "text.md"}
+
+
+def test_files_that_nothing_uses_are_named_and_included_ones_are_not(parallax, tmp_path):
+    folder = tmp_path / "04-parallax"
+    shutil.copytree(parallax.folder, folder)
+    assert list(checking._unused_files(read_exercise(folder))) == []
+    (folder / "old-draft.a7s").write_text("scenario akwanga seed 1\n")
+    (folder / "mounting.a7s").write_text("PHOT1?\n")
+    reference = folder / "reference.a7s"
+    reference.write_text(reference.read_text() + "include mounting.a7s\n")
+    assert list(checking._unused_files(read_exercise(folder))) == [
+        "old-draft.a7s: expected only files that the exercise uses, got one that it does not name"
+    ]

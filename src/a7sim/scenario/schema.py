@@ -1,9 +1,9 @@
-"""What a scenario file may say, as frozen data with units, ranges and sources.
+"""Contents of a scenario file as frozen records with units, ranges and sources.
 
-Every description completes the sentence "expected ...": validation and the JSON Schema both read it.
+Each description completes the sentence "expected ..."; validation and the JSON Schema use it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
@@ -20,7 +20,7 @@ FORMAT_MM = 230.0
 """Side of the picture."""
 
 HALF_WIDTH_MM = 85.0
-"""Distance of the outer rows of standard points from the base where nobody says otherwise."""
+"""Default distance of the outer rows of standard points from the base."""
 
 Name = Annotated[
     str,
@@ -31,7 +31,7 @@ Name = Annotated[
         description="a name of 1 to 64 ASCII characters without double quotes",
     ),
 ]
-"""What goes over the link as a name."""
+"""Name that the link can transmit."""
 
 PictureMm = Annotated[float, Meta(ge=-115, le=115, description="mm within the 230 mm format")]
 OffsetMm = Annotated[float, Meta(ge=-5, le=5, description="mm from -5 to 5")]
@@ -45,61 +45,61 @@ Reading = Annotated[float, Meta(ge=-999999, le=999999, description="a counter re
 Ppm = Annotated[float, Meta(ge=-5000, le=5000, description="parts per million from -5000 to 5000")]
 
 
-class _Data(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Frozen data read from a file; unknown keys are mistakes."""
+class FileRecord(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Frozen record read from a file. An unknown key is an error."""
 
 
-class Fiducial(_Data, frozen=True, kw_only=True):
-    """A fiducial mark by its calibrated place."""
+class Fiducial(FileRecord, frozen=True, kw_only=True):
+    """Fiducial mark by its calibrated position."""
 
     name: Name
     x: PictureMm
     y: PictureMm
 
 
-class Camera(_Data, frozen=True, kw_only=True):
-    """A calibrated taking camera."""
+class Camera(FileRecord, frozen=True, kw_only=True):
+    """Calibrated taking camera."""
 
     name: Name = "RC5"
     c: Annotated[float, Meta(ge=98, le=215, description="a principal distance of 98 to 215 mm")]
     principal_point: tuple[OffsetMm, OffsetMm] = (0.0, 0.0)
-    """mm, the calibrated principal point from the fiducial centre."""
+    """mm, calibrated principal point from the fiducial centre."""
     fiducials: Annotated[list[Fiducial], Meta(min_length=4, max_length=8, description="four or eight fiducials")]
     distortion: Annotated[list[float], Meta(max_length=4, description="up to four radial coefficients")] = []
     """k1, k2, ... of the outward displacement k1 r^3 + k2 r^5 + ..., r and result in mm."""
 
 
-class FilmDeformation(_Data, frozen=True, kw_only=True):
-    """How film and pricking deform the imaged coordinates; standard deviations are drawn anew per photograph."""
+class FilmDeformation(FileRecord, frozen=True, kw_only=True):
+    """Deformation of image coordinates by film and pricking; drawn anew for each photograph."""
 
     shrinkage_ppm: tuple[Ppm, Ppm] = (0.0, 0.0)
-    """Shrinkage of every photograph in x and y."""
+    """Shrinkage of all photographs in x and y."""
     shrinkage_sigma_ppm: Sigma = 0.0
-    """Spread of the shrinkage between photographs."""
+    """Standard deviation of the shrinkage between photographs."""
     shear_sigma_ppm: Sigma = 0.0
-    """Spread of the departure from a right angle."""
+    """Standard deviation of the departure from a right angle."""
     irregular_um: Sigma = 0.0
     """Irregular deformation at a point, each coordinate."""
     identification_um: Sigma = 0.0
-    """Identity of a point from one photograph to the next, each coordinate."""
+    """Identification of a point from one photograph to the next, each coordinate."""
 
 
-class Measured(_Data, frozen=True, kw_only=True):
-    """Image coordinates that somebody measured: the photograph comes from a file."""
+class Measured(FileRecord, frozen=True, kw_only=True):
+    """Measured image coordinates: the photograph comes from a file."""
 
     file: Annotated[str, Meta(min_length=1, max_length=255, description="a file name of 1 to 255 characters")]
     photo: Name | None = None
-    """Its name in the file's `photo` column; by default the photograph's own."""
+    """Name in the file's `photo` column; by default the name of the photograph."""
     side: Literal["left", "right"] | None = None
-    """Which half of a pair file (`point,xl,yl,xr,yr`) it is."""
+    """Half of a pair file (`point,xl,yl,xr,yr`)."""
     units: Literal["mm", "counts"] = "mm"
     """mm refined to the fiducial axes, or comparator counts with the camera's fiducials among the points."""
     count_mm: Annotated[float, Meta(gt=0, le=1, description="mm a count, above 0 to 1")] | None = None
-    """Size of a count; taken from the fiducials when absent, which hides any uniform film shrinkage."""
+    """Size of a count; if absent it follows from the fiducials, which hides a uniform film shrinkage."""
 
 
-class Photo(_Data, frozen=True, kw_only=True):
-    """A photograph: where it was taken from, or the file of its measured image coordinates."""
+class Photo(FileRecord, frozen=True, kw_only=True):
+    """Photograph: its exposure station, or the file of its measured image coordinates."""
 
     name: Name
     position: tuple[Metres, Metres, Metres] | None = None
@@ -110,37 +110,37 @@ class Photo(_Data, frozen=True, kw_only=True):
     measured: Measured | None = None
     polarity: Literal["positive", "negative"] = "positive"
     laid: Literal["right way up", "upside down"] = "right way up"
-    """How the picture was laid in its carrier; upside down is a slip for training."""
+    """Placement of the picture in its carrier; upside down is a slip for training."""
 
 
-class Water(_Data, frozen=True, kw_only=True):
-    """A sheet of water: no point on it can be pricked, and its picture shows nothing to set a mark on."""
+class Water(FileRecord, frozen=True, kw_only=True):
+    """Water surface: no point on it can be pricked, and its picture has no detail for the mark."""
 
     name: Name = "lake"
     shore: Annotated[list[tuple[Metres, Metres]], Meta(min_length=3, max_length=200, description="3 to 200 places")]
-    """East and north along the shore, once round."""
+    """East and north along the closed shore."""
 
 
-class Terrain(_Data, frozen=True, kw_only=True):
+class Terrain(FileRecord, frozen=True, kw_only=True):
     """Rolling ground about a mean height."""
 
     mean_height: Metres = 0.0
     relief: Annotated[float, Meta(ge=0, le=4000, description="metres of relief, 0 to 4000")] = 0.0
-    """The heights stay within mean_height -+ relief."""
+    """Heights stay within mean_height -+ relief."""
     wavelength: Annotated[float, Meta(gt=0, le=1e6, description="a wavelength in metres above 0")] = 800.0
     seed: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] = 0
     water: list[Water] = []
 
 
-class Air(_Data, frozen=True, kw_only=True):
-    """Departures of the rays from straight lines over a plane, as switches."""
+class Air(FileRecord, frozen=True, kw_only=True):
+    """Switches for the departure of rays from straight lines over a plane."""
 
     earth_curvature: bool = False
     refraction: bool = False
 
 
-class GroundPoint(_Data, frozen=True, kw_only=True):
-    """A signalised ground point; without Z it stands on the terrain."""
+class GroundPoint(FileRecord, frozen=True, kw_only=True):
+    """Signalised ground point; without Z it is on the terrain."""
 
     point: Name
     X: Metres
@@ -149,8 +149,8 @@ class GroundPoint(_Data, frozen=True, kw_only=True):
     role: Literal["control", "plan", "height", "check"] = "check"
 
 
-class LinePlan(_Data, frozen=True, kw_only=True):
-    """A line that is seen on the ground: a smooth curve through vertices, lighter than what lies beside it."""
+class LinePlan(FileRecord, frozen=True, kw_only=True):
+    """Visible line on the ground: a smooth curve through vertices, lighter than its surroundings."""
 
     name: Name
     kind: Literal["road", "track"] = "road"
@@ -159,15 +159,15 @@ class LinePlan(_Data, frozen=True, kw_only=True):
     """East and north."""
 
 
-class Published(_Data, frozen=True, kw_only=True):
-    """A relative orientation that others published, to stand beside the instrument's."""
+class Published(FileRecord, frozen=True, kw_only=True):
+    """Published relative orientation for comparison with the instrument's."""
 
     omega: Gon
     phi: Gon
     kappa: Gon
-    """Turns the right photograph's camera vectors into the left photograph's frame."""
+    """Rotation of the right photograph's camera vectors into the left photograph's frame."""
     base: tuple[float, float, float]
-    """Left to right centre in the left photograph's frame, any length."""
+    """From left to right centre in the left photograph's frame, any length."""
     sigma_omega: Sigma = 0.0
     sigma_phi: Sigma = 0.0
     sigma_kappa: Sigma = 0.0
@@ -177,19 +177,19 @@ class Published(_Data, frozen=True, kw_only=True):
     source: Text = "the scenario"
 
 
-class ModelPlan(_Data, frozen=True, kw_only=True):
-    """Two photographs to be set up as a model."""
+class ModelPlan(FileRecord, frozen=True, kw_only=True):
+    """Two photographs that form a model."""
 
     name: Name
     left: Name
     right: Name
     base: Literal["inside", "outside"] = "inside"
     standard_points: dict[str, Name] | None = None
-    """Position (1-6, a-i) to point name; laid out on dry land of the terrain when absent."""
+    """Position (1-6, a-i) to point name; if absent, points are placed on dry land of the terrain."""
     published: Published | None = None
 
 
-class ProjectorCondition(_Data, frozen=True, kw_only=True):
+class ProjectorCondition(FileRecord, frozen=True, kw_only=True):
     """Faults of one projector, zero for a faultless one."""
 
     principal_distance_mm: OffsetMm = 0.0
@@ -200,25 +200,27 @@ class ProjectorCondition(_Data, frozen=True, kw_only=True):
     by_zero_mm: OffsetMm = 0.0
     bz_zero_mm: OffsetMm = 0.0
     axes_um: tuple[SmallUm, SmallUm, SmallUm] = (0.0, 0.0, 0.0)
-    """By how much the tilt axes miss the projection centre, in the camera's axes."""
+    """Distance of the tilt axes from the projection centre, in the camera's axes."""
     rod_um: tuple[SmallUm, SmallUm] = (0.0, 0.0)
-    """By how much the space rod passes beside the centre of its cardan, along the two axes of the cardan: it goes
-    round with the inclination of the rod."""
+    """Distance of the space rod from the centre of its gimbal along the gimbal's two axes;
+
+    it rotates with the inclination of the rod.
+    """
     local_um: Sigma = 0.0
     """Standard error of a grid test: smooth local errors of the projector, each coordinate at photo scale."""
     local_pattern: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] | None = None
-    """Which pattern these local errors have; every seed has its own when absent."""
+    """Number of the pattern of these local errors; if absent, each seed has its own."""
 
 
 MaintenanceClass = Literal["new", "serviced", "worn"]
 """Classes of maintenance (docs/decisions/0006-condition.md)."""
 
 
-class Condition(_Data, frozen=True, kw_only=True):
-    """The state of maintenance of an instrument; all zero is a faultless one (never true)."""
+class Condition(FileRecord, frozen=True, kw_only=True):
+    """Condition of an instrument; all zero is a faultless one (which does not exist)."""
 
     upkeep: MaintenanceClass | None = None
-    """The faults listed beside it come on top of those that a seed draws for this class."""
+    """Class of maintenance; a seed draws its faults, and the faults listed beside it are added."""
     left: ProjectorCondition = ProjectorCondition()
     right: ProjectorCondition = ProjectorCondition()
     bx_zero_mm: OffsetMm = 0.0
@@ -229,49 +231,49 @@ class Condition(_Data, frozen=True, kw_only=True):
     carriage_skew_ppm: tuple[Ppm, Ppm, Ppm] = (0.0, 0.0, 0.0)
     """Departures from right angles of XY, XZ and YZ."""
     carriage_periodic_um: tuple[Sigma, Sigma, Sigma] = (0.0, 0.0, 0.0)
-    """Amplitude of the error that repeats with every turn of the X, Y and Z spindles, in the model."""
+    """Amplitude of the periodic error of the X, Y and Z spindles per turn, in the model."""
     carriage_periodic_phase_gon: tuple[Gon, Gon, Gon] = (0.0, 0.0, 0.0)
-    """Where in a turn it begins."""
+    """Phase of the periodic error."""
     setting_sigma_mm: Sigma = 0.0
     setting_sigma_gon: Sigma = 0.0
-    """Setting error of the element spindles, drawn at every setting."""
+    """Setting error of the element spindles, drawn for each setting."""
     backlash_mm: Sigma = 0.0
     backlash_gon: Sigma = 0.0
     """Play of the element spindles."""
     carriage_backlash_mm: Sigma = 0.0
     """Play of the X, Y and Z spindles."""
     counter_slip_share: Share = 0.0
-    """Share of the passes over zero at which the last drum of the X, Y or Z counter does not carry the next one."""
+    """Share of the passes over zero at which the last drum of the X, Y or Z counter does not carry to the next one."""
 
 
-class GridTest(_Data, frozen=True, kw_only=True):
-    """What the last adjustment of an A8 left in it, drawn anew for every session (docs/decisions/0005-a8-strip.md)."""
+class GridTest(FileRecord, frozen=True, kw_only=True):
+    """Errors left by the last adjustment of an A8, drawn anew for each session (docs/decisions/0005-a8-strip.md)."""
 
     local_um: Sigma = 5.5
     """Standard error of a grid test of either projector, each coordinate at photo scale (A7, A8: 4 to 7)."""
     local: Literal["smooth", "scattered"] = "smooth"
-    """Local errors belong to the place in the projector, the same in every model, or come anew at every point."""
+    """Local errors belong to the position in the projector, the same in all models, or are drawn anew at each point."""
     principal_distance_mm: Sigma = 0.01
     principal_point_mm: Sigma = 0.01
     """Each coordinate; both known within 0.01 to 0.02 mm."""
 
 
-class Instrument(_Data, frozen=True, kw_only=True):
-    """Which plotter stands in the room, and in what state."""
+class Instrument(FileRecord, frozen=True, kw_only=True):
+    """Plotter and its condition."""
 
     variant: Literal["A7", "A8"] = "A7"
     serial: Name = "3268"
     condition: Condition | MaintenanceClass = Condition()
-    """Faults in a table, or a class of maintenance by its name."""
+    """Faults as a table, or a class of maintenance by its name."""
     grid_test: GridTest = GridTest()
     """Of the A8 of an A8 strip."""
     laying_sigma_mm: Sigma = 0.3
     laying_sigma_gon: Sigma = 0.2
-    """How far from centred a picture lies when it is put on its carrier by hand."""
+    """Standard deviation of the position of a picture placed on its carrier by hand."""
 
 
 Skill = Literal["novice", "trained", "first-order"]
-"""Profiles of operators; their numbers stand in scenario/skills.py."""
+"""Profiles of operators; their numbers are in scenario/skills.py."""
 
 SlipKind = Literal[
     "last digit",
@@ -284,41 +286,44 @@ SlipKind = Literal[
 ]
 
 
-class PlannedSlip(_Data, frozen=True, kw_only=True):
-    """A slip that is made for certain, once, at the first occasion that fits; what is empty fits everywhere."""
+class PlannedSlip(FileRecord, frozen=True, kw_only=True):
+    """Planned slip, made once at the first occasion that matches; an empty field matches any."""
 
     kind: SlipKind
     model: Annotated[str, Meta(max_length=64, description="the name of a model, or an empty text")] = ""
     form: Annotated[str, Meta(max_length=64, description="the form, such as 'relative orientation'")] = ""
-    """Heading in the book; that of the fittings is 'interior orientation'."""
+    """Heading in the observation book; the heading of the fittings is 'interior orientation'."""
     point: Annotated[str, Meta(max_length=64, description="a point, fitting or element, or an empty text")] = ""
-    """Name of the point; of the fitting for a forgotten lever, of the element for one that is not re-read."""
+    """Name of the point; of the fitting for a forgotten fitting, of the element for a reading that is not repeated."""
 
 
-class Observer(_Data, frozen=True, kw_only=True):
-    """The person in the chair. um are at photo scale; sources in docs/decisions/0004-observer.md and 0008-skill.md."""
+class Observer(FileRecord, frozen=True, kw_only=True):
+    """The operator as a person; um at photo scale. Sources: docs/decisions/0004-observer.md, 0008-operator-skill.md."""
 
     skill: Skill | None = None
-    """Profile that gives all that is not said here; without one, what stands below."""
+    """Profile that gives all values that are not stated here; without a profile, the defaults below."""
     parallax_um: Sigma = 4.0
     """One setting of by on vanishing y-parallax (surveys: 2.2 to 5.7)."""
     monocular_um: Sigma = 4.0
-    """One monocular pointing, each coordinate (geometry.md; the thesis's twenty centres ask for 2.8)."""
+    """One monocular pointing, each coordinate (geometry.md; the twenty centres of the thesis imply 2.8)."""
     stereo_um: Sigma = 4.0
     """One stereoscopic pointing in plan, each coordinate."""
     height_um: Sigma = 3.0
     """One setting of the mark on the ground, as x-parallax."""
     repeat_share: Share = 0.4
-    """Share of a pointing's error that is new when the pointing is repeated at once; the rest is how the
-    point itself is seen. Double pointings agree within 0.01 mm (thesis 3.5) only if this is well below one."""
+    """Share of the error of a pointing that is new when the pointing is repeated at once;
+
+    the rest is the appearance of the point itself. Double pointings agree within 0.01 mm (thesis 3.5) only if this
+    share is well below one.
+    """
     fiducial_um: Sigma = 10.0
     """Registering a fiducial against its collimating mark under the magnifier."""
     last_digit_slip: Share = 0.002
     """Share of readings whose last digit is read one off."""
     blunder_rate: Share = 0.003
-    """Share of readings with a gross slip (a wrong digit further up)."""
+    """Share of readings with a gross slip (a wrong higher digit)."""
     wrong_point_rate: Share = 0.0
-    """Share of the points gone to at which a neighbouring standard point is taken instead."""
+    """Share of the points at which a neighbouring standard point is measured instead."""
     wrong_sign_rate: Share = 0.0
     """Share of by readings written with the wrong sign."""
     transposed_rate: Share = 0.0
@@ -326,24 +331,24 @@ class Observer(_Data, frozen=True, kw_only=True):
     forgotten_lever_rate: Share = 0.0
     """Share of fittings left in the other position."""
     not_reread_rate: Share = 0.0
-    """Share of the elements of a round for which the reading of the round before is used."""
+    """Share of the elements of a round for which the reading of the previous round is used."""
     certain_slips: Annotated[list[PlannedSlip], Meta(max_length=20, description="up to 20 slips")] = []
-    """Slips planted whatever the rates; each happens once."""
+    """Planned slips, independent of the rates; each happens once."""
     warm_up: Annotated[float, Meta(ge=0, le=10, description="a share of the settings' errors, 0 to 10")] = 0.0
-    """By what share settings are worse on sitting down; it falls evenly to nothing."""
+    """Relative increase of setting errors at the start of work; it decreases linearly to zero."""
     warm_up_minutes: Annotated[float, Meta(gt=0, le=1440, description="minutes above 0")] = 30.0
     fresh_hours: Annotated[float, Meta(ge=0, le=24, description="hours from 0 to 24")] = 1.0
-    """How long a person stays fresh after sitting down or after a break."""
+    """Hours without fatigue after the start of work or after a break."""
     fatigue_per_hour: Annotated[float, Meta(ge=0, le=10, description="a share an hour, 0 to 10")] = 0.0
-    """By what share settings get worse in an hour without a break, once no longer fresh."""
+    """Relative increase of setting errors per hour without a break, after the fresh hours."""
     slip_fatigue_per_hour: Annotated[float, Meta(ge=0, le=10, description="a share an hour, 0 to 10")] = 0.0
-    """By what share slips get more frequent in an hour without a break, once no longer fresh."""
+    """Relative increase of slips per hour without a break, after the fresh hours."""
     takes_breaks: bool = False
     break_every_hours: Annotated[float, Meta(gt=0, le=24, description="hours above 0")] = 2.0
-    """A break is taken when the next form or round is begun so long after the last."""
+    """A break is taken before the next form or round if the last one is longer ago than this."""
     break_minutes: Annotated[float, Meta(ge=0, le=1440, description="minutes, zero or more")] = 15.0
     pace: Annotated[float, Meta(gt=0, le=100, description="a factor above 0 to 100")] = 1.0
-    """Factor of all the seconds below."""
+    """Factor of all durations below."""
     seconds_to_look: Seconds = 2.0
     seconds_to_turn: Seconds = 2.5
     seconds_to_read: Seconds = 3.0
@@ -351,7 +356,7 @@ class Observer(_Data, frozen=True, kw_only=True):
     seconds_to_drive: Seconds = 15.0
     seconds_to_mount: Seconds = 300.0
     seconds_to_compute: Seconds = 900.0
-    """Pace: estimates of the trade, no source at hand; to compute is one least-squares solution by calculator."""
+    """Durations: estimates of the trade, no source at hand; to compute is one least-squares solution by calculator."""
 
     @classmethod
     def faultless(cls) -> "Observer":
@@ -373,23 +378,23 @@ OBSERVER_IN_WORDS = f"{', '.join(repr(skill) for skill in get_args(Skill))} or a
 CentreLevels = Annotated[list[Reading], Meta(min_length=2, max_length=10, description="2 to 10 counter readings")]
 
 
-class Plan(_Data, frozen=True, kw_only=True):
-    """The settings and the procedure on the operator's job sheet."""
+class Plan(FileRecord, frozen=True, kw_only=True):
+    """Settings and procedure on the operator's job sheet."""
 
     method: Literal["independent", "dependent"] = "independent"
-    """Swing-swing, or everything with the projector that has the new photograph (T 2.34, 2.33)."""
+    """Swing-swing, or all elements of the projector with the new photograph (T 2.34, 2.33)."""
     procedure: Literal["numerical", "empirical"] = "numerical"
     """Parallaxes measured and elements computed from them, or cleared point by point."""
     solution: Literal["least squares", "hallert"] = "least squares"
-    """Of the numerical procedure: Hallert's closed forms in cases A and D, where the points lie on the pattern."""
+    """Of the numerical procedure: Hallert's closed forms in cases A and D, if the points lie on the pattern."""
     measure_with: Literal["both", "by1", "by2"] = "both"
-    """The measuring element of the numerical procedure."""
+    """Measuring element of the numerical procedure."""
     over_correction: (
         Annotated[float, Meta(gt=0, le=5, description="how many times the turn, above 0 to 5")] | Literal["computed"]
     ) = "computed"
-    """Of the last omega step of the empirical procedure; 1 is to clear the last point and no more."""
+    """Of the last omega step of the empirical procedure; 1 clears the last point and no more."""
     start_off_gon: Annotated[float, Meta(ge=0, le=4, description="0 to 4 gon")] = 0.0
-    """By up to how much the operator sets the elements off before starting, for practice."""
+    """Maximum by which the operator perturbs the elements before starting, for practice."""
     case: Literal["A", "B", "C", "D", "E"] = "A"
     bx: Annotated[float, Meta(ge=10, le=280, description="a base of 10 to 280 mm")]
     projection_height: Annotated[float, Meta(ge=140, le=490, description="a projection height of 140 to 490 mm")]
@@ -397,41 +402,42 @@ class Plan(_Data, frozen=True, kw_only=True):
         Annotated[float, Meta(gt=0, le=100, description="counter units a mm, above 0 to 100")]
         | Literal["Bd", "Dc", "Cd"]
     ) = 8.0
-    """Units of the Z counter a mm; 8 is this project's assumption (geometry.md, Gears)."""
+    """Units of the Z counter per mm; 8 is an assumption of this project (geometry.md, Gears)."""
     plan_gear: Name = "1-2-1"
     preset: tuple[Reading, Reading, Reading] = (5000.0, 5000.0, 5000.0)
-    """What X, Y and Z shall show at point 1, or where that is under water at the first standard point there is."""
+    """Readings of X, Y and Z at point 1, or at the first standard point on dry land."""
     centre_method: Literal["two levels", "levels", "grid plate", "scales"] = "two levels"
-    """Lines through points 1 to 6 at two levels of Z or more (thesis 3.6), or resection of a grid plate put in the
-    picture's place."""
+    """Lines through points 1 to 6 at two or more levels of Z (thesis 3.6), or resection of a grid plate mounted in
+    place of the picture.
+    """
     centre_levels: CentreLevels = field(default_factory=lambda: [4900.0, 5100.0])
-    """Z-counter readings for the perspective centres; just two for the method of two levels."""
+    """Z-counter readings for the perspective centres; exactly two for the method of two levels."""
     parallax_readings: Annotated[int, Meta(ge=1, le=20, description="1 to 20 readings")] = 3
     tolerated_parallax_um: Sigma = 40.0
-    """Rms of the residual y-parallaxes at photo scale beyond which a model does not fit (17 answers: 10 to 40)."""
+    """Rms of the residual y-parallaxes at photo scale above which a model does not fit (17 answers: 10 to 40)."""
     tolerated_centre_rms: Sigma = 0.5
-    """Rms of a perspective centre beyond which its pointings do not meet (the thesis's largest is 0.187)."""
+    """Rms of a perspective centre above which its pointings disagree (the largest of the thesis is 0.187)."""
     half_width: Annotated[float, Meta(ge=5, le=115, description="5 to 115 mm")] = HALF_WIDTH_MM
     """Distance of the outer rows of standard points from the base, mm in the photograph."""
     absolute_orientation: bool = False
-    """Whether every model is also levelled and scaled at the instrument, on the control that it shows."""
+    """Whether each model is also levelled and scaled at the instrument on its control."""
 
 
-class GridPlate(_Data, frozen=True, kw_only=True):
-    """A glass plate with crosses in equal squares, with which projectors are tested; it lies in the drawer."""
+class GridPlate(FileRecord, frozen=True, kw_only=True):
+    """Glass plate with crosses in equal squares for testing projectors."""
 
     name: Name = "grid"
     lines: Annotated[int, Meta(ge=3, le=23, description="3 to 23 lines each way")] = 9
     spacing_mm: Annotated[float, Meta(ge=5, le=100, description="5 to 100 mm")] = 25.0
-    """From line to line."""
+    """Distance of neighbouring lines."""
     accuracy_um: Annotated[float, Meta(ge=0, le=100, description="micrometres, 0 to 100")] = 1.0
-    """Standard error of every cross and fiducial mark, each coordinate [assumption; no source at hand]."""
+    """Standard error of each cross and fiducial mark, each coordinate [assumption; no source at hand]."""
     seed: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] = 0
-    """Draws where the crosses really are: the plate is the same whatever is flown."""
+    """Seed of the true positions of the crosses: the plate is the same for all flights."""
 
     @property
     def crosses(self) -> dict[str, tuple[float, float]]:
-        """Nominal places in mm about the middle; G and line and column, counted from the front left corner."""
+        """Nominal positions in mm about the middle; named G and line and column, counted from the front left corner."""
         digits = len(str(self.lines))
         at = [(i - (self.lines - 1) / 2.0) * self.spacing_mm for i in range(self.lines)]
         return {
@@ -442,11 +448,11 @@ class GridPlate(_Data, frozen=True, kw_only=True):
 
     @property
     def even_counts(self) -> list[int]:
-        """Numbers of crosses that lie on lines evenly spaced over the whole plate, its corners among them."""
+        """Numbers of crosses on lines evenly spaced over the whole plate, including its corners."""
         return [k * k for k in range(3, self.lines + 1) if (self.lines - 1) % (k - 1) == 0]
 
     def some_crosses(self, count: int) -> dict[str, tuple[float, float]]:
-        """Return so many crosses, evenly spaced over the whole plate. Raises Mistake where none lie so."""
+        """Return `count` crosses, evenly spaced over the whole plate. Raises A7SimError if no such set exists."""
         if count not in self.even_counts:
             known = ", ".join(map(str, self.even_counts))
             raise A7SimError(f"expected a number of crosses that lie evenly on the grid plate ({known}), got {count}")
@@ -459,45 +465,59 @@ class GridPlate(_Data, frozen=True, kw_only=True):
         }
 
     def certificate(self, camera: Camera) -> Camera:
-        """Return the camera by which the plate is centred: its middle belongs under the middle of the fiducials."""
+        """Camera by which the plate is centred: its middle belongs under the middle of the fiducials."""
         return replace(camera, name=self.name, principal_point=(0.0, 0.0), distortion=[])
 
 
-class Comparator(_Data, frozen=True, kw_only=True):
-    """A comparator, and how its readings become models."""
+class Comparator(FileRecord, frozen=True, kw_only=True):
+    """Comparator, and the computation of models from its readings."""
 
     kind: Literal["mono", "stereo"] = "mono"
-    """Every photograph by itself, with `observer.monocular_um`; or in pairs, the left image with `observer.stereo_um`
-    and the right one from it by parallaxes: px with `observer.height_um`, py with `observer.parallax_um`. Fiducials
-    are pointed at monocularly in both."""
+    """Single photographs with `observer.monocular_um`;
+
+    or pairs, the left image with `observer.stereo_um` and the right one by parallaxes: px with `observer.height_um`, py
+    with `observer.parallax_um`. Fiducials are measured monocularly in both.
+    """
     pointings: Annotated[int, Meta(ge=1, le=20, description="1 to 20 pointings")] = 2
-    """Of every fiducial and point; the mean counts (thesis 3.5 points twice)."""
+    """Pointings of each fiducial and point; the mean is used (thesis 3.5 points twice)."""
     least_count_um: Annotated[float, Meta(ge=0, le=100, description="micrometres, 0 (not rounded) to 100")] = 1.0
     """The Wild STK1 reads to 1 um."""
     fit: Literal["conformal", "affine"] = "affine"
     """Interior orientation on the fiducials; P eliminates film shrinkage by a linear transformation."""
     case: Literal["A", "B", "C", "D", "E"] = "A"
-    """Standard points that are measured, beside the ground points; pairs are oriented on all they have in common."""
+    """Standard points that are measured beside the ground points; pairs are oriented on all common points."""
     orientation: Literal["coplanarity", "schut", "parallax"] = "coplanarity"
     """P 1.1-1.8, S equations 2 to 5, or the y-parallax equations of thesis 2.34, iterated."""
 
 
-class StripPlan(_Data, frozen=True, kw_only=True):
-    """How models become a strip on the ground, whoever measured them."""
+class StripPlan(FileRecord, frozen=True, kw_only=True):
+    """Formation of a strip from models and its orientation on the ground, for all methods of measurement."""
 
     join: Literal["points", "centre", "heights"] = "points"
     """On all common points and the common centre (P 2.1-2.7), about the centre (T 2.35-2.39), scaled by heights (S)."""
     polynomial: Literal[2, 3] | None = None
-    """Degree of the adjustment on the control after absolute orientation; none when absent."""
+    """Degree of the adjustment on the control after absolute orientation; none if absent."""
 
 
 StripMethod = Literal["plotter", "comparator", "readings", "bridge"]
-"""How a strip is measured: by an operator at a plotter, in a comparator, as an A8's readings on arrays, or by an
-operator who bridges it, base in and base out in turn."""
+"""Method of measuring a strip:
+
+an operator at a plotter, a comparator, an A8 as arrays of readings, or an operator who bridges it with base in and base
+out in turn.
+"""
 
 
-class Scenario(_Data, frozen=True, kw_only=True):
-    """A flight, a camera, photographs, an instrument with its faults and an operator with theirs."""
+_loaders: list[Callable[[Path, Mapping[str, Any] | None], "Scenario"]] = []
+"""Loader of scenario files, registered by `a7sim.scenario.loading`, which imports this module."""
+
+
+def register_loader(loader: Callable[[Path, Mapping[str, Any] | None], "Scenario"]) -> None:
+    """Set the function behind `Scenario.load`: it takes the path of a scenario file, and settings by path."""
+    _loaders[:] = [loader]
+
+
+class Scenario(FileRecord, frozen=True, kw_only=True):
+    """Flight, camera, photographs, an instrument with its faults and an operator with slips."""
 
     schema_version: Literal[1]
     title: Text
@@ -511,16 +531,16 @@ class Scenario(_Data, frozen=True, kw_only=True):
     lines: list[LinePlan] = []
     """Roads and tracks, shown by the photographs."""
     models: Annotated[list[ModelPlan], Meta(min_length=1, description="one model or more")] = []
-    """When absent, each photograph and the next, numbered from 1."""
+    """If absent, each photograph and the next, numbered from 1."""
     work: Annotated[
         list[StripMethod], Meta(min_length=1, description="'plotter', 'comparator', 'readings' or 'bridge', or several")
     ] = field(default_factory=lambda: ["plotter"])
-    """Who measures the strip."""
+    """Methods of measuring the strip."""
     instrument: Instrument = Instrument()
     grid_plate: GridPlate = GridPlate()
     observer: Annotated[Observer, Meta(description=OBSERVER_IN_WORDS)] = Observer()
     plotting: Plan | None = field(default=None, name="plan")
-    """`plan` in the file; needed where somebody works at a plotter."""
+    """`plan` in the file; required for work at a plotter."""
     comparator: Comparator = Comparator()
     strip: StripPlan = StripPlan()
     seed: Annotated[int, Meta(ge=0, description="a whole number, zero or more")] = 1
@@ -529,20 +549,18 @@ class Scenario(_Data, frozen=True, kw_only=True):
     def load(cls, name: str | PathLike[str], settings: Mapping[str, Any] | None = None) -> "Scenario":
         """Return the scenario of a file, or one that comes with a7sim, with other values by their paths.
 
-        Raises ScenarioError, a Mistake that names every mistake at once.
+        Raises ScenarioError, an A7SimError that lists all errors.
 
         >>> from a7sim import Scenario
         >>> scenario = Scenario.load("akwanga", {"plan.case": "E", "observer.parallax_um": 12})
         >>> scenario.plan.case, [model.name for model in scenario.models]
         ('E', ['1', '2'])
         """
-        from a7sim.scenario.loading import load_scenario  # noqa: PLC0415 # loading reads all that stands here
-
-        return load_scenario(Path(name), settings=settings)
+        return _loaders[0](Path(name), settings)
 
     @property
     def plan(self) -> Plan:
-        """The job sheet of the operator at the plotter. Raises Mistake where there is none."""
+        """Job sheet of the operator at the plotter. Raises A7SimError if there is none."""
         if self.plotting is None:
             raise A7SimError("plan: expected the settings of a plotter, got none: the scenario is not for one")
         return self.plotting

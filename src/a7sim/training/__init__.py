@@ -1,1 +1,1 @@
-"""Training: exercises as data, attempts at them, and grades that a student can act on (decision 14)."""
+"""Training: exercises as data, attempts at them, and grades with instructions for the student (decision 14)."""

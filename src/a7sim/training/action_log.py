@@ -1,4 +1,4 @@
-"""An instrument with a witness beside it: every deed in its order, every registration with the truth at that moment."""
+"""Instrument with an action log: all actions in their order, and all registrations with the true state."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,19 +18,19 @@ from a7sim.training.exercise import OPENING
 AXES = ("X", "Y", "Z")
 
 PLAIN = ("drive", "wheel", "set", "turn")
-"""Deeds that move a drum or a carriage."""
+"""Actions that move a drum or a carriage."""
 
 
 class StudentAction(Struct, frozen=True, gc=False):
-    """Something done at the instrument, with where a handle stood before and after, as its counter counts.
+    """Action at the instrument, with the position of its control before and after, as its counter shows it.
 
     `what` is 'set' or 'turn' of an element, 'drive' or 'wheel' of an axis, 'preset', 'fit', 'base', 'gear', 'load',
-    'unload', 'centre', 'fiducials' (asked for), 'reset', 'record', 'strike', 'look' (through an eyepiece or both),
+    'unload', 'centre', 'fiducials' (queried), 'reset', 'record', 'strike', 'look' (through one or both eyepieces),
     'note'; `name` the element, axis, fitting, projector or point.
     """
 
     index: int
-    """Counted from 0 in the order of things."""
+    """Counted from 0 in order of occurrence."""
     time: float
     client: str
     what: str
@@ -42,54 +42,54 @@ class StudentAction(Struct, frozen=True, gc=False):
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A registration with how everything stood at that moment."""
+    """Registration with the state of the instrument at that moment."""
 
     place: int
-    """Among the deeds."""
+    """Index among the actions."""
     time: float
     client: str
     number: int
     point: str
     shown: Mapping[str, float]
-    """What all counters showed: X, Y, Z and the elements."""
+    """Readings of all counters: X, Y, Z and the elements."""
     named: tuple[str, ...]
-    """The elements that were registered."""
+    """Registered elements."""
     sides: Mapping[str, int]
-    """By handle, +1 where its last movement came from smaller readings, -1 from larger ones; none unmoved."""
+    """By control, +1 if its last movement came from smaller readings, -1 from larger ones; absent if unmoved."""
     fittings: Mapping[str, str]
     base: str
     stereo: tuple[float, float] | None
-    """px, py in um at photo scale of the point, exactly; None where it is not seen with both eyes."""
+    """Exact px, py in um at photo scale of the point; None if it is not visible in both eyepieces."""
     eyes: tuple[tuple[float, float] | None, tuple[float, float] | None]
-    """dx, dy in um of its image from the mark in either eyepiece, exactly."""
+    """Exact dx, dy in um of its image from the mark in either eyepiece."""
     pictures: tuple[str | None, str | None]
-    """What lay in the projectors."""
+    """Pictures in the projectors."""
     mark: tuple[float, float, float]
-    """Where the mark truly stood in the frame, mm."""
+    """True position of the mark in the frame, mm."""
     struck: bool = False
 
 
 @dataclass
 class ActionLog:
-    """What was seen at an instrument, the truth beside it; everything but the truth can be had at the link."""
+    """Log of an instrument's actions with the true state; all but the truth is also available at the link."""
 
     actions: list[StudentAction] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)
     sides: dict[str, int] = field(default_factory=dict)
     began: float = 0.0
-    """Simulated time in s at which the opening was done."""
+    """Simulated time in s at the end of the opening."""
     opened: bool = False
-    """Whether the opening was done to its end."""
+    """Whether the opening is complete."""
     now: float = 0.0
     client: str = ""
 
     def copy_from(self, other: "ActionLog") -> None:
-        """Know what another has seen so far, and nothing else."""
+        """Replace the contents by those of another log."""
         self.actions, self.readings, self.sides = [*other.actions], [*other.readings], dict(other.sides)
         self.began, self.opened, self.now, self.client = other.began, other.opened, other.now, other.client
 
     def on_link_event(self, event: LinkEvent) -> None:
-        """Take note of who speaks, when, and what is noted down."""
+        """Record client, time and note of a link event."""
         if event.direction == "<":
             return
         self.now, self.client = event.time, event.client
@@ -109,13 +109,13 @@ class ActionLog:
             self.add_action("fiducials", str(unit.suffix))
 
     def add_action(self, what: str, name: str = "", before: float = 0.0, after: float = 0.0, text: str = "") -> None:
-        """Take note of a deed."""
+        """Record an action."""
         if what in PLAIN and before != after:
             self.sides[name] = 1 if after > before else -1
         self.actions.append(StudentAction(len(self.actions), self.now, self.client, what, name, before, after, text))
 
     def add_reading(self, autograph: Autograph, made: Registration) -> None:
-        """Take note of a registration and of how everything stands."""
+        """Record a registration and the state of the instrument."""
         self.add_action("record", made.point)
         shown = {axis: autograph.counter(axis) for axis in AXES}
         shown |= {name: autograph.element(name) for name in autograph.variant.elements}
@@ -142,7 +142,7 @@ class ActionLog:
         )
 
     def strike_reading(self, number: int) -> None:
-        """Take note that a registration was struck out."""
+        """Record that a registration was struck out."""
         self.add_action("strike", str(number))
         self.readings = [replace(each, struck=True) if each.number == number else each for each in self.readings]
 
@@ -163,14 +163,14 @@ class _WitnessedRecorder(Recorder):
 
 
 class LoggedAutograph(Autograph):
-    """An instrument that does all it is asked exactly as any other, and tells its witness. Refused deeds are none."""
+    """Instrument that behaves exactly as any other and writes a log. Rejected actions are not logged."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.action_log = ActionLog()
         self.recorder = _WitnessedRecorder(self)
         self.blind = False
-        """Whether pictures are left black, for who only works a journal again: they take longer than all the rest."""
+        """Whether pictures stay black, for a replay only: they take longer than all the rest."""
 
     def _counted(self, axis: str) -> float:
         counter = self._counters[axis]
@@ -178,7 +178,7 @@ class LoggedAutograph(Autograph):
 
     @property
     def z_units_per_mm(self) -> float:
-        """Return the units of the Z counter a mm, as it is geared."""
+        """Return the units of the Z counter per mm for the engaged gear."""
         return self._counters["Z"].units_per_mm
 
     @property
@@ -191,7 +191,7 @@ class LoggedAutograph(Autograph):
         return self._carriages[handle].play if handle in self._carriages else self._spindle(handle).play
 
     def set_element(self, name: str, value: float) -> None:
-        """Set an element through its counter."""
+        """Set an element by its counter."""
         before = self._spindle(name).at
         super().set_element(name, value)
         self.action_log.add_action("set", name, before, self._spindle(name).at)
@@ -203,7 +203,7 @@ class LoggedAutograph(Autograph):
         self.action_log.add_action("turn", name, before, self._spindle(name).at)
 
     def drive(self, axis: str, reading: float) -> None:
-        """Run a carriage to a reading."""
+        """Drive a carriage to a reading."""
         before = self._counted(axis)
         super().drive(axis, reading)
         self.action_log.add_action("drive", axis, before, self._counted(axis))
@@ -221,7 +221,7 @@ class LoggedAutograph(Autograph):
         self.action_log.add_action("preset", axis, before, self._counted(axis))
 
     def set_fitting(self, name: str, position: str) -> None:
-        """Put a fitting over."""
+        """Set a fitting."""
         super().set_fitting(name, position)
         self.action_log.add_action("fit", name, text=position)
 
@@ -236,22 +236,22 @@ class LoggedAutograph(Autograph):
         self.action_log.add_action("gear", text=self.height_gear)
 
     def load(self, projector: int, name: str) -> None:
-        """Lay a picture on a carrier."""
+        """Mount a picture on a carrier."""
         super().load(projector, name)
         self.action_log.add_action("load", str(projector), text=name)
 
     def unload(self, projector: int) -> None:
-        """Take a picture off."""
+        """Remove a picture."""
         super().unload(projector)
         self.action_log.add_action("unload", str(projector))
 
     def centre_picture(self, projector: int, dx: float, dy: float, dkappa: float) -> None:
-        """Shift and turn a picture on its carrier."""
+        """Shift and rotate a picture on its carrier."""
         super().centre_picture(projector, dx, dy, dkappa)
         self.action_log.add_action("centre", str(projector))
 
     def reset(self) -> None:
-        """Run everything to its zero."""
+        """Move all to zero."""
         before = {name: spindle.at for name, spindle in self._spindles.items()}
         super().reset()
         self.action_log.add_action("reset")
@@ -271,7 +271,7 @@ class LoggedAutograph(Autograph):
         return None if left is None or right is None else (left[0] - right[0], left[1] - right[1])
 
     def picture(self, eyepiece: int, columns: int, rows: int, magnification: float) -> Any:
-        """Look at the picture that an eyepiece shows."""
+        """Look at the picture of an eyepiece."""
         self.action_log.add_action("look")
         if self.blind:
             return np.zeros((rows, columns))

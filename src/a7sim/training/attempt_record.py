@@ -1,4 +1,4 @@
-"""The account of an attempt: what was done and read in it, the truth beside it. All grades follow from it."""
+"""Record of an attempt: its actions and readings with the truth. All grades follow from it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,48 +13,48 @@ from a7sim.training.action_log import ActionLog, LoggedAutograph, Reading, Stude
 from a7sim.training.exercise import OPENING, Exercise
 
 ANSWER = "answer "
-"""How a note begins that answers something at the instrument: NOTE "answer play=0.05"."""
+"""Start of a note with an answer at the instrument: NOTE "answer play=0.05"."""
 
 
 @dataclass(frozen=True)
 class AttemptRecord:
-    """An attempt as it stands."""
+    """Record of an attempt."""
 
     exercise: Exercise
     scenario: Scenario
     scene: Scene
     autograph: LoggedAutograph
-    """As the attempt leaves it."""
+    """State at the end of the attempt."""
     action_log: ActionLog
     written: Mapping[str, str] = field(default_factory=dict)
-    """Answers that were written down beside the journal."""
+    """Answers written beside the journal."""
     hidden: Mapping[str, Any] = field(default_factory=dict)
-    """What the maker of the papers knows and did not hand out."""
+    """Values known to the maker of the handout and not handed out."""
 
     @property
     def actions(self) -> Sequence[StudentAction]:
-        """The student's deeds."""
+        """Actions of the student."""
         return [each for each in self.action_log.actions if each.client != OPENING]
 
     @property
     def readings(self) -> Sequence[Reading]:
-        """The student's registrations that were not struck out."""
+        """Registrations of the student that were not struck out."""
         return [each for each in self.action_log.readings if each.client != OPENING and not each.struck]
 
     @property
     def seconds(self) -> float:
-        """Simulated s since the student sat down."""
+        """Simulated s since the start of the student's work."""
         return max(0.0, self.action_log.now - self.action_log.began)
 
     @cached_property
     def model(self) -> ModelJob:
-        """The model that the exercise is about, as the job sheet has it."""
+        """Model of the exercise, as on the job sheet."""
         models = make_job(self.scenario, self.scene).models
         return next(each for each in models if each.name == self.exercise.model)
 
     @property
     def answers(self) -> dict[str, str]:
-        """What was answered, in notes at the instrument or beside the journal; the later answer counts."""
+        """Answers in notes at the instrument or beside the journal; the latest one counts."""
         noted: dict[str, str] = {}
         for action in self.actions:
             if action.what == "note" and action.text.lower().startswith(ANSWER):
@@ -67,6 +67,6 @@ class AttemptRecord:
 
 
 def parse_answers(words: Sequence[str]) -> dict[str, str]:
-    """Return the answers in words such as play=0.05; words that are none are passed over."""
+    """Return the answers in words such as play=0.05; other words are ignored."""
     pairs = (word.partition("=") for word in words)
     return {key.strip().lower(): value.strip() for key, equals, value in pairs if equals and key.strip()}

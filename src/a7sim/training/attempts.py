@@ -1,4 +1,4 @@
-"""An attempt from the opening to its end: by a script, by the virtual operator, or by whoever sits down."""
+"""Attempts from the opening to the end: by a script, by the virtual operator, or interactively."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -19,22 +19,22 @@ from a7sim.training.procedures import run_procedure
 from a7sim.training.variation import scenario_for
 
 ANSWERS = "answers.txt"
-"""Answers that were written down beside the journal, a KEY=VALUE a line."""
+"""Answers written beside the journal, one KEY=VALUE per line."""
 
 HINTS = "hints.txt"
-"""Hints that were given, their number and what they cost, a line each; the student's progress has them too."""
+"""Given hints, number and cost per line; the student's progress contains them, too."""
 
 _HINT = re.compile(r"\d+ \d+(\.\d+)?")
 
 STUDENT = "student"
-"""The client as which a script or the virtual operator plays the student."""
+"""Client name under which a script or the virtual operator acts as the student."""
 
 
 @contextmanager
 def start_attempt(
     exercise_folder: ExerciseFolder, seed: int, folder: Path, student: str, mode: str
 ) -> Iterator[AttemptEnvironment]:
-    """Begin an attempt in a folder: its papers are handed out and its opening is done. Raises Mistake."""
+    """Start an attempt in a folder: write its handouts and run its opening. Raises A7SimError."""
     folder.mkdir(parents=True, exist_ok=True)
     hand_out(exercise_folder, seed, folder)
     with open_environment(exercise_folder, seed, folder, student, mode) as environment:
@@ -44,7 +44,7 @@ def start_attempt(
 
 @contextmanager
 def resume_attempt(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
-    """Go on with an attempt that was left, or cut off. Raises Mistake."""
+    """Resume an attempt. Raises A7SimError."""
     with resume_environment(exercise_folder, seed, folder) as environment:
         if not environment.action_log.opened:
             run_opening(environment)
@@ -52,13 +52,13 @@ def resume_attempt(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> 
 
 
 def hand_out(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> None:
-    """Put the papers of an exercise into a folder."""
+    """Write the handouts of an exercise into a folder."""
     for name, text in make_papers(exercise_folder, seed).items():
         write_atomic(folder / name, text)
 
 
 def make_papers(exercise_folder: ExerciseFolder, seed: int) -> Mapping[str, str]:
-    """Return the papers of an exercise by file name, none where it has none."""
+    """Return the handouts of an exercise by file name, empty if it has none."""
     exercise = exercise_folder.exercise
     if not exercise.handout:
         return {}
@@ -66,7 +66,7 @@ def make_papers(exercise_folder: ExerciseFolder, seed: int) -> Mapping[str, str]
 
 
 def run_opening(environment: AttemptEnvironment) -> None:
-    """Do the opening of an exercise. Raises Mistake where it cannot be done."""
+    """Run the opening of an exercise. Raises A7SimError if it fails."""
     opening = environment.exercise_folder.exercise.opening
     if opening is not None:
         error = play_item(environment, opening, OPENING)
@@ -75,14 +75,14 @@ def run_opening(environment: AttemptEnvironment) -> None:
 
 
 def play_item(environment: AttemptEnvironment, played: PlayedRun, client: str = STUDENT) -> str:
-    """Let a script or a procedure be played; return what kept it from its end, empty where nothing did."""
+    """Run a script or a procedure; return the reason if it did not finish, otherwise an empty text."""
     if played.procedure:
         return run_procedure(environment, played, client, make_papers(environment.exercise_folder, environment.seed))
     return play_script(environment, read_script(environment.exercise_folder.folder / played.script), client)
 
 
 def play_script(environment: AttemptEnvironment, script: Script, client: str = STUDENT) -> str:
-    """Play a script at the instrument of an attempt; return what it expected in vain, empty where nothing."""
+    """Run a script at the instrument of an attempt; return the unmet expectation, otherwise an empty text."""
     not_met = ScriptRunner(script, instrument=environment.instrument, clock=environment.clock).run(client)
     if not_met is not None and client in environment.instrument.clients:
         environment.instrument.close(client, environment.clock.now)
@@ -90,7 +90,7 @@ def play_script(environment: AttemptEnvironment, script: Script, client: str = S
 
 
 def seed_for(exercise_folder: ExerciseFolder, played: PlayedRun, otherwise: int = 1) -> int:
-    """Return the seed with which something is played: a script's own, or that of the exercise's reference."""
+    """Return the seed of a run: a script's own, or that of the exercise's reference."""
     if played.seed is not None:
         return played.seed
     if played.script:
@@ -100,9 +100,9 @@ def seed_for(exercise_folder: ExerciseFolder, played: PlayedRun, otherwise: int 
 
 
 def run_attempt(
-    exercise_folder: ExerciseFolder, played: PlayedRun, folder: Path, seed: int, student: str = "somebody"
+    exercise_folder: ExerciseFolder, played: PlayedRun, folder: Path, seed: int, student: str = "student"
 ) -> str:
-    """Do an exercise from its opening to its end in a folder; return what kept it from its end."""
+    """Run an exercise from its opening to its end in a folder; return the reason if it did not finish."""
     folder.mkdir(parents=True, exist_ok=True)
     hand_out(exercise_folder, seed, folder)
     with open_environment(exercise_folder, seed, folder, student, "practice", dict(played.observer)) as environment:
@@ -111,14 +111,14 @@ def run_attempt(
 
 
 def write_answers(folder: Path, answers: dict[str, str]) -> dict[str, str]:
-    """Add answers to those that were written down; return all of them. Raises Mistake where that fails."""
+    """Add answers to the written ones; return all of them. Raises A7SimError if that fails."""
     known = written_answers(folder) | answers
     write_atomic(folder / ANSWERS, "".join(f"{key}={value}\n" for key, value in known.items()))
     return known
 
 
 def written_answers(folder: Path) -> dict[str, str]:
-    """Return the answers that were written down beside a journal."""
+    """Return the answers written beside a journal."""
     path = folder / ANSWERS
     if not path.is_file():
         return {}
@@ -129,14 +129,14 @@ def written_answers(folder: Path) -> dict[str, str]:
 
 
 def write_hint(folder: Path, number: int, cost: float) -> None:
-    """Note beside the journal that a hint was given, for whoever grades the folder alone."""
+    """Record beside the journal that a hint was given, for grading the folder alone."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / HINTS).open("a", encoding="utf-8") as hints:
         hints.write(f"{number} {cost:g}\n")
 
 
 def written_hints(folder: Path) -> tuple[int, float]:
-    """Return how many hints are noted beside a journal, and what they cost."""
+    """Return the number of hints recorded beside a journal, and their cost."""
     path = folder / HINTS
     lines = read_text(path).splitlines() if path.is_file() else []
     costs = [float(line.split()[1]) for line in lines if _HINT.fullmatch(line)]
@@ -144,7 +144,7 @@ def written_hints(folder: Path) -> tuple[int, float]:
 
 
 def attempt_mode(folder: Path) -> tuple[str, str, str]:
-    """Return exercise, student and mode of the attempt in a folder, as its journal names them. Raises Mistake."""
+    """Return exercise, student and mode of the attempt in a folder, from its journal. Raises A7SimError."""
     settings = read_journal(folder / JOURNAL).header.get("settings", {})
     try:
         return settings["exercise"], settings["student"], settings["mode"]

@@ -1,4 +1,4 @@
-"""Finding and reading exercises: those that come with a7sim, and folders of one's own."""
+"""Catalogue of exercises: those that come with a7sim, and other folders."""
 
 from functools import cache
 from pathlib import Path
@@ -16,22 +16,22 @@ from a7sim.training.metrics import MEASURES, make_metric
 from a7sim.training.procedures import PROCEDURES
 
 SEARCH_PATH = bundled_dirs("exercises")
-"""Where the exercises are that come with a7sim."""
+"""Folders of the exercises that come with a7sim."""
 
 FILE = "exercise.toml"
 
 
 class ExerciseError(A7SimError):
-    """An exercise that cannot be used; the text names each mistake with its path."""
+    """Invalid exercise; the text states each error with its path."""
 
 
 def all_exercises() -> list[ExerciseFolder]:
-    """Return the exercises that come with a7sim, by their numbers."""
+    """Return the exercises that come with a7sim, by number."""
     return [read_exercise(folder) for folder in _folders()]
 
 
 def find_exercise(name: str) -> ExerciseFolder:
-    """Return an exercise by its number, the name of its folder or a part of it, or a folder. Raises Mistake."""
+    """Return an exercise by number, by the name of its folder or a part of it, or by a folder. Raises A7SimError."""
     if (Path(name) / FILE).is_file():
         return read_exercise(Path(name))
     there = _folders()
@@ -46,13 +46,13 @@ def find_exercise(name: str) -> ExerciseFolder:
 
 
 def _folders() -> list[Path]:
-    """Return the folders of the exercises that come with a7sim: number, hyphen, name, in their order."""
+    """Return the folders of the exercises that come with a7sim: number, hyphen, name, in order."""
     catalogue = next((each for each in SEARCH_PATH if each.is_dir()), None)
     return sorted(path.parent for path in catalogue.glob(f"[0-9][0-9]-*/{FILE}")) if catalogue else []
 
 
 def read_exercise(folder: Path) -> ExerciseFolder:
-    """Return the exercise in a folder. Raises Mistake, which names every mistake at once."""
+    """Return the exercise in a folder. Raises A7SimError with all errors."""
     path = folder / FILE
     raw = read_toml(path)
     mistakes = list(schema_errors(raw, _expected()))

@@ -1,5 +1,6 @@
-"""Checking exercises: the reference passes, every faulty one fails for its reason, no criterion is dead."""
+"""Checks of exercises: the reference passes, each faulty run fails for its reason, each criterion decides something."""
 
+import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,21 +14,23 @@ from a7sim.scenario import Scenario
 from a7sim.text import pluralize
 from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.attempts import run_attempt, seed_for
+from a7sim.training.catalogue import FILE
 from a7sim.training.dry_runs import DryRuns
 from a7sim.training.exercise import FULL_MARKS, Exercise, ExerciseFolder
 from a7sim.training.grading import Grade, evaluate_metrics, grade_by, load_record
 from a7sim.training.metrics import MetricResult, make_metric
+from a7sim.training.template import PLACEHOLDERS
 from a7sim.training.variation import scenario_for
 
 MIN_HINTS, MIN_FAULTY = 2, 2
 
 NEVER = 1e12
-"""A limit that everything, or nothing, reaches."""
+"""Limit that all values, or none, reach."""
 
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What was found of an exercise: sentences on what is missing or wrong, none where all is well."""
+    """Result of the check of an exercise: sentences on errors, empty without errors."""
 
     name: str
     faults: tuple[str, ...]
@@ -36,7 +39,7 @@ class CheckResult:
 
 @dataclass(frozen=True)
 class _Run:
-    """Something played: its account, and what every criterion's measure came to, which no change of a limit changes."""
+    """Run with its record and the result of each criterion's metric, which changed limits do not affect."""
 
     record: AttemptRecord
     found: Sequence[MetricResult]
@@ -46,15 +49,15 @@ class _Run:
         return cls(record, evaluate_metrics(record))
 
     def grade(self, exercise: Exercise) -> Grade:
-        """Grade it by the limits and weights of an exercise with the same measures."""
+        """Return the grade with the limits and weights of an exercise with the same metrics."""
         return grade_by(exercise, self.found, self.record.seconds)
 
 
 def check_exercise(exercise_folder: ExerciseFolder) -> CheckResult:
-    """Check an exercise whole."""
+    """Check an exercise completely."""
     exercise = exercise_folder.exercise
     faults = list(_of_form(exercise_folder))
-    if not _all_there(exercise_folder):
+    if not _has_all_scripts(exercise_folder):
         return CheckResult(exercise_folder.name, tuple(faults))
     with tempfile.TemporaryDirectory() as place:
         try:
@@ -83,15 +86,49 @@ def _of_form(exercise_folder: ExerciseFolder) -> Iterator[str]:
     total = sum(each.weight for each in exercise.criteria)
     if abs(total - FULL_MARKS) > 1e-6:
         yield f"criterion: expected weights that add up to {FULL_MARKS:g}, got {total:g}"
-    for played in (exercise.reference, *exercise.faulty, exercise.opening):
-        if played is not None and played.script and not (exercise_folder.folder / played.script).is_file():
-            yield f"{played.script}: expected a script beside the exercise, found none"
+    for script in _scripts(exercise):
+        if not (exercise_folder.folder / script).is_file():
+            yield f"{script}: expected a script beside the exercise, found none"
+    yield from _template_text(exercise_folder)
+    yield from _unused_files(exercise_folder)
 
 
-def _all_there(exercise_folder: ExerciseFolder) -> bool:
+def _scripts(exercise: Exercise) -> list[str]:
+    runs = (exercise.reference, *exercise.faulty, exercise.opening)
+    return [run.script for run in runs if run is not None and run.script]
+
+
+def _has_all_scripts(exercise_folder: ExerciseFolder) -> bool:
+    return all((exercise_folder.folder / script).is_file() for script in _scripts(exercise_folder.exercise))
+
+
+def _template_text(exercise_folder: ExerciseFolder) -> Iterator[str]:
+    """Yield a sentence for each text of the template that the author has not replaced."""
     exercise = exercise_folder.exercise
-    played = [each for each in (exercise.reference, *exercise.faulty, exercise.opening) if each is not None]
-    return all(not each.script or (exercise_folder.folder / each.script).is_file() for each in played)
+    texts = {"goal": exercise.goal}
+    texts |= {f"{each.id}: feedback": each.feedback for each in exercise.criteria}
+    texts |= {f"hint {number}": each.text for number, each in enumerate(exercise.hints, start=1)}
+    left = [(place, text) for place, text in texts.items() if text in PLACEHOLDERS]
+    left += [("text.md", line.strip()) for line in exercise_folder.text.splitlines() if line.strip() in PLACEHOLDERS]
+    for place, text in left:
+        yield f"{place}: expected a text of your own, got that of the template: {text}"
+
+
+def _unused_files(exercise_folder: ExerciseFolder) -> Iterator[str]:
+    """Yield a sentence for each file in the folder that neither the exercise nor one of its scripts uses."""
+    folder, exercise = exercise_folder.folder, exercise_folder.exercise
+    if not folder.is_dir():
+        return
+    used = {FILE, "text.md", exercise.scenario, f"{exercise.scenario}.toml", *_scripts(exercise)}
+    files = {path.name: path for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")}
+    pending = [name for name in used if name in files]
+    while pending:
+        text = files[pending.pop()].read_text(encoding="utf-8", errors="replace")
+        named = {name for name in files if name not in used and re.search(rf"(?<![\w./-]){re.escape(name)}", text)}
+        used |= named
+        pending += named
+    for name in sorted(files.keys() - used):
+        yield f"{name}: expected only files that the exercise uses, got one that it does not name"
 
 
 def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
@@ -107,9 +144,9 @@ def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
 
 
 def _accounts(exercise_folder: ExerciseFolder, place: Path) -> dict[str, AttemptRecord]:
-    """Return the accounts of the reference, the faulty ones, who does nothing, who is slow, who stops early.
+    """Return the records of the reference, of the faulty runs, and of runs that do nothing, are slow or stop early.
 
-    The reference is an attempt as a student's, journal and all; the others are rehearsed.
+    The reference is an attempt with a journal, as a student's; the others are dry runs.
     """
     exercise = exercise_folder.exercise
     rehearsals = DryRuns(exercise_folder)
@@ -131,7 +168,7 @@ def _of_reference(exercise_folder: ExerciseFolder, place: Path) -> AttemptRecord
     seed = seed_for(exercise_folder, reference)
     error = run_attempt(exercise_folder, reference, place, seed)
     if error:
-        raise A7SimError(f"reference: expected it to come to its end: {error}")
+        raise A7SimError(f"reference: expected it to finish: {error}")
     return load_record(exercise_folder, seed, place)
 
 
@@ -167,9 +204,9 @@ def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
 
 
 def _dead_criteria(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
-    """Yield what of the criteria decides nothing: limits and weights that may be anything, and no verdict changes.
+    """Yield the criteria that decide nothing: limits and weights whose change does not change any verdict.
 
-    Who does nothing at all is left out: they fail everything.
+    The run without any action is left out: it fails all criteria.
     """
     done = [run for name, run in runs.items() if name != "nothing"]
     verdicts = [_verdict(run, exercise) for run in done]

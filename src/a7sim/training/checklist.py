@@ -1,4 +1,4 @@
-"""The checklist of an attempt, which ticks itself by what is seen at the link."""
+"""Checklist of an attempt, ticked automatically by the events at the link."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +12,12 @@ from a7sim.training.progress import EXAM, Attempt
 TICKED, OPEN = "[x]", "[ ]"
 
 PAPERS = (".csv", ".txt", ".md")
-"""Endings of papers that are handed out."""
+"""Suffixes of handouts."""
 
 
 @dataclass(frozen=True)
 class Checklist:
-    """The checklist of an attempt in its room; in an exam it only says what is to be done."""
+    """Checklist of an attempt; in an exam it lists the tasks without ticks."""
 
     environment: AttemptEnvironment
     attempt: Attempt
@@ -28,7 +28,7 @@ class Checklist:
         return self.environment.exercise_folder.exercise
 
     def ticks(self) -> list[bool]:
-        """Return which steps are done."""
+        """Return which items are done."""
         record = self.environment.record(written_answers(self.attempt.folder))
         measures = [make_metric(each) for each in self.exercise.steps]
         return [
@@ -37,7 +37,7 @@ class Checklist:
         ]
 
     def lines(self) -> list[str]:
-        """Return goal and checklist for people, a line each."""
+        """Return goal and checklist as lines of text."""
         told = [self.head(), *(f"your papers: {paper}" for paper in self.papers())]
         if self.attempt.mode == EXAM:
             return [*told, *(f"  -  {each.text}" for each in self.exercise.steps)]
@@ -45,12 +45,12 @@ class Checklist:
         return [*told, *(f" {TICKED if done else OPEN} {step.text}" for done, step in ticked)]
 
     def papers(self) -> list[Path]:
-        """Return the papers that were handed out, in the attempt's folder."""
+        """Return the handouts in the attempt's folder."""
         there = sorted(self.attempt.folder.iterdir())
         return [path for path in there if path.suffix in PAPERS and path.name not in (ANSWERS, HINTS)]
 
     def head(self) -> str:
-        """Return exercise and time for people."""
+        """Return exercise and time as text."""
         exercise, minutes = self.exercise, self.environment.record().seconds / 60.0
         exam = ", exam" if self.attempt.mode == EXAM else ""
         over = ", the time is up" if minutes > exercise.minutes else ""

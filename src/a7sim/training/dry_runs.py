@@ -1,4 +1,4 @@
-"""Attempts of which nothing is kept, for checks: what begins alike is opened once, and no journal is written."""
+"""Attempts without files, for checks: common openings run once, and no journal is written."""
 
 from dataclasses import dataclass, field
 
@@ -12,14 +12,14 @@ from a7sim.training.grading import make_record
 
 @dataclass(frozen=True)
 class DryRuns:
-    """Attempts at an exercise, each as if the student had sat down at it alone: to the digit what its journal gives."""
+    """Attempts at an exercise, each equal to the digit to an attempt with a journal."""
 
     exercise_folder: ExerciseFolder
     _opened: dict[int, AttemptEnvironment] = field(default_factory=dict)
-    """Rooms in which the opening is done and nothing else, by seed."""
+    """Environments after the opening, by seed."""
 
     def open_environment(self, seed: int) -> AttemptEnvironment:
-        """Return a room of its own in which the opening is done. Raises Mistake where it cannot be done."""
+        """Return an environment after the opening. Raises A7SimError if the opening fails."""
         if seed not in self._opened:
             environment = dry_run_environment(self.exercise_folder, seed)
             run_opening(environment)
@@ -27,13 +27,13 @@ class DryRuns:
         return self._opened[seed].snapshot()
 
     def run_attempt(self, played: PlayedRun) -> tuple[AttemptRecord, str]:
-        """Do the exercise to its end; return the account, and what kept it from its end. Raises Mistake."""
+        """Run the exercise to its end; return the record, and the reason if it did not finish. Raises A7SimError."""
         environment = self.open_environment(seed_for(self.exercise_folder, played))
         error = play_item(environment, played)
         return make_record(environment), error
 
     def run_and_leave(self, seed: int, script: Script | None, minutes: float = 0.0) -> AttemptRecord:
-        """Play a script, if any, come again so many minutes later, and be gone. Raises Mistake."""
+        """Run a script, if any, and return the record after a number of minutes. Raises A7SimError."""
         environment = self.open_environment(seed)
         if script is not None:
             play_script(environment, script)

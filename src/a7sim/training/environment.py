@@ -1,4 +1,4 @@
-"""The room of an attempt: the instrument of an exercise with a witness beside it, its clock, and its journal."""
+"""Environment of an attempt: the instrument of an exercise with its action log, clock and journal."""
 
 import re
 from collections.abc import Iterator
@@ -24,16 +24,16 @@ from a7sim.training.variation import scenario_for
 _CHECKSUM = re.compile(r"(?<=bytes, )crc32 [0-9a-f]{8}")
 
 JOURNAL_COMMAND = "train"
-"""The command in the header of an attempt's journal."""
+"""Command in the header of an attempt's journal."""
 
 
 class UnreliableJournalError(A7SimError):
-    """A journal that is damaged, or in which stands what the instrument does not do again."""
+    """Damaged journal, or journal whose replay differs."""
 
 
 @dataclass(frozen=True)
 class AttemptEnvironment:
-    """An exercise's instrument."""
+    """Instrument of an exercise with its surroundings."""
 
     exercise_folder: ExerciseFolder
     scenario: Scenario
@@ -45,20 +45,20 @@ class AttemptEnvironment:
 
     @property
     def action_log(self) -> ActionLog:
-        """Who saw all that happened."""
+        """Log of all actions."""
         return self.autograph.action_log
 
     def record(self, written: dict[str, str] | None = None, hidden: dict[str, Any] | None = None) -> AttemptRecord:
-        """Return the account of what has happened so far."""
+        """Return the record of the attempt so far."""
         exercise = self.exercise_folder.exercise
         return AttemptRecord(
             exercise, self.scenario, self.scene, self.autograph, self.action_log, written or {}, hidden or {}
         )
 
     def snapshot(self) -> "AttemptEnvironment":
-        """Return a room of its own in which all has happened as in this one, of which no journal is kept.
+        """Return a copy with the same state and without a journal.
 
-        To be asked while every client is gone.
+        Call it only while no client is connected.
         """
         autograph = LoggedAutograph.from_parts(self.scenario.instrument, self.scene.mountable, self.seed)
         instrument = SharedInstrument(autograph, autograph.action_log.on_link_event)
@@ -68,7 +68,7 @@ class AttemptEnvironment:
 
 
 def header_for(exercise_folder: ExerciseFolder, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
-    """Return what the journal of an attempt says first. It names the scenario by its hash alone: it holds the truth."""
+    """Return the header of an attempt's journal. It contains only the hash of the scenario, which is truth."""
     first = make_header_without_scenario(
         JOURNAL_COMMAND, exercise=exercise_folder.name, student=student, mode=mode
     ).line
@@ -86,7 +86,7 @@ def _built(
 
 
 def dry_run_environment(exercise_folder: ExerciseFolder, seed: int) -> AttemptEnvironment:
-    """Return the room of an attempt of which no journal is kept; the opening is still to be done."""
+    """Return the environment of an attempt without a journal, before its opening."""
     scenario, scene, autograph = _built(exercise_folder, seed, {})
     return AttemptEnvironment(
         exercise_folder,
@@ -108,9 +108,9 @@ def open_environment(
     mode: str,
     observer: dict[str, Any] | None = None,
 ) -> Iterator[AttemptEnvironment]:
-    """Enter the room of a new attempt, journalled in a folder; the opening is still to be done.
+    """Open the environment of a new attempt with a journal in a folder, before its opening.
 
-    Raises Mistake where it cannot be written.
+    Raises A7SimError if the journal cannot be written.
     """
     scenario, scene, autograph = _built(exercise_folder, seed, observer or {})
     journal = Journal(JournalOptions(states=False))
@@ -122,11 +122,11 @@ def open_environment(
 
 @contextmanager
 def resume_environment(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
-    """Enter the room of an attempt that was left, as its journal leaves it. Raises Unreliable, Mistake."""
+    """Open the environment of an attempt in the state of its journal. Raises UnreliableJournalError, A7SimError."""
     there = read_journal(folder / JOURNAL)
     if there.header.get("software") != software_version():
         raise A7SimError(
-            f"{there.location(1)}: expected an attempt of {software_version()} to go on with, got one of "
+            f"{there.location(1)}: expected an attempt of {software_version()} to resume, got one of "
             f"{there.header.get('software')} (a7sim train reset begins anew)"
         )
     environment, replay = _replayed(exercise_folder, seed, there)
@@ -143,7 +143,7 @@ def resume_environment(exercise_folder: ExerciseFolder, seed: int, folder: Path)
 
 
 def replay_environment(exercise_folder: ExerciseFolder, seed: int, there: JournalFile) -> AttemptEnvironment:
-    """Return the room of an attempt as its journal leaves it. Raises Unreliable."""
+    """Return the environment of an attempt in the state of its journal. Raises UnreliableJournalError."""
     return _replayed(exercise_folder, seed, there)[0]
 
 
@@ -173,13 +173,13 @@ def _replayed(exercise_folder: ExerciseFolder, seed: int, there: JournalFile) ->
 
 
 def _same_but_for_pictures(difference: ReplayDifference) -> bool:
-    """Whether two replies differ in nothing but the checksums of pictures, which are not drawn again."""
+    """Return whether two replies differ only in the checksums of pictures, which are not drawn again."""
     journalled, again = (_CHECKSUM.sub("", each) for each in (difference.journalled, difference.replayed))
     return journalled == again != difference.replayed
 
 
 def tee_listener(first: Listener, then: Listener) -> Listener:
-    """Return a listener that lets two hear."""
+    """Return a listener that calls both."""
 
     def heard(event: LinkEvent) -> None:
         first(event)

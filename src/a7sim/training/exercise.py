@@ -1,17 +1,19 @@
-"""What the file of an exercise may say, as frozen data."""
+"""Contents of an exercise file as frozen records."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct, field
 
+from a7sim.scenario.schema import FileRecord
+
 SCHEMA_VERSION = 1
 
 FULL_MARKS = 100.0
-"""What the weights of an exercise's criteria add up to."""
+"""Sum of the weights of an exercise's criteria."""
 
 OPENING = "opening"
-"""The client that says the opening; what it does is nobody's merit."""
+"""Client of the opening; its actions are not graded."""
 
 Words = Annotated[str, Meta(min_length=1, max_length=4000, description="some words")]
 Id = Annotated[
@@ -20,26 +22,22 @@ Id = Annotated[
 Points = Annotated[float, Meta(ge=0, le=FULL_MARKS, description="points, 0 to 100")]
 
 
-class _Data(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Frozen data read from a file; unknown keys are mistakes."""
-
-
-class MetricSpec(_Data, frozen=True, kw_only=True):
-    """A registered measure with its options."""
+class MetricSpec(FileRecord, frozen=True, kw_only=True):
+    """Registered metric with its options."""
 
     measure: Words
     options: dict[str, Any] = {}
 
 
 class ChecklistItem(MetricSpec, frozen=True, kw_only=True):
-    """A line of the checklist: it ticks itself once a measure of what is seen at the link is as good as `done`."""
+    """Item of the checklist: it is ticked once a metric of the events at the link reaches `done`."""
 
     text: Words
     done: float
 
 
 class Criterion(MetricSpec, frozen=True, kw_only=True):
-    """What is graded: a measure, its bands, its weight, and what to tell who does not reach them."""
+    """Criterion of the grade: a metric, its bands, its weight, and the advice for failing it."""
 
     id: Id
     title: Words
@@ -48,18 +46,18 @@ class Criterion(MetricSpec, frozen=True, kw_only=True):
     weight: Annotated[float, Meta(gt=0, le=FULL_MARKS, description="points above 0 to 100")]
     feedback: Words
     required: bool = True
-    """Whether who fails it fails the exercise."""
+    """Whether the exercise fails if this criterion fails."""
 
 
-class Hint(_Data, frozen=True, kw_only=True):
-    """A hint and what it costs, in points."""
+class Hint(FileRecord, frozen=True, kw_only=True):
+    """Hint and its cost in points."""
 
     text: Words
     cost: Points
 
 
-class PlayedRun(_Data, frozen=True, kw_only=True):
-    """Something done by a script beside the exercise, or by a procedure of the virtual operator."""
+class PlayedRun(FileRecord, frozen=True, kw_only=True):
+    """Run by a script beside the exercise, or by a procedure of the virtual operator."""
 
     script: str = ""
     procedure: str = ""
@@ -72,14 +70,14 @@ class PlayedRun(_Data, frozen=True, kw_only=True):
 
 
 class FaultyRun(PlayedRun, frozen=True, kw_only=True):
-    """The exercise done with a mistake: which criterion must fail of it, and why."""
+    """Run with a mistake: the criterion that must fail, and the reason."""
 
     fails: Id
     why: Words
 
 
-class Exercise(_Data, frozen=True, kw_only=True):
-    """An exercise."""
+class Exercise(FileRecord, frozen=True, kw_only=True):
+    """Exercise."""
 
     schema_version: Literal[1]
     number: Annotated[int, Meta(ge=1, le=999, description="a number, 1 to 999")]
@@ -88,25 +86,25 @@ class Exercise(_Data, frozen=True, kw_only=True):
     scenario: Words = "akwanga"
     """By name, or a file beside the exercise."""
     settings: dict[str, Any] = {}
-    """Values of the scenario by path, instead of its own."""
+    """Values of the scenario by path."""
     vary: dict[str, float] = {}
-    """By path, within how much of its own value a number of the scenario is drawn anew by the seed."""
+    """By path, the share of its value within which the seed draws a number of the scenario anew."""
     choose: list[Annotated[list[dict[str, Any]], Meta(min_length=1, description="one alternative or more")]] = []
-    """Groups of alternatives, each values by path that belong together; of every group the seed draws one."""
+    """Groups of alternatives, each a set of values by path; the seed draws one alternative of each group."""
     opening: PlayedRun | None = None
-    """What is done at the instrument before the student sits down."""
+    """Actions at the instrument before the student starts."""
     handout: str = ""
-    """What is put into the student's hands: a registered maker of papers."""
+    """Registered maker of the handouts of the student."""
     handout_options: dict[str, Any] = {}
     paper: bool = False
-    """Whether it is done on paper alone, without sitting down."""
+    """Whether the exercise needs no instrument."""
     model: str = "1"
-    """The model of the scenario that it is about."""
+    """Model of the scenario that it uses."""
     minutes: Annotated[float, Meta(gt=0, le=100000, description="minutes above 0")]
-    """Given to it at the simulated clock, as the text says."""
+    """Time limit on the simulated clock, as stated in the text."""
     pass_points: Points = 60.0
     answers: dict[str, Words] = {}
-    """What is to be answered on paper: key, and what it is."""
+    """Answers to be given on paper: key, and description."""
     steps: list[ChecklistItem] = field(default_factory=list, name="step")
     criteria: Annotated[list[Criterion], Meta(min_length=1, description="one criterion or more")] = field(
         name="criterion"
@@ -117,23 +115,23 @@ class Exercise(_Data, frozen=True, kw_only=True):
 
     @property
     def criterion_ids(self) -> list[str]:
-        """Return the ids of the criteria in their order."""
+        """Return the ids of the criteria in order."""
         return [each.id for each in self.criteria]
 
 
 class ExerciseFolder(Struct, frozen=True):
-    """An exercise with the folder in which it stands."""
+    """Exercise with its folder."""
 
     exercise: Exercise
     folder: Path
 
     @property
     def name(self) -> str:
-        """Return the name of its folder, such as 04-parallax."""
+        """Name of its folder, such as 04-parallax."""
         return self.folder.name
 
     @property
     def text(self) -> str:
-        """Return the exercise in plain words, empty where nobody wrote any."""
+        """Text of the exercise, empty if there is none."""
         path = self.folder / "text.md"
         return path.read_text(encoding="utf-8") if path.is_file() else ""

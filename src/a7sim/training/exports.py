@@ -1,4 +1,4 @@
-"""Grades for other programs: nbgrader's columns, one JSON document, xAPI statements as JSON lines."""
+"""Exports of grades: nbgrader's columns, one JSON document, xAPI statements as JSON lines."""
 
 import uuid
 from collections.abc import Mapping, Sequence
@@ -27,17 +27,17 @@ NBGRADER_COLUMNS = (
 """Of the CSV that `nbgrader export` writes."""
 
 HOME_PAGE = "http://localhost/a7sim"
-"""Where the accounts of students are said to be, unless a teacher names a place."""
+"""Home page of the students' accounts unless the teacher names one."""
 
 _VERB = "http://adlnet.gov/expapi/verbs/"
 _STATEMENTS = uuid.UUID("5d9cfd3b-3a61-5c7e-9a53-7b6a7d1f0a07")
-"""Namespace of the statements' ids, so that the same grade is the same statement whenever it is told."""
+"""Namespace of the statements' ids, so that the same grade is always the same statement."""
 
 _EXTENSIONS = "http://localhost/a7sim/xapi"
 
 
 def to_nbgrader(best: Mapping[tuple[str, str], GradeRecord]) -> str:
-    """Return best grades as CSV in the columns of nbgrader. Hints are taken off; names and due dates are not known."""
+    """Return best grades as CSV in the columns of nbgrader. Hints are deducted; names and due dates are unknown."""
     rows: list[list[str | float | None]] = []
     for (student, exercise), each in sorted(best.items()):
         points = each.grade.points
@@ -74,7 +74,7 @@ def _told(each: GradeRecord) -> Document:
 
 
 def to_xapi(graded: Sequence[GradeRecord], home_page: str = HOME_PAGE) -> str:
-    """Return grades as xAPI statements, a JSON object a line."""
+    """Return grades as xAPI statements, one JSON object per line."""
     return "".join(msgspec.json.encode(_statement(each, home_page)).decode() + "\n" for each in graded)
 
 

@@ -1,4 +1,4 @@
-"""Computation forms of the numerical relative orientation: what every parallax is multiplied by at regular points."""
+"""Computation forms of numerical relative orientation: multipliers of the parallaxes at regular points."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES, PLACES
 
 FIVE = ("kappa1", "kappa2", "phi1", "phi2", "omega1")
-"""What swing-swing turns, 1 for the left-hand photograph."""
+"""Elements of swing-swing, 1 for the left-hand photograph."""
 
 
 def multipliers(scenario: Scenario, case: str) -> Array:
-    """Return by how many gon each mm of parallax corrects the five elements ``(5, n)``, at the points of a case.
+    """Return the corrections in gon of the five elements per mm of parallax ``(5, n)``, at the points of a case.
 
-    They are the least-squares solution of T 2.34 for points that lie regularly below vertical photographs.
+    They are the least-squares solution of T 2.34 for regular points below vertical photographs.
     """
     plan = scenario.plan
     width = plan.half_width * plan.projection_height / scenario.camera.c
@@ -26,7 +26,7 @@ def multipliers(scenario: Scenario, case: str) -> Array:
 
 
 def computation_form(scenario: Scenario, case: str) -> str:
-    """Return the form of a case as plain text: a line for every point, to be filled in."""
+    """Return the form of a case as plain text: one line per point to be filled in."""
     heads = ("kappa'", 'kappa"', "phi'", 'phi"', "omega'")
     lines = [
         f"Numerical relative orientation, case {case}: kappa', kappa\", phi', phi\", omega'",

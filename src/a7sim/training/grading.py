@@ -1,4 +1,4 @@
-"""Grading an attempt: its journal is worked again, and every criterion gets a band, points and a reason."""
+"""Grading of an attempt: its journal is replayed, and each criterion gets a band, points and a reason."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from a7sim.training.handouts import make_handout
 from a7sim.training.metrics import MetricResult, make_metric
 
 JUST_PASSED = 0.6
-"""Share of its weight that a criterion earns at the limit of its pass band; from there it rises to all of it."""
+"""Share of its weight that a criterion earns at the limit of its pass band; above, it rises to the whole weight."""
 
 EXCELLENT, PASSED, FAILED = "excellent", "pass", "fail"
 
 
 class CriterionResult(msgspec.Struct, frozen=True):
-    """A criterion as it was graded."""
+    """Criterion with its grade."""
 
     id: str
     title: str
@@ -40,25 +40,25 @@ class CriterionResult(msgspec.Struct, frozen=True):
 
     @property
     def lost(self) -> float:
-        """Return the points that it cost."""
+        """Return the lost points."""
         return round(self.weight - self.points, 1)
 
     @property
     def sentence(self) -> str:
-        """Return the reason, what it cost, and what to do about it."""
+        """Return the reason, its cost, and the advice."""
         if self.band == EXCELLENT:
             return f"{self.reason}: {self.points:+g}"
         return f"{self.reason}: -{self.lost:g}. {self.feedback}"
 
 
 class Grade(msgspec.Struct, frozen=True):
-    """An attempt as it was graded."""
+    """Grade of an attempt."""
 
     exercise: str
     title: str
     passed: bool
     points: float
-    """What is left of 100 after hints."""
+    """Remainder of 100 after hints."""
     pass_points: float
     hints: int
     hint_points: float
@@ -67,25 +67,25 @@ class Grade(msgspec.Struct, frozen=True):
 
     @property
     def failed(self) -> list[CriterionResult]:
-        """Return the criteria that were failed."""
+        """Return the failed criteria."""
         return [each for each in self.marks if each.band == FAILED]
 
 
 @dataclass(frozen=True)
 class HintsTaken:
-    """How many hints were asked for, and what they cost."""
+    """Number of hints, and their cost."""
 
     number: int = 0
     cost: float = 0.0
 
 
 def grade_record(record: AttemptRecord, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
-    """Grade an account."""
+    """Return the grade of a record."""
     return grade_by(record.exercise, evaluate_metrics(record), record.seconds, hints, shelved_name)
 
 
 def evaluate_metrics(record: AttemptRecord) -> list[MetricResult]:
-    """Return what the measure of every criterion comes to, in their order."""
+    """Return the results of the metrics of all criteria, in order."""
     return [make_metric(each).evaluate(record) for each in record.exercise.criteria]
 
 
@@ -96,7 +96,7 @@ def grade_by(
     hints: HintsTaken | None = None,
     shelved_name: str = "",
 ) -> Grade:
-    """Grade what the measures of an exercise's criteria came to in an attempt of so many simulated s."""
+    """Return the grade for the metrics' results of an attempt that took this many simulated s."""
     hints = hints or HintsTaken()
     marks = [grade_criterion(criterion, value) for criterion, value in zip(exercise.criteria, found, strict=True)]
     earned = round(max(0.0, sum(each.points for each in marks) - hints.cost), 1)
@@ -115,7 +115,7 @@ def grade_by(
 
 
 def grade_criterion(criterion: Criterion, found: MetricResult) -> CriterionResult:
-    """Return a criterion with its band and points by what its measure came to."""
+    """Return a criterion with its band and points by the result of its metric."""
     measure = make_metric(criterion)
     value = found.value
     if measure.meets(value, criterion.excellent):
@@ -143,12 +143,12 @@ def grade_criterion(criterion: Criterion, found: MetricResult) -> CriterionResul
 
 
 def grade_folder(exercise_folder: ExerciseFolder, seed: int, folder: Path, hints: HintsTaken | None = None) -> Grade:
-    """Grade the attempt in a folder. Raises Unreliable for a journal that cannot be relied on."""
+    """Return the grade of the attempt in a folder. Raises UnreliableJournalError for an unreliable journal."""
     return grade_record(load_record(exercise_folder, seed, folder), hints, exercise_folder.name)
 
 
 def load_record(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> AttemptRecord:
-    """Return the account of the attempt in a folder, by working it again. Raises Unreliable."""
+    """Return the record of the attempt in a folder by replaying it. Raises UnreliableJournalError."""
     try:
         environment = replay_environment(exercise_folder, seed, read_journal(folder / JOURNAL))
     except UnreliableJournalError:
@@ -159,14 +159,14 @@ def load_record(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> Att
 
 
 def make_record(environment: AttemptEnvironment, written: dict[str, str] | None = None) -> AttemptRecord:
-    """Return the account of an attempt with what was answered on paper, and what its maker of papers knows."""
+    """Return the record of an attempt with the answers on paper, and the hidden values of its handouts."""
     exercise = environment.exercise_folder.exercise
     hidden = make_handout(exercise.handout, environment.scenario, environment.seed, exercise.handout_options).hidden
     return environment.record(written, dict(hidden))
 
 
 def grade_lines(grade: Grade) -> Sequence[str]:
-    """Return a grade for people, a line each: the verdict, then every criterion."""
+    """Return a grade as lines of text: the verdict, then each criterion."""
     verdict = "passed" if grade.passed else "not passed"
     lines = [f"{grade.title}: {verdict}, {grade.points:g} of {FULL_MARKS:g} points"]
     if grade.hints:

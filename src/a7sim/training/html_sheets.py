@@ -1,4 +1,4 @@
-"""The student's sheet and the class sheet, each one page of HTML that needs nothing beside it."""
+"""Pages of a student and of a class, each one self-contained HTML file."""
 
 from collections.abc import Mapping, Sequence
 from statistics import median
@@ -18,7 +18,7 @@ Best = Mapping[tuple[str, str], GradeRecord]
 
 
 def student_sheet(student: str, catalogue: Sequence[ExerciseFolder], best: Best, graded: Sequence[GradeRecord]) -> str:
-    """Return the sheet of a student: where they stand, and for every exercise what to do better."""
+    """Return the page of a student: results, and advice for each exercise."""
     mine = {exercise: each for (name, exercise), each in best.items() if name == student}
     passed = sum(each.grade.passed for each in mine.values())
     lead: list[Part] = [Paragraph(f"{passed} of {pluralize(len(catalogue), 'exercise')} passed, {len(mine)} tried.")]
@@ -85,14 +85,14 @@ def _points(catalogue: Sequence[ExerciseFolder], mine: Mapping[str, GradeRecord]
 
 
 def _what_passes(axes: "Axes", catalogue: Sequence[ExerciseFolder]) -> None:
-    """Draw the points with which each exercise is passed."""
+    """Draw the points required to pass each exercise."""
     for place, exercise_folder in enumerate(catalogue):
         limit = exercise_folder.exercise.pass_points
         axes.plot([place - 0.45, place + 0.45], [limit] * 2, ":", color=INK, linewidth=1.6)
 
 
 def class_sheet(catalogue: Sequence[ExerciseFolder], best: Best, attempts: Sequence[Attempt]) -> str:
-    """Return the sheet of a class: who stands where, and which mistakes are everybody's."""
+    """Return the page of a class: results, and frequent mistakes."""
     students = sorted({each.student for each in attempts})
     lead: list[Part] = [Paragraph(f"{pluralize(len(students), 'student')}, {pluralize(len(attempts), 'attempt')}.")]
     rows = [
@@ -115,7 +115,7 @@ def class_sheet(catalogue: Sequence[ExerciseFolder], best: Best, attempts: Seque
 
 
 def _passed(best: Best, students: Sequence[str], catalogue: Sequence[ExerciseFolder]) -> int:
-    """Return how many exercises of these were passed by these students, all together."""
+    """Return the total number of these exercises passed by these students."""
     grades = [best.get((student, exercise_folder.name)) for student in students for exercise_folder in catalogue]
     return sum(each is not None and each.grade.passed for each in grades)
 
@@ -130,9 +130,7 @@ def _spread(catalogue: Sequence[ExerciseFolder], best: Best) -> PageFigure:
     by_exercise = [[each.grade.points for (_, name), each in best.items() if name == s.name] for s in catalogue]
     numbers = [str(each.exercise.number) for each in catalogue]
     said = "; ".join(
-        f"exercise {n}: median {median(some):g} of {pluralize(len(some), 'student')}"
-        if some
-        else f"exercise {n}: nobody"
+        f"exercise {n}: median {median(some):g} of {pluralize(len(some), 'student')}" if some else f"exercise {n}: none"
         for n, some in zip(numbers, by_exercise, strict=True)
     )
     with drawing("spread", "Points of the class by exercise", said, size=(8.0, 3.6), wide=True) as drawn:

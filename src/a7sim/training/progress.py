@@ -18,7 +18,7 @@ from a7sim.training.variation import attempt_seed
 FILE = "progress.sqlite"
 
 BUSY_S = 15.0
-"""How long a console waits while another one writes."""
+"""Time in s that a console waits while another one writes."""
 
 PRACTICE, EXAM = "practice", "exam"
 
@@ -54,12 +54,12 @@ MIGRATIONS = (
     CREATE INDEX grade_of_attempt ON grade (attempt);
     """,
 )
-"""Each brings the file from one schema version to the next; the first, from an empty file to version 1."""
+"""Migrations of the file from one schema version to the next; the first from an empty file to version 1."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """An attempt at an exercise."""
+    """Attempt at an exercise."""
 
     id: int
     student: str
@@ -70,12 +70,12 @@ class Attempt:
     folder: Path
     begun: str
     closed: str | None
-    """When it was closed, as ISO 8601 in UTC; None while it is open."""
+    """Time of closing, as ISO 8601 in UTC; None while it is open."""
 
 
 @dataclass(frozen=True)
 class GradeRecord:
-    """A grade that was given, when, and for what."""
+    """Grade with its time and attempt."""
 
     attempt: Attempt
     at: str
@@ -87,7 +87,7 @@ def _now() -> str:
 
 
 class Progress:
-    """The progress kept in a folder, with the attempts' own folders beside it."""
+    """Progress in a folder, with the attempts' folders beside it."""
 
     def __init__(self, home: Path) -> None:
         self.home = home
@@ -101,7 +101,7 @@ class Progress:
             raise A7SimError(f"{home / FILE}: expected a file of progress that can be used: {error}") from error
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._database.close()
 
     def __enter__(self) -> "Progress":
@@ -141,7 +141,7 @@ class Progress:
     def begin(
         self, student: str, exercise_folder: ExerciseFolder, mode: str = PRACTICE, seed: int | None = None
     ) -> Attempt:
-        """Begin a new attempt; one that is open is closed. Its folder is still to be made."""
+        """Start a new attempt; an open one is closed. Its folder does not exist yet."""
         name = exercise_folder.name
         with self._writing():
             self._close_open(student, name)
@@ -159,12 +159,12 @@ class Progress:
         return int(self._database.execute(query, values).fetchone()[0])
 
     def open_attempt(self, student: str, exercise: str) -> Attempt | None:
-        """Return the attempt that a student left open."""
+        """Return the open attempt of a student."""
         found = self._attempts("student = ? AND exercise = ? AND closed IS NULL", student, exercise)
         return found[-1] if found else None
 
     def last(self, student: str, exercise: str | None = None) -> Attempt:
-        """Return a student's last attempt, at an exercise or at all. Raises Mistake where there is none."""
+        """Return a student's last attempt, at an exercise or at all. Raises A7SimError if there is none."""
         found = (
             self._attempts("student = ? AND exercise = ?", student, exercise)
             if exercise
@@ -178,7 +178,7 @@ class Progress:
         return found[-1]
 
     def attempts(self, student: str | None = None) -> list[Attempt]:
-        """Return the attempts of a student, or of all, in the order in which they were begun."""
+        """Return the attempts of a student, or of all, in order of their start."""
         return self._attempts("student = ?", student) if student else self._attempts("1 = 1")
 
     def _attempts(self, condition: str, *values: object) -> list[Attempt]:
@@ -190,7 +190,7 @@ class Progress:
         ]
 
     def end(self, attempt: Attempt) -> None:
-        """Close an attempt: it is kept, and the next one begins anew."""
+        """Close an attempt: it is kept, and the next one starts anew."""
         with self._writing():
             self._close_open(attempt.student, attempt.exercise)
 
@@ -203,9 +203,9 @@ class Progress:
     # --- hints and grades -----------------------------------------------------------------------------
 
     def next_hint(self, attempt: Attempt, exercise: Exercise) -> tuple[int, Hint]:
-        """Return the next hint and its number, counted from 1, and record that it was given.
+        """Return the next hint and its number, counted from 1, and record it.
 
-        Raises Mistake in an exam, and where all were given.
+        Raises A7SimError in an exam, and if all hints were given.
         """
         if attempt.mode == EXAM:
             raise A7SimError(f"{attempt.exercise}: expected an attempt for practice, got an exam: there are no hints")
@@ -218,13 +218,13 @@ class Progress:
         return given + 1, hint
 
     def hints_taken(self, attempt: Attempt) -> HintsTaken:
-        """Return how many hints were given in an attempt, and what they cost."""
+        """Return the number of hints of an attempt, and their cost."""
         query = "SELECT count(*), coalesce(sum(cost), 0) FROM hint WHERE attempt = ?"
         number, cost = self._database.execute(query, (attempt.id,)).fetchone()
         return HintsTaken(int(number), float(cost))
 
     def record_grade(self, attempt: Attempt, grade: Grade) -> None:
-        """Record a grade; an exam is over with it."""
+        """Record a grade; it ends an exam."""
         with self._writing():
             self._database.execute(
                 "INSERT INTO grade (attempt, at, points, passed, document) VALUES (?, ?, ?, ?, ?)",
@@ -234,14 +234,14 @@ class Progress:
                 self._close_open(attempt.student, attempt.exercise)
 
     def first_grade(self, attempt: Attempt) -> Grade | None:
-        """Return the grade that an attempt was given first, None where it has none."""
+        """Return the first grade of an attempt, None if there is none."""
         row = self._database.execute(
             "SELECT document FROM grade WHERE attempt = ? ORDER BY id", (attempt.id,)
         ).fetchone()
         return msgspec.json.decode(row[0], type=Grade) if row else None
 
     def grades(self, student: str | None = None) -> list[GradeRecord]:
-        """Return the grades of a student, or of all, in the order in which they were given."""
+        """Return the grades of a student, or of all, in their order."""
         attempts = {each.id: each for each in self.attempts(student)}
         rows = self._database.execute("SELECT attempt, at, document FROM grade ORDER BY id")
         return [
@@ -251,7 +251,7 @@ class Progress:
         ]
 
     def best(self, student: str | None = None) -> dict[tuple[str, str], GradeRecord]:
-        """Return the best grade by student and exercise; one that passed before any that did not."""
+        """Return the best grade by student and exercise; a passed one precedes any that is not."""
         best: dict[tuple[str, str], GradeRecord] = {}
         for each in self.grades(student):
             key = each.attempt.student, each.attempt.exercise

@@ -1,4 +1,4 @@
-"""Attempts that a class has handed in as folders, graded on all cores."""
+"""Attempts handed in by a class as folders, graded on all cores."""
 
 import os
 from collections.abc import Sequence
@@ -17,11 +17,11 @@ from a7sim.training.grading import Grade, HintsTaken, grade_folder
 from a7sim.training.variation import attempt_seed
 
 ALONE = 8
-"""So many are graded before other processes could begin."""
+"""Number of attempts graded before other processes start."""
 
 
 class Submission(msgspec.Struct, frozen=True):
-    """What came of an attempt that was handed in: its grade, or why it has none."""
+    """Result of an attempt that was handed in: its grade, or the reason why it has none."""
 
     folder: str
     student: str = ""
@@ -31,7 +31,7 @@ class Submission(msgspec.Struct, frozen=True):
 
 
 def find_submissions(folders: Sequence[Path]) -> list[Path]:
-    """Return the folders of attempts: those named, or where there is no journal those within them that have one."""
+    """Return the folders of attempts: the named ones, or those within them that contain a journal."""
     found: list[Path] = []
     for folder in folders:
         within = [] if (folder / JOURNAL).exists() else sorted(path.parent for path in folder.rglob(JOURNAL))
@@ -42,7 +42,7 @@ def find_submissions(folders: Sequence[Path]) -> list[Path]:
 def grade_submissions(folders: Sequence[Path], seed: int | None = None, workers: int | None = None) -> list[Submission]:
     """Grade the attempts in folders, each by its journal alone, in their order.
 
-    Their seeds are those of the students whom their journals name, unless one is given.
+    Their seeds are those of the students named in their journals, unless one is given.
     """
     grade = partial(grade_submission, seed=seed)
     workers = min(workers or os.cpu_count() or 1, len(folders))
@@ -53,7 +53,7 @@ def grade_submissions(folders: Sequence[Path], seed: int | None = None, workers:
 
 
 def grade_submission(folder: Path, seed: int | None = None) -> Submission:
-    """Grade the attempt in a folder; a journal that cannot be relied on gets no grade."""
+    """Grade the attempt in a folder; an unreliable journal gets no grade."""
     try:
         exercise, student, mode = attempt_mode(folder)
     except A7SimError as error:

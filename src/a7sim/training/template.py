@@ -1,24 +1,31 @@
-"""The skeleton of a new exercise, which `check` goes through and says what is still missing."""
+"""Template of a new exercise; `check-exercise` lists what is missing."""
 
 from pathlib import Path
 
 from a7sim.errors import A7SimError
 from a7sim.training.catalogue import FILE
 
+GOAL = "State the task in one or two sentences."
+TEXT = "State in plain words what the student learns and does."
+FEEDBACK = "State how to do better."
+HINT = "A small hint."
+PLACEHOLDERS = frozenset({GOAL, TEXT, FEEDBACK, HINT})
+"""Texts of the template that the author has to replace; `check-exercise` reports each that is left."""
+
 _EXERCISE = """\
 schema_version = 1
 number = {number}
 title = "{title}"
-goal = "Say in a sentence or two what is to be done."
+goal = "{goal}"
 scenario = "akwanga"
 minutes = 30
 reference = {{ script = "reference.a7s" }}
 
-# What is done at the instrument before the student sits down; leave it out where they begin at nothing.
+# Actions at the instrument before the student starts; leave it out to start at zero.
 [opening]
 script = "opening.a7s"
 
-# Values of the scenario by path, instead of its own, and what of it every seed draws anew within so much.
+# Values of the scenario by path, and values that each seed draws anew within a tolerance.
 [settings]
 "instrument.laying_sigma_mm" = 0.0
 "instrument.laying_sigma_gon" = 0.0
@@ -34,34 +41,34 @@ done = 0
 
 [[criterion]]
 id = "complete"
-title = "all readings are there"
+title = "all readings are made"
 measure = "missing-readings"
 options = {{ points = ["1"], each = 2 }}
 excellent = 0
 pass = 0
 weight = 50
-feedback = "Say what to do better."
+feedback = "{feedback}"
 
 [[criterion]]
 id = "pointed"
-title = "the mark stands on the point"
+title = "the mark is on the point"
 measure = "beside-the-point"
 options = {{ points = ["1"], eye = 1 }}
 excellent = 12
 pass = 30
 weight = 50
-feedback = "Say what to do better."
+feedback = "{feedback}"
 
 # Two hints or more.
 [[hint]]
-text = "A small hint."
+text = "{hint}"
 cost = 2
 
-# Two faulty scripts or more, each with the criterion that must fail and why.
+# Two faulty scripts or more, each with the criterion that must fail and the reason.
 [[faulty]]
 script = "faulty-once.a7s"
 fails = "complete"
-why = "Point 1 is registered once only."
+why = "Point 1 is registered only once."
 """
 
 _OPENING = """\
@@ -78,7 +85,7 @@ DRIV:X 1.00;Y -2.00;Z -330.00
 _REFERENCE = """\
 scenario akwanga seed 1
 
-# Say what is done and why. `a7sim train start FOLDER --script reference.a7s` plays it.
+# Describe the steps and their reasons. `a7sim train start FOLDER --script reference.a7s` runs it.
 REC "1011"
 WHE:X -0.50
 WHE:X 0.50
@@ -88,13 +95,13 @@ REC "1011"
 _FAULTY = """\
 scenario akwanga seed 1
 
-# By mistake point 1 is registered once only.
+# By mistake point 1 is registered only once.
 REC "1011"
 """
 
 
 def write_template(folder: Path, number: int) -> Path:
-    """Write the skeleton of an exercise into a new folder and return it. Raises Mistake where that cannot be done."""
+    """Write the template of an exercise into a new folder and return it. Raises A7SimError if that fails."""
     title = folder.name.lstrip("0123456789-_").replace("-", " ").strip().capitalize() or "A new exercise"
     try:
         folder.mkdir(parents=True)
@@ -102,8 +109,8 @@ def write_template(folder: Path, number: int) -> Path:
         raise A7SimError(f"{folder}: expected a folder that does not exist yet: {error.strerror}") from error
     escaped = title.replace("\\", "\\\\").replace('"', '\\"')
     texts = {
-        FILE: _EXERCISE.format(number=number, title=escaped),
-        "text.md": f"# {title}\n\nSay in plain words what there is to learn, and what to do.\n",
+        FILE: _EXERCISE.format(number=number, title=escaped, goal=GOAL, feedback=FEEDBACK, hint=HINT),
+        "text.md": f"# {title}\n\n{TEXT}\n",
         "opening.a7s": _OPENING,
         "reference.a7s": _REFERENCE,
         "faulty-once.a7s": _FAULTY,

@@ -1,4 +1,4 @@
-"""A scenario of each student's own: what of an exercise's scenario the seed draws anew."""
+"""Scenario of each student: values of an exercise's scenario that the seed draws anew."""
 
 import hashlib
 from collections.abc import Mapping
@@ -12,21 +12,21 @@ from a7sim.scenario import Scenario, load_scenario
 from a7sim.training.exercise import ExerciseFolder
 
 TRAINING_STREAM = 7
-"""Spawn key of what exercises vary, beside those of scene, instrument and operator."""
+"""Spawn key of the variations of exercises, beside those of scene, instrument and operator."""
 
 _DECIMALS = 4
 
 
 def attempt_seed(student: str, exercise: str, mode: str = "practice") -> int:
-    """Return the seed of a student's exercise: neighbours have different ones, and an exam has another again."""
+    """Return the seed of a student's exercise: different for each student, and another one for an exam."""
     digest = hashlib.sha256("\0".join((student, exercise, mode)).encode("utf-8", "surrogatepass")).digest()
     return int.from_bytes(digest[:4])
 
 
 def scenario_for(exercise_folder: ExerciseFolder, seed: int, observer: Mapping[str, Any] | None = None) -> Scenario:
-    """Return the scenario of an exercise as a seed draws it. Raises Mistake for settings that do not fit.
+    """Return the scenario of an exercise as a seed draws it. Raises A7SimError for invalid settings.
 
-    `observer` says who the virtual operator is, where one plays.
+    `observer` overrides the virtual operator.
     """
     exercise = exercise_folder.exercise
     beside = exercise_folder.folder / exercise.scenario
@@ -62,7 +62,7 @@ def _at(data: Any, path: str) -> float:
 
 
 def to_toml(value: Any) -> str:
-    """Return a value as TOML writes it."""
+    """Return a value in TOML notation."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key} = {to_toml(each)}" for key, each in value.items()) + "}"
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Papers that exercises put into students' hands."""
+"""Handouts of exercises."""
 
 from a7sim.training.handouts import control, job_sheet, model_sheets, orientation_forms, slipped_book
 from a7sim.training.handouts.base import HANDOUTS, Handout, make_handout

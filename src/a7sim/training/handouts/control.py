@@ -1,4 +1,4 @@
-"""The list of ground control that an operator is given."""
+"""List of ground control for the operator."""
 
 import math
 
@@ -14,12 +14,12 @@ COLUMNS = ("point", "X", "Y", "Z", "role")
 
 @handout("control")
 def control(scenario: Scenario, seed: int, points: list[str] | None = None) -> Handout:
-    """Make the list of ground control, of the points named or of all."""
+    """Return the list of ground control, of the named points or of all."""
     return Handout({"control.csv": control_csv(given_control(scenario, build_scene(scenario, seed)), points)})
 
 
 def control_csv(given: Ground, points: list[str] | None = None) -> str:
-    """Return ground control as CSV, m; empty where something is not given."""
+    """Return ground control as CSV, m; empty where a coordinate is not given."""
     places = zip(given.points, given.coordinates.T.tolist(), given.roles, strict=True)
     rows = [
         (name, *("" if math.isnan(each) else f"{each:.2f}" for each in place), role)

@@ -1,4 +1,4 @@
-"""The job sheet of a model: what whoever sets it up is told, and nothing of the truth."""
+"""Job sheet of a model, without any truth."""
 
 from a7sim.operator import Job, ModelJob
 from a7sim.scenario import Scenario
@@ -11,7 +11,7 @@ JOB = "job.txt"
 
 @handout("job sheet")
 def job_sheet(scenario: Scenario, seed: int, model: str = "1") -> Handout:
-    """Make the job sheet of a model."""
+    """Return the job sheet of a model."""
     job = make_job(scenario, build_scene(scenario, seed))
     ordered = next(each for each in job.models if each.name == model)
     return Handout({JOB: "\n".join([*_of_model(job, ordered), *_of_camera(scenario), *_of_plan(job), ""])})

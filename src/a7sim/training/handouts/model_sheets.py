@@ -1,4 +1,4 @@
-"""Sheets of independent models: what stood on the counters at points and centres, one figure of them misread."""
+"""Sheets of independent models: counter readings at points and centres, with one misread number."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ SHEETS, CONTROL = "models.csv", "control.csv"
 COLUMNS = ("model", "point", "X", "Y", "Z")
 
 HANDOUT_STREAM = (7, 1)
-"""Spawn key of what is misread, after those of what exercises vary."""
+"""Spawn key of the misreading, after those of the variations of exercises."""
 
 MISREAD_MM = (0.8, 1.6)
-"""By how much, in the model: a wrong digit of a drum."""
+"""Size in the model: a wrong digit of a drum."""
 
 
 @dataclass(frozen=True)
 class Misread:
-    """A figure on the sheets that is not what the counter showed."""
+    """Number on the sheets that differs from the counter."""
 
     model: str
     point: str
@@ -40,7 +40,7 @@ class Misread:
     """mm in the model."""
 
     def on(self, models: Sequence[Model]) -> list[Model]:
-        """Return the models with it."""
+        """Return the models with the misreading."""
         return [self._on(model) if model.name == self.model else model for model in models]
 
     def _on(self, model: Model) -> Model:
@@ -51,10 +51,10 @@ class Misread:
 
 @handout("model sheets")
 def model_sheets(scenario: Scenario, seed: int, wanted: list[str]) -> Handout:
-    """Make sheets of a strip's models in counter readings, and keep back what the strip comes to without the slip.
+    """Return sheets of a strip's models in counter readings, and as hidden values the strip without the slip.
 
-    The models are those of a comparator with the scenario's observer, brought to the scale and the presets of the
-    plan. Kept back are `bad`, `ties`, `scale`, and x, y and z of the `wanted` points in m.
+    The models are those of a comparator with the scenario's observer, at the scale and the presets of the plan. Hidden
+    are `bad`, `ties`, `scale`, and x, y and z of the `wanted` points in m.
     """
     scene = build_scene(scenario, seed)
     models = [_in_instrument(each, scenario) for each in strip_by_comparator(scenario, scene, seed).models]
@@ -73,7 +73,7 @@ def model_sheets(scenario: Scenario, seed: int, wanted: list[str]) -> Handout:
 
 
 def add_misreading(models: Sequence[Model], given: Ground, seed: int) -> Misread:
-    """Return a slip that the joins show: its point has by far the largest closing difference. Raises Mistake."""
+    """Return a slip that the joins reveal: its point has by far the largest closing difference. Raises A7SimError."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=HANDOUT_STREAM))
     candidates: list[Misread] = [
         Misread(after.name, name, axis, float(sign * round(rng.uniform(*MISREAD_MM), 2)))
@@ -100,12 +100,12 @@ def _stands_out(slip: Misread, models: Sequence[Model]) -> bool:
 
 
 def common_points(before: Model, after: Model) -> list[str]:
-    """Return the names of what two models have in common, their centre among them."""
+    """Return the names of the common points of two models, including their centre."""
     return [name for name in before.points if name in after.points]
 
 
 def _in_instrument(model: Model, scenario: Scenario) -> Model:
-    """Return a model at the scale of the plan, with what the plan presets at its first standard point, mm."""
+    """Return a model at the scale of the plan, with the plan's presets at its first standard point, mm."""
     left, right = (model.at([name])[:, 0] for name in model.centres)
     larger = scenario.plan.bx / float(length_of(right - left))
     first = model.at([f"{model.centres[0].partition(':')[0]}1"])

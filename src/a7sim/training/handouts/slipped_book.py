@@ -1,4 +1,4 @@
-"""Somebody else's book of a relative orientation, with one of seven slips in it, for who is to find it."""
+"""Observation book of a relative orientation with one of seven slips, which the student has to find."""
 
 import csv
 import io
@@ -31,15 +31,15 @@ ROUNDS = 2
 MEASURING = ("by1", "by2")
 
 PLAINLY_MM = 0.05
-"""Readings that slips of sign and digits befall are larger: smaller ones tell little."""
+"""Minimum size of readings for slips of sign and digits: smaller ones reveal little."""
 
 _SLIPS = 1
-"""Spawn key of the slip, beside what the scenario varies."""
+"""Spawn key of the slip, beside those of the scenario's variation."""
 
 
 @dataclass(frozen=True)
 class BookLine:
-    """A line of the fair copy."""
+    """Line of the fair copy."""
 
     entry: int
     form: str
@@ -50,13 +50,13 @@ class BookLine:
 
     @property
     def is_reading(self) -> bool:
-        """Whether it is what a drum showed where a parallax was cleared."""
+        """Return whether it is a drum reading of a cleared parallax."""
         return self.item in MEASURING
 
 
 @dataclass(frozen=True)
 class Slipped:
-    """A copy of a line with a slip in it, and what belongs there."""
+    """Copy of a line with a slip, and the right value."""
 
     line: BookLine
     right: Sequence[str]
@@ -64,7 +64,7 @@ class Slipped:
 
 @handout("book with a slip")
 def book_with_slip(scenario: Scenario, seed: int, kind: str = "") -> Handout:
-    """Return the fair copy of an operator's book in which one slip was made, of a kind that the seed draws."""
+    """Return the fair copy of an operator's book with one slip of a kind that the seed draws."""
     kinds: tuple[str, ...] = get_args(SlipKind)
     if kind and kind not in kinds:
         raise A7SimError(f"handout_options.kind: expected one of {', '.join(kinds)}, got {kind!r}")
@@ -82,7 +82,7 @@ def book_with_slip(scenario: Scenario, seed: int, kind: str = "") -> Handout:
 
 @dataclass(frozen=True)
 class _Round:
-    """A round as it was worked: elements before and after, and the book's entries at its points."""
+    """Round of the session: elements before and after, and the book's entries at its points."""
 
     before: Mapping[str, float]
     after: Mapping[str, float]
@@ -117,7 +117,7 @@ def _worked(scenario: Scenario, seed: int) -> tuple[ProcedureContext, list[_Roun
 
 
 def _copied(seated: ProcedureContext, rounds: Sequence[_Round]) -> list[BookLine]:
-    """Return the fair copy without any slip: fittings, and the rounds with their sums."""
+    """Return the fair copy without a slip: fittings, and the rounds with their sums."""
     model, lines = seated.model, list[BookLine]()
 
     def write(form: str, round_: int, point: str, item: str, reading: str) -> None:

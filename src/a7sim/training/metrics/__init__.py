@@ -1,4 +1,4 @@
-"""The measures that exercises are graded by."""
+"""Metrics of the exercises' criteria."""
 
 from a7sim.training.metrics import actions, answers, centres, clearing, grid, ground, numerical, readings, truth
 from a7sim.training.metrics.base import MEASURES, Metric, MetricResult, make_metric

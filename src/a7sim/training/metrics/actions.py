@@ -1,4 +1,4 @@
-"""Measures of what was done, by what is seen at the link: order, levers, what was left alone, time."""
+"""Metrics of actions at the link: order, fittings, unchanged elements, time."""
 
 import msgspec
 from msgspec import field
@@ -22,14 +22,14 @@ from a7sim.training.metrics.base import (
 
 @register_metric("out-of-order")
 class ActionsOutOfOrder(Metric, frozen=True, kw_only=True):
-    """How many deeds of a procedure are missing or came too early: in each of some chains, its own order.
+    """Number of actions of a procedure that are missing or too early, in each of some sequences.
 
-    Deeds are written 'load 1', 'fiducials 1', 'centre 1', 'set c1', 'turn by1', 'record 3': what, and of what where it
-    matters; 'move X' is any way of moving it, 'adjust by1' setting or turning it. The last deed of a kind counts, or
-    the first where it ends in '!'.
+    Actions are written 'load 1', 'fiducials 1', 'centre 1', 'set c1', 'turn by1', 'record 3': the action, and its
+    object if it matters; 'move X' is any movement of it, 'adjust by1' setting or turning it. The last action of a kind
+    counts, or the first if it ends in '!'.
     """
 
-    unit = "deeds"
+    unit = "actions"
     chains: list[list[str]]
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
@@ -68,7 +68,7 @@ def _plainly(deed: str) -> str:
 
 @register_metric("run-by-motor")
 class MotorDrivenReadings(Metric, frozen=True, kw_only=True):
-    """How many registrations were made with a carriage that was last run there, not turned there by hand."""
+    """Number of registrations with a carriage that was last driven by motor rather than turned by hand."""
 
     unit = "registrations"
     handles: list[str]
@@ -90,7 +90,7 @@ class MotorDrivenReadings(Metric, frozen=True, kw_only=True):
 
 @register_metric("handles-moved")
 class MovedElements(Metric, frozen=True, kw_only=True):
-    """How many elements do not stand in the end where the opening left them."""
+    """Number of elements that finally differ from their positions after the opening."""
 
     unit = "elements"
     handles: list[str]
@@ -112,7 +112,7 @@ class MovedElements(Metric, frozen=True, kw_only=True):
 
 @register_metric("not-looked")
 class UnviewedPoints(Metric, frozen=True, kw_only=True):
-    """How many points were registered without a look through an eyepiece since the last lever was put over."""
+    """Number of points registered without a look through an eyepiece since the last change of a fitting."""
 
     unit = "points"
     points: list[str]
@@ -127,18 +127,18 @@ class UnviewedPoints(Metric, frozen=True, kw_only=True):
             levers = [each.index for each in before if each.what in ("fit", "base", "load")]
             if not readings or max(looks, default=-1) < max(levers, default=0):
                 blind.append(point)
-        told = f"at {join_words(blind)} nobody looked after the last lever" if blind else "looked every time"
+        told = f"at {join_words(blind)} without a look after the last fitting" if blind else "looked every time"
         return MetricResult(float(len(blind)), told)
 
 
 @register_metric("minutes")
 class Minutes(Metric, frozen=True, kw_only=True):
-    """Minutes at the simulated clock since the student sat down."""
+    """Minutes on the simulated clock since the start of the student's work."""
 
     unit = "min"
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return them."""
+        """Return the minutes."""
         minutes = record.seconds / 60.0
         return MetricResult(
             round(minutes, 2), f"{minutes:.1f} of {record.exercise.minutes:g} minutes at the instrument's clock"
@@ -147,13 +147,13 @@ class Minutes(Metric, frozen=True, kw_only=True):
 
 @register_metric("element-off")
 class ElementDeviation(Metric, frozen=True, kw_only=True):
-    """The largest difference of elements, or counters, from what they should show in the end."""
+    """Largest final difference of elements, or counters, from their required readings."""
 
     unit = "mm or gon"
     wanted: dict[str, float]
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         shown = {
             name: record.autograph.counter(name) if name in AXES else record.autograph.element(name)
             for name in self.wanted
@@ -171,9 +171,9 @@ class ElementDeviation(Metric, frozen=True, kw_only=True):
 
 @register_metric("wrong-fittings")
 class WrongFittings(Metric, frozen=True, kw_only=True):
-    """How many fittings do not belong to the pictures and the base: in the end, or at the registrations of a point.
+    """Number of fittings that do not fit the pictures and the base: at the end, or at the registrations of a point.
 
-    Base and picture as they are, unless they are named.
+    Base and pictures as they are, unless they are named.
     """
 
     unit = "fittings"
@@ -181,12 +181,12 @@ class WrongFittings(Metric, frozen=True, kw_only=True):
     base: str = ""
     polarity: str = ""
     pictures: list[str] = field(default_factory=list)
-    """What must lie in the left and the right projector; what else lies there is counted too."""
+    """Required pictures in the left and the right projector; a wrong picture counts, too."""
     by_job: bool = False
     """Whether base and pictures must be those of the exercise's model on the job sheet."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return their number, the base counted where it is not as it should be."""
+        """Return their number; a wrong base counts."""
         if self.by_job:
             return self._as_ordered(record.model).evaluate(record)
         autograph = record.autograph
@@ -211,6 +211,6 @@ class WrongFittings(Metric, frozen=True, kw_only=True):
         return MetricResult(float(len(wrong)), f"{picture}: {join_words(wrong) if wrong else 'all is as it belongs'}")
 
     def _as_ordered(self, model: ModelJob) -> "WrongFittings":
-        """Return the measure with what the job sheet orders of a model."""
+        """Return the metric with the job sheet's requirements of a model."""
         pictures = [model.left, model.right] if model.left_projector == 1 else [model.right, model.left]
         return msgspec.structs.replace(self, base=model.base, polarity=model.polarity, pictures=pictures, by_job=False)

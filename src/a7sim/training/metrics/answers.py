@@ -1,4 +1,4 @@
-"""Measures of what was answered, at the instrument or on paper."""
+"""Metrics of answers, at the instrument or on paper."""
 
 import math
 from collections.abc import Sequence
@@ -14,11 +14,11 @@ from a7sim.training.metrics.truth import y_parallax_at
 
 @register_metric("not-answered")
 class MissingAnswers(Metric, frozen=True, kw_only=True):
-    """How many answers are missing."""
+    """Number of missing answers."""
 
     unit = "answers"
     keys: list[str] = field(default_factory=list)
-    """All that the exercise asks for, where none are named."""
+    """All answers of the exercise if none are named."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
@@ -30,20 +30,20 @@ class MissingAnswers(Metric, frozen=True, kw_only=True):
 
 @register_metric("answer-off")
 class AnswerDeviation(Metric, frozen=True, kw_only=True):
-    """How far a number that was answered is from the truth.
+    """Difference of an answered number from the truth.
 
-    `true` is 'play X' (of a carriage or an element, mm), 'parallax 3' (the y-parallax at a point as the instrument
-    stands in the end, um), or a number that the maker of the papers kept back.
+    `true` is 'play X' (of a carriage or an element, mm), 'parallax 3' (the y-parallax at a point at the end, um), or a
+    hidden value of the handout.
     """
 
     truth = True
     key: str
     true: str
     least: float = 0.0
-    """What can be read of it: no tolerance is below."""
+    """Smallest readable difference: no tolerance is smaller."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         answered = record.answers.get(self.key, "")
         try:
             number = float(answered)
@@ -62,21 +62,21 @@ class AnswerDeviation(Metric, frozen=True, kw_only=True):
         return float(record.hidden.get(self.true, math.nan))
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what can be read of it."""
+        """Return the smallest readable difference."""
         return self.least
 
 
 @register_metric("answers-off")
 class MaxAnswerDeviation(Metric, frozen=True, kw_only=True):
-    """The largest difference of several answered numbers from what the maker of the papers kept back."""
+    """Largest difference of several answered numbers from the hidden values of the handout."""
 
     truth = True
     keys: list[str]
     least: float = 0.0
-    """What can be read of them: no tolerance is below."""
+    """Smallest readable difference: no tolerance is smaller."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         off: dict[str, float] = {}
         for key in self.keys:
             try:
@@ -91,13 +91,13 @@ class MaxAnswerDeviation(Metric, frozen=True, kw_only=True):
         return MetricResult(round(off[worst], 4), f"{worst} was answered {record.answers[worst]}, the furthest off")
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what can be read of them."""
+        """Return the smallest readable difference."""
         return self.least
 
 
 @register_metric("answer-wrong")
 class WrongAnswers(Metric, frozen=True, kw_only=True):
-    """How many answers are not the words that the maker of the papers kept back under the same keys."""
+    """Number of answers that differ from the hidden words of the handout under the same keys."""
 
     unit = "answers"
     truth = True
@@ -119,7 +119,7 @@ class WrongAnswers(Metric, frozen=True, kw_only=True):
 
 @register_metric("place-by-scales")
 class PlaceByScales(Metric, frozen=True, kw_only=True):
-    """How far answered coordinates of a point are from what its registered scales give (P 3.1), mm."""
+    """Difference of answered coordinates of a point from those given by its registered scales (P 3.1), mm."""
 
     unit = "mm"
     point: str

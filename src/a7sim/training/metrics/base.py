@@ -1,4 +1,4 @@
-"""What a measure is: a small pure function of the account, with its options, its unit and its floor."""
+"""Metric: a pure function of the attempt record, with options, a unit and a floor."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ BEST_PARALLAX_UM = 2.2
 """Of one setting on vanishing y-parallax, at photo scale: the best of the organisations of 1960 (geometry.md)."""
 
 BEST_POINTING_UM = 2.8
-"""Of one monocular pointing: what the thesis's twenty centres ask for (decision 4)."""
+"""Of one monocular pointing: implied by the thesis's twenty centres (decision 4)."""
 
 BEST_HEIGHT_UM = 2.0
 """Of one setting of the mark on the ground, as x-parallax (decision 8)."""
@@ -24,51 +24,51 @@ BEST_FIDUCIAL_UM = 7.0
 """Of a fiducial against its collimating mark (decision 8)."""
 
 MAX_OF_SEVERAL = 2.5
-"""The largest of some tens of settings, in standard deviations."""
+"""Largest of some tens of settings, in standard deviations."""
 
 HALF_A_COUNT = 0.005
-"""mm and gon: nearer than this a counter shows no difference."""
+"""mm and gon: the resolution of a counter."""
 
 
 @dataclass(frozen=True)
 class MetricResult:
-    """What a measure came to: its value, None where there was nothing to measure, and why, in words with numbers."""
+    """Result of a metric: its value, None if there was nothing to measure, and the reason with numbers."""
 
     value: float | None
     reason: str
 
 
 class Metric(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A measure with its options. A smaller value is a better one, unless `more_is_better`."""
+    """Metric with its options. A smaller value is better, unless `more_is_better`."""
 
     unit: ClassVar[str] = ""
     truth: ClassVar[bool] = False
-    """Whether it looks at what cannot be seen at the link."""
+    """Whether it uses the truth, which is not available at the link."""
     more_is_better: ClassVar[bool] = False
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return what it comes to."""
+        """Return the value for a record."""
         raise NotImplementedError
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what nobody can be asked to stay below: what an eye and a least count allow."""
+        """Return the smallest achievable value, limited by the eye and the least count."""
         return 0.0
 
     def meets(self, value: float | None, limit: float) -> bool:
-        """Whether a value is as good as a limit."""
+        """Return whether a value reaches a limit."""
         if value is None:
             return False
         return value >= limit - 1e-9 if self.more_is_better else value <= limit + 1e-9
 
 
 MEASURES: dict[str, type[Metric]] = {}
-"""All measures by the names that exercises use."""
+"""All metrics by the names in exercises."""
 
 Kind = TypeVar("Kind", bound=type[Metric])
 
 
 def register_metric(name: str) -> Callable[[Kind], Kind]:
-    """Register a measure under a name."""
+    """Register a metric under a name."""
 
     def registered(kind: Kind) -> Kind:
         MEASURES[name] = kind
@@ -78,12 +78,12 @@ def register_metric(name: str) -> Callable[[Kind], Kind]:
 
 
 def make_metric(measured: MetricSpec) -> Metric:
-    """Return the measure of a step or a criterion. Raises msgspec.ValidationError for options that are none."""
+    """Return the metric of a checklist item or a criterion. Raises msgspec.ValidationError for invalid options."""
     return msgspec.convert(measured.options, MEASURES[measured.measure])
 
 
 def join_words(words: Iterable[object], most: int = 6) -> str:
-    """Return words as people list them, the first few."""
+    """Return the first few words as an enumeration."""
     all_words = [str(each) for each in words]
     shown = all_words[:most]
     if len(all_words) > most:
@@ -92,14 +92,14 @@ def join_words(words: Iterable[object], most: int = 6) -> str:
 
 
 def handle_label(handle: str) -> str:
-    """Return a handle as the field writes it: by', kappa\", X."""
+    """Return a control in the notation of the field: by', kappa", X."""
     if handle[-1:] in "12" and handle[:-1] in ("c", "kappa", "phi", "omega", "by", "bz"):
         return handle[:-1] + ("'" if handle.endswith("1") else '"')
     return handle
 
 
 def readings_with(record: AttemptRecord, element: str, points: Sequence[str] = ()) -> list[Reading]:
-    """Return the registrations of an element, or any, at points given by position or name, or anywhere."""
+    """Return the registrations of an element, or any, at points given by position or name, or at any point."""
     names = [record.name_of(point) for point in points]
     return [
         each
@@ -109,7 +109,7 @@ def readings_with(record: AttemptRecord, element: str, points: Sequence[str] = (
 
 
 def describe_points(readings: Iterable[Reading], record: AttemptRecord) -> str:
-    """Return at which points readings were made, as positions of the model where they have one."""
+    """Return the points of readings, as positions of the model if they have one."""
     positions = {name: position for position, name in record.model.standard_points.items()}
     names = list(dict.fromkeys(positions.get(each.point, each.point) for each in readings))
     return f"{'points' if len(names) > 1 else 'point'} {join_words(names)}"

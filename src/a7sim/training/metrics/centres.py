@@ -1,4 +1,4 @@
-"""Measures of perspective centres that were observed at two levels of Z: pointings, sums, and where the centres are."""
+"""Metrics of perspective centres by two levels of Z: pointings, computations, and positions of the centres."""
 
 import math
 from collections.abc import Mapping
@@ -34,14 +34,14 @@ AXES = ("X", "Y", "Z")
 
 
 class _Centres(Metric, frozen=True, kw_only=True):
-    """Registered with an element of its projector, by1 or by2, that says which eye pointed; two levels of Z."""
+    """Registrations with an element of the projector, by1 or by2, that identifies the pointing eye; two levels of Z."""
 
     levels: tuple[float, float]
     points: list[str] = field(default_factory=lambda: list(CASES["A"]))
     elements: list[str] = field(default_factory=lambda: ["by1", "by2"])
 
     def _pointings(self, record: AttemptRecord, element: str) -> dict[tuple[str, float], list[Reading]]:
-        """Return the registrations by point and level, those that belong to no level left out."""
+        """Return the registrations by point and level, without those of no level."""
         found: dict[tuple[str, float], list[Reading]] = {}
         for reading in record.readings:
             level = next((each for each in self.levels if abs(reading.shown["Z"] - each) <= AT_LEVEL), None)
@@ -50,7 +50,7 @@ class _Centres(Metric, frozen=True, kw_only=True):
         return found
 
     def _centre(self, record: AttemptRecord, element: str) -> PerspectiveCentre | None:
-        """Return the centre that follows from one's own pointings, None where they are too few or do not move."""
+        """Return the centre from the student's pointings, None if they are too few or do not move."""
         found = self._pointings(record, element)
         names = [record.name_of(point) for point in self.points]
         whole = [name for name in names if all((name, level) in found for level in self.levels)]
@@ -78,7 +78,7 @@ class _Centres(Metric, frozen=True, kw_only=True):
 
 @register_metric("levels-missing")
 class MissingLevels(_Centres, frozen=True, kw_only=True):
-    """How many registrations are missing: of every point, with each eye, at each level."""
+    """Number of missing registrations: of each point, with each eye, at each level."""
 
     unit = "registrations"
 
@@ -99,13 +99,13 @@ class MissingLevels(_Centres, frozen=True, kw_only=True):
 
 @register_metric("pointing-rms")
 class PointingRms(_Centres, frozen=True, kw_only=True):
-    """How far the images stood from the mark where they were registered: rms of a coordinate, um at photo scale."""
+    """Displacement of the images from the mark at the registrations: rms of a coordinate, um at photo scale."""
 
     unit = "um"
     truth = True
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it, over all registrations at the levels."""
+        """Return the rms over all registrations at the levels."""
         off: list[float] = []
         worst = (0.0, "")
         for element in self.elements:
@@ -128,18 +128,18 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
         return MetricResult(round(rms, 2), told)
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye leaves."""
+        """Return the error of the best eye."""
         return BEST_POINTING_UM
 
 
 @register_metric("pointings-apart")
 class PointingDisagreement(_Centres, frozen=True, kw_only=True):
-    """By how much one's pointings miss a common centre: the larger rms of both centres, mm at their height."""
+    """Distance of the student's pointings from a common centre: the larger rms of both centres, mm at their height."""
 
     unit = "mm"
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the rms."""
         centres = self._centres(record)
         if len(centres) < len(self.elements):
             return self._few(centres)
@@ -149,7 +149,7 @@ class PointingDisagreement(_Centres, frozen=True, kw_only=True):
         return MetricResult(round(rms, 4), f"the lines to the {side} centre miss each other, rms {rms:.3f}")
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye's pointings come to."""
+        """Return the rms for the best eye."""
         return rms_of_pointings(scenario, self.levels, BEST_POINTING_UM)
 
 
@@ -176,7 +176,7 @@ def sigmas_of_centre(scenario: Scenario, levels: tuple[float, float], pointing_u
 
 
 class _Answered(_Centres, frozen=True, kw_only=True):
-    """The largest difference of answered coordinates, such as x1 and x2, over some axes."""
+    """Largest difference of answered coordinates, such as x1 and x2, over some axes."""
 
     unit = "counter units"
     truth = True
@@ -199,10 +199,10 @@ class _Answered(_Centres, frozen=True, kw_only=True):
 
 @register_metric("centre-sums-off")
 class CentreComputationDeviation(_Answered, frozen=True, kw_only=True):
-    """The largest difference of answered coordinates from those that follow from one's own registrations."""
+    """Largest difference of answered coordinates from those that follow from the student's registrations."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         centres = self._centres(record)
         if len(centres) < len(self.elements):
             return self._few(centres)
@@ -218,10 +218,10 @@ class CentreComputationDeviation(_Answered, frozen=True, kw_only=True):
 
 @register_metric("centre-off")
 class CentreDeviation(_Answered, frozen=True, kw_only=True):
-    """The largest difference of answered coordinates from where the centres truly are, in counter units."""
+    """Largest difference of answered coordinates from the true centres, in counter units."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it; counters are as they stood at the registrations."""
+        """Return the difference; counters are as at the registrations."""
         readings = {element: self._pointings(record, element) for element in self.elements}
         if not all(readings.values()):
             return self._few({element: each for element, each in readings.items() if each})

@@ -1,4 +1,4 @@
-"""Measures of an empirical relative orientation: which point was cleared with what, and how far omega was turned."""
+"""Metrics of an empirical relative orientation: points, elements, and the over-correction of omega."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ from a7sim.training.metrics.base import (
 
 
 def projector_poses(record: AttemptRecord, reading: Reading) -> tuple[ProjectorPose, ProjectorPose]:
-    """Return how the projectors of the left-hand and the right-hand photograph stood by their counters."""
+    """Return the poses of the left-hand and the right-hand photograph's projectors by their counters."""
     zero = {name: record.autograph.element_data(name).zero for name in record.autograph.variant.elements}
 
     def stand(projector: int, x: float) -> ProjectorPose:
@@ -36,12 +36,12 @@ def projector_poses(record: AttemptRecord, reading: Reading) -> tuple[ProjectorP
 
 
 class _Clearing(Metric, frozen=True, kw_only=True):
-    """Steps by point and element, such as { "2" = "kappa1" }, in groups within which their order is free."""
+    """Steps by point and element, such as { "2" = "kappa1" }, in groups with free order."""
 
     steps: list[dict[str, str]]
 
     def _step_of(self, record: AttemptRecord, reading: Reading) -> str | None:
-        """Return the point of the step that a registration belongs to, None where it belongs to none."""
+        """Return the point of the step of a registration, None if it belongs to no step."""
         for group in self.steps:
             for point, element in group.items():
                 if element in reading.named and reading.point == record.name_of(point):
@@ -54,7 +54,7 @@ class _Clearing(Metric, frozen=True, kw_only=True):
 
 @register_metric("steps-missing")
 class MissingSteps(_Clearing, frozen=True, kw_only=True):
-    """How many steps were not registered, were done before those they rest on, or with their element elsewhere."""
+    """Number of steps that were not registered, came before their predecessors, or had another element reading."""
 
     unit = "steps"
 
@@ -98,33 +98,32 @@ class MissingSteps(_Clearing, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class OmegaTurn:
-    """A turn of omega at the last point: where it stood, where the point was clear, and where it was left."""
+    """Turn of omega at the last point: start, position at which the point was clear, and end."""
 
     reading: Reading
     before: float
     cleared: float
     left: float
     needed: float
-    """How many times the clearing turn it takes, by the places of the five points."""
+    """Required multiple of the clearing turn, by the positions of the five points."""
 
     @property
     def times(self) -> float:
-        """Return how many times as far as cleared the point omega was turned."""
+        """Return the actual multiple of the clearing turn."""
         return (self.left - self.before) / (self.cleared - self.before)
 
     @property
     def remains(self) -> float:
-        """Return what share of the parallax the next round finds again."""
+        """Return the share of the parallax that the next round finds again."""
         return abs(1.0 - self.times / self.needed)
 
 
 @register_metric("over-correction-off")
 class OverCorrectionDeviation(_Clearing, frozen=True, kw_only=True):
-    """What share of the last point's parallax is left after a round, since omega was turned too far or not enough.
+    """Share of the last point's parallax that remains after a round because omega was turned too far or too little.
 
-    The last step is omega's. It counts where the turn that cleared it was `least` or more, and the worst of these.
-    What cleared it is what was registered there first; where it was left, what it shows when another step is
-    registered, or in the end.
+    The last step is omega's. It counts if the clearing turn was `least` or more, and the worst of these. The clearing
+    turn is the first registration there; its end is the reading at the registration of another step, or at the end.
     """
 
     truth = True
@@ -132,7 +131,7 @@ class OverCorrectionDeviation(_Clearing, frozen=True, kw_only=True):
     """Gon."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the share."""
         turns = self._turns(record)
         last, omega = list(self._elements().items())[-1]
         if not turns:
@@ -185,13 +184,13 @@ class OverCorrectionDeviation(_Clearing, frozen=True, kw_only=True):
         return clearing_coefficients(marks, *projector_poses(record, reading))[rows]
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what half a count at either end of the shortest turn makes of it."""
+        """Return the effect of half a count at either end of the shortest turn."""
         return 2.0 * HALF_A_COUNT / self.least
 
 
 @register_metric("missing-point-wrong")
 class WrongMissingPoints(Metric, frozen=True, kw_only=True):
-    """How many of the positions 1 to 6 were wrongly answered to be missing, or not answered though they are."""
+    """Number of positions 1 to 6 wrongly answered as missing, or missing and not answered."""
 
     unit = "points"
     truth = True

@@ -1,4 +1,4 @@
-"""Measures of a grid test: how crosses were pointed at, at which levels, and what was found of the projectors."""
+"""Metrics of a grid test: pointings at crosses, levels, and errors of the projectors."""
 
 import math
 
@@ -22,7 +22,7 @@ from a7sim.training.metrics.truth import MaxAtReadings
 
 @register_metric("cross-missed")
 class CrossDistance(MaxAtReadings, frozen=True, kw_only=True):
-    """The largest distance of the mark from a point where it was registered, by the eye that saw it, um."""
+    """Largest distance of the mark from a point at a registration, in the pointing eye, um."""
 
     def _um(self, reading: Reading) -> float | None:
         seen = [each for each in reading.eyes if each is not None]
@@ -32,14 +32,14 @@ class CrossDistance(MaxAtReadings, frozen=True, kw_only=True):
         return f"the mark stood {value:.0f} um beside the cross"
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye leaves, and half a count of both wheels at the highest level."""
+        """Return the error of the best eye, and half a count of both wheels at the highest level."""
         count = 1e3 * HALF_A_COUNT * math.sqrt(2.0) * scenario.camera.c / scenario.plan.projection_height
         return math.hypot(MAX_OF_SEVERAL * BEST_POINTING_UM, count)
 
 
 @register_metric("levels-near")
 class LevelDepthRatio(Metric, frozen=True, kw_only=True):
-    """The depth of the highest level of pointings below the centres as a share of that of the lowest."""
+    """Depth of the highest level of pointings below the centres as a share of that of the lowest."""
 
     points: list[str]
 
@@ -55,18 +55,18 @@ class LevelDepthRatio(Metric, frozen=True, kw_only=True):
 
 @register_metric("errors-answered")
 class AnsweredErrorDeviation(Metric, frozen=True, kw_only=True):
-    """The largest difference of answered errors of elements, such as c1 or phi2, from what truly stands there."""
+    """Largest difference of answered errors of elements, such as c1 or phi2, from the true ones."""
 
     unit = "mm or gon"
     truth = True
     elements: list[str] = field(default_factory=lambda: ["c1", "c2"])
     local_um: float = 10.0
-    """Of the local errors of the projector, which nobody can tell from others by so few crosses."""
+    """Of the local errors of the projector, which a few crosses cannot separate from others."""
     reach_mm: float = 100.0
-    """How far from the middle of the plate the crosses lie."""
+    """Distance of the crosses from the middle of the plate."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it: what stands minus what the counter shows."""
+        """Return the true position minus the counter reading."""
         off: dict[str, float] = {}
         for element in self.elements:
             answered = record.answers.get(element, "")
@@ -85,7 +85,7 @@ class AnsweredErrorDeviation(Metric, frozen=True, kw_only=True):
         return MetricResult(round(off[worst], 4), f"{worst} was answered {record.answers[worst]}, the furthest off")
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what local errors of eight crosses let be known of c in mm, or of a tilt in gon."""
+        """Return the precision of c in mm, or of a tilt in gon, with local errors of eight crosses."""
         c, mm = scenario.camera.c, 1e-3 * self.local_um
         of_c = mm * c / self.reach_mm / math.sqrt(8.0)
         of_tilt = 63.66 * mm * c / self.reach_mm**2 / math.sqrt(6.0)

@@ -1,4 +1,7 @@
-"""Measures of models beside the ground and beside each other: heights, distances, scale carried on, what was kept."""
+"""Metrics of models compared with the ground and with each other:
+
+heights, distances, transfer of scale, unchanged elements.
+"""
 
 import math
 from bisect import bisect_left
@@ -28,14 +31,14 @@ from a7sim.training.metrics.base import (
 PLAN_AXES = ("X", "Y")
 
 ARRIVAL = 2.0
-"""Units of its counter by which a carriage moves when the mark is brought to a point, and not when it is set on it."""
+"""Counter units by which a carriage moves when the mark is brought to a point, and not when it is set on it."""
 
 LAST = 2
-"""So many registrations of a point are its reading: a point is pointed at twice."""
+"""Number of registrations of a point that form its reading: a point is measured twice."""
 
 
 def last_readings(record: AttemptRecord, points: Iterable[str], base: str = "") -> dict[str, list[Reading]]:
-    """Return the last two pointings at points, with a base where it is named; points without any are left out."""
+    """Return the last two pointings at points, with a base mode if given; points without any are left out."""
     found = {}
     for point in points:
         name = record.name_of(point)
@@ -46,16 +49,16 @@ def last_readings(record: AttemptRecord, points: Iterable[str], base: str = "") 
 
 
 def pointings(record: AttemptRecord, name: str, base: str = "") -> list[Reading]:
-    """Return the registrations of a point's coordinates: those that are no readings of an element just turned there."""
+    """Return the registrations of a point's coordinates, without readings of an element just turned there."""
     actions = [each for each in record.actions if each.what in PLAIN]
     there = [each for each in record.readings if each.point == name and base in ("", each.base)]
     return [each for each in there if not _turned_there(actions, each)]
 
 
 def _turned_there(actions: Sequence[StudentAction], reading: Reading) -> bool:
-    """Whether an element that was registered had been turned after the mark came to the point.
+    """Return whether a registered element was turned after the mark had reached the point.
 
-    At the console whatever is in hand is registered, so that it is named says nothing.
+    The console registers the element in hand with each reading, so its name alone is no indication.
     """
     for action in reversed(actions[: bisect_left(actions, reading.place, key=lambda each: each.index)]):
         if action.name in reading.named:
@@ -66,25 +69,25 @@ def _turned_there(actions: Sequence[StudentAction], reading: Reading) -> bool:
 
 
 def mean_display(readings: Sequence[Reading]) -> Array:
-    """Return what the X, Y and Z counters showed in the mean ``(3,)``."""
+    """Return the mean readings of the X, Y and Z counters ``(3,)``."""
     return np.asarray(np.mean([[each.shown[axis] for axis in AXES] for each in readings], axis=0))
 
 
 def height_floor_um(scenario: Scenario) -> float:
-    """Return what the best eye leaves in an x-parallax, the film's irregular deformation in both pictures with it."""
+    """Return the x-parallax error of the best eye, including the film's irregular deformation in both pictures."""
     film = math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
     return math.hypot(BEST_HEIGHT_UM, math.sqrt(2.0) * film)
 
 
 def metres_per_um(scenario: Scenario, scale_number: float) -> float:
-    """Return by how much a height changes with a micrometre of x-parallax at photo scale, m on the ground."""
+    """Return the change of height by a micrometre of x-parallax at photo scale, m on the ground."""
     plan, c = scenario.plan, scenario.camera.c
     return 1e-6 * scale_number * plan.projection_height / c * plan.projection_height / plan.bx
 
 
 @register_metric("missing-pointings")
 class MissingPointings(Metric, frozen=True, kw_only=True):
-    """How many pointings are missing: at every point so many, with each of some bases."""
+    """Number of missing pointings: a required number at each point, with each of some base modes."""
 
     unit = "registrations"
     points: list[str]
@@ -110,7 +113,7 @@ class MissingPointings(Metric, frozen=True, kw_only=True):
 
 @register_metric("heights-off")
 class HeightDeviation(Metric, frozen=True, kw_only=True):
-    """By how much heights that the Z counter showed differ from the ground: rms or the largest, m."""
+    """Difference of heights by the Z counter from the ground: rms or the largest, m."""
 
     unit = "m"
     truth = True
@@ -133,23 +136,23 @@ class HeightDeviation(Metric, frozen=True, kw_only=True):
         return MetricResult(round(abs(off[worst]) if self.largest else rms, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye and the film allow, and half a count."""
+        """Return the errors of the best eye and the film, and half a count."""
         return height_floor_um(scenario) * metres_per_um(scenario, self.scale_number)
 
 
 @register_metric("distances-off")
 class DistanceDeviation(Metric, frozen=True, kw_only=True):
-    """The largest share by which distances in plan that the counters showed differ from the ground, in a thousand."""
+    """Largest difference in per mille of distances in plan by the counters from the ground."""
 
     unit = "per mille"
     truth = True
     points: list[str]
     scale_number: float
     shortest_m: float = 500.0
-    """Distances shorter than that tell little of the scale."""
+    """Shorter distances hardly determine the scale."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return the share in the mean of all pairs, by the last two registrations of each point."""
+        """Return the mean over all pairs, by the last two registrations of each point."""
         readings = last_readings(record, self.points)
         truth = record.scene.ground_points
         metres = 1e-3 * self.scale_number / record.autograph.variant.scales["X"].units_per_mm
@@ -166,14 +169,14 @@ class DistanceDeviation(Metric, frozen=True, kw_only=True):
         return MetricResult(round(abs(share), 4), told)
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what two pointings allow over the width of the model."""
+        """Return the error of two pointings over the width of the model."""
         film = math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
         um = math.sqrt(2.0) * math.hypot(BEST_POINTING_UM, film)
         return um / (1.5 * scenario.plan.half_width)
 
 
 def element_at(record: AttemptRecord, name: str, place: int) -> float:
-    """Return where an element stood before a deed."""
+    """Return the position of an element before an action."""
     moved = [each for each in record.action_log.actions if each.what in ("set", "turn") and each.name == name]
     before = [each.after for each in moved if each.index < place]
     later = [each.before for each in moved if each.index >= place]
@@ -181,22 +184,22 @@ def element_at(record: AttemptRecord, name: str, place: int) -> float:
 
 
 def change_of_base(record: AttemptRecord, mode: str) -> StudentAction | None:
-    """Return the student's deed by which the base was last changed over to a mode, None where it never was."""
+    """Return the student's last action that changed the base to a mode, None if there is none."""
     changes = [each for each in record.actions if each.what == "base" and each.text == mode]
     return changes[-1] if changes else None
 
 
 @register_metric("moved-since")
 class ElementChange(Metric, frozen=True, kw_only=True):
-    """The largest difference of elements from how they stood when the base was changed over, mm or gon."""
+    """Largest difference of elements from their positions at the change of base, mm or gon."""
 
     unit = "mm or gon"
     elements: list[str]
     base: str = "outside"
-    """To which it was changed."""
+    """Base mode after the change."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         change = change_of_base(record, self.base)
         if change is None:
             return MetricResult(None, f"the base was never set {self.base}")
@@ -215,9 +218,9 @@ class ElementChange(Metric, frozen=True, kw_only=True):
 
 @register_metric("ties-apart")
 class TiePointDisagreement(Metric, frozen=True, kw_only=True):
-    """The largest difference of a counter between the readings of common points in two models, mm.
+    """Largest difference of a counter between the readings of common points in two models, mm.
 
-    The two are the one with base in and the one with base out.
+    The two models are the one with base in and the one with base out.
     """
 
     unit = "mm"
@@ -242,7 +245,7 @@ class TiePointDisagreement(Metric, frozen=True, kw_only=True):
         return MetricResult(round(worst, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye allows of heights in two models."""
+        """Return the error of the best eye in heights of two models."""
         plan = scenario.plan
         um = math.sqrt(2.0) * height_floor_um(scenario)
         return 1e-3 * um * plan.projection_height / scenario.camera.c * plan.projection_height / plan.bx
@@ -250,7 +253,7 @@ class TiePointDisagreement(Metric, frozen=True, kw_only=True):
 
 @register_metric("scale-not-carried")
 class ScaleTransferDeviation(Metric, frozen=True, kw_only=True):
-    """By how much the second model's scale differs from the first's, per mille: by the bases, beside the flight."""
+    """Difference of the second model's scale from the first's, per mille: by the bases, compared with the flight."""
 
     unit = "per mille"
     truth = True
@@ -258,7 +261,7 @@ class ScaleTransferDeviation(Metric, frozen=True, kw_only=True):
     base: str = "outside"
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         change = change_of_base(record, self.base)
         if change is None:
             return MetricResult(None, f"the base was never set {self.base}")
@@ -280,7 +283,7 @@ class ScaleTransferDeviation(Metric, frozen=True, kw_only=True):
         return float(length_of(base) / length_of(stations[model.right].centre - stations[model.left].centre))
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what y-parallaxes in the outer rows allow of phi of both photographs in both models (T 2.32)."""
+        """Return the error of phi of both photographs in both models due to y-parallaxes in the outer rows (T 2.32)."""
         plan, c = scenario.plan, scenario.camera.c
         film = math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
         parallax = math.hypot(BEST_PARALLAX_UM, math.sqrt(2.0) * film)

@@ -1,4 +1,4 @@
-"""Measures of a numerical relative orientation: the sums that follow from one's own readings, and what was set."""
+"""Metrics of a numerical relative orientation: corrections that follow from the student's readings, and settings."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -33,20 +33,20 @@ BYS = ("by1", "by2")
 
 @dataclass(frozen=True)
 class MeasuredRound:
-    """Readings of by' and by\" made with the same settings of the five elements."""
+    """Readings of by' and by" with the same settings of the five elements."""
 
     record: AttemptRecord
     readings: Sequence[Reading]
 
     @cached_property
     def elements(self) -> Mapping[str, str]:
-        """Return the five elements of the plotter by those of the hands: base out they have changed places."""
+        """Return the five elements of the plotter by those of the sides: with base out they are exchanged."""
         projectors = {1: self.record.model.left_projector, 2: self.record.model.right_projector}
         return {name: f"{name[:-1]}{projectors[int(name[-1])]}" for name in FIVE}
 
     @cached_property
     def parallaxes(self) -> dict[str, float]:
-        """Return the y-parallaxes in mm by position, from the means of by' and by\" against where they rest."""
+        """Return the y-parallaxes in mm by position, from the means of by' and by" minus their rest positions."""
         found = {}
         for label, name in self.record.model.standard_points.items():
             there = [each for each in self.readings if each.point == name]
@@ -59,14 +59,13 @@ class MeasuredRound:
         return found
 
     def has(self, case: str) -> bool:
-        """Whether all points of a case were read with both."""
+        """Return whether all points of a case were read with both."""
         return set(CASES[case]) & set(self.record.model.standard_points) <= set(self.parallaxes)
 
     def sums(self, case: str) -> list[dict[str, float]]:
-        """Return the corrections in gon that follow, by element, in every way that is taught.
+        """Return the resulting corrections in gon, by element, for all methods that are taught.
 
-        By the form for regular points or rigorously by least squares, from the parallaxes or from what they differ by
-        from their mean.
+        By the form for regular points or by least squares, from the parallaxes or from their differences from the mean.
         """
         labels = [label for label in CASES[case] if label in self.parallaxes]
         p = np.array([self.parallaxes[label] for label in labels])
@@ -85,12 +84,12 @@ class MeasuredRound:
         return solution.unknowns[:, 0] / GON
 
     def shows(self, element: str) -> float:
-        """Return what an element showed."""
+        """Return the reading of an element."""
         return self.readings[0].shown[element]
 
 
 def find_rounds(record: AttemptRecord) -> list[MeasuredRound]:
-    """Return the rounds of measuring by' and by\"; turning one of the five elements begins a new one."""
+    """Return the rounds of measuring by' and by"; turning one of the five elements starts a new one."""
     rounds: list[list[Reading]] = []
     for each in (each for each in record.readings if set(each.named) & set(BYS)):
         if rounds and all(abs(each.shown[name] - rounds[-1][-1].shown[name]) < HALF_A_COUNT for name in FIVE):
@@ -102,16 +101,16 @@ def find_rounds(record: AttemptRecord) -> list[MeasuredRound]:
 
 @dataclass(frozen=True)
 class AnsweredCase:
-    """A case as it was worked: what was measured, what follows, what was answered, what was set."""
+    """Case of the exercise: measurements, resulting corrections, answers and settings."""
 
     sums: Sequence[Mapping[str, float]]
     answered: Mapping[str, float]
-    """Empty where not all five were."""
+    """Empty unless all five were answered."""
     set: Mapping[str, float]
 
 
 def answered_case(record: AttemptRecord, case: str) -> AnsweredCase | None:
-    """Return the first round that has all of a case, and what came of it; None where there is none."""
+    """Return the first complete round of a case with its results; None if there is none."""
     rounds = find_rounds(record)
     place = next((i for i, each in enumerate(rounds) if each.has(case)), None)
     if place is None:
@@ -138,16 +137,16 @@ def _number(text: str) -> float | None:
 
 
 def _apart(given: Mapping[str, float], ways: Sequence[Mapping[str, float]]) -> tuple[float, str, float]:
-    """Return the largest difference from the way that it is nearest to, of which element, and what that comes to."""
+    """Return the largest difference from the nearest method, its element, and the right value."""
     worst = [max((abs(given[name] - way[name]), name, way[name]) for name in way) for way in ways]
     return min(worst)
 
 
 @register_metric("sums-off")
 class ComputationDeviation(Metric, frozen=True, kw_only=True):
-    """The largest difference of corrections from those that follow from one's own readings, gon.
+    """Largest difference of corrections from those that follow from the student's readings, gon.
 
-    Of the corrections as they were answered, CASE-ELEMENT such as a-kappa1, or else as they were set.
+    Of the corrections as answered, CASE-ELEMENT such as a-kappa1, or else as set.
     """
 
     unit = "gon"
@@ -155,7 +154,7 @@ class ComputationDeviation(Metric, frozen=True, kw_only=True):
     case: str
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         found = answered_case(record, self.case)
         if found is None:
             return MetricResult(
@@ -174,14 +173,14 @@ class ComputationDeviation(Metric, frozen=True, kw_only=True):
 
 @register_metric("set-otherwise")
 class SettingDeviation(Metric, frozen=True, kw_only=True):
-    """The largest difference of the corrections that were set from those worked out, gon, over some cases."""
+    """Largest difference of the corrections that were set from the computed ones, gon, over some cases."""
 
     unit = "gon"
     truth = True
     cases: list[str] = field(default_factory=lambda: ["A"])
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         there = {case: each for case in self.cases if (each := answered_case(record, case)) is not None}
         if len(there) < len(self.cases):
             return MetricResult(None, f"case {join_words(set(self.cases) - set(there))} was not measured whole")
@@ -196,20 +195,20 @@ class SettingDeviation(Metric, frozen=True, kw_only=True):
         return MetricResult(round(off, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
-        """Return a count: both what is set and what it is set from are full counts."""
+        """Return a count: both the old and the new setting are full counts."""
         return 2.0 * HALF_A_COUNT
 
 
 @register_metric("parallax-rms")
 class ParallaxRms(Metric, frozen=True, kw_only=True):
-    """The rms of the y-parallaxes that were left where readings of elements were registered, um at photo scale."""
+    """Rms of the y-parallaxes at the registrations of elements, um at photo scale."""
 
     unit = "um"
     truth = True
     elements: list[str] = field(default_factory=lambda: list(BYS))
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the rms."""
         left = [
             each.stereo[1]
             for each in record.readings
@@ -223,5 +222,5 @@ class ParallaxRms(Metric, frozen=True, kw_only=True):
         )
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye leaves, and the rounding of the drum."""
+        """Return the error of the best eye, and the rounding of the drum."""
         return BEST_PARALLAX_UM

@@ -1,4 +1,4 @@
-"""Measures of readings, by what is seen at the link: that they are there, how they were come to, how they agree."""
+"""Metrics of readings at the link: completeness, approach, agreement."""
 
 from itertools import groupby, pairwise
 from statistics import fmean
@@ -23,14 +23,14 @@ from a7sim.training.metrics.base import (
 
 @register_metric("missing-readings")
 class MissingReadings(Metric, frozen=True, kw_only=True):
-    """How many registrations are missing: of every point, and of each element there, so many."""
+    """Number of missing registrations: a required number of each point, and of each element there."""
 
     unit = "registrations"
     points: list[str]
     elements: list[str] = field(default_factory=list)
     each: int = 1
     after: list[str] = field(default_factory=list)
-    """Only those count that were made after the last movement of these handles."""
+    """Only registrations after the last movement of these controls count."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
@@ -58,7 +58,7 @@ class MissingReadings(Metric, frozen=True, kw_only=True):
 
 @register_metric("wrong-approach")
 class WrongApproach(Metric, frozen=True, kw_only=True):
-    """How many registrations were made with a handle whose last movement came from the other side."""
+    """Number of registrations with a control whose last movement came from the other side."""
 
     unit = "registrations"
     handles: list[str]
@@ -92,7 +92,7 @@ class WrongApproach(Metric, frozen=True, kw_only=True):
 
 @register_metric("one-side-only")
 class OneSidedReadings(Metric, frozen=True, kw_only=True):
-    """How many handles were not registered at a point both coming from smaller readings and from larger ones."""
+    """Number of controls not registered at a point with approaches both from smaller and from larger readings."""
 
     unit = "handles"
     point: str
@@ -116,13 +116,13 @@ class OneSidedReadings(Metric, frozen=True, kw_only=True):
 
 @register_metric("not-left-between")
 class ReadingsWithoutReturn(Metric, frozen=True, kw_only=True):
-    """How many points have no second registration for which a handle had gone away and come back."""
+    """Number of points without a second registration after a control was moved away and back."""
 
     unit = "points"
     points: list[str]
     handles: list[str]
     away: float = 0.1
-    """By how much it must have gone away, in units of its counter."""
+    """Required movement, in units of its counter."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
@@ -151,7 +151,7 @@ class ReadingsWithoutReturn(Metric, frozen=True, kw_only=True):
 
 @register_metric("off-target")
 class TargetDeviation(Metric, frozen=True, kw_only=True):
-    """The largest difference of a counter from what it should show where a point was registered."""
+    """Largest difference of a counter from its required reading at the registration of a point."""
 
     unit = "mm"
     targets: dict[str, dict[str, float]]
@@ -184,11 +184,11 @@ class TargetDeviation(Metric, frozen=True, kw_only=True):
 
 @register_metric("other-not-at-rest")
 class OtherElementDisplaced(Metric, frozen=True, kw_only=True):
-    """How many readings of an element were made while another did not stand where it rests."""
+    """Number of readings of an element while another was not at its rest position."""
 
     unit = "readings"
     pairs: dict[str, str]
-    """By the element that is read, the one that must rest."""
+    """By the element that is read, the element that must rest."""
     at: float = 0.0
     within: float = 0.005
 
@@ -215,14 +215,14 @@ class OtherElementDisplaced(Metric, frozen=True, kw_only=True):
 
 @register_metric("spread")
 class ReadingSpread(Metric, frozen=True, kw_only=True):
-    """The largest difference between readings of the same element, or counter, at the same point."""
+    """Largest difference between readings of the same element, or counter, at the same point."""
 
     unit = "mm"
     handles: list[str]
     points: list[str] = field(default_factory=list)
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         spreads: list[tuple[float, str]] = []
         for handle in self.handles:
             readings = sorted(
@@ -243,13 +243,13 @@ class ReadingSpread(Metric, frozen=True, kw_only=True):
         return MetricResult(*max(spreads))
 
     def floor(self, scenario: Scenario) -> float:
-        """Return a count: two readings of the same setting may fall on either side of a half."""
+        """Return a count: two readings of the same setting may be rounded to either side."""
         return 2.0 * HALF_A_COUNT
 
 
 @register_metric("not-opposed")
 class OppositionDeviation(Metric, frozen=True, kw_only=True):
-    """By how much the mean readings of two elements at a point differ from being opposite: by' reads +p, by\" -p."""
+    """Difference of the mean readings of two elements at a point from being opposite: by' reads +p, by" -p."""
 
     unit = "mm"
     one: str = "by1"

@@ -1,4 +1,4 @@
-"""Measures of what was reached, by the truth that never crosses the link."""
+"""Metrics of results, by the truth that never crosses the link."""
 
 import math
 
@@ -35,7 +35,7 @@ def half_a_count_um(scenario: Scenario) -> float:
 
 
 class MaxAtReadings(Metric, frozen=True, kw_only=True):
-    """The largest of something at the registrations, in um at photo scale."""
+    """Largest value of a quantity at the registrations, in um at photo scale."""
 
     unit = "um"
     truth = True
@@ -44,7 +44,7 @@ class MaxAtReadings(Metric, frozen=True, kw_only=True):
     points: list[str] = field(default_factory=list)
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the value."""
         names = [record.name_of(point) for point in self.points]
         readings = [
             each
@@ -72,7 +72,7 @@ class MaxAtReadings(Metric, frozen=True, kw_only=True):
 
 @register_metric("parallax-left")
 class RemainingParallax(MaxAtReadings, frozen=True, kw_only=True):
-    """The largest y-parallax that was left where a reading was registered, um at photo scale."""
+    """Largest y-parallax at a registration, um at photo scale."""
 
     def _um(self, reading: Reading) -> float | None:
         return None if reading.stereo is None else abs(reading.stereo[1])
@@ -81,13 +81,13 @@ class RemainingParallax(MaxAtReadings, frozen=True, kw_only=True):
         return f"the largest y-parallax left was {value:.0f} um at photo scale,"
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye leaves, and half a count."""
+        """Return the error of the best eye, and half a count."""
         return math.hypot(MAX_OF_SEVERAL * BEST_PARALLAX_UM, half_a_count_um(scenario))
 
 
 @register_metric("off-the-ground")
 class HeightParallax(MaxAtReadings, frozen=True, kw_only=True):
-    """The largest x-parallax where a reading was registered: the mark was above or below the ground, um."""
+    """Largest x-parallax at a registration: the mark was above or below the ground, um."""
 
     def _um(self, reading: Reading) -> float | None:
         return None if reading.stereo is None else abs(reading.stereo[0])
@@ -96,13 +96,13 @@ class HeightParallax(MaxAtReadings, frozen=True, kw_only=True):
         return f"the mark stood off the ground by an x-parallax of {value:.0f} um"
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye leaves."""
+        """Return the error of the best eye."""
         return MAX_OF_SEVERAL * BEST_HEIGHT_UM
 
 
 @register_metric("beside-the-point")
 class PlanDeviation(MaxAtReadings, frozen=True, kw_only=True):
-    """The largest distance of the mark from the point in plan where a reading was registered, um at photo scale."""
+    """Largest distance of the mark from the point in plan at a registration, um at photo scale."""
 
     eye: int = 0
     """Of one eye; 0 for the mean of both."""
@@ -118,14 +118,14 @@ class PlanDeviation(MaxAtReadings, frozen=True, kw_only=True):
         return f"the mark stood {value:.0f} um beside the point"
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye leaves, and the least count of both wheels."""
+        """Return the error of the best eye, and the least count of both wheels."""
         return MAX_OF_SEVERAL * BEST_POINTING_UM
 
 
 def y_parallax_at(record: AttemptRecord, point: str) -> float | None:
-    """Return the y-parallax in um at photo scale of a point as the projectors stand, None where it is on no picture.
+    """Return the y-parallax in um at photo scale of a point as the projectors are set, None if it is on no picture.
 
-    It is what both eyes would see with the mark on the ground there.
+    It is the view of both eyes with the mark on the ground there.
     """
     autograph, model = record.autograph, record.model
     images = []
@@ -148,7 +148,7 @@ def y_parallax_at(record: AttemptRecord, point: str) -> float | None:
 
 
 def _misses(autograph: LoggedAutograph, images: list[tuple[int, Array]], mark: Array) -> Array:
-    """Return how images stand to a mark ``(4,)`` in mm at photo scale: x and y in the mean, px, py."""
+    """Return the displacements of images from a mark ``(4,)`` in mm at photo scale: mean x and y, px, py."""
     seen = []
     for projector, place in images:
         swing = plane_rotation(autograph.element(f"kappa{projector}") * GON)
@@ -159,7 +159,7 @@ def _misses(autograph: LoggedAutograph, images: list[tuple[int, Array]], mark: A
 
 @register_metric("residual-parallax")
 class ResidualParallax(Metric, frozen=True, kw_only=True):
-    """The y-parallax that is left at the standard points in the end: rms, or the largest, um at photo scale."""
+    """Final y-parallax at the standard points: rms, or the largest, um at photo scale."""
 
     unit = "um"
     truth = True
@@ -167,7 +167,7 @@ class ResidualParallax(Metric, frozen=True, kw_only=True):
     largest: bool = False
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the y-parallax."""
         names = {point: record.name_of(point) for point in self.points if point in record.model.standard_points}
         found = {point: y_parallax_at(record, name) for point, name in names.items()}
         seen = {point: value for point, value in found.items() if value is not None}
@@ -179,7 +179,7 @@ class ResidualParallax(Metric, frozen=True, kw_only=True):
         return MetricResult(round(abs(seen[worst]) if self.largest else rms, 1), told)
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the best eye leaves, the film's irregular deformation, and half a count."""
+        """Return the error of the best eye, the film's irregular deformation, and half a count."""
         film = math.sqrt(2.0) * math.hypot(scenario.film.irregular_um, scenario.film.identification_um)
         rms = math.hypot(BEST_PARALLAX_UM, half_a_count_um(scenario), film)
         return MAX_OF_SEVERAL * rms if self.largest else rms
@@ -187,14 +187,14 @@ class ResidualParallax(Metric, frozen=True, kw_only=True):
 
 @register_metric("picture-off-centre")
 class CentringDeviation(Metric, frozen=True, kw_only=True):
-    """How far pictures lie from centred: the largest shift or, at the fiducials, turn that is left, mm."""
+    """Displacement of pictures from centred: the largest remaining shift or, at the fiducials, rotation, mm."""
 
     unit = "mm"
     truth = True
     projectors: list[int] = field(default_factory=lambda: [1, 2])
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the displacement."""
         left: list[tuple[float, str]] = []
         for projector in self.projectors:
             name = record.autograph.loaded(projector)
@@ -207,12 +207,12 @@ class CentringDeviation(Metric, frozen=True, kw_only=True):
         return MetricResult(round(value, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
-        """Return what the mean of four fiducials allows."""
+        """Return the precision of the mean of four fiducials."""
         return 1e-3 * MAX_OF_SEVERAL * BEST_FIDUCIAL_UM / 2.0
 
 
 def _lie(record: AttemptRecord, projector: int) -> tuple[float, float, float]:
-    """Return shift and turn in mm by which a picture lies off, and by how much its film is larger than it was."""
+    """Return shift and rotation in mm of a picture, and the change of size of its film."""
     camera = record.scenario.camera
     displaced = record.autograph.carrier(projector).fiducial_displacements()
     places = {each.name: (each.x, each.y) for each in camera.fiducials}
@@ -228,14 +228,14 @@ def _lie(record: AttemptRecord, projector: int) -> tuple[float, float, float]:
 
 @register_metric("principal-distance-off")
 class PrincipalDistanceDeviation(Metric, frozen=True, kw_only=True):
-    """The largest difference of a principal distance from that of the camera with the film as it has shrunk, mm."""
+    """Largest difference of a principal distance from that of the camera for the shrunk film, mm."""
 
     unit = "mm"
     truth = True
     projectors: list[int] = field(default_factory=lambda: [1, 2])
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it."""
+        """Return the difference."""
         off: list[tuple[float, str]] = []
         for projector in self.projectors:
             if record.autograph.loaded(projector) is None:
@@ -252,6 +252,6 @@ class PrincipalDistanceDeviation(Metric, frozen=True, kw_only=True):
         return MetricResult(round(value, 4), told)
 
     def floor(self, scenario: Scenario) -> float:
-        """Return half a count, and what four fiducials say of a scale."""
+        """Return half a count, and the precision of a scale from four fiducials."""
         reach = max(abs(each.x) for each in scenario.camera.fiducials)
         return HALF_A_COUNT + 1e-3 * BEST_FIDUCIAL_UM / math.sqrt(8.0) * scenario.camera.c / reach

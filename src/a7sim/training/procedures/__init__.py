@@ -1,4 +1,4 @@
-"""The procedures of the virtual operator that exercises name."""
+"""Procedures of the virtual operator that exercises name."""
 
 from a7sim.training.procedures import cards, models, orienting, testing
 from a7sim.training.procedures.base import PROCEDURES, ProcedureContext, procedure, run_procedure

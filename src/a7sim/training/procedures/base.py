@@ -1,4 +1,4 @@
-"""What the virtual operator can do of an exercise, for references, openings and the skill study: by name."""
+"""Procedures of the virtual operator for references, openings and the skill study, by name."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -27,7 +27,7 @@ from a7sim.training.variation import scenario_for
 ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)
 
 _POINTED = {1: "X left at", 2: "X right at"}
-"""How items of pointings with one eye begin, by the hand of the photograph."""
+"""Start of items of monocular pointings, by the side of the photograph."""
 
 _REGISTERED = (*_POINTED.values(), "parallax seen")
 """Items at which counters are registered beside those of elements."""
@@ -35,27 +35,27 @@ _REGISTERED = (*_POINTED.values(), "parallax seen")
 
 @dataclass(frozen=True)
 class ProcedureContext:
-    """The virtual operator at the instrument of an exercise."""
+    """Virtual operator at the instrument of an exercise."""
 
     person: Person
     workstation: Workstation
     model: ModelJob
     papers: Mapping[str, str] = field(default_factory=dict)
-    """What was handed out, by file name."""
+    """Handouts by file name."""
 
     @classmethod
     def for_model(cls, person: Person, job: Job, model: str) -> "ProcedureContext":
-        """Return an operator who is to work on a model of a job."""
+        """Return an operator for a model of a job."""
         workstation = Workstation(OperatorBatch.single(person), ScpiDriver(person), job)
         return cls(person, workstation, next(each for each in job.models if each.name == model))
 
     def points(self) -> list[str]:
-        """Return the names of the standard points that the job sheet asks for."""
+        """Return the names of the standard points on the job sheet."""
         labels = self.model.points_of_case(self.workstation.job.plan.case)
         return [self.model.standard_points[label] for label in labels]
 
     def set_up(self) -> None:
-        """Bring the instrument to the settings of the job sheet, mount and centre pictures, take up the prints."""
+        """Set the instrument as on the job sheet, mount and centre pictures, load the prints."""
         workstation = self.workstation
         active = workstation.operators.active
         self.begin("preparation")
@@ -67,25 +67,25 @@ class ProcedureContext:
         workstation.begin(active, self.model, load_prints(workstation, self.model))
 
     def take_over(self) -> None:
-        """Sit down at an instrument that stands ready: base and pictures set, its counters as `*RST` leaves them."""
+        """Take over a prepared instrument: base and pictures set, its counters as after `*RST`."""
         active = self.workstation.operators.active
         self.workstation.controls.take_over(active)
         self.workstation.controls.counters(active)
         self.workstation.begin(active, self.model, load_prints(self.workstation, self.model))
 
     def answer(self, answers: Mapping[str, float], decimals: int = 2) -> None:
-        """Note answers down at the instrument."""
+        """Write answers as notes at the instrument."""
         for key, value in answers.items():
             self.person.note(f"{ANSWER}{key}={value:.{decimals}f}")
 
     def begin(self, form: str) -> None:
-        """Begin a form of the book."""
+        """Start a form of the book."""
         self.workstation.operators.begin(self.workstation.operators.active, self.model.name, form)
         self.person.note(f"{self.model.name}: {form}")
 
 
 def perturb_elements(seated: ProcedureContext, elements: Mapping[str, float]) -> None:
-    """Turn elements by so much, by mistake."""
+    """Turn elements by amounts, as a mistake."""
     active = seated.workstation.operators.active
     standing = seated.workstation.controls.elements(active, list(elements))
     seated.workstation.controls.turn_elements(
@@ -94,16 +94,16 @@ def perturb_elements(seated: ProcedureContext, elements: Mapping[str, float]) ->
 
 
 def misplace_fittings(seated: ProcedureContext, fittings: Mapping[str, str]) -> None:
-    """Put fittings into positions, by mistake."""
+    """Set fittings to positions, as a mistake."""
     for name, position in fittings.items():
         seated.workstation.driver.set_fitting(np.asarray(seated.workstation.operators.active), name, position)
 
 
 Procedure = Callable[..., None]
-"""What takes `Seated` and the options of an exercise."""
+"""Function of `ProcedureContext` and the options of an exercise."""
 
 PROCEDURES: dict[str, Procedure] = {}
-"""All procedures by the names that exercises use."""
+"""All procedures by the names in exercises."""
 
 
 def procedure(name: str) -> Callable[[Procedure], Procedure]:
@@ -119,9 +119,9 @@ def procedure(name: str) -> Callable[[Procedure], Procedure]:
 def run_procedure(
     environment: AttemptEnvironment, played: PlayedRun, client: str, papers: Mapping[str, str] | None = None
 ) -> str:
-    """Let the virtual operator do a procedure; return why it was given up, empty where it was not. Raises Mistake.
+    """Run a procedure of the virtual operator; return the reason if the operator gave up. Raises A7SimError.
 
-    `papers` are what was handed out, by file name.
+    `papers` are the handouts by file name.
     """
     port = InProcessSerial(instrument=environment.instrument, clock=environment.clock, client=client, timeout=1.0)
     observer = scenario_for(environment.exercise_folder, environment.seed, played.observer).observer
@@ -144,13 +144,13 @@ def run_procedure(
 
 
 REGISTERED_ALREADY = "X"
-"""Of a point measured with both eyes the operator has registered all three coordinates before they are entered."""
+"""Items of a stereoscopic point: all three coordinates are registered before they are entered."""
 
 
 class _Button:
-    """The button of the recording device: what is written into the book is registered as well.
+    """Button of the recording device: entries of the book are registered as well.
 
-    With the element that is read; a pointing with one eye with by of its projector, which says whose it is.
+    With the element that is read; a monocular pointing with by of its projector, which identifies it.
     """
 
     def __init__(self, client: Client, model: ModelJob) -> None:
@@ -179,13 +179,13 @@ class _Button:
 
 @procedure("interior orientation")
 def interior_orientation(seated: ProcedureContext) -> None:
-    """Fittings, both pictures mounted and centred, principal distances."""
+    """Set fittings, mount and centre both pictures, and set principal distances."""
     seated.set_up()
 
 
 @procedure("measure parallaxes")
 def measure_parallaxes(seated: ProcedureContext, readings: int = 2) -> None:
-    """Clear the y-parallax at the standard points with by', then with by\", coming back to each so many times."""
+    """Clear the y-parallax at the standard points with by', then with by", `readings` times at each."""
     seated.take_over()
     seated.begin("y-parallaxes")
     for _ in range(readings):
@@ -194,7 +194,7 @@ def measure_parallaxes(seated: ProcedureContext, readings: int = 2) -> None:
 
 @procedure("relative orientation")
 def relative_orientation(seated: ProcedureContext) -> None:
-    """Relative orientation as the scenario's plan has it, of pictures that lie ready; then a look at every point."""
+    """Orient mounted pictures relatively by the scenario's plan; then look at all points."""
     seated.take_over()
     seated.begin("relative orientation")
     orient_model(seated.workstation, seated.model)
@@ -204,6 +204,6 @@ def relative_orientation(seated: ProcedureContext) -> None:
 
 @procedure("day's work")
 def full_day(seated: ProcedureContext) -> None:
-    """All models of the scenario from the first picture to the last centre."""
+    """Measure all models of the scenario from the first picture to the last centre."""
     for _ in measure_models(seated.person, seated.workstation.job):
         pass

@@ -1,4 +1,4 @@
-"""A strip of independent models by cards, from sheets that were handed out, in the computing room."""
+"""Strip of independent models by cards, from sheets that were handed out."""
 
 import csv
 import io
@@ -24,10 +24,10 @@ def strip_by_cards(
     count_centre: bool = True,
     named: str = "",
 ) -> None:
-    """Punch the cards of the models handed out, have the strip computed, leave out what stands out, and answer.
+    """Punch the cards of the models, compute the strip, leave out outliers, and answer.
 
-    By mistake Z is divided by another number of units, what stands out is not left out, the centre is not counted
-    among the ties, or another point is `named` as the bad one.
+    Mistakes: Z divided by another number of units, outliers not left out, the centre not counted among the ties, or
+    another point `named` as the bad one.
     """
     models = _models_of(seated.papers["models.csv"], z_units_per_mm)
     ground = _ground_of(seated.papers["control.csv"])

@@ -1,4 +1,4 @@
-"""What the virtual operator can do of the exercises after relative orientation: absolute orientation, base change."""
+"""Procedures after relative orientation: absolute orientation and base change."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,9 +16,9 @@ from a7sim.training.procedures.base import ProcedureContext, misplace_fittings, 
 
 @procedure("prepared model")
 def prepared_model(seated: ProcedureContext, model: str = "", orient: bool = True) -> None:
-    """Set a model up and `orient` it relatively, as somebody does who leaves it to the next operator.
+    """Set up a model and `orient` it relatively, for the next operator.
 
-    The Z counter is left so that it reads from the base line.
+    The Z counter then reads from the base line.
     """
     workstation, chosen = seated.workstation, find_model(seated, model)
     ProcedureContext(seated.person, workstation, chosen).set_up()
@@ -34,7 +34,7 @@ def prepared_model(seated: ProcedureContext, model: str = "", orient: bool = Tru
 
 
 def take_over(seated: ProcedureContext, model: ModelJob) -> None:
-    """Go on at an instrument that somebody else left, a model mounted in it and its counters not preset."""
+    """Continue at a prepared instrument with a mounted model and counters not preset."""
     workstation = seated.workstation
     active = workstation.operators.active
     workstation.controls.take_over(active)
@@ -43,7 +43,7 @@ def take_over(seated: ProcedureContext, model: ModelJob) -> None:
 
 
 def find_model(seated: ProcedureContext, name: str) -> ModelJob:
-    """Return a model of the job sheet, that of the exercise where none is named."""
+    """Return a model of the job sheet, that of the exercise if none is named."""
     return next((each for each in seated.workstation.job.models if each.name == name), seated.model)
 
 
@@ -54,9 +54,9 @@ def absolute_orientation(
     points: Sequence[str] | None = None,
     knocked: Mapping[str, float] | None = None,
 ) -> None:
-    """Level and scale the model that stands there on its control, index its heights, and read control and new points.
+    """Level and scale the mounted model on its control, index its heights, and read control and new points.
 
-    By mistake control is `misread` by so many m in X, Y, Z; only `points` are read; elements are `knocked` in the end.
+    Mistakes: control `misread` by amounts in m in X, Y, Z; only `points` read; elements `knocked` at the end.
     """
     workstation = seated.workstation
     model = seated.model if points is None else replace(seated.model, other_points=tuple(points))
@@ -76,10 +76,10 @@ def a8_model(
     points: Sequence[str] | None = None,
     knocked: Mapping[str, float] | None = None,
 ) -> None:
-    """Orient a model empirically, level it by common Phi and both omegas, read it, and answer the place of a point.
+    """Orient a model empirically, level it by common Phi and both omegas, read it, and answer the position of a point.
 
-    By mistake it is not made `level`, scale units are taken for mm instead of `doubled`, control is `misread`, only
-    `points` are read, elements are `knocked` in the end.
+    Mistakes: not made `level`, scale units taken for mm instead of `doubled`, control `misread`, only `points` read,
+    elements `knocked` at the end.
     """
     workstation, operators = seated.workstation, seated.workstation.operators
     name = seated.model.standard_points[place]
@@ -109,7 +109,7 @@ def a8_model(
 def misread_control(
     control: Mapping[str, tuple[float, float, float]], misread: Mapping[str, Sequence[float]]
 ) -> dict[str, tuple[float, float, float]]:
-    """Return control with some of it misread by so many m in X, Y, Z."""
+    """Return control with some coordinates misread by amounts in m in X, Y, Z."""
     changed = dict(control)
     for name, (dx, dy, dz) in misread.items():
         x, y, z = control[name]
@@ -127,10 +127,10 @@ def base_change(
     wrong_fittings: Mapping[str, str] | None = None,
     knocked: Mapping[str, float] | None = None,
 ) -> None:
-    """Read the common points, change the base, orient the next photograph to the one that stays, carry the scale on.
+    """Read the common points, change the base, orient the next photograph to the oriented one, transfer the scale.
 
-    By mistake the one that should be `kept` is turned as well, the `counters` are not preset, the `scale` is not
-    carried on, common points are not `read_again`, fittings are left in `wrong_fittings` or elements `knocked`.
+    Mistakes: the photograph to be `kept` turned as well, the `counters` not preset, the `scale` not transferred, common
+    points not `read_again`, fittings left in `wrong_fittings` or elements `knocked`.
     """
     workstation, model = seated.workstation, seated.model
     operators, plan = workstation.operators, workstation.job.plan

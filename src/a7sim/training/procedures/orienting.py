@@ -1,4 +1,4 @@
-"""What the virtual operator can do of the exercises in orienting a model: clearing, computing, perspective centres."""
+"""Procedures of orienting a model: clearing, computing, perspective centres."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -30,7 +30,7 @@ def clear_the_model(
 ) -> None:
     """Clear the y-parallaxes point by point, registering each element at the point that it cleared.
 
-    With `names_missing` the operator answers which of the points 1 to 6 are not there, or by mistake `missing`.
+    With `names_missing` the operator answers which of the points 1 to 6 do not exist, or by mistake `missing`.
     """
     seated.take_over()
     seated.begin("relative orientation")
@@ -59,9 +59,9 @@ def numerical_orientation(
     slip_gon: float = 0.0,
     mean_on_by: Literal["in the end", "at once", "never"] = "in the end",
 ) -> None:
-    """Measure, compute, answer and set in one case after the other; then the mean of what is left goes on by'.
+    """Measure, compute, answer and set in one case after the other; then set the remaining mean on by'.
 
-    `sense` is that in which the corrections are set, `slip_gon` by how much the sum for phi' is out.
+    `sense` is the sign with which the corrections are set, `slip_gon` the error of the sum for phi'.
     """
     seated.take_over()
     workstation, model = seated.workstation, seated.model
@@ -99,7 +99,7 @@ def _parallaxes(seated: ProcedureContext, case: str, readings: int) -> Parallaxe
 
 
 def _put_on_by(seated: ProcedureContext, mean: Array) -> None:
-    """Set by of the left-hand photograph's projector on by a mean parallax."""
+    """Set by of the left-hand photograph's projector by a mean parallax."""
     workstation, by = seated.workstation, f"by{seated.model.left_projector}"
     active = workstation.operators.active
     workstation.controls.set_elements(active, {by: workstation.controls.elements(active, [by])[by] + mean})
@@ -111,8 +111,8 @@ def perspective_centres(
 ) -> None:
     """Preset the counters on the ground at point 1, point at two levels with each eye, and answer both centres.
 
-    By mistake only with some eyes (`hands`, 1 for the left-hand photograph), each centre under the other's name
-    (`swapped`), or the height above the lower level in mm instead of counter units.
+    Mistakes: only some eyes (`hands`, 1 for the left-hand photograph), each centre under the other's name (`swapped`),
+    or the height above the lower level in mm instead of counter units.
     """
     seated.take_over()
     find_centres(seated, hands, swapped, height_in_mm)
@@ -127,9 +127,11 @@ def model_with_its_centres(
     knocked: Mapping[str, float] | None = None,
     wrong_fittings: Mapping[str, str] | None = None,
 ) -> None:
-    """From empty carriers to both centres answered: fittings, pictures, relative orientation, pointings, sums.
+    """Set up a model from empty carriers to both answered centres:
 
-    By mistake as in `perspective_centres`, or in the end elements are `knocked` or fittings left in `wrong_fittings`.
+    fittings, pictures, relative orientation, pointings, sums.
+
+    Mistakes as in `perspective_centres`, or at the end elements `knocked` or fittings left in `wrong_fittings`.
     """
     seated.set_up()
     seated.begin("relative orientation")

@@ -1,4 +1,4 @@
-"""The grid test of a projector by few crosses."""
+"""Grid test of a projector with few crosses."""
 
 from a7sim.geometry import GON
 from a7sim.operator.driving.workstation import Workstation
@@ -19,9 +19,9 @@ def grid_test(
     in_gon: bool = True,
     projectors: int = 2,
 ) -> None:
-    """Test both projectors with the grid plate and answer by how much c, phi and omega stand beside their counters.
+    """Test both projectors with the grid plate and answer the errors of c, phi and omega.
 
-    By mistake errors are answered in the other `sense`, tilts in radians, or fewer `projectors` are tested.
+    Mistakes: errors answered with the other `sense`, tilts in radians, or fewer `projectors` tested.
     """
     job = seated.workstation.job
     order = GridTestPlan(job.certificate, job.grid_plate, crosses, levels, pointings, seated.model.polarity)
