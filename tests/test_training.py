@@ -58,7 +58,7 @@ def test_the_sheet_names_the_mistake_with_its_points(parallax, left_standing):
     grade = grade_folder(parallax, 4, left_standing)
     mark = next(each for each in grade.failed if each.id == "at-rest")
     assert not grade.passed
-    assert mark.sentence.startswith("by\" was not returned to 0 before reading by' at points 1, 5, 6, 2 and 4: -25.")
+    assert mark.sentence.startswith("by\" was never returned to 0 before reading by' at points 1, 5, 6, 2 and 4: -25.")
 
 
 def test_an_edited_reply_is_found_by_working_the_journal_again(parallax, left_standing, tmp_path):

@@ -203,7 +203,7 @@ def test_reports_of_student_and_class_in_every_form(train, tmp_path, monkeypatch
         assert train("report", *words, "--out", out)[0] == 0
         text = out.read_text()
         assert "<svg" in text and not re.search(r'(src|href)="(?!#|data:)', text)
-    assert "by&quot; was not returned to 0" in text and "Bob O&#x27;Neill" in text
+    assert "by&quot; was never returned to 0" in text and "Bob O&#x27;Neill" in text
 
 
 def test_the_list_says_what_is_passed(train):

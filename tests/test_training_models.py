@@ -89,7 +89,7 @@ def levelled(tmp_path_factory):
 
 def test_levelling_turns_both_projectors_as_the_text_says(levelled):
     """Both phi alike, both omega alike, and the right centre sinks by bx times the tilt of phi (T 3.5)."""
-    opened = max(each.action_index for each in levelled.action_log.actions if each.client == "opening") + 1
+    opened = max(each.index for each in levelled.action_log.actions if each.client == "opening") + 1
     level = last_readings(levelled, ["K1"])["K1"][-1]
     turned = {
         name: level.counters[name] - element_at(levelled, name, opened)

@@ -42,13 +42,13 @@ def _overview(
     rows = []
     for exercise_folder in catalogue:
         each = own_best.get(exercise_folder.name)
-        tried = sum(other.attempt.exercise == exercise_folder.name for other in grades)
+        attempt_count = sum(other.attempt.exercise == exercise_folder.name for other in grades)
         name = f"{exercise_folder.exercise.number} {exercise_folder.exercise.title}"
         if each is None:
             rows.append([name, "open", "", "", ""])
         else:
             grade = each.grade
-            rows.append([name, _verdict(grade), f"{grade.points:g}", str(grade.hints), str(tried)])
+            rows.append([name, _verdict(grade), f"{grade.points:g}", str(grade.hints), str(attempt_count)])
     return TableBlock(
         "Best grade of each exercise", ["exercise", "", "points", "hints", "graded"], rows, frozenset({0, 1})
     )

@@ -39,8 +39,8 @@ def scenario_for(exercise_folder: ExerciseFolder, seed: int, observer: Mapping[s
         for path, tolerance in exercise.vary.items():
             overrides[path] = to_toml(_draw(_number_at(nominal, path), tolerance, rng))
     for alternatives in exercise.choose:
-        chosen = alternatives[int(rng.integers(len(alternatives)))]
-        overrides |= {path: to_toml(value) for path, value in chosen.items()}
+        alternative = alternatives[int(rng.integers(len(alternatives)))]
+        overrides |= {path: to_toml(value) for path, value in alternative.items()}
     return load_scenario(name, overrides)
 
 

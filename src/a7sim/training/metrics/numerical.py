@@ -171,10 +171,10 @@ class ComputationDeviation(Metric, frozen=True, kw_only=True):
             return MetricResult(
                 None, f"not all points of case {self.case} were read with by' and by\" at the same settings"
             )
-        given = case.answered or case.settings
-        deviation, name, expected = _nearest_difference(given, case.corrections)
+        corrections = case.answered or case.settings
+        deviation, name, expected = _nearest_difference(corrections, case.corrections)
         how = "answered" if case.answered else "set"
-        value = f"{handle_label(name)} was {how} as {given[name]:+.2f}"
+        value = f"{handle_label(name)} was {how} as {corrections[name]:+.2f}"
         message = f"case {self.case}: {value}, your readings give {expected:+.2f}"
         return MetricResult(round(deviation, 4), message)
 

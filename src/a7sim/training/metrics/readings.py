@@ -80,16 +80,14 @@ class WrongApproach(Metric, frozen=True, kw_only=True):
         }
         bad = {each.number for group in wrong.values() for each in group}
         if not bad:
-            return MetricResult(
-                0.0, f"{join_words(map(handle_label, self.handles))} always approached from the same side"
-            )
+            return MetricResult(0.0, f"{join_words(map(handle_label, self.handles))} always came from the same side")
         wrong_side = "larger" if self.side > 0 else "smaller"
         places = [
             f"{handle_label(handle)} at {describe_points(group, record)}" for handle, group in wrong.items() if group
         ]
         return MetricResult(
             float(len(bad)),
-            f"{len(bad)} of {pluralize(len(readings), 'registration')} approached from {wrong_side} readings: "
+            f"{len(bad)} of {pluralize(len(readings), 'registration')} came from {wrong_side} readings: "
             f"{join_words(places)}",
         )
 
@@ -109,13 +107,13 @@ class OneSidedReadings(Metric, frozen=True, kw_only=True):
             return MetricResult(None, f"nothing was registered at {self.point}")
         sides_of = {handle: {each.sides.get(handle, 0) for each in readings} for handle in self.handles}
         messages = [
-            f"{handle_label(handle)} never approached from {'smaller' if 1 not in sides else 'larger'} readings"
+            f"{handle_label(handle)} never came from {'smaller' if 1 not in sides else 'larger'} readings"
             for handle, sides in sides_of.items()
             if not {1, -1} <= sides
         ]
         return MetricResult(
             float(len(messages)),
-            f"at {self.point}: {join_words(messages) if messages else 'registered with approaches from both sides'}",
+            f"at {self.point}: {join_words(messages) if messages else 'registered from both sides'}",
         )
 
 
@@ -207,14 +205,14 @@ class OtherElementDisplaced(Metric, frozen=True, kw_only=True):
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         messages, count, total = [], 0, 0
-        for read, other in self.pairs.items():
-            readings = [each for each in readings_with(record, read) if other not in each.elements]
+        for element, other in self.pairs.items():
+            readings = [each for each in readings_with(record, element) if other not in each.elements]
             total += len(readings)
             wrong = [each for each in readings if abs(each.counters[other] - self.at) > self.within]
             count += len(wrong)
             if wrong:
                 messages.append(
-                    f"{handle_label(other)} was not returned to {self.at:g} before reading {handle_label(read)} "
+                    f"{handle_label(other)} was never returned to {self.at:g} before reading {handle_label(element)} "
                     f"at {describe_points(wrong, record)}"
                 )
         if not total:
@@ -274,12 +272,15 @@ class OppositionDeviation(Metric, frozen=True, kw_only=True):
         """Return the largest sum at a point."""
         sums: list[tuple[float, str]] = []
         for point in dict.fromkeys(each.point for each in readings_with(record, self.one, self.points)):
-            ones, others = readings_with(record, self.one, [point]), readings_with(record, self.other, [point])
-            if others:
-                left = fmean(each.counters[self.one] for each in ones)
-                right = fmean(each.counters[self.other] for each in others)
+            first_readings, second_readings = (
+                readings_with(record, self.one, [point]),
+                readings_with(record, self.other, [point]),
+            )
+            if second_readings:
+                left = fmean(each.counters[self.one] for each in first_readings)
+                right = fmean(each.counters[self.other] for each in second_readings)
                 pair = f"{handle_label(self.one)} reads {left:+.3f} and {handle_label(self.other)} {right:+.3f}"
-                message = f"at {describe_points(ones, record)} {pair}"
+                message = f"at {describe_points(first_readings, record)} {pair}"
                 sums.append((round(abs(left + right), 4), message))
         if not sums:
             return MetricResult(

@@ -58,9 +58,9 @@ class MaxAtReadings(Metric, frozen=True, kw_only=True):
             return MetricResult(None, f"at {describe_points(unseen, record)} the point was not in view")
         worst = max(readings, key=lambda each: self._value_um(each) or 0.0)
         value = self._value_um(worst) or 0.0
-        elements = join_words(map(handle_label, worst.elements)) if worst.elements else "the mark"
+        elements = f" with {join_words(map(handle_label, worst.elements))}" if worst.elements else ""
         return MetricResult(
-            round(value, 1), f"{self._description(value)} at {describe_points([worst], record)} with {elements}"
+            round(value, 1), f"{self._description(value)} at {describe_points([worst], record)}{elements}"
         )
 
     def _value_um(self, reading: Reading) -> float | None:
