@@ -41,7 +41,7 @@ def test_all_that_is_missing_of_the_form_is_said_at_once_and_nothing_is_played(p
     assert found.faults == (
         "text.md: expected the exercise in plain words, found none",
         "hint: expected 2 hints or more, got 1",
-        "faulty: expected 2 faulty ones or more, got 0",
+        "faulty: expected 2 faulty runs or more, got 0",
         "step: expected a checklist, got no step",
         "criterion: expected weights that add up to 100, got 105",
         "reference.a7s: expected a script beside the exercise, found none",
@@ -72,9 +72,9 @@ def test_an_exercise_that_everybody_passes_is_found_out(parallax):
         "reference.a7s: expected it to fail, got 100 points",
         "reference.a7s: expected at-rest to fail, got nothing",
         "faulty-by2-left.a7s: expected complete to fail, got at-rest",
-        "expected who does nothing not to pass, got a pass",
+        "expected a run without actions not to pass, got a pass",
         "step 'never': expected the reference to tick it, got ",
-        "step 'already': expected it to be still to do after the opening, got it ticked",
+        "step 'already': expected an open item after the opening, got it ticked",
     ):
         assert any(fault.startswith(sentence) for fault in faults), (sentence, faults)
 
@@ -93,8 +93,8 @@ def test_limits_below_what_the_eye_can_do_and_bands_the_wrong_way_round_are_foun
     faults = faults_of(wrong(ExerciseFolder(parallax.exercise, folder), criteria=criteria))
     assert len(faults) == 4
     for fault, band in zip(faults[:2], ("excellent", "pass"), strict=True):
-        assert fault.startswith(f"cleared: expected {band} no better than eye and least count, ")
-    assert faults[2] == "on-the-ground: expected excellent no worse than pass, got 50 and 40"
+        assert fault.startswith(f"cleared: expected {band} not below the accuracy of eye and least count, ")
+    assert faults[2] == "on-the-ground: expected excellent at least as strict as pass, got excellent 50 and pass 40"
     assert faults[3].startswith("reference: expected it to finish: ")
 
 
@@ -120,7 +120,7 @@ def test_a_new_template_is_refused_for_its_own_text(tmp_path):
     folder = template.write_template(tmp_path / "20-clouds", 20)
     faults = list(checking._template_text(read_exercise(folder)))
     places = {fault.partition(": expected")[0] for fault in faults}
-    assert places == {"goal", "complete: feedback", "pointed: feedback", "hint 1", "text.md"}
+    assert places == {"goal", "complete: feedback", "pointed: feedback", "hint 1", "text.md", "reference.a7s"}
 
 
 def test_files_that_nothing_uses_are_named_and_included_ones_are_not(parallax, tmp_path):
@@ -134,3 +134,45 @@ def test_files_that_nothing_uses_are_named_and_included_ones_are_not(parallax, t
     assert list(checking._unused_files(read_exercise(folder))) == [
         "old-draft.a7s: expected only files that the exercise uses, got one that it does not name"
     ]
+
+
+def test_text_of_the_template_in_text_and_scripts_is_named(parallax, tmp_path):
+    folder = tmp_path / "04-parallax"
+    shutil.copytree(parallax.folder, folder)
+    (folder / "text.md").write_text(f"# Parallax\n\n{template.TEXT}\n")
+    opening = folder / "opening.a7s"
+    opening.write_text(f"{opening.read_text()}# {template.REMARK} Then look.\n")
+    faults = list(checking._template_text(read_exercise(folder)))
+    assert faults == [
+        f"{place}: expected a text of your own, got that of the template: {text}"
+        for place, text in (("text.md", template.TEXT), ("opening.a7s", template.REMARK))
+    ]
+
+
+def test_unused_files_in_folders_of_the_exercise_are_named(parallax, tmp_path):
+    folder = tmp_path / "04-parallax"
+    shutil.copytree(parallax.folder, folder)
+    (folder / "parts").mkdir()
+    (folder / "parts" / "mounting.a7s").write_text("include centring.a7s\n")
+    (folder / "parts" / "centring.a7s").write_text("PHOT1?\n")
+    (folder / "parts" / "notes.txt").write_text("to do\n")
+    (folder / ".editor").write_text("")
+    reference = folder / "reference.a7s"
+    reference.write_text(reference.read_text() + "include parts/mounting.a7s\n")
+    assert list(checking._unused_files(read_exercise(folder))) == [
+        "parts/notes.txt: expected only files that the exercise uses, got one that it does not name"
+    ]
+
+
+def test_the_check_refuses_template_text_and_unused_files(parallax, tmp_path):
+    """Both are reported with the other faults of form, before any run: the reference is missing."""
+    folder = tmp_path / "04-parallax"
+    shutil.copytree(parallax.folder, folder)
+    (folder / "reference.a7s").unlink()
+    (folder / "old-draft.a7s").write_text("scenario akwanga seed 1\n")
+    unfinished = wrong(ExerciseFolder(parallax.exercise, folder), goal=template.GOAL)
+    assert faults_of(unfinished) == (
+        "reference.a7s: expected a script beside the exercise, found none",
+        f"goal: expected a text of your own, got that of the template: {template.GOAL}",
+        "old-draft.a7s: expected only files that the exercise uses, got one that it does not name",
+    )

@@ -161,7 +161,7 @@ def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
 
 
 def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path, monkeypatch):
-    monkeypatch.setattr("a7sim.training.submissions.ALONE", 2)
+    monkeypatch.setattr("a7sim.training.submissions.MAX_SERIAL", 2)
     exercise_folder = find_exercise("14")
     folders = []
     for i in range(4):
@@ -232,7 +232,9 @@ def test_check_finds_an_exercise_that_does_not_hold(train, tmp_path):
     toml.write_text(toml.read_text().replace("excellent = 12\npass = 30", "excellent = 1\npass = 1e6"))
     code, out, _ = train("check-exercise", folder)
     assert code == 1
-    assert re.search(r"cleared: expected excellent no better than eye and least count, 5\.9\d+, got 1\n", out)
+    assert re.search(
+        r"cleared: expected excellent not below the accuracy of eye and least count, 5\.9\d+, got 1\n", out
+    )
     assert "faulty-not-cleared.a7s: expected cleared to fail, got opposed" in out
 
 

@@ -41,7 +41,7 @@ def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: 
             sit_down(Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, drawing=DrawingMode.HALVES, tasks=tasks)))
         )
         readings = environment.record().readings
-        assert [(each.point, each.named) for each in readings] == [("1011", ("by1",))] * 2 + [("A", ("by1",))]
+        assert [(each.point, each.elements) for each in readings] == [("1011", ("by1",))] * 2 + [("A", ("by1",))]
 
 
 def shown(console: Console) -> str:

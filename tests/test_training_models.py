@@ -39,7 +39,7 @@ def test_the_grid_test_by_hand_finds_what_stands_in_a_worn_projector(grid_tested
     read = defaultdict(list)
     for each in grid_tested.readings:
         if each.eyes[projector - 1] is not None:
-            read[round(each.shown["Z"]), each.point].append([each.shown[axis] for axis in "XY"])
+            read[round(each.counters["Z"]), each.point].append([each.counters[axis] for axis in "XY"])
     high, low = sorted({level for level, _ in read}, reverse=True)
     names = [[f"G{row}{column}" for column in (1, 5, 9)] for row in (1, 5, 9)]
     x, y = np.moveaxis(
@@ -92,14 +92,14 @@ def test_levelling_turns_both_projectors_as_the_text_says(levelled):
     opened = max(each.index for each in levelled.action_log.actions if each.client == "opening") + 1
     level = last_readings(levelled, ["K1"])["K1"][-1]
     turned = {
-        name: level.shown[name] - element_at(levelled, name, opened)
+        name: level.counters[name] - element_at(levelled, name, opened)
         for name in ("phi1", "phi2", "omega1", "omega2", "bz1", "bz2")
     }
     assert turned["phi1"] == pytest.approx(turned["phi2"], abs=0.02)
     assert turned["omega1"] == pytest.approx(turned["omega2"], abs=0.02)
     assert abs(turned["phi1"]) > 0.03
     sunk = -(turned["bz2"] - turned["bz1"])
-    assert sunk == pytest.approx(level.shown["bx"] * turned["phi1"] * GON, abs=0.03)
+    assert sunk == pytest.approx(level.counters["bx"] * turned["phi1"] * GON, abs=0.03)
 
 
 def test_a_perfect_eye_is_left_with_what_film_and_counts_allow(levelled):

@@ -14,7 +14,7 @@ from a7sim.standard_points import CASES
 from a7sim.training.attempts import run_attempt
 from a7sim.training.catalogue import find_exercise
 from a7sim.training.exercise import PlayedRun
-from a7sim.training.forms import FIVE, computation_form, multipliers
+from a7sim.training.forms import FIVE_ELEMENTS, computation_form, multipliers
 from a7sim.training.grading import grade_folder
 from a7sim.training.metrics.centres import sigmas_of_centre
 from a7sim.training.metrics.clearing import OmegaTurn
@@ -33,7 +33,7 @@ def test_form_a_is_hallerts_six_point_form(akwanga):
     plan = akwanga.plan
     p = np.random.default_rng(8).normal(0.0, 0.2, 6)
     width = plan.half_width * plan.projection_height / akwanga.camera.c
-    closed, _ = regular_corrections(p, plan.bx, width, plan.projection_height, FIVE)
+    closed, _ = regular_corrections(p, plan.bx, width, plan.projection_height, FIVE_ELEMENTS)
     assert multipliers(akwanga, "A") @ p == pytest.approx(closed / GON, abs=1e-9)
 
 
@@ -105,7 +105,7 @@ def test_the_sheet_says_how_far_omega_should_have_gone(tmp_path):
     observer = {"skill": "first-order"}
     sheet = sheet_of("6", tmp_path, 6, procedure="clear the model", options=options, observer=observer)
     reason = sheet["over-correction"].reason
-    assert sheet["over-correction"].band == "fail" and "omega' was turned 1.00 times as far as cleared it" in reason
+    assert sheet["over-correction"].band == "fail" and "omega' was turned by 1.00 times the clearing turn" in reason
     assert 0.4 < sheet["over-correction"].value < 0.7
 
 
@@ -114,7 +114,7 @@ def test_the_sheet_tells_a_slip_in_the_sums_from_a_wrong_setting(tmp_path):
     options = {"readings": 2, "cases": "A", "slip_gon": 0.1}
     sheet = sheet_of("8", tmp_path, 8, procedure="numerical orientation", options=options)
     assert sheet["sums-a"].value == pytest.approx(0.1, abs=0.01) and "phi' was answered as" in sheet["sums-a"].reason
-    assert sheet["set"].reason == "case E was not measured whole"
+    assert sheet["set"].reason == "case E was not measured completely"
 
 
 def test_the_sheet_says_when_the_centres_have_changed_places(tmp_path):

@@ -17,14 +17,14 @@ from a7sim.training.exercise import OPENING
 
 AXES = ("X", "Y", "Z")
 
-PLAIN = ("drive", "wheel", "set", "turn")
+MOVEMENTS = ("drive", "wheel", "set", "turn")
 """Actions that move a drum or a carriage."""
 
 
 class StudentAction(Struct, frozen=True, gc=False):
     """Action at the instrument, with the position of its control before and after, as its counter shows it.
 
-    `what` is 'set' or 'turn' of an element, 'drive' or 'wheel' of an axis, 'preset', 'fit', 'base', 'gear', 'load',
+    `kind` is 'set' or 'turn' of an element, 'drive' or 'wheel' of an axis, 'preset', 'fit', 'base', 'gear', 'load',
     'unload', 'centre', 'fiducials' (queried), 'reset', 'record', 'strike', 'look' (through one or both eyepieces),
     'note'; `name` the element, axis, fitting, projector or point.
     """
@@ -33,7 +33,7 @@ class StudentAction(Struct, frozen=True, gc=False):
     """Counted from 0 in order of occurrence."""
     time: float
     client: str
-    what: str
+    kind: str
     name: str = ""
     before: float = 0.0
     after: float = 0.0
@@ -44,15 +44,15 @@ class StudentAction(Struct, frozen=True, gc=False):
 class Reading:
     """Registration with the state of the instrument at that moment."""
 
-    place: int
+    action_index: int
     """Index among the actions."""
     time: float
     client: str
     number: int
     point: str
-    shown: Mapping[str, float]
+    counters: Mapping[str, float]
     """Readings of all counters: X, Y, Z and the elements."""
-    named: tuple[str, ...]
+    elements: tuple[str, ...]
     """Registered elements."""
     sides: Mapping[str, int]
     """By control, +1 if its last movement came from smaller readings, -1 from larger ones; absent if unmoved."""
@@ -76,7 +76,7 @@ class ActionLog:
     actions: list[StudentAction] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)
     sides: dict[str, int] = field(default_factory=dict)
-    began: float = 0.0
+    start_time: float = 0.0
     """Simulated time in s at the end of the opening."""
     opened: bool = False
     """Whether the opening is complete."""
@@ -86,7 +86,7 @@ class ActionLog:
     def copy_from(self, other: "ActionLog") -> None:
         """Replace the contents by those of another log."""
         self.actions, self.readings, self.sides = [*other.actions], [*other.readings], dict(other.sides)
-        self.began, self.opened, self.now, self.client = other.began, other.opened, other.now, other.client
+        self.start_time, self.opened, self.now, self.client = other.start_time, other.opened, other.now, other.client
 
     def on_link_event(self, event: LinkEvent) -> None:
         """Record client, time and note of a link event."""
@@ -94,11 +94,11 @@ class ActionLog:
             return
         self.now, self.client = event.time, event.client
         if event.direction == "-" and event.client == OPENING:
-            self.began, self.opened = event.time, True
+            self.start_time, self.opened = event.time, True
         if event.direction != ">":
             return
-        line_text = event.text.lower()
-        if "note" in line_text or "fid" in line_text:
+        text = event.text.lower()
+        if "note" in text or "fid" in text:
             for unit in parse_program(event.text.encode("latin-1", "replace")):
                 self._take_note(unit)
 
@@ -108,29 +108,29 @@ class ActionLog:
         if isinstance(unit, ParsedCommand) and unit.command.header == "PHOTo<n>:FIDucial?":
             self.add_action("fiducials", str(unit.suffix))
 
-    def add_action(self, what: str, name: str = "", before: float = 0.0, after: float = 0.0, text: str = "") -> None:
+    def add_action(self, kind: str, name: str = "", before: float = 0.0, after: float = 0.0, text: str = "") -> None:
         """Record an action."""
-        if what in PLAIN and before != after:
+        if kind in MOVEMENTS and before != after:
             self.sides[name] = 1 if after > before else -1
-        self.actions.append(StudentAction(len(self.actions), self.now, self.client, what, name, before, after, text))
+        self.actions.append(StudentAction(len(self.actions), self.now, self.client, kind, name, before, after, text))
 
-    def add_reading(self, autograph: Autograph, made: Registration) -> None:
+    def add_reading(self, autograph: Autograph, registration: Registration) -> None:
         """Record a registration and the state of the instrument."""
-        self.add_action("record", made.point)
-        shown = {axis: autograph.counter(axis) for axis in AXES}
-        shown |= {name: autograph.element(name) for name in autograph.variant.elements}
+        self.add_action("record", registration.point)
+        counters = {axis: autograph.counter(axis) for axis in AXES}
+        counters |= {name: autograph.element(name) for name in autograph.variant.elements}
         x, y, z = autograph.mark_in_model().tolist()
-        left, right = (Autograph.eyepiece(autograph, eye, made.point) for eye in (1, 2))
+        left, right = (Autograph.eyepiece(autograph, eye, registration.point) for eye in (1, 2))
         stereo = None if left is None or right is None else (left[0] - right[0], left[1] - right[1])
         self.readings.append(
             Reading(
                 len(self.actions) - 1,
                 self.now,
                 self.client,
-                made.number,
-                made.point,
-                shown,
-                tuple(recorded_element(word) for word, _ in made.readings[len(AXES) :]),
+                registration.number,
+                registration.point,
+                counters,
+                tuple(recorded_element(word) for word, _ in registration.readings[len(AXES) :]),
                 dict(self.sides),
                 autograph.fittings.as_words(),
                 autograph.base_mode,
@@ -147,15 +147,15 @@ class ActionLog:
         self.readings = [replace(each, struck=True) if each.number == number else each for each in self.readings]
 
 
-class _WitnessedRecorder(Recorder):
+class _LoggedRecorder(Recorder):
     def __init__(self, autograph: "LoggedAutograph") -> None:
         super().__init__()
         self._autograph = autograph
 
     def register(self, point: str, readings: list[tuple[str, str]]) -> Registration:
-        made = super().register(point, readings)
-        self._autograph.action_log.add_reading(self._autograph, made)
-        return made
+        registration = super().register(point, readings)
+        self._autograph.action_log.add_reading(self._autograph, registration)
+        return registration
 
     def strike(self, number: int, why: str) -> None:
         super().strike(number, why)
@@ -168,11 +168,11 @@ class LoggedAutograph(Autograph):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.action_log = ActionLog()
-        self.recorder = _WitnessedRecorder(self)
-        self.blind = False
+        self.recorder = _LoggedRecorder(self)
+        self.blank_pictures = False
         """Whether pictures stay black, for a replay only: they take longer than all the rest."""
 
-    def _counted(self, axis: str) -> float:
+    def _counter_reading(self, axis: str) -> float:
         counter = self._counters[axis]
         return counter.offset + counter.units_per_mm * self._carriages[axis].at
 
@@ -204,21 +204,21 @@ class LoggedAutograph(Autograph):
 
     def drive(self, axis: str, reading: float) -> None:
         """Drive a carriage to a reading."""
-        before = self._counted(axis)
+        before = self._counter_reading(axis)
         super().drive(axis, reading)
-        self.action_log.add_action("drive", axis, before, self._counted(axis))
+        self.action_log.add_action("drive", axis, before, self._counter_reading(axis))
 
     def turn_handwheel(self, axis: str, amount: float) -> None:
         """Turn a handwheel."""
-        before = self._counted(axis)
+        before = self._counter_reading(axis)
         super().turn_handwheel(axis, amount)
-        self.action_log.add_action("wheel", axis, before, self._counted(axis))
+        self.action_log.add_action("wheel", axis, before, self._counter_reading(axis))
 
     def preset(self, axis: str, reading: float) -> None:
         """Preset a counter."""
-        before = self._counted(axis)
+        before = self._counter_reading(axis)
         super().preset(axis, reading)
-        self.action_log.add_action("preset", axis, before, self._counted(axis))
+        self.action_log.add_action("preset", axis, before, self._counter_reading(axis))
 
     def set_fitting(self, name: str, position: str) -> None:
         """Set a fitting."""
@@ -273,6 +273,6 @@ class LoggedAutograph(Autograph):
     def picture(self, eyepiece: int, columns: int, rows: int, magnification: float) -> Any:
         """Look at the picture of an eyepiece."""
         self.action_log.add_action("look")
-        if self.blind:
+        if self.blank_pictures:
             return np.zeros((rows, columns))
         return super().picture(eyepiece, columns, rows, magnification)

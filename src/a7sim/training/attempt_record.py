@@ -26,7 +26,7 @@ class AttemptRecord:
     autograph: LoggedAutograph
     """State at the end of the attempt."""
     action_log: ActionLog
-    written: Mapping[str, str] = field(default_factory=dict)
+    written_answers: Mapping[str, str] = field(default_factory=dict)
     """Answers written beside the journal."""
     hidden: Mapping[str, Any] = field(default_factory=dict)
     """Values known to the maker of the handout and not handed out."""
@@ -44,7 +44,7 @@ class AttemptRecord:
     @property
     def seconds(self) -> float:
         """Simulated s since the start of the student's work."""
-        return max(0.0, self.action_log.now - self.action_log.began)
+        return max(0.0, self.action_log.now - self.action_log.start_time)
 
     @cached_property
     def model(self) -> ModelJob:
@@ -57,9 +57,9 @@ class AttemptRecord:
         """Answers in notes at the instrument or beside the journal; the latest one counts."""
         noted: dict[str, str] = {}
         for action in self.actions:
-            if action.what == "note" and action.text.lower().startswith(ANSWER):
+            if action.kind == "note" and action.text.lower().startswith(ANSWER):
                 noted |= parse_answers(action.text[len(ANSWER) :].split())
-        return noted | dict(self.written)
+        return noted | dict(self.written_answers)
 
     def name_of(self, point: str) -> str:
         """Return the name of a point given by its position in the model, such as 1, or by its name."""

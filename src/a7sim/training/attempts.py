@@ -71,7 +71,7 @@ def run_opening(environment: AttemptEnvironment) -> None:
     if opening is not None:
         error = play_item(environment, opening, OPENING)
         if error:
-            raise A7SimError(f"{environment.exercise_folder.name}: the opening cannot be done: {error}")
+            raise A7SimError(f"{environment.exercise_folder.name}: expected the opening to finish: {error}")
 
 
 def play_item(environment: AttemptEnvironment, played: PlayedRun, client: str = STUDENT) -> str:
@@ -83,20 +83,20 @@ def play_item(environment: AttemptEnvironment, played: PlayedRun, client: str = 
 
 def play_script(environment: AttemptEnvironment, script: Script, client: str = STUDENT) -> str:
     """Run a script at the instrument of an attempt; return the unmet expectation, otherwise an empty text."""
-    not_met = ScriptRunner(script, instrument=environment.instrument, clock=environment.clock).run(client)
-    if not_met is not None and client in environment.instrument.clients:
+    unmet = ScriptRunner(script, instrument=environment.instrument, clock=environment.clock).run(client)
+    if unmet is not None and client in environment.instrument.clients:
         environment.instrument.close(client, environment.clock.now)
-    return str(not_met) if not_met is not None else ""
+    return str(unmet) if unmet is not None else ""
 
 
-def seed_for(exercise_folder: ExerciseFolder, played: PlayedRun, otherwise: int = 1) -> int:
+def seed_for(exercise_folder: ExerciseFolder, played: PlayedRun, default: int = 1) -> int:
     """Return the seed of a run: a script's own, or that of the exercise's reference."""
     if played.seed is not None:
         return played.seed
     if played.script:
         return read_script(exercise_folder.folder / played.script).seed
     reference = exercise_folder.exercise.reference
-    return otherwise if played is reference else seed_for(exercise_folder, reference)
+    return default if played is reference else seed_for(exercise_folder, reference)
 
 
 def run_attempt(
@@ -112,9 +112,9 @@ def run_attempt(
 
 def write_answers(folder: Path, answers: dict[str, str]) -> dict[str, str]:
     """Add answers to the written ones; return all of them. Raises A7SimError if that fails."""
-    known = written_answers(folder) | answers
-    write_atomic(folder / ANSWERS, "".join(f"{key}={value}\n" for key, value in known.items()))
-    return known
+    all_answers = written_answers(folder) | answers
+    write_atomic(folder / ANSWERS, "".join(f"{key}={value}\n" for key, value in all_answers.items()))
+    return all_answers
 
 
 def written_answers(folder: Path) -> dict[str, str]:
@@ -149,4 +149,4 @@ def attempt_mode(folder: Path) -> tuple[str, str, str]:
     try:
         return settings["exercise"], settings["student"], settings["mode"]
     except (KeyError, TypeError):
-        raise A7SimError(f"{folder}: expected the journal of an attempt at an exercise, got another") from None
+        raise A7SimError(f"{folder}: expected the journal of an attempt at an exercise, got another journal") from None

@@ -34,15 +34,15 @@ def find_exercise(name: str) -> ExerciseFolder:
     """Return an exercise by number, by the name of its folder or a part of it, or by a folder. Raises A7SimError."""
     if (Path(name) / FILE).is_file():
         return read_exercise(Path(name))
-    present = _folders()
+    folders = _folders()
     if name.isdecimal():
-        found = [each for each in present if int(each.name.partition("-")[0]) == int(name)]
+        found = [each for each in folders if int(each.name.partition("-")[0]) == int(name)]
     else:
-        found = [each for each in present if each.name == name] or [
-            each for each in present if name and name in each.name
+        found = [each for each in folders if each.name == name] or [
+            each for each in folders if name and name in each.name
         ]
     if len(found) != 1:
-        known = ", ".join(each.name for each in found or present)
+        known = ", ".join(each.name for each in found or folders)
         raise A7SimError(f"{name}: expected the number of an exercise, its folder, or one of {known}")
     return read_exercise(found[0])
 
@@ -57,60 +57,61 @@ def read_exercise(folder: Path) -> ExerciseFolder:
     """Return the exercise in a folder. Raises A7SimError with all errors."""
     path = folder / FILE
     raw = read_toml(path)
-    mistakes = list(schema_errors(raw, _expected()))
-    if not mistakes:
+    errors = list(schema_errors(raw, _exercise_type()))
+    if not errors:
         exercise = msgspec.convert(raw, Exercise)
-        mistakes = _mistakes_of_reference(exercise)
-        if not mistakes:
+        errors = _reference_errors(exercise)
+        if not errors:
             return ExerciseFolder(exercise, folder)
-    raise ExerciseError("\n".join(f"{path}: {mistake}" for mistake in mistakes))
+    raise ExerciseError("\n".join(f"{path}: {error}" for error in errors))
 
 
 @cache
-def _expected() -> msgspec.inspect.Type:
+def _exercise_type() -> msgspec.inspect.Type:
     return msgspec.inspect.type_info(Exercise)
 
 
-def _mistakes_of_reference(exercise: Exercise) -> list[str]:
-    mistakes: list[str] = []
-    measured: list[tuple[str, MetricSpec]] = [(f"step[{i}]", each) for i, each in enumerate(exercise.steps)]
-    measured += [(f"criterion[{i}]", each) for i, each in enumerate(exercise.criteria)]
-    for place, each in measured:
-        mistakes += _mistakes_of_measure(place, each)
+def _reference_errors(exercise: Exercise) -> list[str]:
+    errors: list[str] = []
+    specs: list[tuple[str, MetricSpec]] = [(f"step[{i}]", each) for i, each in enumerate(exercise.steps)]
+    specs += [(f"criterion[{i}]", each) for i, each in enumerate(exercise.criteria)]
+    for path, spec in specs:
+        errors += _metric_errors(path, spec)
     for i, step in enumerate(exercise.steps):
         known = MEASURES.get(step.measure)
         if known is not None and known.truth:
-            mistakes.append(
-                f"step[{i}].measure: expected what can be seen at the link, got {step.measure!r}: the truth"
+            errors.append(
+                f"step[{i}].measure: expected a metric of the events at the link, "
+                f"got {step.measure!r}: it uses the truth"
             )
     ids = exercise.criterion_ids
-    mistakes += [f"criterion: expected every id once, got {each!r} twice" for each in _twice(ids)]
+    errors += [f"criterion: expected every id once, got {each!r} twice" for each in _duplicates(ids)]
     for i, faulty in enumerate(exercise.faulty):
         if faulty.fails not in ids:
-            mistakes.append(f"faulty[{i}].fails: expected one of {', '.join(ids)}, got {faulty.fails!r}")
-    played: list[tuple[str, Any]] = [("reference", exercise.reference), ("opening", exercise.opening)]
-    for place, run in played + [(f"faulty[{i}]", each) for i, each in enumerate(exercise.faulty)]:
+            errors.append(f"faulty[{i}].fails: expected one of {', '.join(ids)}, got {faulty.fails!r}")
+    runs: list[tuple[str, Any]] = [("reference", exercise.reference), ("opening", exercise.opening)]
+    for path, run in runs + [(f"faulty[{i}]", each) for i, each in enumerate(exercise.faulty)]:
         if run is None:
             continue
         if bool(run.script) == bool(run.procedure):
-            mistakes.append(f"{place}: expected a script or a procedure, got {'both' if run.script else 'neither'}")
+            errors.append(f"{path}: expected a script or a procedure, got {'both' if run.script else 'neither'}")
         if run.procedure and run.procedure not in PROCEDURES:
-            known_ones = ", ".join(PROCEDURES)
-            mistakes.append(f"{place}.procedure: expected one of {known_ones}, got {run.procedure!r}")
+            known_procedures = ", ".join(PROCEDURES)
+            errors.append(f"{path}.procedure: expected one of {known_procedures}, got {run.procedure!r}")
     if exercise.handout and exercise.handout not in HANDOUTS:
-        mistakes.append(f"handout: expected one of {', '.join(HANDOUTS)}, got {exercise.handout!r}")
-    return mistakes
+        errors.append(f"handout: expected one of {', '.join(HANDOUTS)}, got {exercise.handout!r}")
+    return errors
 
 
-def _mistakes_of_measure(place: str, each: MetricSpec) -> list[str]:
-    kind = MEASURES.get(each.measure)
+def _metric_errors(path: str, spec: MetricSpec) -> list[str]:
+    kind = MEASURES.get(spec.measure)
     if kind is None:
-        return [f"{place}.measure: expected one of {', '.join(MEASURES)}, got {each.measure!r}"]
-    mistakes = list(schema_errors(each.options, msgspec.inspect.type_info(kind), f"{place}.options"))
-    if not mistakes:
-        make_metric(each)
-    return mistakes
+        return [f"{path}.measure: expected one of {', '.join(MEASURES)}, got {spec.measure!r}"]
+    errors = list(schema_errors(spec.options, msgspec.inspect.type_info(kind), f"{path}.options"))
+    if not errors:
+        make_metric(spec)
+    return errors
 
 
-def _twice(names: list[str]) -> list[str]:
+def _duplicates(names: list[str]) -> list[str]:
     return [name for i, name in enumerate(names) if name in names[:i]]

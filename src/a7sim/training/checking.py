@@ -1,5 +1,6 @@
 """Checks of exercises: the reference passes, each faulty run fails for its reason, each criterion decides something."""
 
+import os
 import re
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -42,45 +43,45 @@ class _Run:
     """Run with its record and the result of each criterion's metric, which changed limits do not affect."""
 
     record: AttemptRecord
-    found: Sequence[MetricResult]
+    results: Sequence[MetricResult]
 
     @classmethod
-    def of(cls, record: AttemptRecord) -> "_Run":
+    def from_record(cls, record: AttemptRecord) -> "_Run":
         return cls(record, evaluate_metrics(record))
 
     def grade(self, exercise: Exercise) -> Grade:
         """Return the grade with the limits and weights of an exercise with the same metrics."""
-        return grade_by(exercise, self.found, self.record.seconds)
+        return grade_by(exercise, self.results, self.record.seconds)
 
 
 def check_exercise(exercise_folder: ExerciseFolder) -> CheckResult:
     """Check an exercise completely."""
     exercise = exercise_folder.exercise
-    faults = list(_of_form(exercise_folder))
+    faults = list(_form_faults(exercise_folder))
     if not _has_all_scripts(exercise_folder):
         return CheckResult(exercise_folder.name, tuple(faults))
-    with tempfile.TemporaryDirectory() as place:
+    with tempfile.TemporaryDirectory() as folder:
         try:
-            faults += _of_tolerances(
+            faults += _tolerance_faults(
                 exercise, scenario_for(exercise_folder, seed_for(exercise_folder, exercise.reference))
             )
-            accounts = _accounts(exercise_folder, Path(place))
+            records = _run_all(exercise_folder, Path(folder))
         except A7SimError as error:
             return CheckResult(exercise_folder.name, (*faults, str(error)))
-        runs = {name: _Run.of(record) for name, record in accounts.items()}
-        faults += _of_runs(exercise, runs)
+        runs = {name: _Run.from_record(record) for name, record in records.items()}
+        faults += _run_faults(exercise, runs)
         faults += _dead_criteria(exercise, runs)
     return CheckResult(exercise_folder.name, tuple(faults), runs["reference"].grade(exercise).points)
 
 
-def _of_form(exercise_folder: ExerciseFolder) -> Iterator[str]:
+def _form_faults(exercise_folder: ExerciseFolder) -> Iterator[str]:
     exercise = exercise_folder.exercise
     if not exercise_folder.text.strip():
         yield "text.md: expected the exercise in plain words, found none"
     if len(exercise.hints) < MIN_HINTS:
         yield f"hint: expected {MIN_HINTS} hints or more, got {len(exercise.hints)}"
     if len(exercise.faulty) < MIN_FAULTY:
-        yield f"faulty: expected {MIN_FAULTY} faulty ones or more, got {len(exercise.faulty)}"
+        yield f"faulty: expected {MIN_FAULTY} faulty runs or more, got {len(exercise.faulty)}"
     if not exercise.steps:
         yield "step: expected a checklist, got no step"
     total = sum(each.weight for each in exercise.criteria)
@@ -110,97 +111,114 @@ def _template_text(exercise_folder: ExerciseFolder) -> Iterator[str]:
     texts |= {f"hint {number}": each.text for number, each in enumerate(exercise.hints, start=1)}
     left = [(place, text) for place, text in texts.items() if text in PLACEHOLDERS]
     left += [("text.md", line.strip()) for line in exercise_folder.text.splitlines() if line.strip() in PLACEHOLDERS]
+    for script in dict.fromkeys(_scripts(exercise)):
+        file = exercise_folder.folder / script
+        comments = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
+        left += [(script, text) for text in sorted(PLACEHOLDERS) if f"# {text}" in comments]
     for place, text in left:
         yield f"{place}: expected a text of your own, got that of the template: {text}"
 
 
 def _unused_files(exercise_folder: ExerciseFolder) -> Iterator[str]:
-    """Yield a sentence for each file in the folder that neither the exercise nor one of its scripts uses."""
+    """Yield a sentence for each file in the folder that neither the exercise nor one of its scripts uses.
+
+    A used file names another one by its path relative to its own folder. Hidden files are ignored.
+    """
     folder, exercise = exercise_folder.folder, exercise_folder.exercise
     if not folder.is_dir():
         return
     used = {FILE, "text.md", exercise.scenario, f"{exercise.scenario}.toml", *_scripts(exercise)}
-    files = {path.name: path for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")}
+    relative = [path.relative_to(folder) for path in folder.rglob("*") if path.is_file()]
+    files = {path.as_posix() for path in relative if not any(part.startswith(".") for part in path.parts)}
     pending = [name for name in used if name in files]
     while pending:
-        text = files[pending.pop()].read_text(encoding="utf-8", errors="replace")
-        named = {name for name in files if name not in used and re.search(rf"(?<![\w./-]){re.escape(name)}", text)}
+        user = pending.pop()
+        text = (folder / user).read_text(encoding="utf-8", errors="replace")
+        named = {name for name in files - used if _is_named(name, user, text)}
         used |= named
         pending += named
-    for name in sorted(files.keys() - used):
+    for name in sorted(files - used):
         yield f"{name}: expected only files that the exercise uses, got one that it does not name"
 
 
-def _of_tolerances(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
+def _is_named(name: str, user: str, text: str) -> bool:
+    """Return whether the text of a file names another file; both paths are relative to the exercise's folder."""
+    path = os.path.relpath(name, Path(user).parent).replace(os.sep, "/")
+    return re.search(rf"(?<![\w./-]){re.escape(path)}", text) is not None
+
+
+def _tolerance_faults(exercise: Exercise, scenario: Scenario) -> Iterator[str]:
     for each in exercise.criteria:
-        measure = make_metric(each)
-        if not measure.more_is_better:
-            floor = round(measure.floor(scenario), 4)
+        metric = make_metric(each)
+        if not metric.more_is_better:
+            floor = round(metric.floor(scenario), 4)
             for band, limit in (("excellent", each.excellent), ("pass", each.passing)):
                 if limit < floor:
-                    yield f"{each.id}: expected {band} no better than eye and least count, {floor:g}, got {limit:g}"
-        if not measure.meets(each.excellent, each.passing):
-            yield f"{each.id}: expected excellent no worse than pass, got {each.excellent:g} and {each.passing:g}"
+                    least = f"not below the accuracy of eye and least count, {floor:g}"
+                    yield f"{each.id}: expected {band} {least}, got {limit:g}"
+        if not metric.meets(each.excellent, each.passing):
+            limits = f"excellent {each.excellent:g} and pass {each.passing:g}"
+            yield f"{each.id}: expected excellent at least as strict as pass, got {limits}"
 
 
-def _accounts(exercise_folder: ExerciseFolder, place: Path) -> dict[str, AttemptRecord]:
+def _run_all(exercise_folder: ExerciseFolder, folder: Path) -> dict[str, AttemptRecord]:
     """Return the records of the reference, of the faulty runs, and of runs that do nothing, are slow or stop early.
 
     The reference is an attempt with a journal, as a student's; the others are dry runs.
     """
     exercise = exercise_folder.exercise
-    rehearsals = DryRuns(exercise_folder)
-    accounts = {"reference": _of_reference(exercise_folder, place)}
+    dry_runs = DryRuns(exercise_folder)
+    records = {"reference": _run_reference(exercise_folder, folder)}
     for i, played in enumerate(exercise.faulty, start=1):
-        accounts[f"faulty {i}"], error = rehearsals.run_attempt(played)
+        records[f"faulty {i}"], error = dry_runs.run_attempt(played)
         if error and played.script:
             raise A7SimError(f"{played.script}: {error}")
     seed = seed_for(exercise_folder, exercise.reference)
     script = read_script(exercise_folder.folder / exercise.reference.script) if exercise.reference.script else None
-    accounts["nothing"] = rehearsals.run_and_leave(seed, None)
-    accounts["slow"] = rehearsals.run_and_leave(seed, script, 10.0 * exercise.minutes)
-    accounts["half"] = rehearsals.run_and_leave(seed, _half_of(script)) if script else accounts["nothing"]
-    return accounts
+    records["nothing"] = dry_runs.run_and_leave(seed, None)
+    records["slow"] = dry_runs.run_and_leave(seed, script, 10.0 * exercise.minutes)
+    records["half"] = dry_runs.run_and_leave(seed, _first_half(script)) if script else records["nothing"]
+    return records
 
 
-def _of_reference(exercise_folder: ExerciseFolder, place: Path) -> AttemptRecord:
+def _run_reference(exercise_folder: ExerciseFolder, folder: Path) -> AttemptRecord:
     reference = exercise_folder.exercise.reference
     seed = seed_for(exercise_folder, reference)
-    error = run_attempt(exercise_folder, reference, place, seed)
+    error = run_attempt(exercise_folder, reference, folder, seed)
     if error:
         raise A7SimError(f"reference: expected it to finish: {error}")
-    return load_record(exercise_folder, seed, place)
+    return load_record(exercise_folder, seed, folder)
 
 
-def _half_of(script: Script) -> Script:
+def _first_half(script: Script) -> Script:
     lines = [each for each in script.statements if isinstance(each, SendLine)]
     return replace(script, statements=tuple(lines[: len(lines) // 2]))
 
 
-def _of_runs(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
+def _run_faults(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
     reference = runs["reference"].grade(exercise)
     if not reference.passed:
-        remark = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or pluralize(
+        reason = "; ".join(f"{each.id}: {each.reason}" for each in reference.failed) or pluralize(
             reference.points, "point"
         )
-        yield f"reference: expected it to pass, got {remark}"
+        yield f"reference: expected it to pass, got {reason}"
     for i, faulty in enumerate(exercise.faulty, start=1):
         grade = runs[f"faulty {i}"].grade(exercise)
-        called = faulty.script or f"faulty {i} ({faulty.procedure})"
+        name = faulty.script or f"faulty {i} ({faulty.procedure})"
         if grade.passed:
-            yield f"{called}: expected it to fail, got {pluralize(grade.points, 'point')}"
+            yield f"{name}: expected it to fail, got {pluralize(grade.points, 'point')}"
         if faulty.fails not in [each.id for each in grade.failed]:
             got = ", ".join(each.id for each in grade.failed) or "nothing"
-            yield f"{called}: expected {faulty.fails} to fail, got {got}"
+            yield f"{name}: expected {faulty.fails} to fail, got {got}"
     if runs["nothing"].grade(exercise).passed:
-        yield "expected who does nothing not to pass, got a pass"
+        yield "expected a run without actions not to pass, got a pass"
     for step in exercise.steps:
-        measure = make_metric(step)
-        found = measure.evaluate(runs["reference"].record)
-        if not measure.meets(found.value, step.done):
-            yield f"step {step.text!r}: expected the reference to tick it, got {found.reason}"
-        if exercise.opening is not None and measure.meets(measure.evaluate(runs["nothing"].record).value, step.done):
-            yield f"step {step.text!r}: expected it to be still to do after the opening, got it ticked"
+        metric = make_metric(step)
+        result = metric.evaluate(runs["reference"].record)
+        if not metric.meets(result.value, step.done):
+            yield f"step {step.text!r}: expected the reference to tick it, got {result.reason}"
+        if exercise.opening is not None and metric.meets(metric.evaluate(runs["nothing"].record).value, step.done):
+            yield f"step {step.text!r}: expected an open item after the opening, got it ticked"
 
 
 def _dead_criteria(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
@@ -208,21 +226,21 @@ def _dead_criteria(exercise: Exercise, runs: dict[str, _Run]) -> Iterator[str]:
 
     The run without any action is left out: it fails all criteria.
     """
-    done = [run for name, run in runs.items() if name != "nothing"]
-    verdicts = [_verdict(run, exercise) for run in done]
+    active_runs = [run for name, run in runs.items() if name != "nothing"]
+    verdicts = [_verdict(run, exercise) for run in active_runs]
     for criterion in exercise.criteria:
         sense = -1.0 if make_metric(criterion).more_is_better else 1.0
         mutations = {
-            "its tolerances are without limit": changed(criterion, excellent=sense * NEVER, passing=sense * NEVER),
+            "its tolerances are unlimited": changed(criterion, excellent=sense * NEVER, passing=sense * NEVER),
             "its tolerances are impossible": changed(criterion, excellent=-sense * NEVER, passing=-sense * NEVER),
-            "its weight is next to nothing": changed(criterion, weight=1e-6),
-            "its weight is all": changed(criterion, weight=1e3),
+            "its weight is almost 0": changed(criterion, weight=1e-6),
+            "its weight is 1000": changed(criterion, weight=1e3),
         }
         for mutation, mutant in mutations.items():
             criteria = [mutant if each.id == mutant.id else each for each in exercise.criteria]
             mutated = changed(exercise, criteria=criteria)
-            if [_verdict(run, mutated) for run in done] == verdicts:
-                yield f"{criterion.id}: expected it to decide something, but nothing changes where {mutation}"
+            if [_verdict(run, mutated) for run in active_runs] == verdicts:
+                yield f"{criterion.id}: expected some grade to change if {mutation}, got no change"
 
 
 def _verdict(run: _Run, exercise: Exercise) -> tuple[bool, float]:

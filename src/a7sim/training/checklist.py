@@ -30,28 +30,28 @@ class Checklist:
     def ticks(self) -> list[bool]:
         """Return which items are done."""
         record = self.environment.record(written_answers(self.attempt.folder))
-        measures = [make_metric(each) for each in self.exercise.steps]
+        metrics = [make_metric(each) for each in self.exercise.steps]
         return [
-            measure.meets(measure.evaluate(record).value, step.done)
-            for measure, step in zip(measures, self.exercise.steps, strict=True)
+            metric.meets(metric.evaluate(record).value, step.done)
+            for metric, step in zip(metrics, self.exercise.steps, strict=True)
         ]
 
     def lines(self) -> list[str]:
         """Return goal and checklist as lines of text."""
-        remark = [self.head(), *(f"your papers: {paper}" for paper in self.papers())]
+        lines = [self.head(), *(f"your papers: {paper}" for paper in self.papers())]
         if self.attempt.mode == EXAM:
-            return [*remark, *(f"  -  {each.text}" for each in self.exercise.steps)]
+            return [*lines, *(f"  -  {each.text}" for each in self.exercise.steps)]
         ticked = zip(self.ticks(), self.exercise.steps, strict=True)
-        return [*remark, *(f" {TICKED if done else OPEN} {step.text}" for done, step in ticked)]
+        return [*lines, *(f" {TICKED if done else OPEN} {step.text}" for done, step in ticked)]
 
     def papers(self) -> list[Path]:
         """Return the handouts in the attempt's folder."""
-        present = sorted(self.attempt.folder.iterdir())
-        return [path for path in present if path.suffix in PAPERS and path.name not in (ANSWERS, HINTS)]
+        files = sorted(self.attempt.folder.iterdir())
+        return [path for path in files if path.suffix in PAPERS and path.name not in (ANSWERS, HINTS)]
 
     def head(self) -> str:
         """Return exercise and time as text."""
         exercise, minutes = self.exercise, self.environment.record().seconds / 60.0
         exam = ", exam" if self.attempt.mode == EXAM else ""
-        over = ", the time is up" if minutes > exercise.minutes else ""
-        return f"{exercise.number} {exercise.title}{exam}: {minutes:.0f} of {exercise.minutes:g} minutes{over}"
+        overrun = ", the time is up" if minutes > exercise.minutes else ""
+        return f"{exercise.number} {exercise.title}{exam}: {minutes:.0f} of {exercise.minutes:g} minutes{overrun}"

@@ -48,11 +48,13 @@ class AttemptEnvironment:
         """Log of all actions."""
         return self.autograph.action_log
 
-    def record(self, written: dict[str, str] | None = None, hidden: dict[str, Any] | None = None) -> AttemptRecord:
+    def record(
+        self, written_answers: dict[str, str] | None = None, hidden: dict[str, Any] | None = None
+    ) -> AttemptRecord:
         """Return the record of the attempt so far."""
         exercise = self.exercise_folder.exercise
         return AttemptRecord(
-            exercise, self.scenario, self.scene, self.autograph, self.action_log, written or {}, hidden or {}
+            exercise, self.scenario, self.scene, self.autograph, self.action_log, written_answers or {}, hidden or {}
         )
 
     def snapshot(self) -> "AttemptEnvironment":
@@ -69,15 +71,13 @@ class AttemptEnvironment:
 
 def header_for(exercise_folder: ExerciseFolder, scenario: Scenario, seed: int, student: str, mode: str) -> Header:
     """Return the header of an attempt's journal. It contains only the hash of the scenario, which is truth."""
-    first = make_header_without_scenario(
-        JOURNAL_COMMAND, exercise=exercise_folder.name, student=student, mode=mode
-    ).line
+    line = make_header_without_scenario(JOURNAL_COMMAND, exercise=exercise_folder.name, student=student, mode=mode).line
     return Header(
-        first | {"title": exercise_folder.exercise.title, "scenario_hash": hash_scenario(scenario), "seed": seed}
+        line | {"title": exercise_folder.exercise.title, "scenario_hash": hash_scenario(scenario), "seed": seed}
     )
 
 
-def _built(
+def _build_parts(
     exercise_folder: ExerciseFolder, seed: int, observer: dict[str, Any]
 ) -> tuple[Scenario, Scene, LoggedAutograph]:
     scenario = scenario_for(exercise_folder, seed, observer)
@@ -87,7 +87,7 @@ def _built(
 
 def dry_run_environment(exercise_folder: ExerciseFolder, seed: int) -> AttemptEnvironment:
     """Return the environment of an attempt without a journal, before its opening."""
-    scenario, scene, autograph = _built(exercise_folder, seed, {})
+    scenario, scene, autograph = _build_parts(exercise_folder, seed, {})
     return AttemptEnvironment(
         exercise_folder,
         scenario,
@@ -112,7 +112,7 @@ def open_environment(
 
     Raises A7SimError if the journal cannot be written.
     """
-    scenario, scene, autograph = _built(exercise_folder, seed, observer or {})
+    scenario, scene, autograph = _build_parts(exercise_folder, seed, observer or {})
     journal = Journal(JournalOptions(states=False))
     instrument = SharedInstrument(autograph, tee_listener(journal.on_link_event, autograph.action_log.on_link_event))
     nominal = scenario_for(exercise_folder, seed)
@@ -123,15 +123,15 @@ def open_environment(
 @contextmanager
 def resume_environment(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> Iterator[AttemptEnvironment]:
     """Open the environment of an attempt in the state of its journal. Raises UnreliableJournalError, A7SimError."""
-    stored = read_journal(folder / JOURNAL)
-    if stored.header.get("software") != software_version():
+    journal_file = read_journal(folder / JOURNAL)
+    if journal_file.header.get("software") != software_version():
         raise A7SimError(
-            f"{stored.location(1)}: expected an attempt of {software_version()} to resume, got one of "
-            f"{stored.header.get('software')} (a7sim train reset begins anew)"
+            f"{journal_file.location(1)}: expected an attempt of {software_version()} to resume, got one of "
+            f"{journal_file.header.get('software')} (a7sim train reset starts a new one)"
         )
-    environment, replay = _replayed(exercise_folder, seed, stored)
+    environment, replay = _replay_journal(exercise_folder, seed, journal_file)
     journal = Journal(JournalOptions(resumes=True, states=False)).resume_at(
-        stored, environment.instrument, replay.checkpoints
+        journal_file, environment.instrument, replay.checkpoints
     )
     environment.instrument.listener = tee_listener(journal.on_link_event, environment.action_log.on_link_event)
     with journal:
@@ -142,47 +142,49 @@ def resume_environment(exercise_folder: ExerciseFolder, seed: int, folder: Path)
         yield environment
 
 
-def replay_environment(exercise_folder: ExerciseFolder, seed: int, stored: JournalFile) -> AttemptEnvironment:
+def replay_environment(exercise_folder: ExerciseFolder, seed: int, journal_file: JournalFile) -> AttemptEnvironment:
     """Return the environment of an attempt in the state of its journal. Raises UnreliableJournalError."""
-    return _replayed(exercise_folder, seed, stored)[0]
+    return _replay_journal(exercise_folder, seed, journal_file)[0]
 
 
-def _replayed(exercise_folder: ExerciseFolder, seed: int, stored: JournalFile) -> tuple[AttemptEnvironment, Replay]:
-    scenario, scene, autograph = _built(exercise_folder, seed, {})
+def _replay_journal(
+    exercise_folder: ExerciseFolder, seed: int, journal_file: JournalFile
+) -> tuple[AttemptEnvironment, Replay]:
+    scenario, scene, autograph = _build_parts(exercise_folder, seed, {})
     expected = header_for(exercise_folder, scenario, seed, "", "").line
     for name in ("command", "scenario_hash", "seed"):
-        got = stored.header.get(name)
+        got = journal_file.header.get(name)
         if got != expected[name]:
             raise UnreliableJournalError(
-                f"{stored.location(1)}: expected an attempt with {name} {expected[name]}, got {got}"
+                f"{journal_file.location(1)}: expected an attempt with {name} {expected[name]}, got {got}"
             )
-    replay = Replay(stored, autograph=autograph)
-    autograph.blind = True
+    replay = Replay(journal_file, autograph=autograph)
+    autograph.blank_pictures = True
     assert replay.instrument.listener is not None
     replay.instrument.listener = tee_listener(replay.instrument.listener, autograph.action_log.on_link_event)
     for number, _, difference in replay_lines(replay):
-        if difference is not None and not _same_but_for_pictures(difference):
-            wanted, got = difference.replayed or "nothing", difference.journalled or "nothing"
+        if difference is not None and not _differ_only_in_pictures(difference):
+            replayed, journalled = difference.replayed or "nothing", difference.journalled or "nothing"
             raise UnreliableJournalError(
-                f"{stored.location(number)}: expected what the instrument does again, {wanted[:200]}, got {got[:200]}"
+                f"{journal_file.location(number)}: expected the replayed line, {replayed[:200]}, got {journalled[:200]}"
             )
-    autograph.blind = False
+    autograph.blank_pictures = False
     return AttemptEnvironment(
         exercise_folder, scenario, seed, scene, replay.instrument, Clock(replay.time), autograph
     ), replay
 
 
-def _same_but_for_pictures(difference: ReplayDifference) -> bool:
+def _differ_only_in_pictures(difference: ReplayDifference) -> bool:
     """Return whether two replies differ only in the checksums of pictures, which are not drawn again."""
     journalled, again = (_CHECKSUM.sub("", each) for each in (difference.journalled, difference.replayed))
     return journalled == again != difference.replayed
 
 
-def tee_listener(first: Listener, then: Listener) -> Listener:
+def tee_listener(first: Listener, second: Listener) -> Listener:
     """Return a listener that calls both."""
 
-    def heard(event: LinkEvent) -> None:
+    def call_both(event: LinkEvent) -> None:
         first(event)
-        then(event)
+        second(event)
 
-    return heard
+    return call_both

@@ -46,12 +46,12 @@ def to_nbgrader(best: Mapping[tuple[str, str], GradeRecord]) -> str:
 
 
 def to_class_document(
-    graded: Sequence[GradeRecord], best: Mapping[tuple[str, str], GradeRecord], attempts: Sequence[Attempt]
+    grades: Sequence[GradeRecord], best: Mapping[tuple[str, str], GradeRecord], attempts: Sequence[Attempt]
 ) -> Document:
     """Return all grades as a document, the best ones by student and exercise first."""
     return document_header("train report") | {
-        "best": [_remark(each) for _, each in sorted(best.items())],
-        "grades": [_remark(each) for each in graded],
+        "best": [_grade_document(each) for _, each in sorted(best.items())],
+        "grades": [_grade_document(each) for each in grades],
         "attempts": [
             {
                 "student": each.student,
@@ -66,24 +66,29 @@ def to_class_document(
     }
 
 
-def _remark(each: GradeRecord) -> Document:
+def _grade_document(each: GradeRecord) -> Document:
     attempt = each.attempt
-    where = {"student": attempt.student, "exercise": attempt.exercise, "mode": attempt.mode, "attempt": attempt.number}
+    attempt_keys = {
+        "student": attempt.student,
+        "exercise": attempt.exercise,
+        "mode": attempt.mode,
+        "attempt": attempt.number,
+    }
     grade: Document = msgspec.to_builtins(each.grade)
-    return where | {"at": each.at, "grade": grade}
+    return attempt_keys | {"at": each.at, "grade": grade}
 
 
-def to_xapi(graded: Sequence[GradeRecord], home_page: str = HOME_PAGE) -> str:
+def to_xapi(grades: Sequence[GradeRecord], home_page: str = HOME_PAGE) -> str:
     """Return grades as xAPI statements, one JSON object per line."""
-    return "".join(msgspec.json.encode(_statement(each, home_page)).decode() + "\n" for each in graded)
+    return "".join(msgspec.json.encode(_statement(each, home_page)).decode() + "\n" for each in grades)
 
 
 def _statement(each: GradeRecord, home_page: str) -> dict[str, Any]:
     attempt, grade = each.attempt, each.grade
     verb = "passed" if grade.passed else "failed"
-    named = f"{attempt.student}/{attempt.exercise}/{attempt.number}/{each.at}/{grade.points}"
+    identity = f"{attempt.student}/{attempt.exercise}/{attempt.number}/{each.at}/{grade.points}"
     return {
-        "id": str(uuid.uuid5(_STATEMENTS, named)),
+        "id": str(uuid.uuid5(_STATEMENTS, identity)),
         "actor": {"objectType": "Agent", "account": {"homePage": home_page, "name": attempt.student}},
         "verb": {"id": _VERB + verb, "display": {"en": verb}},
         "object": {

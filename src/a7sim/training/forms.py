@@ -7,7 +7,7 @@ from a7sim.reduction.least_squares import solve_least_squares
 from a7sim.scenario import Scenario
 from a7sim.standard_points import CASES, PLACES
 
-FIVE = ("kappa1", "kappa2", "phi1", "phi2", "omega1")
+FIVE_ELEMENTS = ("kappa1", "kappa2", "phi1", "phi2", "omega1")
 """Elements of swing-swing, 1 for the left-hand photograph."""
 
 
@@ -20,7 +20,7 @@ def multipliers(scenario: Scenario, case: str) -> Array:
     width = plan.half_width * plan.projection_height / scenario.camera.c
     x, y = np.array([PLACES[label] for label in CASES[case]]).T * np.array([plan.bx, width])[:, None]
     coefficients = near_vertical_parallax_coefficients(x, y, plan.projection_height, plan.bx)
-    design = coefficients[[PARALLAX_ELEMENTS.index(name) for name in FIVE]].T
+    design = coefficients[[PARALLAX_ELEMENTS.index(name) for name in FIVE_ELEMENTS]].T
     solved = [solve_least_squares(design, -each).unknowns for each in np.eye(len(x))]
     return np.asarray(solved).T / GON
 

@@ -79,9 +79,9 @@ class HintsTaken:
     cost: float = 0.0
 
 
-def grade_record(record: AttemptRecord, hints: HintsTaken | None = None, shelved_name: str = "") -> Grade:
+def grade_record(record: AttemptRecord, hints: HintsTaken | None = None, exercise_name: str = "") -> Grade:
     """Return the grade of a record."""
-    return grade_by(record.exercise, evaluate_metrics(record), record.seconds, hints, shelved_name)
+    return grade_by(record.exercise, evaluate_metrics(record), record.seconds, hints, exercise_name)
 
 
 def evaluate_metrics(record: AttemptRecord) -> list[MetricResult]:
@@ -91,20 +91,20 @@ def evaluate_metrics(record: AttemptRecord) -> list[MetricResult]:
 
 def grade_by(
     exercise: Exercise,
-    found: Sequence[MetricResult],
+    results: Sequence[MetricResult],
     seconds: float,
     hints: HintsTaken | None = None,
-    shelved_name: str = "",
+    exercise_name: str = "",
 ) -> Grade:
     """Return the grade for the metrics' results of an attempt that took this many simulated s."""
     hints = hints or HintsTaken()
-    marks = [grade_criterion(criterion, value) for criterion, value in zip(exercise.criteria, found, strict=True)]
+    marks = [grade_criterion(criterion, result) for criterion, result in zip(exercise.criteria, results, strict=True)]
     earned = round(max(0.0, sum(each.points for each in marks) - hints.cost), 1)
-    missed = any(each.band == FAILED and each.required for each in marks)
+    is_required_failed = any(each.band == FAILED and each.required for each in marks)
     return Grade(
-        shelved_name,
+        exercise_name,
         exercise.title,
-        not missed and earned >= exercise.pass_points,
+        not is_required_failed and earned >= exercise.pass_points,
         earned,
         exercise.pass_points,
         hints.number,
@@ -114,16 +114,16 @@ def grade_by(
     )
 
 
-def grade_criterion(criterion: Criterion, found: MetricResult) -> CriterionResult:
+def grade_criterion(criterion: Criterion, result: MetricResult) -> CriterionResult:
     """Return a criterion with its band and points by the result of its metric."""
-    measure = make_metric(criterion)
-    value = found.value
-    if measure.meets(value, criterion.excellent):
+    metric = make_metric(criterion)
+    value = result.value
+    if metric.meets(value, criterion.excellent):
         band, share = EXCELLENT, 1.0
-    elif measure.meets(value, criterion.passing) and value is not None:
+    elif metric.meets(value, criterion.passing) and value is not None:
         width = criterion.passing - criterion.excellent
-        left = (criterion.passing - value) / width if width else 1.0
-        band, share = PASSED, JUST_PASSED + (1.0 - JUST_PASSED) * left
+        position = (criterion.passing - value) / width if width else 1.0
+        band, share = PASSED, JUST_PASSED + (1.0 - JUST_PASSED) * position
     else:
         band, share = FAILED, 0.0
     return CriterionResult(
@@ -133,10 +133,10 @@ def grade_criterion(criterion: Criterion, found: MetricResult) -> CriterionResul
         round(share * criterion.weight, 1),
         criterion.weight,
         value,
-        measure.unit,
+        metric.unit,
         criterion.excellent,
         criterion.passing,
-        found.reason,
+        result.reason,
         criterion.feedback,
         criterion.required,
     )
@@ -158,11 +158,11 @@ def load_record(exercise_folder: ExerciseFolder, seed: int, folder: Path) -> Att
     return make_record(environment, written_answers(folder))
 
 
-def make_record(environment: AttemptEnvironment, written: dict[str, str] | None = None) -> AttemptRecord:
+def make_record(environment: AttemptEnvironment, written_answers: dict[str, str] | None = None) -> AttemptRecord:
     """Return the record of an attempt with the answers on paper, and the hidden values of its handouts."""
     exercise = environment.exercise_folder.exercise
     hidden = make_handout(exercise.handout, environment.scenario, environment.seed, exercise.handout_options).hidden
-    return environment.record(written, dict(hidden))
+    return environment.record(written_answers, dict(hidden))
 
 
 def grade_lines(grade: Grade) -> Sequence[str]:

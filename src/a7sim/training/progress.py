@@ -98,7 +98,7 @@ class Progress:
             self._database.execute("PRAGMA foreign_keys = ON")
             self._migrate()
         except (OSError, sqlite3.Error) as error:
-            raise A7SimError(f"{home / FILE}: expected a file of progress that can be used: {error}") from error
+            raise A7SimError(f"{home / FILE}: expected a usable progress file: {error}") from error
 
     def close(self) -> None:
         """Close the file."""
@@ -146,12 +146,12 @@ class Progress:
         with self._writing():
             self._close_open(student, name)
             number = 1 + self._one("SELECT count(*) FROM attempt WHERE student = ? AND exercise = ?", student, name)
-            drawn = attempt_seed(student, name, mode) if seed is None else seed
+            used_seed = attempt_seed(student, name, mode) if seed is None else seed
             folder = Path("attempts") / quote(student, safe="") / name / str(number)
             self._database.execute(
                 "INSERT INTO attempt (student, exercise, mode, number, seed, folder, begun) "
                 "VALUES (?, ?, ?, ?, ?, ?, ?)",
-                (student, name, mode, number, drawn, str(folder), _now()),
+                (student, name, mode, number, used_seed, str(folder), _now()),
             )
         return self.last(student, name)
 
@@ -212,7 +212,7 @@ class Progress:
         with self._writing():
             given = self._one("SELECT count(*) FROM hint WHERE attempt = ?", attempt.id)
             if given >= len(exercise.hints):
-                raise A7SimError(f"{attempt.exercise}: expected another hint, but all {given} were given")
+                raise A7SimError(f"{attempt.exercise}: expected a hint that is left, got none: all {given} were given")
             hint = exercise.hints[given]
             self._database.execute("INSERT INTO hint VALUES (?, ?, ?, ?)", (attempt.id, given + 1, hint.cost, _now()))
         return given + 1, hint

@@ -16,8 +16,8 @@ from a7sim.training.catalogue import find_exercise
 from a7sim.training.grading import Grade, HintsTaken, grade_folder
 from a7sim.training.variation import attempt_seed
 
-ALONE = 8
-"""Number of attempts graded before other processes start."""
+MAX_SERIAL = 8
+"""Number of attempts up to which one process grades them all."""
 
 
 class Submission(msgspec.Struct, frozen=True):
@@ -34,8 +34,8 @@ def find_submissions(folders: Sequence[Path]) -> list[Path]:
     """Return the folders of attempts: the named ones, or those within them that contain a journal."""
     found: list[Path] = []
     for folder in folders:
-        within = [] if (folder / JOURNAL).exists() else sorted(path.parent for path in folder.rglob(JOURNAL))
-        found += within or [folder]
+        journal_folders = [] if (folder / JOURNAL).exists() else sorted(path.parent for path in folder.rglob(JOURNAL))
+        found += journal_folders or [folder]
     return found
 
 
@@ -46,7 +46,7 @@ def grade_submissions(folders: Sequence[Path], seed: int | None = None, workers:
     """
     grade = partial(grade_submission, seed=seed)
     workers = min(workers or os.cpu_count() or 1, len(folders))
-    if workers < 2 or len(folders) <= ALONE:
+    if workers < 2 or len(folders) <= MAX_SERIAL:
         return [grade(folder) for folder in folders]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         return list(pool.map(grade, folders, chunksize=max(1, len(folders) // (8 * workers))))
@@ -59,8 +59,8 @@ def grade_submission(folder: Path, seed: int | None = None) -> Submission:
     except A7SimError as error:
         return Submission(str(folder), error=str(error))
     try:
-        drawn = attempt_seed(student, exercise, mode) if seed is None else seed
-        grade = grade_folder(find_exercise(exercise), drawn, folder, HintsTaken(*written_hints(folder)))
+        used_seed = attempt_seed(student, exercise, mode) if seed is None else seed
+        grade = grade_folder(find_exercise(exercise), used_seed, folder, HintsTaken(*written_hints(folder)))
     except A7SimError as error:
         return Submission(str(folder), student, exercise, error=str(error))
     return Submission(str(folder), student, exercise, grade)

@@ -9,7 +9,8 @@ GOAL = "State the task in one or two sentences."
 TEXT = "State in plain words what the student learns and does."
 FEEDBACK = "State how to do better."
 HINT = "A small hint."
-PLACEHOLDERS = frozenset({GOAL, TEXT, FEEDBACK, HINT})
+REMARK = "Describe the steps and their reasons."
+PLACEHOLDERS = frozenset({GOAL, TEXT, FEEDBACK, HINT, REMARK})
 """Texts of the template that the author has to replace; `check-exercise` reports each that is left."""
 
 _EXERCISE = """\
@@ -82,10 +83,10 @@ PROJ1:KAPP 399.50;PHI 100.27;OMEG 99.03
 DRIV:X 1.00;Y -2.00;Z -330.00
 """
 
-_REFERENCE = """\
+_REFERENCE = f"""\
 scenario akwanga seed 1
 
-# Describe the steps and their reasons. `a7sim train start FOLDER --script reference.a7s` runs it.
+# {REMARK} `a7sim train start FOLDER --script reference.a7s` runs it.
 REC "1011"
 WHE:X -0.50
 WHE:X 0.50

@@ -29,28 +29,28 @@ def scenario_for(exercise_folder: ExerciseFolder, seed: int, observer: Mapping[s
     `observer` overrides the virtual operator.
     """
     exercise = exercise_folder.exercise
-    beside = exercise_folder.folder / exercise.scenario
-    name = beside if beside.is_file() else exercise.scenario
+    file = exercise_folder.folder / exercise.scenario
+    name = file if file.is_file() else exercise.scenario
     overrides = {path: to_toml(value) for path, value in exercise.settings.items()}
     overrides |= {f"observer.{key}": to_toml(value) for key, value in (observer or {}).items()}
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(TRAINING_STREAM,)))
     if exercise.vary:
         nominal = msgspec.to_builtins(load_scenario(name, overrides))
-        for path, within in exercise.vary.items():
-            overrides[path] = to_toml(_drawn(_at(nominal, path), within, rng))
+        for path, tolerance in exercise.vary.items():
+            overrides[path] = to_toml(_draw(_number_at(nominal, path), tolerance, rng))
     for alternatives in exercise.choose:
-        chosen = alternatives[int(rng.integers(len(alternatives)))]
-        overrides |= {path: to_toml(value) for path, value in chosen.items()}
+        alternative = alternatives[int(rng.integers(len(alternatives)))]
+        overrides |= {path: to_toml(value) for path, value in alternative.items()}
     return load_scenario(name, overrides)
 
 
-def _drawn(value: float, within: float, rng: np.random.Generator) -> float:
+def _draw(value: float, tolerance: float, rng: np.random.Generator) -> float:
     if isinstance(value, int):
-        return value + int(rng.integers(0, int(within) + 1))
-    return round(value + float(rng.uniform(-within, within)), _DECIMALS)
+        return value + int(rng.integers(0, int(tolerance) + 1))
+    return round(value + float(rng.uniform(-tolerance, tolerance)), _DECIMALS)
 
 
-def _at(data: Any, path: str) -> float:
+def _number_at(data: Any, path: str) -> float:
     for key in path.split("."):
         try:
             data = data[int(key)] if isinstance(data, list | tuple) else data[key]

@@ -25,11 +25,11 @@ HANDOUTS: dict[str, HandoutMaker] = {}
 def handout(name: str) -> Callable[[HandoutMaker], HandoutMaker]:
     """Register a maker of handouts under a name."""
 
-    def registered(maker: HandoutMaker) -> HandoutMaker:
+    def register(maker: HandoutMaker) -> HandoutMaker:
         HANDOUTS[name] = maker
         return maker
 
-    return registered
+    return register
 
 
 def make_handout(name: str, scenario: Scenario, seed: int, options: Mapping[str, Any]) -> Handout:

@@ -18,12 +18,12 @@ def control(scenario: Scenario, seed: int, points: list[str] | None = None) -> H
     return Handout({"control.csv": control_csv(given_control(scenario, build_scene(scenario, seed)), points)})
 
 
-def control_csv(given: Ground, points: list[str] | None = None) -> str:
+def control_csv(ground: Ground, points: list[str] | None = None) -> str:
     """Return ground control as CSV, m; empty where a coordinate is not given."""
-    places = zip(given.points, given.coordinates.T.tolist(), given.roles, strict=True)
+    positions = zip(ground.points, ground.coordinates.T.tolist(), ground.roles, strict=True)
     rows = [
-        (name, *("" if math.isnan(each) else f"{each:.2f}" for each in place), role)
-        for name, place, role in places
+        (name, *("" if math.isnan(each) else f"{each:.2f}" for each in position), role)
+        for name, position, role in positions
         if points is None or name in points
     ]
     return to_csv(COLUMNS, rows)

@@ -13,11 +13,11 @@ JOB = "job.txt"
 def job_sheet(scenario: Scenario, seed: int, model: str = "1") -> Handout:
     """Return the job sheet of a model."""
     job = make_job(scenario, build_scene(scenario, seed))
-    ordered = next(each for each in job.models if each.name == model)
-    return Handout({JOB: "\n".join([*_of_model(job, ordered), *_of_camera(scenario), *_of_plan(job), ""])})
+    model_job = next(each for each in job.models if each.name == model)
+    return Handout({JOB: "\n".join([*_model_lines(job, model_job), *_camera_lines(scenario), *_plan_lines(job), ""])})
 
 
-def _of_model(job: Job, model: ModelJob) -> list[str]:
+def _model_lines(job: Job, model: ModelJob) -> list[str]:
     labels = model.points_of_case(job.plan.case)
     return [
         f"Model {model.name}: {model.left} on the left of the model, {model.right} on its right; {model.polarity}s",
@@ -27,7 +27,7 @@ def _of_model(job: Job, model: ModelJob) -> list[str]:
     ]
 
 
-def _of_camera(scenario: Scenario) -> list[str]:
+def _camera_lines(scenario: Scenario) -> list[str]:
     camera = scenario.camera
     x0, y0 = camera.principal_point
     return [
@@ -36,7 +36,7 @@ def _of_camera(scenario: Scenario) -> list[str]:
     ]
 
 
-def _of_plan(job: Job) -> list[str]:
+def _plan_lines(job: Job) -> list[str]:
     plan = job.plan
     x, y, z = plan.preset
     low, high = plan.centre_levels[0], plan.centre_levels[-1]

@@ -30,7 +30,7 @@ MISREAD_MM = (0.8, 1.6)
 
 
 @dataclass(frozen=True)
-class Misread:
+class Misreading:
     """Number on the sheets that differs from the counter."""
 
     model: str
@@ -39,11 +39,11 @@ class Misread:
     by: float
     """mm in the model."""
 
-    def on(self, models: Sequence[Model]) -> list[Model]:
+    def add_to(self, models: Sequence[Model]) -> list[Model]:
         """Return the models with the misreading."""
-        return [self._on(model) if model.name == self.model else model for model in models]
+        return [self._add_to_model(model) if model.name == self.model else model for model in models]
 
-    def _on(self, model: Model) -> Model:
+    def _add_to_model(self, model: Model) -> Model:
         coordinates = model.coordinates.copy()
         coordinates[self.axis, model.points.index(self.point)] += self.by
         return Model(model.name, model.points, coordinates)
@@ -57,46 +57,46 @@ def model_sheets(scenario: Scenario, seed: int, wanted: list[str]) -> Handout:
     are `bad`, `ties`, `scale`, and x, y and z of the `wanted` points in m.
     """
     scene = build_scene(scenario, seed)
-    models = [_in_instrument(each, scenario) for each in strip_by_comparator(scenario, scene, seed).models]
-    given = given_control(scenario, scene)
-    slip = add_misreading(models, given, seed)
-    strip = orient_strip([model.without(slip.point) if model.name == slip.model else model for model in models], given)
-    places = dict(zip(strip.points.points, strip.points.coordinates.T.tolist(), strict=True))
+    models = [_to_counters(each, scenario) for each in strip_by_comparator(scenario, scene, seed).models]
+    ground = given_control(scenario, scene)
+    slip = add_misreading(models, ground, seed)
+    strip = orient_strip([model.without(slip.point) if model.name == slip.model else model for model in models], ground)
+    positions = dict(zip(strip.points.points, strip.points.coordinates.T.tolist(), strict=True))
     hidden = {
         "bad": slip.point,
         "ties": len(common_points(models[0], models[1])),
         "scale": 1e3 * float(strip.oriented.similarity.scale),
     }
-    hidden |= {f"{axis}{name}": places[name][k] for name in wanted for k, axis in enumerate("xyz")}
-    papers = {SHEETS: _sheets_csv(slip.on(models), scenario), CONTROL: control_csv(given)}
+    hidden |= {f"{axis}{name}": positions[name][k] for name in wanted for k, axis in enumerate("xyz")}
+    papers = {SHEETS: _sheets_csv(slip.add_to(models), scenario), CONTROL: control_csv(ground)}
     return Handout(papers, hidden)
 
 
-def add_misreading(models: Sequence[Model], given: Ground, seed: int) -> Misread:
+def add_misreading(models: Sequence[Model], ground: Ground, seed: int) -> Misreading:
     """Return a slip that the joins reveal: its point has by far the largest closing difference. Raises A7SimError."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=HANDOUT_STREAM))
-    candidates: list[Misread] = [
-        Misread(after.name, name, axis, float(sign * round(rng.uniform(*MISREAD_MM), 2)))
+    candidates: list[Misreading] = [
+        Misreading(after.name, name, axis, float(sign * round(rng.uniform(*MISREAD_MM), 2)))
         for before, after in pairwise(models)
         for name in common_points(before, after)
-        if not is_centre(name) and name not in given.points
+        if not is_centre(name) and name not in ground.points
         for axis in range(3)
         for sign in (-1.0, 1.0)
     ]
     order: list[int] = rng.permutation(len(candidates)).tolist()
     for i in order:
-        if _stands_out(candidates[i], models):
+        if _is_detectable(candidates[i], models):
             return candidates[i]
-    raise A7SimError("expected models with ties enough for a misread one to stand out, got too few")
+    raise A7SimError("expected enough ties between the models to detect a misread one, got too few")
 
 
-def _stands_out(slip: Misread, models: Sequence[Model]) -> bool:
+def _is_detectable(slip: Misreading, models: Sequence[Model]) -> bool:
     if sum(slip.point in model.points for model in models) > 2:
         return False
-    join = next(each for each in formed_strip(slip.on(models)).joins if each.after == slip.model)
-    off = np.abs(join.differences).max(axis=0)
-    worst = int(off.argmax())
-    return join.points[worst] == slip.point and bool(np.sort(off)[-2] < 0.6 * off[worst])
+    join = next(each for each in formed_strip(slip.add_to(models)).joins if each.after == slip.model)
+    differences = np.abs(join.differences).max(axis=0)
+    worst = int(differences.argmax())
+    return join.points[worst] == slip.point and bool(np.sort(differences)[-2] < 0.6 * differences[worst])
 
 
 def common_points(before: Model, after: Model) -> list[str]:
@@ -104,16 +104,16 @@ def common_points(before: Model, after: Model) -> list[str]:
     return [name for name in before.points if name in after.points]
 
 
-def _in_instrument(model: Model, scenario: Scenario) -> Model:
+def _to_counters(model: Model, scenario: Scenario) -> Model:
     """Return a model at the scale of the plan, with the plan's presets at its first standard point, mm."""
     left, right = (model.at([name])[:, 0] for name in model.centres)
-    larger = scenario.plan.bx / float(length_of(right - left))
+    factor = scenario.plan.bx / float(length_of(right - left))
     first = model.at([f"{model.centres[0].partition(':')[0]}1"])
-    preset = np.array(scenario.plan.preset)[:, None] / _units(scenario)
-    return Model(model.name, model.points, larger * (model.coordinates - first) + preset)
+    preset = np.array(scenario.plan.preset)[:, None] / _units_per_mm(scenario)
+    return Model(model.name, model.points, factor * (model.coordinates - first) + preset)
 
 
-def _units(scenario: Scenario) -> Array:
+def _units_per_mm(scenario: Scenario) -> Array:
     gear = scenario.plan.height_gear
     assert not isinstance(gear, str)
     return np.array([[1.0], [1.0], [gear]])
@@ -121,8 +121,8 @@ def _units(scenario: Scenario) -> Array:
 
 def _sheets_csv(models: Sequence[Model], scenario: Scenario) -> str:
     rows = [
-        (model.name, name, *(f"{each:.2f}" for each in place))
+        (model.name, name, *(f"{each:.2f}" for each in position))
         for model in models
-        for name, place in zip(model.points, (model.coordinates * _units(scenario)).T.tolist(), strict=True)
+        for name, position in zip(model.points, (model.coordinates * _units_per_mm(scenario)).T.tolist(), strict=True)
     ]
     return to_csv(COLUMNS, rows)

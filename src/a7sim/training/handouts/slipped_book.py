@@ -28,12 +28,12 @@ COLUMNS = ("entry", "form", "round", "point", "item", "reading")
 
 ROUNDS = 2
 
-MEASURING = ("by1", "by2")
+PARALLAX_ITEMS = ("by1", "by2")
 
-PLAINLY_MM = 0.05
+MIN_SLIP_MM = 0.05
 """Minimum size of readings for slips of sign and digits: smaller ones reveal little."""
 
-_SLIPS = 1
+_SLIP_KEY = 1
 """Spawn key of the slip, beside those of the scenario's variation."""
 
 
@@ -51,11 +51,11 @@ class BookLine:
     @property
     def is_reading(self) -> bool:
         """Return whether it is a drum reading of a cleared parallax."""
-        return self.item in MEASURING
+        return self.item in PARALLAX_ITEMS
 
 
 @dataclass(frozen=True)
-class Slipped:
+class SlippedLine:
     """Copy of a line with a slip, and the right value."""
 
     line: BookLine
@@ -68,20 +68,20 @@ def book_with_slip(scenario: Scenario, seed: int, kind: str = "") -> Handout:
     kinds: tuple[str, ...] = get_args(SlipKind)
     if kind and kind not in kinds:
         raise A7SimError(f"handout_options.kind: expected one of {', '.join(kinds)}, got {kind!r}")
-    seated, rounds = _worked(scenario, seed)
-    lines = _copied(seated, rounds)
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(TRAINING_STREAM, _SLIPS)))
-    drawn = str(rng.choice(kinds))
-    kind = kind or drawn
-    ways = [way for line in lines for way in _WAYS[kind](line, lines, seated)]
-    way = ways[int(rng.integers(len(ways)))]
-    slipped = [way.line if each.entry == way.line.entry else each for each in lines]
-    hidden = {"kind": kind, "entry": way.line.entry, "right": list(way.right)}
-    return Handout({BOOK: _as_csv(slipped)}, hidden)
+    context, rounds = _measure_rounds(scenario, seed)
+    lines = _fair_copy(context, rounds)
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(TRAINING_STREAM, _SLIP_KEY)))
+    drawn_kind = str(rng.choice(kinds))
+    kind = kind or drawn_kind
+    slips = [slip for line in lines for slip in _SLIP_MAKERS[kind](line, lines, context)]
+    slip = slips[int(rng.integers(len(slips)))]
+    copied_lines = [slip.line if each.entry == slip.line.entry else each for each in lines]
+    hidden = {"kind": kind, "entry": slip.line.entry, "right": list(slip.right)}
+    return Handout({BOOK: _to_csv(copied_lines)}, hidden)
 
 
 @dataclass(frozen=True)
-class _Round:
+class _BookRound:
     """Round of the session: elements before and after, and the book's entries at its points."""
 
     before: Mapping[str, float]
@@ -89,119 +89,129 @@ class _Round:
     entries: Sequence[BookEntry]
 
 
-def _worked(scenario: Scenario, seed: int) -> tuple[ProcedureContext, list[_Round]]:
+def _measure_rounds(scenario: Scenario, seed: int) -> tuple[ProcedureContext, list[_BookRound]]:
     session = open_session(scenario, seed)
-    seated = ProcedureContext.for_model(session.person, session.job, session.job.models[0].name)
-    seated.set_up()
-    workstation, model, plan = seated.workstation, seated.model, session.job.plan
+    context = ProcedureContext.for_model(session.person, session.job, session.job.models[0].name)
+    context.set_up()
+    workstation, model, plan = context.workstation, context.model, session.job.plan
     active, elements = workstation.operators.active, unknown_elements(plan.method, model)
     labels = model.points_of_case(plan.case)
     rounds = []
     for _ in range(ROUNDS):
-        begun = len(session.person.book.entries)
+        first_entry = len(session.person.book.entries)
         before = workstation.controls.elements(active, elements)
-        seen = workstation.parallaxes(
+        parallaxes = workstation.parallaxes(
             active, [model.standard_points[label] for label in labels], plan.parallax_readings
         )
-        entries = [each for each in session.person.book.entries[begun:] if each.item in MEASURING and not each.struck]
-        mean = seen.parallax_mm.mean(axis=0) if float(np.sqrt(np.mean(seen.parallax_mm**2))) < GROSS_MM else 0.0
-        base = np.full(active.size, plan.bx)
-        found, _ = compute_corrections(
-            workstation, active, model, seen.places, seen.parallax_mm - mean, elements, base, labels
+        entries = [
+            each
+            for each in session.person.book.entries[first_entry:]
+            if each.item in PARALLAX_ITEMS and not each.struck
+        ]
+        mean = (
+            parallaxes.parallax_mm.mean(axis=0)
+            if float(np.sqrt(np.mean(parallaxes.parallax_mm**2))) < GROSS_MM
+            else 0.0
         )
-        workstation.controls.set_elements(active, {name: before[name] + found[name][active] for name in elements})
+        base = np.full(active.size, plan.bx)
+        corrections, _ = compute_corrections(
+            workstation, active, model, parallaxes.places, parallaxes.parallax_mm - mean, elements, base, labels
+        )
+        workstation.controls.set_elements(active, {name: before[name] + corrections[name][active] for name in elements})
         after = workstation.controls.elements(active, elements)
         counts = [{name: float(each[name][0]) for name in elements} for each in (before, after)]
-        rounds.append(_Round(counts[0], counts[1], entries))
-    return seated, rounds
+        rounds.append(_BookRound(counts[0], counts[1], entries))
+    return context, rounds
 
 
-def _copied(seated: ProcedureContext, rounds: Sequence[_Round]) -> list[BookLine]:
+def _fair_copy(context: ProcedureContext, rounds: Sequence[_BookRound]) -> list[BookLine]:
     """Return the fair copy without a slip: fittings, and the rounds with their sums."""
-    model, lines = seated.model, list[BookLine]()
+    model, lines = context.model, list[BookLine]()
 
     def write(form: str, round_: int, point: str, item: str, reading: str) -> None:
         lines.append(BookLine(len(lines) + 1, form, round_, point, item, reading))
 
-    for name, position in required_fittings(seated.workstation.controls.manual, model.polarity, model.base).items():
+    for name, position in required_fittings(context.workstation.controls.manual, model.polarity, model.base).items():
         write("fittings", 0, "", name, position)
     form = "relative orientation"
-    for number, worked in enumerate(rounds, start=1):
-        for name, value in worked.before.items():
+    for number, measured_round in enumerate(rounds, start=1):
+        for name, value in measured_round.before.items():
             write(form, number, "", f"{name} before", f"{value:.2f}")
-        for point in dict.fromkeys(each.point for each in worked.entries):
-            read = [each for each in worked.entries if each.point == point]
-            for each in read:
+        for point in dict.fromkeys(each.point for each in measured_round.entries):
+            readings = [each for each in measured_round.entries if each.point == point]
+            for each in readings:
                 write(form, number, point, each.item, each.reading)
-            by1, by2 = (fmean(float(each.reading) for each in read if each.item == by) for by in MEASURING)
+            by1, by2 = (fmean(float(each.reading) for each in readings if each.item == by) for by in PARALLAX_ITEMS)
             write(form, number, point, "mean p", f"{(by1 - by2) / 2.0:+.4f}")
-        for name, value in worked.after.items():
-            correction = (value - worked.before[name] + 200.0) % 400.0 - 200.0
+        for name, value in measured_round.after.items():
+            correction = (value - measured_round.before[name] + 200.0) % 400.0 - 200.0
             write(form, number, "", f"{name} correction", f"{correction:+.2f}")
-        for name, value in worked.after.items():
+        for name, value in measured_round.after.items():
             write(form, number, "", f"{name} after", f"{value:.2f}")
     return lines
 
 
-Way = Callable[[BookLine, Sequence[BookLine], ProcedureContext], list[Slipped]]
+SlipMaker = Callable[[BookLine, Sequence[BookLine], ProcedureContext], list[SlippedLine]]
 
 
-def _misread(line: BookLine, wrong: float) -> list[Slipped]:
-    return [Slipped(replace(line, reading=f"{wrong:.2f}"), [line.reading])]
+def _misread(line: BookLine, wrong: float) -> list[SlippedLine]:
+    return [SlippedLine(replace(line, reading=f"{wrong:.2f}"), [line.reading])]
 
 
-def _last_digit(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
+def _last_digit(line: BookLine, lines: Sequence[BookLine], context: ProcedureContext) -> list[SlippedLine]:
     return _misread(line, float(line.reading) + 0.01) if line.is_reading else []
 
 
-def _gross(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
+def _gross(line: BookLine, lines: Sequence[BookLine], context: ProcedureContext) -> list[SlippedLine]:
     return _misread(line, float(line.reading) + 1.0) if line.is_reading else []
 
 
-def _wrong_sign(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
-    plain = line.is_reading and abs(float(line.reading)) > PLAINLY_MM
-    return _misread(line, -float(line.reading)) if plain else []
+def _wrong_sign(line: BookLine, lines: Sequence[BookLine], context: ProcedureContext) -> list[SlippedLine]:
+    is_large = line.is_reading and abs(float(line.reading)) > MIN_SLIP_MM
+    return _misread(line, -float(line.reading)) if is_large else []
 
 
-def _transposed(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
+def _transposed(line: BookLine, lines: Sequence[BookLine], context: ProcedureContext) -> list[SlippedLine]:
     if not line.is_reading:
         return []
-    shown = float(line.reading)
+    reading = float(line.reading)
     return [
         each
-        for wrong in transpositions(shown)
-        if abs(wrong - shown) > PLAINLY_MM and abs(abs(wrong - shown) - 1.0) > PLAINLY_MM
+        for wrong in transpositions(reading)
+        if abs(wrong - reading) > MIN_SLIP_MM and abs(abs(wrong - reading) - 1.0) > MIN_SLIP_MM
         for each in _misread(line, wrong)
     ]
 
 
-def _wrong_point(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
+def _wrong_point(line: BookLine, lines: Sequence[BookLine], context: ProcedureContext) -> list[SlippedLine]:
     if not line.is_reading:
         return []
-    read = {each.point for each in lines if each.is_reading}
-    measured = {position: name for position, name in seated.model.standard_points.items() if name in read}
+    read_points = {each.point for each in lines if each.is_reading}
+    measured = {position: name for position, name in context.model.standard_points.items() if name in read_points}
     position = next(each for each, name in measured.items() if name == line.point)
-    return [Slipped(replace(line, point=name), [line.point, position]) for name in neighbours(measured, line.point)]
+    return [SlippedLine(replace(line, point=name), [line.point, position]) for name in neighbours(measured, line.point)]
 
 
-def _forgotten_lever(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
+def _forgotten_lever(line: BookLine, lines: Sequence[BookLine], context: ProcedureContext) -> list[SlippedLine]:
     if line.form != "fittings":
         return []
-    return [Slipped(replace(line, reading=other), [line.reading]) for other in _others(line.item, line.reading)]
+    return [
+        SlippedLine(replace(line, reading=other), [line.reading]) for other in _other_positions(line.item, line.reading)
+    ]
 
 
-def _others(fitting: str, position: str) -> list[str]:
+def _other_positions(fitting: str, position: str) -> list[str]:
     return [each for each in POSITIONS_OF[fitting] if each != position]
 
 
-def _not_reread(line: BookLine, lines: Sequence[BookLine], seated: ProcedureContext) -> list[Slipped]:
+def _not_reread(line: BookLine, lines: Sequence[BookLine], context: ProcedureContext) -> list[SlippedLine]:
     if line.round < 2 or not line.item.endswith(" before"):
         return []
     old = next(each.reading for each in lines if each.round == line.round - 1 and each.item == line.item)
-    return [Slipped(replace(line, reading=old), [line.reading])] if old != line.reading else []
+    return [SlippedLine(replace(line, reading=old), [line.reading])] if old != line.reading else []
 
 
-_WAYS: Mapping[str, Way] = {
+_SLIP_MAKERS: Mapping[str, SlipMaker] = {
     "last digit": _last_digit,
     "gross": _gross,
     "wrong point": _wrong_point,
@@ -212,7 +222,7 @@ _WAYS: Mapping[str, Way] = {
 }
 
 
-def _as_csv(lines: Sequence[BookLine]) -> str:
+def _to_csv(lines: Sequence[BookLine]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)

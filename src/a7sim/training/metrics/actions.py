@@ -6,7 +6,7 @@ from msgspec import field
 from a7sim.operator import ModelJob
 from a7sim.plotters import REQUIRED_FITTINGS
 from a7sim.scenario import Scenario
-from a7sim.training.action_log import AXES, PLAIN, Reading
+from a7sim.training.action_log import AXES, MOVEMENTS, Reading
 from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.metrics.base import (
     HALF_A_COUNT,
@@ -38,32 +38,32 @@ class ActionsOutOfOrder(Metric, frozen=True, kw_only=True):
         early: list[str] = []
         for chain in self.chains:
             last, before = -1, ""
-            for deed in chain:
-                place = self._place(record, deed)
-                if place is None:
-                    missing.append(_plainly(deed))
-                elif place < last:
-                    early.append(f"{_plainly(deed)} (before {_plainly(before)})")
-                elif place > last:
-                    last, before = place, deed
-        remark = [f"not done: {join_words(dict.fromkeys(missing))}"] if missing else []
-        remark += [f"done too early: {join_words(dict.fromkeys(early))}"] if early else []
-        return MetricResult(float(len(missing) + len(early)), "; ".join(remark) or "everything was done, in its order")
+            for action in chain:
+                index = self._action_index(record, action)
+                if index is None:
+                    missing.append(_action_label(action))
+                elif index < last:
+                    early.append(f"{_action_label(action)} (before {_action_label(before)})")
+                elif index > last:
+                    last, before = index, action
+        messages = [f"not done: {join_words(dict.fromkeys(missing))}"] if missing else []
+        messages += [f"done too early: {join_words(dict.fromkeys(early))}"] if early else []
+        return MetricResult(float(len(missing) + len(early)), "; ".join(messages) or "all actions were done in order")
 
-    def _place(self, record: AttemptRecord, deed: str) -> int | None:
-        what, _, name = deed.removesuffix("!").partition(" ")
-        kinds = {"move": PLAIN, "adjust": ("set", "turn")}.get(what, (what,))
-        places = [
+    def _action_index(self, record: AttemptRecord, action: str) -> int | None:
+        kind, _, name = action.removesuffix("!").partition(" ")
+        kinds = {"move": MOVEMENTS, "adjust": ("set", "turn")}.get(kind, (kind,))
+        indices = [
             each.index
             for each in record.actions
-            if each.what in kinds and (not name or record.name_of(name) == each.name or name in (each.name, each.text))
+            if each.kind in kinds and (not name or record.name_of(name) == each.name or name in (each.name, each.text))
         ]
-        return (places[0] if deed.endswith("!") else places[-1]) if places else None
+        return (indices[0] if action.endswith("!") else indices[-1]) if indices else None
 
 
-def _plainly(deed: str) -> str:
-    what, _, name = deed.removesuffix("!").partition(" ")
-    return f"{what} {handle_label(name)}".strip()
+def _action_label(action: str) -> str:
+    kind, _, name = action.removesuffix("!").partition(" ")
+    return f"{kind} {handle_label(name)}".strip()
 
 
 @register_metric("run-by-motor")
@@ -79,13 +79,17 @@ class MotorDrivenReadings(Metric, frozen=True, kw_only=True):
         readings = readings_with(record, "", self.points)
         if not readings:
             return MetricResult(None, "nothing was registered")
-        ran = [each for each in readings if any(self._ran(record, each, handle) for handle in self.handles)]
-        remark = f"run there at {describe_points(ran, record)}" if ran else "turned there by hand every time"
-        return MetricResult(float(len(ran)), f"{join_words(map(handle_label, self.handles))}: {remark}")
+        motor_driven = [
+            each for each in readings if any(self._is_motor_driven(record, each, handle) for handle in self.handles)
+        ]
+        message = (
+            f"driven by motor at {describe_points(motor_driven, record)}" if motor_driven else "always turned by hand"
+        )
+        return MetricResult(float(len(motor_driven)), f"{join_words(map(handle_label, self.handles))}: {message}")
 
-    def _ran(self, record: AttemptRecord, reading: Reading, handle: str) -> bool:
-        before = [each for each in record.actions if each.name == handle and each.index < reading.place]
-        return bool(before) and before[-1].what in ("drive", "set")
+    def _is_motor_driven(self, record: AttemptRecord, reading: Reading, handle: str) -> bool:
+        before = [each for each in record.actions if each.name == handle and each.index < reading.action_index]
+        return bool(before) and before[-1].kind in ("drive", "set")
 
 
 @register_metric("handles-moved")
@@ -98,12 +102,12 @@ class MovedElements(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        moved = [handle for handle in self.handles if self._by_how_much(record, handle) > self.within + 1e-9]
-        remark = f"{join_words(map(handle_label, moved))} moved" if moved else "all of it stands where it stood"
-        return MetricResult(float(len(moved)), remark)
+        moved = [handle for handle in self.handles if self._movement(record, handle) > self.within + 1e-9]
+        message = f"{join_words(map(handle_label, moved))} moved" if moved else "no element moved"
+        return MetricResult(float(len(moved)), message)
 
-    def _by_how_much(self, record: AttemptRecord, handle: str) -> float:
-        actions = [each for each in record.actions if each.name == handle and each.what in PLAIN]
+    def _movement(self, record: AttemptRecord, handle: str) -> float:
+        actions = [each for each in record.actions if each.name == handle and each.kind in MOVEMENTS]
         if not actions:
             return 0.0
         moved = abs(actions[-1].after - actions[0].before)
@@ -119,16 +123,20 @@ class UnviewedPoints(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        blind = []
+        unviewed = []
         for point in self.points:
             readings = readings_with(record, "", [point])
-            before = [each for each in record.actions if readings and each.index < readings[-1].place]
-            looks = [each.index for each in before if each.what == "look"]
-            levers = [each.index for each in before if each.what in ("fit", "base", "load")]
-            if not readings or max(looks, default=-1) < max(levers, default=0):
-                blind.append(point)
-        remark = f"at {join_words(blind)} without a look after the last fitting" if blind else "looked every time"
-        return MetricResult(float(len(blind)), remark)
+            before = [each for each in record.actions if readings and each.index < readings[-1].action_index]
+            looks = [each.index for each in before if each.kind == "look"]
+            changes = [each.index for each in before if each.kind in ("fit", "base", "load")]
+            if not readings or max(looks, default=-1) < max(changes, default=0):
+                unviewed.append(point)
+        message = (
+            f"no look through an eyepiece after the last change of a fitting at {join_words(unviewed)}"
+            if unviewed
+            else "a look through an eyepiece precedes every registration"
+        )
+        return MetricResult(float(len(unviewed)), message)
 
 
 @register_metric("minutes")
@@ -141,7 +149,7 @@ class Minutes(Metric, frozen=True, kw_only=True):
         """Return the minutes."""
         minutes = record.seconds / 60.0
         return MetricResult(
-            round(minutes, 2), f"{minutes:.1f} of {record.exercise.minutes:g} minutes at the instrument's clock"
+            round(minutes, 2), f"{minutes:.1f} of {record.exercise.minutes:g} minutes on the instrument's clock"
         )
 
 
@@ -154,14 +162,14 @@ class ElementDeviation(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the difference."""
-        shown = {
+        readings = {
             name: record.autograph.counter(name) if name in AXES else record.autograph.element(name)
             for name in self.wanted
         }
-        name = max(self.wanted, key=lambda each: abs(shown[each] - self.wanted[each]))
+        name = max(self.wanted, key=lambda each: abs(readings[each] - self.wanted[each]))
         return MetricResult(
-            round(abs(shown[name] - self.wanted[name]), 4),
-            f"{handle_label(name)} stands at {shown[name]:.2f} and belongs at {self.wanted[name]:.2f}",
+            round(abs(readings[name] - self.wanted[name]), 4),
+            f"{handle_label(name)} reads {readings[name]:.2f}, required {self.wanted[name]:.2f}",
         )
 
     def floor(self, scenario: Scenario) -> float:
@@ -188,29 +196,33 @@ class WrongFittings(Metric, frozen=True, kw_only=True):
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number; a wrong base counts."""
         if self.by_job:
-            return self._as_ordered(record.model).evaluate(record)
+            return self._for_job(record.model).evaluate(record)
         autograph = record.autograph
         fittings, base = autograph.fittings.as_words(), autograph.base_mode
-        lying = autograph.loaded(1), autograph.loaded(2)
+        mounted = autograph.loaded(1), autograph.loaded(2)
         if self.point:
             readings = readings_with(record, "", [self.point])
             if not readings:
                 return MetricResult(None, f"nothing was registered as {self.point}")
-            fittings, base, lying = dict(readings[-1].fittings), readings[-1].base, readings[-1].pictures
+            fittings, base, mounted = dict(readings[-1].fittings), readings[-1].base, readings[-1].pictures
         polarity = self.polarity or record.model.polarity
-        right = REQUIRED_FITTINGS[polarity, self.base or base].as_words()
-        wrong = [f"{name} stands {at} and belongs {right[name]}" for name, at in fittings.items() if at != right[name]]
-        if self.base and base != self.base:
-            wrong.append(f"the base is {base} and belongs {self.base}")
-        wrong += [
-            f"{present or 'no picture'} lies in projector {projector} and {wanted} belongs there"
-            for projector, (present, wanted) in enumerate(zip(lying, self.pictures, strict=False), start=1)
-            if present != wanted
+        required = REQUIRED_FITTINGS[polarity, self.base or base].as_words()
+        wrong = [
+            f"{name} is {position} instead of {required[name]}"
+            for name, position in fittings.items()
+            if position != required[name]
         ]
-        picture = f"{'at ' + self.point + ' ' if self.point else ''}for a {polarity} with base {self.base or base}"
-        return MetricResult(float(len(wrong)), f"{picture}: {join_words(wrong) if wrong else 'all is as it belongs'}")
+        if self.base and base != self.base:
+            wrong.append(f"the base is {base} instead of {self.base}")
+        wrong += [
+            f"projector {projector} has {picture or 'no picture'} instead of {wanted}"
+            for projector, (picture, wanted) in enumerate(zip(mounted, self.pictures, strict=False), start=1)
+            if picture != wanted
+        ]
+        case = f"{'at ' + self.point + ' ' if self.point else ''}for a {polarity} with base {self.base or base}"
+        return MetricResult(float(len(wrong)), f"{case}: {join_words(wrong) if wrong else 'all correct'}")
 
-    def _as_ordered(self, model: ModelJob) -> "WrongFittings":
+    def _for_job(self, model: ModelJob) -> "WrongFittings":
         """Return the metric with the job sheet's requirements of a model."""
         pictures = [model.left, model.right] if model.left_projector == 1 else [model.right, model.left]
         return msgspec.structs.replace(self, base=model.base, polarity=model.polarity, pictures=pictures, by_job=False)

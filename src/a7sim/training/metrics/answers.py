@@ -24,7 +24,7 @@ class MissingAnswers(Metric, frozen=True, kw_only=True):
         """Return their number."""
         missing = [key for key in self.keys or record.exercise.answers if not record.answers.get(key)]
         return MetricResult(
-            float(len(missing)), f"not answered: {join_words(missing)}" if missing else "all is answered"
+            float(len(missing)), f"not answered: {join_words(missing)}" if missing else "all questions are answered"
         )
 
 
@@ -48,16 +48,16 @@ class AnswerDeviation(Metric, frozen=True, kw_only=True):
         try:
             number = float(answered)
         except ValueError:
-            answer_text = f"expected a number, got {answered!r}" if answered else "not answered"
-            return MetricResult(None, f"{self.key}: {answer_text}")
+            message = f"expected a number, got {answered!r}" if answered else "not answered"
+            return MetricResult(None, f"{self.key}: {message}")
         value = abs(number - self._truth(record))
         return MetricResult(round(value, 4) if math.isfinite(value) else None, f"{self.key} was answered {answered}")
 
     def _truth(self, record: AttemptRecord) -> float:
-        what, _, name = self.true.partition(" ")
-        if what == "play":
+        kind, _, name = self.true.partition(" ")
+        if kind == "play":
             return record.autograph.play(name)
-        if what == "parallax":
+        if kind == "parallax":
             return y_parallax_at(record, record.name_of(name)) or math.nan
         return float(record.hidden.get(self.true, math.nan))
 
@@ -77,18 +77,20 @@ class MaxAnswerDeviation(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the difference."""
-        off: dict[str, float] = {}
+        deviations: dict[str, float] = {}
         for key in self.keys:
             try:
-                off[key] = abs(float(record.answers.get(key, "")) - float(record.hidden[key]))
+                deviations[key] = abs(float(record.answers.get(key, "")) - float(record.hidden[key]))
             except (ValueError, KeyError):
                 answered = record.answers.get(key, "")
-                answer_text = f"expected a number, got {answered!r}" if answered else "not answered"
-                return MetricResult(None, f"{key}: {answer_text}")
-        worst = max(off, key=lambda key: off[key])
-        if not math.isfinite(off[worst]):
+                message = f"expected a number, got {answered!r}" if answered else "not answered"
+                return MetricResult(None, f"{key}: {message}")
+        worst = max(deviations, key=lambda key: deviations[key])
+        if not math.isfinite(deviations[worst]):
             return MetricResult(None, f"{worst}: expected a number, got {record.answers[worst]!r}")
-        return MetricResult(round(off[worst], 4), f"{worst} was answered {record.answers[worst]}, the furthest off")
+        return MetricResult(
+            round(deviations[worst], 4), f"{worst} was answered {record.answers[worst]}, the largest deviation"
+        )
 
     def floor(self, scenario: Scenario) -> float:
         """Return the smallest readable difference."""
@@ -106,15 +108,15 @@ class WrongAnswers(Metric, frozen=True, kw_only=True):
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         missing = [key for key in self.keys if not record.answers.get(key)]
-        wrong = [key for key in self.keys if key not in missing and not self._right(record, key)]
-        remark = [f"not answered: {join_words(missing)}"] if missing else []
-        remark += [f"{key} is not {record.answers[key]}" for key in wrong]
-        return MetricResult(float(len(missing) + len(wrong)), "; ".join(remark) or f"{join_words(self.keys)}: right")
+        wrong = [key for key in self.keys if key not in missing and not self._is_right(record, key)]
+        messages = [f"not answered: {join_words(missing)}"] if missing else []
+        messages += [f"{key}: {record.answers[key]} is wrong" for key in wrong]
+        return MetricResult(float(len(missing) + len(wrong)), "; ".join(messages) or f"{join_words(self.keys)}: right")
 
-    def _right(self, record: AttemptRecord, key: str) -> bool:
+    def _is_right(self, record: AttemptRecord, key: str) -> bool:
         right = record.hidden.get(key, ())
         allowed = [right] if isinstance(right, str | int | float) else right
-        return _plain(record.answers[key]) in {_plain(str(each)) for each in allowed}
+        return _normalize(record.answers[key]) in {_normalize(str(each)) for each in allowed}
 
 
 @register_metric("place-by-scales")
@@ -135,22 +137,23 @@ class PlaceByScales(Metric, frozen=True, kw_only=True):
         readings = [each for each in record.readings if each.point == record.name_of(self.point)]
         if not readings:
             return MetricResult(None, f"nothing was registered at {self.point}")
-        off = {self._off(record, each, answered): each for each in readings}
-        nearest = min(off)
-        x, y = self._place(record, off[nearest])
+        by_deviation = {self._deviation(record, each, answered): each for each in readings}
+        nearest = min(by_deviation)
+        x, y = self._position(record, by_deviation[nearest])
         return MetricResult(
-            round(nearest, 4), f"answered {answered[0]:g}, {answered[1]:g}; the scales gave {x:.2f}, {y:.2f}"
+            round(nearest, 4), f"answered {answered[0]:g}, {answered[1]:g}; the scales give {x:.2f}, {y:.2f}"
         )
 
-    def _place(self, record: AttemptRecord, reading: Reading) -> tuple[float, float]:
+    def _position(self, record: AttemptRecord, reading: Reading) -> tuple[float, float]:
         variant = record.autograph.variant
         x, y = (
-            (reading.shown[axis] - variant.scales[axis].at_origin) / variant.scales[axis].units_per_mm for axis in "XY"
+            (reading.counters[axis] - variant.scales[axis].at_origin) / variant.scales[axis].units_per_mm
+            for axis in "XY"
         )
-        return x - variant.centres_on_base[0] * reading.shown["bx"], y
+        return x - variant.centres_on_base[0] * reading.counters["bx"], y
 
-    def _off(self, record: AttemptRecord, reading: Reading, answered: Sequence[float]) -> float:
-        x, y = self._place(record, reading)
+    def _deviation(self, record: AttemptRecord, reading: Reading, answered: Sequence[float]) -> float:
+        x, y = self._position(record, reading)
         return math.hypot(answered[0] - x, answered[1] - y)
 
     def floor(self, scenario: Scenario) -> float:
@@ -158,7 +161,7 @@ class PlaceByScales(Metric, frozen=True, kw_only=True):
         return 2.0 * math.sqrt(2.0) * HALF_A_COUNT
 
 
-def _plain(text: str) -> str:
+def _normalize(text: str) -> str:
     try:
         return f"{float(text):.6g}"
     except ValueError:

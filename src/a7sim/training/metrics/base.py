@@ -70,24 +70,24 @@ Kind = TypeVar("Kind", bound=type[Metric])
 def register_metric(name: str) -> Callable[[Kind], Kind]:
     """Register a metric under a name."""
 
-    def registered(kind: Kind) -> Kind:
+    def register(kind: Kind) -> Kind:
         MEASURES[name] = kind
         return kind
 
-    return registered
+    return register
 
 
-def make_metric(measured: MetricSpec) -> Metric:
+def make_metric(spec: MetricSpec) -> Metric:
     """Return the metric of a checklist item or a criterion. Raises msgspec.ValidationError for invalid options."""
-    return msgspec.convert(measured.options, MEASURES[measured.measure])
+    return msgspec.convert(spec.options, MEASURES[spec.measure])
 
 
-def join_words(words: Iterable[object], most: int = 6) -> str:
+def join_words(words: Iterable[object], max_words: int = 6) -> str:
     """Return the first few words as an enumeration."""
     all_words = [str(each) for each in words]
-    shown = all_words[:most]
-    if len(all_words) > most:
-        shown.append(f"{len(all_words) - most} more")
+    shown = all_words[:max_words]
+    if len(all_words) > max_words:
+        shown.append(f"{len(all_words) - max_words} more")
     return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}" if shown else "none"
 
 
@@ -104,7 +104,7 @@ def readings_with(record: AttemptRecord, element: str, points: Sequence[str] = (
     return [
         each
         for each in record.readings
-        if (not element or element in each.named) and (not names or each.point in names)
+        if (not element or element in each.elements) and (not names or each.point in names)
     ]
 
 

@@ -27,13 +27,13 @@ from a7sim.training.metrics.base import (
 
 MIN_POINTS = 3
 
-AT_LEVEL = 0.1
+LEVEL_TOLERANCE = 0.1
 """Units of the Z counter within which a registration belongs to a level."""
 
 AXES = ("X", "Y", "Z")
 
 
-class _Centres(Metric, frozen=True, kw_only=True):
+class _CentreMetric(Metric, frozen=True, kw_only=True):
     """Registrations with an element of the projector, by1 or by2, that identifies the pointing eye; two levels of Z."""
 
     levels: tuple[float, float]
@@ -42,22 +42,24 @@ class _Centres(Metric, frozen=True, kw_only=True):
 
     def _pointings(self, record: AttemptRecord, element: str) -> dict[tuple[str, float], list[Reading]]:
         """Return the registrations by point and level, without those of no level."""
-        found: dict[tuple[str, float], list[Reading]] = {}
+        pointings: dict[tuple[str, float], list[Reading]] = {}
         for reading in record.readings:
-            level = next((each for each in self.levels if abs(reading.shown["Z"] - each) <= AT_LEVEL), None)
-            if element in reading.named and level is not None:
-                found.setdefault((reading.point, level), []).append(reading)
-        return found
+            level = next((each for each in self.levels if abs(reading.counters["Z"] - each) <= LEVEL_TOLERANCE), None)
+            if element in reading.elements and level is not None:
+                pointings.setdefault((reading.point, level), []).append(reading)
+        return pointings
 
     def _centre(self, record: AttemptRecord, element: str) -> PerspectiveCentre | None:
         """Return the centre from the student's pointings, None if they are too few or do not move."""
-        found = self._pointings(record, element)
+        pointings = self._pointings(record, element)
         names = [record.name_of(point) for point in self.points]
-        whole = [name for name in names if all((name, level) in found for level in self.levels)]
-        if len(whole) < MIN_POINTS:
+        complete = [name for name in names if all((name, level) in pointings for level in self.levels)]
+        if len(complete) < MIN_POINTS:
             return None
         low, high = (
-            np.array([[fmean(each.shown[axis] for each in found[name, level]) for name in whole] for axis in "XY"])
+            np.array(
+                [[fmean(each.counters[axis] for each in pointings[name, level]) for name in complete] for axis in "XY"]
+            )
             for level in self.levels
         )
         try:
@@ -66,39 +68,43 @@ class _Centres(Metric, frozen=True, kw_only=True):
             return None
 
     def _centres(self, record: AttemptRecord) -> dict[str, PerspectiveCentre]:
-        found = {element: self._centre(record, element) for element in self.elements}
-        return {element: centre for element, centre in found.items() if centre is not None}
+        centres = {element: self._centre(record, element) for element in self.elements}
+        return {element: centre for element, centre in centres.items() if centre is not None}
 
-    def _few(self, present: Mapping[str, object]) -> MetricResult:
-        lacking = [
-            f"the {'left' if each.endswith('1') else 'right'} one" for each in self.elements if each not in present
+    def _too_few(self, determined: Mapping[str, object]) -> MetricResult:
+        missing = [
+            f"the {'left' if each.endswith('1') else 'right'} centre"
+            for each in self.elements
+            if each not in determined
         ]
-        return MetricResult(None, f"too few points were registered at both levels for a centre: {join_words(lacking)}")
+        return MetricResult(
+            None, f"expected more points registered at both levels, got too few for {join_words(missing)}"
+        )
 
 
 @register_metric("levels-missing")
-class MissingLevels(_Centres, frozen=True, kw_only=True):
+class MissingLevels(_CentreMetric, frozen=True, kw_only=True):
     """Number of missing registrations: of each point, with each eye, at each level."""
 
     unit = "registrations"
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        short = []
+        gaps = []
         for element in self.elements:
-            found = self._pointings(record, element)
+            pointings = self._pointings(record, element)
             for level in self.levels:
-                missing = [point for point in self.points if (record.name_of(point), level) not in found]
-                short += [(element, level, point) for point in missing]
+                missing = [point for point in self.points if (record.name_of(point), level) not in pointings]
+                gaps += [(element, level, point) for point in missing]
         wanted = len(self.elements) * len(self.levels) * len(self.points)
-        if not short:
+        if not gaps:
             return MetricResult(0.0, "no registration is missing")
-        remark = join_words(f"{point} with {handle_label(element)} at {level:.0f}" for element, level, point in short)
-        return MetricResult(float(len(short)), f"{len(short)} of {pluralize(wanted, 'registration')} missing: {remark}")
+        listing = join_words(f"{point} with {handle_label(element)} at {level:.0f}" for element, level, point in gaps)
+        return MetricResult(float(len(gaps)), f"{len(gaps)} of {pluralize(wanted, 'registration')} missing: {listing}")
 
 
 @register_metric("pointing-rms")
-class PointingRms(_Centres, frozen=True, kw_only=True):
+class PointingRms(_CentreMetric, frozen=True, kw_only=True):
     """Displacement of the images from the mark at the registrations: rms of a coordinate, um at photo scale."""
 
     unit = "um"
@@ -106,26 +112,27 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the rms over all registrations at the levels."""
-        off: list[float] = []
+        deviations: list[float] = []
         worst = (0.0, "")
         for element in self.elements:
             eye = record.model.side_of(int(element[-1]))
-            for each in (each for some in self._pointings(record, element).values() for each in some):
-                seen = each.eyes[eye - 1]
-                if seen is None:
+            for each in (each for readings in self._pointings(record, element).values() for each in readings):
+                offsets = each.eyes[eye - 1]
+                if offsets is None:
                     side = "left" if eye == 1 else "right"
                     return MetricResult(
-                        None, f"where {each.point} was registered with {handle_label(element)} the {side} eye saw none"
+                        None,
+                        f"{each.point} was registered with {handle_label(element)} outside the view of the {side} eye",
                     )
-                off += seen
-                place = f"{describe_points([each], record)} with {handle_label(element)} at {each.shown['Z']:.0f}"
-                worst = max(worst, (math.hypot(*seen), place))
-        if not off:
+                deviations += offsets
+                pointing = f"{describe_points([each], record)} with {handle_label(element)} at {each.counters['Z']:.0f}"
+                worst = max(worst, (math.hypot(*offsets), pointing))
+        if not deviations:
             return MetricResult(None, "nothing was registered at the levels")
-        rms = math.sqrt(fmean(each**2 for each in off))
-        remark = f"over {pluralize(len(off) // 2, 'pointing')} the images stood {rms:.1f} um (rms) beside the mark, "
-        remark += f"most of all by {worst[0]:.0f} um at {worst[1]}"
-        return MetricResult(round(rms, 2), remark)
+        rms = math.sqrt(fmean(each**2 for each in deviations))
+        message = f"{pluralize(len(deviations) // 2, 'pointing')}: images {rms:.1f} um (rms) from the mark, "
+        message += f"the largest distance {worst[0]:.0f} um at {worst[1]}"
+        return MetricResult(round(rms, 2), message)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of the best eye."""
@@ -133,7 +140,7 @@ class PointingRms(_Centres, frozen=True, kw_only=True):
 
 
 @register_metric("pointings-apart")
-class PointingDisagreement(_Centres, frozen=True, kw_only=True):
+class PointingDisagreement(_CentreMetric, frozen=True, kw_only=True):
     """Distance of the student's pointings from a common centre: the larger rms of both centres, mm at their height."""
 
     unit = "mm"
@@ -142,11 +149,11 @@ class PointingDisagreement(_Centres, frozen=True, kw_only=True):
         """Return the rms."""
         centres = self._centres(record)
         if len(centres) < len(self.elements):
-            return self._few(centres)
+            return self._too_few(centres)
         element = max(centres, key=lambda each: float(centres[each].rms))
         rms = float(centres[element].rms)
         side = "left" if element.endswith("1") else "right"
-        return MetricResult(round(rms, 4), f"the lines to the {side} centre miss each other, rms {rms:.3f}")
+        return MetricResult(round(rms, 4), f"the pointings to the {side} centre disagree by {rms:.3f} mm (rms)")
 
     def floor(self, scenario: Scenario) -> float:
         """Return the rms for the best eye."""
@@ -175,41 +182,41 @@ def sigmas_of_centre(scenario: Scenario, levels: tuple[float, float], pointing_u
     return {"X": x, "Y": y, "Z": s0 * abs(levels[1] - levels[0]) / math.sqrt(spread)}
 
 
-class _Answered(_Centres, frozen=True, kw_only=True):
+class _CentreAnswerMetric(_CentreMetric, frozen=True, kw_only=True):
     """Largest difference of answered coordinates, such as x1 and x2, over some axes."""
 
     unit = "counter units"
     truth = True
     axes: list[str] = field(default_factory=lambda: ["X", "Y"])
 
-    def _against(self, record: AttemptRecord, right: Mapping[str, Mapping[str, float]], rightly: str) -> MetricResult:
-        off: list[tuple[float, str]] = []
-        for element, coordinates in right.items():
+    def _compare(self, record: AttemptRecord, expected: Mapping[str, Mapping[str, float]], source: str) -> MetricResult:
+        deviations: list[tuple[float, str]] = []
+        for element, coordinates in expected.items():
             for axis in self.axes:
                 key = f"{axis.lower()}{element[-1]}"
                 try:
                     number = float(record.answers.get(key, ""))
                 except ValueError:
                     return MetricResult(None, f"{key}: expected a number, got {record.answers.get(key) or 'no answer'}")
-                by = abs(number - coordinates[axis])
-                off.append((by, f"{key} was answered {number:.2f}, {rightly} {by:.2f} off"))
-        value, remark = max(off)
-        return MetricResult(round(value, 4) if math.isfinite(value) else None, remark)
+                deviation = abs(number - coordinates[axis])
+                deviations.append((deviation, f"{key} was answered {number:.2f}, {deviation:.2f} off {source}"))
+        value, message = max(deviations)
+        return MetricResult(round(value, 4) if math.isfinite(value) else None, message)
 
 
 @register_metric("centre-sums-off")
-class CentreComputationDeviation(_Answered, frozen=True, kw_only=True):
+class CentreComputationDeviation(_CentreAnswerMetric, frozen=True, kw_only=True):
     """Largest difference of answered coordinates from those that follow from the student's registrations."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the difference."""
         centres = self._centres(record)
         if len(centres) < len(self.elements):
-            return self._few(centres)
-        right = {
+            return self._too_few(centres)
+        expected = {
             element: {axis: float(getattr(centre, f"{axis}0")) for axis in AXES} for element, centre in centres.items()
         }
-        return self._against(record, right, "by your own registrations")
+        return self._compare(record, expected, "your registrations")
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -217,25 +224,25 @@ class CentreComputationDeviation(_Answered, frozen=True, kw_only=True):
 
 
 @register_metric("centre-off")
-class CentreDeviation(_Answered, frozen=True, kw_only=True):
+class CentreDeviation(_CentreAnswerMetric, frozen=True, kw_only=True):
     """Largest difference of answered coordinates from the true centres, in counter units."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the difference; counters are as at the registrations."""
         readings = {element: self._pointings(record, element) for element in self.elements}
         if not all(readings.values()):
-            return self._few({element: each for element, each in readings.items() if each})
-        right = {element: self._truly(record, element, found) for element, found in readings.items()}
-        return self._against(record, right, "by the truth")
+            return self._too_few({element: each for element, each in readings.items() if each})
+        expected = {element: self._true_centre(record, element, pointings) for element, pointings in readings.items()}
+        return self._compare(record, expected, "the truth")
 
-    def _truly(
-        self, record: AttemptRecord, element: str, found: Mapping[tuple[str, float], list[Reading]]
+    def _true_centre(
+        self, record: AttemptRecord, element: str, pointings: Mapping[tuple[str, float], list[Reading]]
     ) -> dict[str, float]:
         autograph = record.autograph
         centre = autograph.readings_at(autograph.pose(int(element[-1]))[0])
-        every = [each for some in found.values() for each in some]
-        counted = [(each.shown, autograph.readings_at(np.array(each.mark))) for each in every]
-        return {axis: centre[axis] + fmean(shown[axis] - now[axis] for shown, now in counted) for axis in AXES}
+        registrations = [each for group in pointings.values() for each in group]
+        readings = [(each.counters, autograph.readings_at(np.array(each.mark))) for each in registrations]
+        return {axis: centre[axis] + fmean(shown[axis] - now[axis] for shown, now in readings) for axis in AXES}
 
     def floor(self, scenario: Scenario) -> float:
         """Return the largest standard deviation of these coordinates for the best eye."""

@@ -26,13 +26,15 @@ def projector_poses(record: AttemptRecord, reading: Reading) -> tuple[ProjectorP
     """Return the poses of the left-hand and the right-hand photograph's projectors by their counters."""
     zero = {name: record.autograph.element_data(name).zero for name in record.autograph.variant.elements}
 
-    def stand(projector: int, x: float) -> ProjectorPose:
-        tilts = [reading.shown[f"{name}{projector}"] - zero[f"{name}{projector}"] for name in ("omega", "phi", "kappa")]
-        centre = [x, -reading.shown[f"by{projector}"], reading.shown[f"bz{projector}"]]
+    def pose(projector: int, x: float) -> ProjectorPose:
+        tilts = [
+            reading.counters[f"{name}{projector}"] - zero[f"{name}{projector}"] for name in ("omega", "phi", "kappa")
+        ]
+        centre = [x, -reading.counters[f"by{projector}"], reading.counters[f"bz{projector}"]]
         return ProjectorPose(np.array(centre)[:, None], GON * np.array(tilts)[:, None])
 
     model = record.model
-    return stand(model.left_projector, 0.0), stand(model.right_projector, abs(reading.shown["bx"]))
+    return pose(model.left_projector, 0.0), pose(model.right_projector, abs(reading.counters["bx"]))
 
 
 class _ClearingMetric(Metric, frozen=True, kw_only=True):
@@ -44,7 +46,7 @@ class _ClearingMetric(Metric, frozen=True, kw_only=True):
         """Return the point of the step of a registration, None if it belongs to no step."""
         for group in self.steps:
             for point, element in group.items():
-                if element in reading.named and reading.point == record.name_of(point):
+                if element in reading.elements and reading.point == record.name_of(point):
                     return point
         return None
 
@@ -61,37 +63,39 @@ class MissingSteps(_ClearingMetric, frozen=True, kw_only=True):
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
         first: dict[str, int] = {}
-        elsewhere: list[Reading] = []
+        strays: list[Reading] = []
         elements = self._elements()
         for reading in record.readings:
             step = self._step_of(record, reading)
             if step is not None:
-                first.setdefault(step, reading.place)
-            elif set(reading.named) & set(elements.values()):
-                elsewhere.append(reading)
+                first.setdefault(step, reading.action_index)
+            elif set(reading.elements) & set(elements.values()):
+                strays.append(reading)
         missing = [point for point in elements if point not in first]
-        early, before = [], -1
+        early: list[str] = []
+        before = -1
         for group in self.steps:
-            places = {point: first[point] for point in group if point in first}
-            early += [point for point, place in places.items() if place < before]
-            before = max([before, *places.values()])
-        remark = [f"not registered: {self._remark(missing)}"] if missing else []
-        remark += [f"registered before those it rests on: {self._remark(early)}"] if early else []
-        remark += [f"registered where it does not belong: {self._strayed(elsewhere, record)}"] if elsewhere else []
-        strays = len({(each.point, each.named) for each in elsewhere})
+            indices = {point: first[point] for point in group if point in first}
+            early += [point for point, index in indices.items() if index < before]
+            before = max([before, *indices.values()])
+        messages = [f"not registered: {self._list_steps(missing)}"] if missing else []
+        messages += [f"registered before a preceding step: {self._list_steps(early)}"] if early else []
+        messages += [f"registered at a wrong point: {self._list_readings(strays, record)}"] if strays else []
+        stray_count = len({(each.point, each.elements) for each in strays})
         return MetricResult(
-            float(len(missing) + len(early) + strays),
-            "; ".join(remark) or f"cleared in their order: {self._remark(list(elements))}",
+            float(len(missing) + len(early) + stray_count),
+            "; ".join(messages) or f"cleared in order: {self._list_steps(list(elements))}",
         )
 
-    def _remark(self, points: list[str]) -> str:
+    def _list_steps(self, points: list[str]) -> str:
         elements = self._elements()
         return join_words(f"{handle_label(elements[point])} at {point}" for point in points)
 
-    def _strayed(self, readings: list[Reading], record: AttemptRecord) -> str:
+    def _list_readings(self, readings: list[Reading], record: AttemptRecord) -> str:
         return join_words(
             dict.fromkeys(
-                f"{join_words(map(handle_label, each.named))} at {describe_points([each], record)}" for each in readings
+                f"{join_words(map(handle_label, each.elements))} at {describe_points([each], record)}"
+                for each in readings
             )
         )
 
@@ -136,20 +140,21 @@ class OverCorrectionDeviation(_ClearingMetric, frozen=True, kw_only=True):
         last, omega = list(self._elements().items())[-1]
         if not turns:
             return MetricResult(
-                None, f"{handle_label(omega)} was never turned at {last} by {self.least:g} gon or more and registered"
+                None,
+                f"expected a turn of {handle_label(omega)} by {self.least:g} gon or more registered at point {last}, "
+                "got none",
             )
         worst = max(turns, key=lambda each: each.remains)
         return MetricResult(
             round(worst.remains, 3),
-            f"at point {last} {handle_label(omega)} was turned {worst.times:.2f} times as far as cleared it, "
-            "and it takes "
-            f"{worst.needed:.2f} times: {worst.remains:.0%} of the parallax is left after the next round",
+            f"at point {last} {handle_label(omega)} was turned by {worst.times:.2f} times the clearing turn "
+            f"(required {worst.needed:.2f} times): {worst.remains:.0%} of the parallax is left after the next round",
         )
 
     def _turns(self, record: AttemptRecord) -> list[OmegaTurn]:
         *_, (last, omega) = self._elements().items()
-        begun = [each.before for each in record.actions if each.name == omega and each.what in ("set", "turn")]
-        before = begun[0] if begun else record.autograph.element(omega)
+        start_readings = [each.before for each in record.actions if each.name == omega and each.kind in ("set", "turn")]
+        before = start_readings[0] if start_readings else record.autograph.element(omega)
         readings = [each for each in record.readings if self._step_of(record, each) is not None]
         latest: dict[str, Reading] = {}
         cleared: Reading | None = None
@@ -158,9 +163,9 @@ class OverCorrectionDeviation(_ClearingMetric, frozen=True, kw_only=True):
             step = self._step_of(record, reading) or ""
             if step != last:
                 if cleared is not None:
-                    turns.append(self._turn(record, latest, cleared, before, reading.shown[omega]))
+                    turns.append(self._turn(record, latest, cleared, before, reading.counters[omega]))
                     cleared = None
-                before = reading.shown[omega]
+                before = reading.counters[omega]
             elif cleared is None:
                 cleared = reading
             latest[step] = reading
@@ -172,15 +177,15 @@ class OverCorrectionDeviation(_ClearingMetric, frozen=True, kw_only=True):
         self, record: AttemptRecord, latest: dict[str, Reading], cleared: Reading, before: float, left: float
     ) -> OmegaTurn | None:
         *_, (_, omega) = self._elements().items()
-        if abs(cleared.shown[omega] - before) < self.least or set(latest) != set(self._elements()):
+        if abs(cleared.counters[omega] - before) < self.least or set(latest) != set(self._elements()):
             return None
         marks = np.array([latest[point].mark for point in self._elements()]).T[..., None]
         needed = float(over_correction_by_coefficients(self._coefficients(record, marks, cleared))[0])
-        return OmegaTurn(cleared, before, cleared.shown[omega], left, needed)
+        return OmegaTurn(cleared, before, cleared.counters[omega], left, needed)
 
     def _coefficients(self, record: AttemptRecord, marks: Array, reading: Reading) -> Array:
-        hands = [f"{name[:-1]}{record.model.side_of(int(name[-1]))}" for name in self._elements().values()]
-        rows = [PARALLAX_ELEMENTS.index(name) for name in hands]
+        names = [f"{name[:-1]}{record.model.side_of(int(name[-1]))}" for name in self._elements().values()]
+        rows = [PARALLAX_ELEMENTS.index(name) for name in names]
         return clearing_coefficients(marks, *projector_poses(record, reading))[rows]
 
     def floor(self, scenario: Scenario) -> float:
@@ -201,9 +206,9 @@ class WrongMissingPoints(Metric, frozen=True, kw_only=True):
         answered = record.answers.get(self.key, "")
         if not answered:
             return MetricResult(None, f"{self.key}: not answered")
-        text = set(answered.replace(",", " ").replace("+", " ").split())
-        gone = set(CASES["A"]) - set(record.model.standard_points)
-        wrong = sorted(text ^ gone)
+        answered_points = set(answered.replace(",", " ").replace("+", " ").split())
+        missing = set(CASES["A"]) - set(record.model.standard_points)
+        wrong = sorted(answered_points ^ missing)
         if not wrong:
             return MetricResult(0.0, f"{self.key} was answered {answered}: right")
-        return MetricResult(float(len(wrong)), f"{self.key} was answered {answered}: {join_words(wrong)} is not so")
+        return MetricResult(float(len(wrong)), f"{self.key} was answered {answered}: wrong for {join_words(wrong)}")

@@ -24,12 +24,12 @@ from a7sim.training.metrics.truth import MaxAtReadings
 class CrossDistance(MaxAtReadings, frozen=True, kw_only=True):
     """Largest distance of the mark from a point at a registration, in the pointing eye, um."""
 
-    def _um(self, reading: Reading) -> float | None:
-        seen = [each for each in reading.eyes if each is not None]
-        return min(math.hypot(x, y) for x, y in seen) if seen else None
+    def _value_um(self, reading: Reading) -> float | None:
+        offsets = [each for each in reading.eyes if each is not None]
+        return min(math.hypot(x, y) for x, y in offsets) if offsets else None
 
-    def _called(self, value: float) -> str:
-        return f"the mark stood {value:.0f} um beside the cross"
+    def _description(self, value: float) -> str:
+        return f"the mark was {value:.0f} um from the cross"
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of the best eye, and half a count of both wheels at the highest level."""
@@ -44,7 +44,7 @@ class LevelDepthRatio(Metric, frozen=True, kw_only=True):
     points: list[str]
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it, by the counter of Z, which counts mm from the base line in a grid test."""
+        """Return the ratio by the Z counter, which counts mm from the base line in a grid test."""
         names = [record.name_of(point) for point in self.points]
         depths = [-each.mark[2] for each in record.readings if each.point in names]
         if not depths:
@@ -67,22 +67,24 @@ class AnsweredErrorDeviation(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the true position minus the counter reading."""
-        off: dict[str, float] = {}
+        deviations: dict[str, float] = {}
         for element in self.elements:
             answered = record.answers.get(element, "")
             try:
-                found = float(answered)
+                answer = float(answered)
             except ValueError:
                 return MetricResult(
                     None, f"{element}: {f'expected a number, got {answered!r}' if answered else 'not answered'}"
                 )
             autograph = record.autograph
             truth = true_errors(autograph, autograph.condition, int(element[-1]))["errors"]
-            off[element] = abs(found - truth[element[:-1]])
-        worst = max(off, key=lambda element: off[element])
-        if not math.isfinite(off[worst]):
+            deviations[element] = abs(answer - truth[element[:-1]])
+        worst = max(deviations, key=lambda element: deviations[element])
+        if not math.isfinite(deviations[worst]):
             return MetricResult(None, f"{worst}: expected a number, got {record.answers[worst]!r}")
-        return MetricResult(round(off[worst], 4), f"{worst} was answered {record.answers[worst]}, the furthest off")
+        return MetricResult(
+            round(deviations[worst], 4), f"{worst} was answered {record.answers[worst]}, the largest deviation"
+        )
 
     def floor(self, scenario: Scenario) -> float:
         """Return the precision of c in mm, or of a tilt in gon, with local errors of eight crosses."""

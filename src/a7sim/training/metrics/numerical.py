@@ -16,7 +16,7 @@ from a7sim.standard_points import CASES
 from a7sim.text import pluralize
 from a7sim.training.action_log import Reading
 from a7sim.training.attempt_record import AttemptRecord
-from a7sim.training.forms import FIVE, multipliers
+from a7sim.training.forms import FIVE_ELEMENTS, multipliers
 from a7sim.training.metrics.base import (
     BEST_PARALLAX_UM,
     HALF_A_COUNT,
@@ -28,7 +28,7 @@ from a7sim.training.metrics.base import (
 )
 from a7sim.training.metrics.clearing import projector_poses
 
-BYS = ("by1", "by2")
+BY_ELEMENTS = ("by1", "by2")
 
 
 @dataclass(frozen=True)
@@ -42,57 +42,63 @@ class MeasuredRound:
     def elements(self) -> Mapping[str, str]:
         """Return the five elements of the plotter by those of the sides: with base out they are exchanged."""
         projectors = {1: self.record.model.left_projector, 2: self.record.model.right_projector}
-        return {name: f"{name[:-1]}{projectors[int(name[-1])]}" for name in FIVE}
+        return {name: f"{name[:-1]}{projectors[int(name[-1])]}" for name in FIVE_ELEMENTS}
 
     @cached_property
     def parallaxes(self) -> dict[str, float]:
         """Return the y-parallaxes in mm by position, from the means of by' and by" minus their rest positions."""
-        found = {}
+        parallaxes = {}
         for label, name in self.record.model.standard_points.items():
-            present = [each for each in self.readings if each.point == name]
-            read = {by: [each.shown[by] for each in present if by in each.named] for by in BYS}
-            if all(read.values()):
-                rest = {by: fmean(each.shown[by] for each in present if by not in each.named) for by in BYS}
+            readings = [each for each in self.readings if each.point == name]
+            by_element = {by: [each.counters[by] for each in readings if by in each.elements] for by in BY_ELEMENTS}
+            if all(by_element.values()):
+                rest = {
+                    by: fmean(each.counters[by] for each in readings if by not in each.elements) for by in BY_ELEMENTS
+                }
                 sense = 1.0 if self.record.model.left_projector == 1 else -1.0
-                moved = {by: fmean(read[by]) - rest[by] for by in BYS}
-                found[label] = sense * (moved["by1"] - moved["by2"]) / 2.0
-        return found
+                moved = {by: fmean(by_element[by]) - rest[by] for by in BY_ELEMENTS}
+                parallaxes[label] = sense * (moved["by1"] - moved["by2"]) / 2.0
+        return parallaxes
 
-    def has(self, case: str) -> bool:
+    def has_case(self, case: str) -> bool:
         """Return whether all points of a case were read with both."""
         return set(CASES[case]) & set(self.record.model.standard_points) <= set(self.parallaxes)
 
-    def sums(self, case: str) -> list[dict[str, float]]:
+    def corrections(self, case: str) -> list[dict[str, float]]:
         """Return the resulting corrections in gon, by element, for all methods that are taught.
 
         By the form for regular points or by least squares, from the parallaxes or from their differences from the mean.
         """
         labels = [label for label in CASES[case] if label in self.parallaxes]
         p = np.array([self.parallaxes[label] for label in labels])
-        ways = []
-        for each in (p - p.mean(), p):
+        solutions = []
+        for values in (p - p.mean(), p):
             if len(labels) == len(CASES[case]):
-                ways.append(multipliers(self.record.scenario, case) @ each)
-            ways.append(self._rigorous(labels, each))
-        return [{self.elements[n]: float(v) for n, v in zip(FIVE, way, strict=True)} for way in ways]
+                solutions.append(multipliers(self.record.scenario, case) @ values)
+            solutions.append(self._least_squares(labels, values))
+        return [
+            {self.elements[n]: float(v) for n, v in zip(FIVE_ELEMENTS, solution, strict=True)} for solution in solutions
+        ]
 
-    def _rigorous(self, labels: Sequence[str], p: Array) -> Array:
+    def _least_squares(self, labels: Sequence[str], p: Array) -> Array:
         names = [self.record.name_of(label) for label in labels]
         marks = [np.mean([each.mark for each in self.readings if each.point == name], axis=0) for name in names]
         left, right = projector_poses(self.record, self.readings[0])
-        solution = element_corrections(p[:, None], np.array(marks).T[..., None], left, right, FIVE)
+        solution = element_corrections(p[:, None], np.array(marks).T[..., None], left, right, FIVE_ELEMENTS)
         return solution.unknowns[:, 0] / GON
 
-    def shows(self, element: str) -> float:
+    def reading(self, element: str) -> float:
         """Return the reading of an element."""
-        return self.readings[0].shown[element]
+        return self.readings[0].counters[element]
 
 
 def find_rounds(record: AttemptRecord) -> list[MeasuredRound]:
     """Return the rounds of measuring by' and by"; turning one of the five elements starts a new one."""
     rounds: list[list[Reading]] = []
-    for each in (each for each in record.readings if set(each.named) & set(BYS)):
-        if rounds and all(abs(each.shown[name] - rounds[-1][-1].shown[name]) < HALF_A_COUNT for name in FIVE):
+    for each in (each for each in record.readings if set(each.elements) & set(BY_ELEMENTS)):
+        if rounds and all(
+            abs(each.counters[name] - rounds[-1][-1].counters[name]) < HALF_A_COUNT for name in FIVE_ELEMENTS
+        ):
             rounds[-1].append(each)
         else:
             rounds.append([each])
@@ -103,29 +109,29 @@ def find_rounds(record: AttemptRecord) -> list[MeasuredRound]:
 class AnsweredCase:
     """Case of the exercise: measurements, resulting corrections, answers and settings."""
 
-    sums: Sequence[Mapping[str, float]]
+    corrections: Sequence[Mapping[str, float]]
     answered: Mapping[str, float]
     """Empty unless all five were answered."""
-    set: Mapping[str, float]
+    settings: Mapping[str, float]
 
 
 def answered_case(record: AttemptRecord, case: str) -> AnsweredCase | None:
     """Return the first complete round of a case with its results; None if there is none."""
     rounds = find_rounds(record)
-    place = next((i for i, each in enumerate(rounds) if each.has(case)), None)
-    if place is None:
+    index = next((i for i, each in enumerate(rounds) if each.has_case(case)), None)
+    if index is None:
         return None
-    this, elements = rounds[place], rounds[place].elements.values()
-    after = rounds[place + 1].shows if place + 1 < len(rounds) else record.autograph.element
+    measured_round, elements = rounds[index], rounds[index].elements.values()
+    after = rounds[index + 1].reading if index + 1 < len(rounds) else record.autograph.element
     try:
-        sums = this.sums(case)
+        corrections = measured_round.corrections(case)
     except Undetermined:
         return None
     answers = {name: _number(record.answers.get(f"{case.lower()}-{name}", "")) for name in elements}
     answered = {name: value for name, value in answers.items() if value is not None}
-    moved = {name: after(name) - this.shows(name) for name in elements}
-    changed = {name: math.remainder(value, 400.0) for name, value in moved.items()}
-    return AnsweredCase(sums, answered if len(answered) == len(FIVE) else {}, changed)
+    moved = {name: after(name) - measured_round.reading(name) for name in elements}
+    settings = {name: math.remainder(value, 400.0) for name, value in moved.items()}
+    return AnsweredCase(corrections, answered if len(answered) == len(FIVE_ELEMENTS) else {}, settings)
 
 
 def _number(text: str) -> float | None:
@@ -136,9 +142,14 @@ def _number(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _apart(given: Mapping[str, float], ways: Sequence[Mapping[str, float]]) -> tuple[float, str, float]:
+def _nearest_difference(
+    corrections: Mapping[str, float], solutions: Sequence[Mapping[str, float]]
+) -> tuple[float, str, float]:
     """Return the largest difference from the nearest method, its element, and the right value."""
-    worst = [max((abs(given[name] - way[name]), name, way[name]) for name in way) for way in ways]
+    worst = [
+        max((abs(corrections[name] - solution[name]), name, solution[name]) for name in solution)
+        for solution in solutions
+    ]
     return min(worst)
 
 
@@ -155,16 +166,17 @@ class ComputationDeviation(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the difference."""
-        found = answered_case(record, self.case)
-        if found is None:
+        case = answered_case(record, self.case)
+        if case is None:
             return MetricResult(
                 None, f"not all points of case {self.case} were read with by' and by\" at the same settings"
             )
-        off, name, right = _apart(found.answered or found.set, found.sums)
-        given = (found.answered or found.set)[name]
-        how = "answered" if found.answered else "set"
-        remark = f"case {self.case}: {handle_label(name)} was {how} as {given:+.2f} and your readings give {right:+.2f}"
-        return MetricResult(round(off, 4), remark)
+        corrections = case.answered or case.settings
+        deviation, name, expected = _nearest_difference(corrections, case.corrections)
+        how = "answered" if case.answered else "set"
+        value = f"{handle_label(name)} was {how} as {corrections[name]:+.2f}"
+        message = f"case {self.case}: {value}, your readings give {expected:+.2f}"
+        return MetricResult(round(deviation, 4), message)
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -181,18 +193,17 @@ class SettingDeviation(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the difference."""
-        present = {case: each for case in self.cases if (each := answered_case(record, case)) is not None}
-        if len(present) < len(self.cases):
-            return MetricResult(None, f"case {join_words(set(self.cases) - set(present))} was not measured whole")
-        all_off = [
-            (_apart(each.set, [each.answered] if each.answered else each.sums), case) for case, each in present.items()
+        cases = {case: each for case in self.cases if (each := answered_case(record, case)) is not None}
+        if len(cases) < len(self.cases):
+            return MetricResult(None, f"case {join_words(set(self.cases) - set(cases))} was not measured completely")
+        deviations = [
+            (_nearest_difference(each.settings, [each.answered] if each.answered else each.corrections), case)
+            for case, each in cases.items()
         ]
-        (off, name, right), case = max(all_off)
-        remark = (
-            f"case {case}: {handle_label(name)} was turned by {present[case].set[name]:+.2f} and should be by "
-            f"{right:+.2f}"
-        )
-        return MetricResult(round(off, 4), remark)
+        (deviation, name, expected), case = max(deviations)
+        amount = cases[case].settings[name]
+        message = f"case {case}: {handle_label(name)} was turned by {amount:+.2f}, required {expected:+.2f}"
+        return MetricResult(round(deviation, 4), message)
 
     def floor(self, scenario: Scenario) -> float:
         """Return a count: both the old and the new setting are full counts."""
@@ -205,20 +216,20 @@ class ParallaxRms(Metric, frozen=True, kw_only=True):
 
     unit = "um"
     truth = True
-    elements: list[str] = field(default_factory=lambda: list(BYS))
+    elements: list[str] = field(default_factory=lambda: list(BY_ELEMENTS))
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the rms."""
-        left = [
+        parallaxes = [
             each.stereo[1]
             for each in record.readings
-            if set(each.named) & set(self.elements) and each.stereo is not None
+            if set(each.elements) & set(self.elements) and each.stereo is not None
         ]
-        if not left:
+        if not parallaxes:
             return MetricResult(None, "nothing was registered with both images in view")
-        rms = math.sqrt(fmean(each**2 for each in left))
+        rms = math.sqrt(fmean(each**2 for each in parallaxes))
         return MetricResult(
-            round(rms, 2), f"over {pluralize(len(left), 'reading')} y-parallaxes of {rms:.1f} um (rms) were left"
+            round(rms, 2), f"{pluralize(len(parallaxes), 'reading')}: y-parallaxes of {rms:.1f} um (rms)"
         )
 
     def floor(self, scenario: Scenario) -> float:

@@ -7,7 +7,7 @@ from msgspec import field
 
 from a7sim.scenario import Scenario
 from a7sim.text import pluralize
-from a7sim.training.action_log import AXES, PLAIN, Reading
+from a7sim.training.action_log import AXES, MOVEMENTS, Reading
 from a7sim.training.attempt_record import AttemptRecord
 from a7sim.training.metrics.base import (
     HALF_A_COUNT,
@@ -34,25 +34,25 @@ class MissingReadings(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        short: dict[str, list[str]] = {}
+        gaps: dict[str, list[str]] = {}
         missing = 0
-        moved = [each.index for each in record.actions if each.name in self.after and each.what in PLAIN]
+        moved = [each.index for each in record.actions if each.name in self.after and each.kind in MOVEMENTS]
         last = max(moved, default=-1)
         for point in self.points:
             for element in self.elements or [""]:
-                readings = [each for each in readings_with(record, element, [point]) if each.place > last]
-                lacks = self.each - len(readings)
-                if lacks > 0:
-                    missing += lacks
-                    short.setdefault(f"{handle_label(element) + ' at ' if element else ''}{point}", []).append(
-                        str(lacks)
+                readings = [each for each in readings_with(record, element, [point]) if each.action_index > last]
+                shortfall = self.each - len(readings)
+                if shortfall > 0:
+                    missing += shortfall
+                    gaps.setdefault(f"{handle_label(element) + ' at ' if element else ''}{point}", []).append(
+                        str(shortfall)
                     )
         wanted = len(self.points) * max(1, len(self.elements)) * self.each
         if not missing:
             return MetricResult(0.0, "no registration is missing")
-        late = f" after the last turn of {join_words(map(handle_label, self.after))}" if self.after else ""
+        condition = f" after the last turn of {join_words(map(handle_label, self.after))}" if self.after else ""
         return MetricResult(
-            float(missing), f"{missing} of {pluralize(wanted, 'registration')} missing{late}: {join_words(short)}"
+            float(missing), f"{missing} of {pluralize(wanted, 'registration')} missing{condition}: {join_words(gaps)}"
         )
 
 
@@ -70,25 +70,25 @@ class WrongApproach(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        spared = {record.name_of(point) for point in self.besides}
-        readings = [each for each in readings_with(record, "", self.points) if each.point not in spared]
+        excluded = {record.name_of(point) for point in self.besides}
+        readings = [each for each in readings_with(record, "", self.points) if each.point not in excluded]
         if not readings:
             return MetricResult(None, "nothing was registered")
         wrong = {
             handle: [each for each in readings if each.sides.get(handle, self.side) != self.side]
             for handle in self.handles
         }
-        bad = {each.number for some in wrong.values() for each in some}
+        bad = {each.number for group in wrong.values() for each in group}
         if not bad:
             return MetricResult(0.0, f"{join_words(map(handle_label, self.handles))} always came from the same side")
-        from_where = "larger" if self.side > 0 else "smaller"
-        remark = [
-            f"{handle_label(handle)} at {describe_points(some, record)}" for handle, some in wrong.items() if some
+        wrong_side = "larger" if self.side > 0 else "smaller"
+        places = [
+            f"{handle_label(handle)} at {describe_points(group, record)}" for handle, group in wrong.items() if group
         ]
         return MetricResult(
             float(len(bad)),
-            f"{len(bad)} of {pluralize(len(readings), 'registration')} came from {from_where} readings: "
-            f"{join_words(remark)}",
+            f"{len(bad)} of {pluralize(len(readings), 'registration')} came from {wrong_side} readings: "
+            f"{join_words(places)}",
         )
 
 
@@ -105,14 +105,15 @@ class OneSidedReadings(Metric, frozen=True, kw_only=True):
         readings = readings_with(record, "", [self.point])
         if not readings:
             return MetricResult(None, f"nothing was registered at {self.point}")
-        lacking = {handle: {each.sides.get(handle, 0) for each in readings} for handle in self.handles}
-        remark = [
+        sides_of = {handle: {each.sides.get(handle, 0) for each in readings} for handle in self.handles}
+        messages = [
             f"{handle_label(handle)} never came from {'smaller' if 1 not in sides else 'larger'} readings"
-            for handle, sides in lacking.items()
+            for handle, sides in sides_of.items()
             if not {1, -1} <= sides
         ]
         return MetricResult(
-            float(len(remark)), f"at {self.point}: {join_words(remark) if remark else 'both sides were registered'}"
+            float(len(messages)),
+            f"at {self.point}: {join_words(messages) if messages else 'registered from both sides'}",
         )
 
 
@@ -128,27 +129,31 @@ class ReadingsWithoutReturn(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        lazy = {
-            point: [handle for handle in self.handles if not self._came_back(record, point, handle)]
+        missing = {
+            point: [handle for handle in self.handles if not self._has_returned(record, point, handle)]
             for point in self.points
         }
-        lazy = {point: handles for point, handles in lazy.items() if handles}
-        if not lazy:
-            return MetricResult(0.0, f"at {join_words(self.points)} the second reading is one of its own")
-        handles = [handle_label(each) for each in self.handles if any(each in some for some in lazy.values())]
+        missing = {point: handles for point, handles in missing.items() if handles}
+        if not missing:
+            return MetricResult(0.0, f"independent second readings at {join_words(self.points)}")
+        handles = [handle_label(each) for each in self.handles if any(each in group for group in missing.values())]
         return MetricResult(
-            float(len(lazy)),
-            f"at {join_words(lazy)} there are no two readings of {join_words(handles)} between which it went away "
-            f"by {self.away:g} and came back",
+            float(len(missing)),
+            f"no second reading of {join_words(handles)} at {join_words(missing)} after moving by {self.away:g} "
+            "away and back",
         )
 
-    def _came_back(self, record: AttemptRecord, point: str, handle: str) -> bool:
+    def _has_returned(self, record: AttemptRecord, point: str, handle: str) -> bool:
         readings = readings_with(record, "" if handle in AXES else handle, [point])
-        return any(self._left(record, handle, *pair) for pair in pairwise(readings))
+        return any(self._is_moved_away(record, handle, *pair) for pair in pairwise(readings))
 
-    def _left(self, record: AttemptRecord, handle: str, first: Reading, then: Reading) -> bool:
-        stood = [each.after for each in record.actions if each.name == handle and first.place < each.index < then.place]
-        return any(abs(at - first.shown[handle]) >= self.away - 1e-9 for at in stood)
+    def _is_moved_away(self, record: AttemptRecord, handle: str, first: Reading, second: Reading) -> bool:
+        positions = [
+            each.after
+            for each in record.actions
+            if each.name == handle and first.action_index < each.index < second.action_index
+        ]
+        return any(abs(position - first.counters[handle]) >= self.away - 1e-9 for position in positions)
 
 
 @register_metric("off-target")
@@ -160,8 +165,8 @@ class TargetDeviation(Metric, frozen=True, kw_only=True):
     """By point, by counter or element."""
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
-        """Return it, by the last registration of each point."""
-        off: list[tuple[float, str]] = []
+        """Return the difference by the last registration of each point."""
+        deviations: list[tuple[float, str]] = []
         missing = []
         for point, wanted in self.targets.items():
             readings = readings_with(record, "", [point])
@@ -170,14 +175,17 @@ class TargetDeviation(Metric, frozen=True, kw_only=True):
                 continue
             for handle, reading in wanted.items():
                 for each in readings:
-                    shown = each.shown[handle]
-                    off.append(
-                        (abs(shown - reading), f"{handle_label(handle)} at {point} read {shown:.2f} for {reading:.2f}")
+                    shown = each.counters[handle]
+                    deviations.append(
+                        (
+                            abs(shown - reading),
+                            f"{handle_label(handle)} at {point} reads {shown:.2f}, required {reading:.2f}",
+                        )
                     )
         if missing:
             return MetricResult(None, f"nothing was registered at {join_words(missing)}")
-        worst, remark = max(off)
-        return MetricResult(round(worst, 4), remark)
+        worst, message = max(deviations)
+        return MetricResult(round(worst, 4), message)
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count."""
@@ -196,22 +204,24 @@ class OtherElementDisplaced(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return their number."""
-        remark, count, all_read = [], 0, 0
-        for read, other in self.pairs.items():
-            readings = [each for each in readings_with(record, read) if other not in each.named]
-            all_read += len(readings)
-            wrong = [each for each in readings if abs(each.shown[other] - self.at) > self.within]
+        messages, count, total = [], 0, 0
+        for element, other in self.pairs.items():
+            readings = [each for each in readings_with(record, element) if other not in each.elements]
+            total += len(readings)
+            wrong = [each for each in readings if abs(each.counters[other] - self.at) > self.within]
             count += len(wrong)
             if wrong:
-                remark.append(
-                    f"{handle_label(other)} was never returned to {self.at:g} before reading {handle_label(read)} "
+                messages.append(
+                    f"{handle_label(other)} was never returned to {self.at:g} before reading {handle_label(element)} "
                     f"at {describe_points(wrong, record)}"
                 )
-        if not all_read:
-            return MetricResult(None, f"no reading of {join_words(map(handle_label, self.pairs))} was registered")
+        if not total:
+            return MetricResult(
+                None, f"expected registered readings of {join_words(map(handle_label, self.pairs))}, got none"
+            )
         return MetricResult(
             float(count),
-            join_words(remark) if remark else f"the other one stood at rest at {pluralize(all_read, 'reading')}",
+            join_words(messages) if messages else f"the other element was at rest at {pluralize(total, 'reading')}",
         )
 
 
@@ -230,18 +240,18 @@ class ReadingSpread(Metric, frozen=True, kw_only=True):
             readings = sorted(
                 readings_with(record, "" if handle in AXES else handle, self.points), key=lambda each: each.point
             )
-            for _, some in groupby(readings, key=lambda each: each.point):
-                group = list(some)
-                read = [each.shown[handle] for each in group]
-                if len(read) > 1:
-                    spread = max(read) - min(read)
-                    remark = (
-                        f"{handle_label(handle)} at {describe_points(group, record)} read from {min(read):.2f} "
-                        f"to {max(read):.2f}"
+            for _, same_point in groupby(readings, key=lambda each: each.point):
+                group = list(same_point)
+                values = [each.counters[handle] for each in group]
+                if len(values) > 1:
+                    spread = max(values) - min(values)
+                    message = (
+                        f"{handle_label(handle)} at {describe_points(group, record)} read from {min(values):.2f} "
+                        f"to {max(values):.2f}"
                     )
-                    spreads.append((round(spread, 4), remark))
+                    spreads.append((round(spread, 4), message))
         if not spreads:
-            return MetricResult(None, "nothing was read twice")
+            return MetricResult(None, "expected two readings of an element at a point, got none")
         return MetricResult(*max(spreads))
 
     def floor(self, scenario: Scenario) -> float:
@@ -262,16 +272,20 @@ class OppositionDeviation(Metric, frozen=True, kw_only=True):
         """Return the largest sum at a point."""
         sums: list[tuple[float, str]] = []
         for point in dict.fromkeys(each.point for each in readings_with(record, self.one, self.points)):
-            ones, others = readings_with(record, self.one, [point]), readings_with(record, self.other, [point])
-            if others:
-                left = fmean(each.shown[self.one] for each in ones)
-                right = fmean(each.shown[self.other] for each in others)
-                read = f"{handle_label(self.one)} reads {left:+.3f} and {handle_label(self.other)} {right:+.3f}"
-                remark = f"at {describe_points(ones, record)} {read}"
-                sums.append((round(abs(left + right), 4), remark))
+            first_readings, second_readings = (
+                readings_with(record, self.one, [point]),
+                readings_with(record, self.other, [point]),
+            )
+            if second_readings:
+                left = fmean(each.counters[self.one] for each in first_readings)
+                right = fmean(each.counters[self.other] for each in second_readings)
+                pair = f"{handle_label(self.one)} reads {left:+.3f} and {handle_label(self.other)} {right:+.3f}"
+                message = f"at {describe_points(first_readings, record)} {pair}"
+                sums.append((round(abs(left + right), 4), message))
         if not sums:
             return MetricResult(
-                None, f"no point was read with both {handle_label(self.one)} and {handle_label(self.other)}"
+                None,
+                f"expected a point read with both {handle_label(self.one)} and {handle_label(self.other)}, got none",
             )
         return MetricResult(*max(sums))
 

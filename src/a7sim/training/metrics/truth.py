@@ -49,24 +49,24 @@ class MaxAtReadings(Metric, frozen=True, kw_only=True):
         readings = [
             each
             for each in record.readings
-            if (not self.elements or set(self.elements) & set(each.named)) and (not names or each.point in names)
+            if (not self.elements or set(self.elements) & set(each.elements)) and (not names or each.point in names)
         ]
         if not readings:
             return MetricResult(None, "nothing was registered")
-        lost = [each for each in readings if self._um(each) is None]
-        if lost:
-            return MetricResult(None, f"at {describe_points(lost, record)} the point was not in view")
-        worst = max(readings, key=lambda each: self._um(each) or 0.0)
-        value = self._um(worst) or 0.0
-        named = join_words(map(handle_label, worst.named)) if worst.named else "the mark"
+        unseen = [each for each in readings if self._value_um(each) is None]
+        if unseen:
+            return MetricResult(None, f"at {describe_points(unseen, record)} the point was not in view")
+        worst = max(readings, key=lambda each: self._value_um(each) or 0.0)
+        value = self._value_um(worst) or 0.0
+        elements = f" with {join_words(map(handle_label, worst.elements))}" if worst.elements else ""
         return MetricResult(
-            round(value, 1), f"{self._called(value)} at {describe_points([worst], record)} with {named}"
+            round(value, 1), f"{self._description(value)} at {describe_points([worst], record)}{elements}"
         )
 
-    def _um(self, reading: Reading) -> float | None:
+    def _value_um(self, reading: Reading) -> float | None:
         raise NotImplementedError
 
-    def _called(self, value: float) -> str:
+    def _description(self, value: float) -> str:
         raise NotImplementedError
 
 
@@ -74,11 +74,11 @@ class MaxAtReadings(Metric, frozen=True, kw_only=True):
 class RemainingParallax(MaxAtReadings, frozen=True, kw_only=True):
     """Largest y-parallax at a registration, um at photo scale."""
 
-    def _um(self, reading: Reading) -> float | None:
+    def _value_um(self, reading: Reading) -> float | None:
         return None if reading.stereo is None else abs(reading.stereo[1])
 
-    def _called(self, value: float) -> str:
-        return f"the largest y-parallax left was {value:.0f} um at photo scale,"
+    def _description(self, value: float) -> str:
+        return f"the largest remaining y-parallax was {value:.0f} um at photo scale,"
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of the best eye, and half a count."""
@@ -89,11 +89,11 @@ class RemainingParallax(MaxAtReadings, frozen=True, kw_only=True):
 class HeightParallax(MaxAtReadings, frozen=True, kw_only=True):
     """Largest x-parallax at a registration: the mark was above or below the ground, um."""
 
-    def _um(self, reading: Reading) -> float | None:
+    def _value_um(self, reading: Reading) -> float | None:
         return None if reading.stereo is None else abs(reading.stereo[0])
 
-    def _called(self, value: float) -> str:
-        return f"the mark stood off the ground by an x-parallax of {value:.0f} um"
+    def _description(self, value: float) -> str:
+        return f"the mark was off the ground by an x-parallax of {value:.0f} um"
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of the best eye."""
@@ -107,15 +107,15 @@ class PlanDeviation(MaxAtReadings, frozen=True, kw_only=True):
     eye: int = 0
     """Of one eye; 0 for the mean of both."""
 
-    def _um(self, reading: Reading) -> float | None:
+    def _value_um(self, reading: Reading) -> float | None:
         eyes = [reading.eyes[self.eye - 1]] if self.eye else list(reading.eyes)
-        seen = [each for each in eyes if each is not None]
-        if len(seen) < len(eyes):
+        offsets = [each for each in eyes if each is not None]
+        if len(offsets) < len(eyes):
             return None
-        return math.hypot(sum(x for x, _ in seen) / len(seen), sum(y for _, y in seen) / len(seen))
+        return math.hypot(sum(x for x, _ in offsets) / len(offsets), sum(y for _, y in offsets) / len(offsets))
 
-    def _called(self, value: float) -> str:
-        return f"the mark stood {value:.0f} um beside the point"
+    def _description(self, value: float) -> str:
+        return f"the mark was {value:.0f} um from the point"
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of the best eye, and the least count of both wheels."""
@@ -132,28 +132,28 @@ def y_parallax_at(record: AttemptRecord, point: str) -> float | None:
     for projector in (model.left_projector, model.right_projector):
         if autograph.loaded(projector) is None:
             return None
-        place = autograph.carrier(projector).point(point)
-        if place is None:
+        position = autograph.carrier(projector).point(point)
+        if position is None:
             return None
-        images.append((projector, place))
+        images.append((projector, position))
     mark = np.array([record.scenario.plan.bx / 2.0, 0.0, -record.scenario.plan.projection_height])
     for _ in range(MAX_STEPS):
-        off = _misses(autograph, images, mark)
-        slopes = np.array([_misses(autograph, images, mark + step) - off for step in np.eye(3)]).T
-        change = np.linalg.solve(slopes[:3], -off[:3])
+        displacements = _displacements(autograph, images, mark)
+        slopes = np.array([_displacements(autograph, images, mark + step) - displacements for step in np.eye(3)]).T
+        change = np.linalg.solve(slopes[:3], -displacements[:3])
         mark = mark + change
         if np.abs(change).max() < 1e-6:
             break
-    return float(1e3 * _misses(autograph, images, mark)[3])
+    return float(1e3 * _displacements(autograph, images, mark)[3])
 
 
-def _misses(autograph: LoggedAutograph, images: list[tuple[int, Array]], mark: Array) -> Array:
+def _displacements(autograph: LoggedAutograph, images: list[tuple[int, Array]], mark: Array) -> Array:
     """Return the displacements of images from a mark ``(4,)`` in mm at photo scale: mean x and y, px, py."""
-    seen = []
-    for projector, place in images:
+    offsets = []
+    for projector, position in images:
         swing = plane_rotation(autograph.element(f"kappa{projector}") * GON)
-        seen.append(swing @ (place - autograph.on_carrier(projector, mark)))
-    (x1, y1), (x2, y2) = seen
+        offsets.append(swing @ (position - autograph.on_carrier(projector, mark)))
+    (x1, y1), (x2, y2) = offsets
     return np.array([(x1 + x2) / 2.0, (y1 + y2) / 2.0, x1 - x2, y1 - y2])
 
 
@@ -169,14 +169,14 @@ class ResidualParallax(Metric, frozen=True, kw_only=True):
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the y-parallax."""
         names = {point: record.name_of(point) for point in self.points if point in record.model.standard_points}
-        found = {point: y_parallax_at(record, name) for point, name in names.items()}
-        seen = {point: value for point, value in found.items() if value is not None}
-        if len(seen) < len(found) or not seen:
-            return MetricResult(None, "the pictures of the model do not lie in their projectors")
-        worst = max(seen, key=lambda point: abs(seen[point]))
-        rms = math.sqrt(sum(each**2 for each in seen.values()) / len(seen))
-        remark = f"y-parallaxes of {rms:.0f} um (rms) are left, the largest {seen[worst]:+.0f} um at point {worst}"
-        return MetricResult(round(abs(seen[worst]) if self.largest else rms, 1), remark)
+        parallaxes = {point: y_parallax_at(record, name) for point, name in names.items()}
+        visible = {point: value for point, value in parallaxes.items() if value is not None}
+        if len(visible) < len(parallaxes) or not visible:
+            return MetricResult(None, "expected the pictures of the model in their projectors, got others")
+        worst = max(visible, key=lambda point: abs(visible[point]))
+        rms = math.sqrt(sum(each**2 for each in visible.values()) / len(visible))
+        message = f"y-parallaxes of {rms:.0f} um (rms) are left, the largest {visible[worst]:+.0f} um at point {worst}"
+        return MetricResult(round(abs(visible[worst]) if self.largest else rms, 1), message)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the error of the best eye, the film's irregular deformation, and half a count."""
@@ -195,33 +195,33 @@ class CentringDeviation(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the displacement."""
-        left: list[tuple[float, str]] = []
+        deviations: list[tuple[float, str]] = []
         for projector in self.projectors:
             name = record.autograph.loaded(projector)
             if name is None or name not in record.scene.photographs:
-                return MetricResult(None, f"no photograph lies in projector {projector}")
-            shift, turned, _ = _lie(record, projector)
-            left.append((shift, f"{name} lies {shift:.3f} mm beside the principal point"))
-            left.append((turned, f"{name} is turned by {turned:.3f} mm at its fiducials"))
-        value, remark = max(left)
-        return MetricResult(round(value, 4), remark)
+                return MetricResult(None, f"expected a photograph in projector {projector}, got none")
+            shift, rotation, _ = _mounting_error(record, projector)
+            deviations.append((shift, f"{name} is {shift:.3f} mm off the principal point"))
+            deviations.append((rotation, f"{name} is rotated by {rotation:.3f} mm at its fiducials"))
+        value, message = max(deviations)
+        return MetricResult(round(value, 4), message)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the precision of the mean of four fiducials."""
         return 1e-3 * MAX_OF_SEVERAL * BEST_FIDUCIAL_UM / 2.0
 
 
-def _lie(record: AttemptRecord, projector: int) -> tuple[float, float, float]:
+def _mounting_error(record: AttemptRecord, projector: int) -> tuple[float, float, float]:
     """Return shift and rotation in mm of a picture, and the change of size of its film."""
     camera = record.scenario.camera
-    displaced = record.autograph.carrier(projector).fiducial_displacements()
-    places = {each.name: (each.x, each.y) for each in camera.fiducials}
-    xy = np.array([places[name] for name, _, _ in displaced]).T
-    d = np.array([(dx, dy) for _, dx, dy in displaced]).T
-    about = xy - xy.mean(axis=1, keepdims=True)
-    squares = float((about**2).sum())
-    turn = float((about[0] * d[1] - about[1] * d[0]).sum()) / squares
-    scale = float((about * d).sum()) / squares
+    displacements = record.autograph.carrier(projector).fiducial_displacements()
+    positions = {each.name: (each.x, each.y) for each in camera.fiducials}
+    xy = np.array([positions[name] for name, _, _ in displacements]).T
+    d = np.array([(dx, dy) for _, dx, dy in displacements]).T
+    centred = xy - xy.mean(axis=1, keepdims=True)
+    squares = float((centred**2).sum())
+    turn = float((centred[0] * d[1] - centred[1] * d[0]).sum()) / squares
+    scale = float((centred * d).sum()) / squares
     shift = d.mean(axis=1) + np.array(camera.principal_point)
     return float(np.hypot(*shift)), abs(turn) * float(np.abs(xy).max()), scale
 
@@ -236,20 +236,20 @@ class PrincipalDistanceDeviation(Metric, frozen=True, kw_only=True):
 
     def evaluate(self, record: AttemptRecord) -> MetricResult:
         """Return the difference."""
-        off: list[tuple[float, str]] = []
+        deviations: list[tuple[float, str]] = []
         for projector in self.projectors:
             if record.autograph.loaded(projector) is None:
-                return MetricResult(None, f"no photograph lies in projector {projector}")
-            wanted = record.scenario.camera.c * (1.0 + _lie(record, projector)[2])
+                return MetricResult(None, f"expected a photograph in projector {projector}, got none")
+            wanted = record.scenario.camera.c * (1.0 + _mounting_error(record, projector)[2])
             shown = record.autograph.element(f"c{projector}")
             side = "long" if shown > wanted else "short"
-            remark = (
-                f"{handle_label(f'c{projector}')} stands at {shown:.2f}: {abs(shown - wanted):.3f} mm too {side} "
+            message = (
+                f"{handle_label(f'c{projector}')} reads {shown:.2f}: {abs(shown - wanted):.3f} mm too {side} "
                 "for the film"
             )
-            off.append((abs(shown - wanted), remark))
-        value, remark = max(off)
-        return MetricResult(round(value, 4), remark)
+            deviations.append((abs(shown - wanted), message))
+        value, message = max(deviations)
+        return MetricResult(round(value, 4), message)
 
     def floor(self, scenario: Scenario) -> float:
         """Return half a count, and the precision of a scale from four fiducials."""

@@ -26,10 +26,10 @@ from a7sim.training.variation import scenario_for
 
 ELEMENTS = frozenset(name for variant in VARIANTS.values() for name in variant.elements)
 
-_POINTED = {1: "X left at", 2: "X right at"}
+_POINTING_ITEMS = {1: "X left at", 2: "X right at"}
 """Start of items of monocular pointings, by the side of the photograph."""
 
-_REGISTERED = (*_POINTED.values(), "parallax seen")
+_REGISTERED_ITEMS = (*_POINTING_ITEMS.values(), "parallax seen")
 """Items at which counters are registered beside those of elements."""
 
 
@@ -62,8 +62,8 @@ class ProcedureContext:
         workstation.controls.prepare(active)
         self.begin("interior orientation")
         set_base_and_fittings(workstation, self.model.base, self.model.polarity)
-        found: dict[str, InteriorOrientationBatch] = {}
-        mount_photographs(workstation, self.model, found)
+        orientations: dict[str, InteriorOrientationBatch] = {}
+        mount_photographs(workstation, self.model, orientations)
         workstation.begin(active, self.model, load_prints(workstation, self.model))
 
     def take_over(self) -> None:
@@ -84,19 +84,19 @@ class ProcedureContext:
         self.person.note(f"{self.model.name}: {form}")
 
 
-def perturb_elements(seated: ProcedureContext, elements: Mapping[str, float]) -> None:
+def perturb_elements(context: ProcedureContext, elements: Mapping[str, float]) -> None:
     """Turn elements by amounts, as a mistake."""
-    active = seated.workstation.operators.active
-    standing = seated.workstation.controls.elements(active, list(elements))
-    seated.workstation.controls.turn_elements(
-        active, {name: standing[name] + amount for name, amount in elements.items()}
+    active = context.workstation.operators.active
+    readings = context.workstation.controls.elements(active, list(elements))
+    context.workstation.controls.turn_elements(
+        active, {name: readings[name] + amount for name, amount in elements.items()}
     )
 
 
-def misplace_fittings(seated: ProcedureContext, fittings: Mapping[str, str]) -> None:
+def misplace_fittings(context: ProcedureContext, fittings: Mapping[str, str]) -> None:
     """Set fittings to positions, as a mistake."""
     for name, position in fittings.items():
-        seated.workstation.driver.set_fitting(np.asarray(seated.workstation.operators.active), name, position)
+        context.workstation.driver.set_fitting(np.asarray(context.workstation.operators.active), name, position)
 
 
 Procedure = Callable[..., None]
@@ -109,11 +109,11 @@ PROCEDURES: dict[str, Procedure] = {}
 def procedure(name: str) -> Callable[[Procedure], Procedure]:
     """Register a procedure under a name."""
 
-    def registered(does: Procedure) -> Procedure:
-        PROCEDURES[name] = does
-        return does
+    def register(function: Procedure) -> Procedure:
+        PROCEDURES[name] = function
+        return function
 
-    return registered
+    return register
 
 
 def run_procedure(
@@ -126,14 +126,14 @@ def run_procedure(
     port = InProcessSerial(instrument=environment.instrument, clock=environment.clock, client=client, timeout=1.0)
     observer = scenario_for(environment.exercise_folder, environment.seed, played.observer).observer
     person = Person(Client(port), environment.clock, observer, environment.seed)
-    seated = ProcedureContext.for_model(
+    context = ProcedureContext.for_model(
         person, make_job(environment.scenario, environment.scene), environment.exercise_folder.exercise.model
     )
-    person.book.listener = _Button(person.client, seated.model).written
+    person.book.listener = _RegistrationButton(person.client, context.model).on_entry
     try:
-        PROCEDURES[played.procedure](replace(seated, papers=papers or {}), **played.options)
-    except (OperatorGaveUp, Undetermined) as trouble:
-        return str(trouble) or type(trouble).__name__
+        PROCEDURES[played.procedure](replace(context, papers=papers or {}), **played.options)
+    except (OperatorGaveUp, Undetermined) as error:
+        return str(error) or type(error).__name__
     except TypeError as error:
         if "argument" not in str(error):
             raise
@@ -143,11 +143,11 @@ def run_procedure(
     return ""
 
 
-REGISTERED_ALREADY = "X"
+REGISTERED_BEFORE_ENTRY = "X"
 """Items of a stereoscopic point: all three coordinates are registered before they are entered."""
 
 
-class _Button:
+class _RegistrationButton:
     """Button of the recording device: entries of the book are registered as well.
 
     With the element that is read; a monocular pointing with by of its projector, which identifies it.
@@ -156,17 +156,19 @@ class _Button:
     def __init__(self, client: Client, model: ModelJob) -> None:
         self._client = client
         self._numbers: dict[int, int] = {}
-        self._named = {
-            _POINTED[1]: f"by{model.left_projector}",
-            _POINTED[2]: f"by{model.right_projector}",
+        self._pointing_elements = {
+            _POINTING_ITEMS[1]: f"by{model.left_projector}",
+            _POINTING_ITEMS[2]: f"by{model.right_projector}",
         }
 
-    def written(self, entry: BookEntry) -> None:
+    def on_entry(self, entry: BookEntry) -> None:
         if entry.struck:
             if entry.number in self._numbers:
                 self._client.send(f"REC:STR {self._numbers[entry.number]},{quote_text(entry.struck[:60])}")
-        elif entry.point and (entry.item in {REGISTERED_ALREADY, *ELEMENTS} or entry.item.startswith(_REGISTERED)):
-            if entry.item != REGISTERED_ALREADY:
+        elif entry.point and (
+            entry.item in {REGISTERED_BEFORE_ENTRY, *ELEMENTS} or entry.item.startswith(_REGISTERED_ITEMS)
+        ):
+            if entry.item != REGISTERED_BEFORE_ENTRY:
                 self._client.send(",".join([f"REC {quote_text(entry.point)}", *self._words(entry.item)]))
             self._numbers[entry.number] = int(self._client.numbers("REC:COUN?")[0])
 
@@ -174,36 +176,36 @@ class _Button:
         """Return the elements that are registered with an item of the book."""
         if item in ELEMENTS:
             return [registration_word(item)]
-        return [registration_word(by) for pointed, by in self._named.items() if item.startswith(pointed)]
+        return [registration_word(by) for pointing, by in self._pointing_elements.items() if item.startswith(pointing)]
 
 
 @procedure("interior orientation")
-def interior_orientation(seated: ProcedureContext) -> None:
+def interior_orientation(context: ProcedureContext) -> None:
     """Set fittings, mount and centre both pictures, and set principal distances."""
-    seated.set_up()
+    context.set_up()
 
 
 @procedure("measure parallaxes")
-def measure_parallaxes(seated: ProcedureContext, readings: int = 2) -> None:
+def measure_parallaxes(context: ProcedureContext, readings: int = 2) -> None:
     """Clear the y-parallax at the standard points with by', then with by", `readings` times at each."""
-    seated.take_over()
-    seated.begin("y-parallaxes")
+    context.take_over()
+    context.begin("y-parallaxes")
     for _ in range(readings):
-        seated.workstation.parallaxes(seated.workstation.operators.active, seated.points(), 1)
+        context.workstation.parallaxes(context.workstation.operators.active, context.points(), 1)
 
 
 @procedure("relative orientation")
-def relative_orientation(seated: ProcedureContext) -> None:
+def relative_orientation(context: ProcedureContext) -> None:
     """Orient mounted pictures relatively by the scenario's plan; then look at all points."""
-    seated.take_over()
-    seated.begin("relative orientation")
-    orient_model(seated.workstation, seated.model)
-    seated.begin("last look")
-    seated.workstation.look_at_parallaxes(seated.workstation.operators.active, seated.points())
+    context.take_over()
+    context.begin("relative orientation")
+    orient_model(context.workstation, context.model)
+    context.begin("last look")
+    context.workstation.look_at_parallaxes(context.workstation.operators.active, context.points())
 
 
 @procedure("day's work")
-def full_day(seated: ProcedureContext) -> None:
+def full_day(context: ProcedureContext) -> None:
     """Measure all models of the scenario from the first picture to the last centre."""
-    for _ in measure_models(seated.person, seated.workstation.job):
+    for _ in measure_models(context.person, context.workstation.job):
         pass

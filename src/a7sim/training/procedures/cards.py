@@ -17,7 +17,7 @@ from a7sim.training.procedures.base import ProcedureContext, procedure
 
 @procedure("strip by cards")
 def strip_by_cards(
-    seated: ProcedureContext,
+    context: ProcedureContext,
     wanted: list[str],
     z_units_per_mm: float = 8.0,
     leave_out: bool = True,
@@ -29,54 +29,54 @@ def strip_by_cards(
     Mistakes: Z divided by another number of units, outliers not left out, the centre not counted among the ties, or
     another point `named` as the bad one.
     """
-    models = _models_of(seated.papers["models.csv"], z_units_per_mm)
-    ground = _ground_of(seated.papers["control.csv"])
+    models = _read_models(context.papers["models.csv"], z_units_per_mm)
+    ground = _read_ground(context.papers["control.csv"])
     first, second = models[:2]
     ties = [name for name in first.points if name in second.points and (count_centre or not is_centre(name))]
-    document = _computed(models, ground)
-    after, bad = _largest(document)
+    document = _compute_strip(models, ground)
+    after, bad = _largest_difference(document)
     if leave_out:
         models = [model.without(bad) if model.name == after else model for model in models]
-        document = _computed(models, ground)
+        document = _compute_strip(models, ground)
     answers = {"bad": named or bad, "ties": str(len(ties)), "scale": f"{1e3 * document['absolute']['scale']:.1f}"}
     for name in wanted:
-        place = zip("xyz", document["points"][name], strict=True)
-        answers |= {f"{axis}{name}": f"{each:.2f}" for axis, each in place}
+        position = zip("xyz", document["points"][name], strict=True)
+        answers |= {f"{axis}{name}": f"{each:.2f}" for axis, each in position}
     for key, value in answers.items():
-        seated.person.note(f"{ANSWER}{key}={value}")
+        context.person.note(f"{ANSWER}{key}={value}")
 
 
 def _rows(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
-def _models_of(text: str, z_units_per_mm: float) -> list[Model]:
+def _read_models(text: str, z_units_per_mm: float) -> list[Model]:
     by_model: dict[str, dict[str, list[float]]] = {}
     for row in _rows(text):
-        place = [float(row["X"]), float(row["Y"]), float(row["Z"]) / z_units_per_mm]
-        by_model.setdefault(row["model"], {})[row["point"]] = place
+        position = [float(row["X"]), float(row["Y"]), float(row["Z"]) / z_units_per_mm]
+        by_model.setdefault(row["model"], {})[row["point"]] = position
     return [Model(name, tuple(points), np.array(list(points.values())).T) for name, points in by_model.items()]
 
 
-def _ground_of(text: str) -> Ground:
+def _read_ground(text: str) -> Ground:
     rows = _rows(text)
     coordinates = np.array([[float(row[axis]) for row in rows] for axis in "XYZ"])
     return Ground(tuple(row["point"] for row in rows), coordinates, tuple(row["role"] for row in rows))
 
 
-def _computed(models: list[Model], ground: Ground) -> Document:
+def _compute_strip(models: list[Model], ground: Ground) -> Document:
     with tempfile.TemporaryDirectory() as folder:
         deck = Path(folder) / "strip.crd"
         deck.write_text("\n".join(deck_lines(ground, models)) + "\n", encoding="ascii")
         return strip(deck).document
 
 
-def _largest(document: Document) -> tuple[str, str]:
+def _largest_difference(document: Document) -> tuple[str, str]:
     """Return the model and the point with the largest closing difference."""
-    off = {
-        (join["models"][1], point): max(map(abs, differences))
+    differences = {
+        (join["models"][1], point): max(map(abs, by_axis))
         for join in document["joins"]
-        for point, differences in join["differences_mm"].items()
+        for point, by_axis in join["differences_mm"].items()
         if not is_centre(point)
     }
-    return max(off, key=lambda each: off[each])
+    return max(differences, key=lambda each: differences[each])

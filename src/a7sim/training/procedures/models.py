@@ -15,41 +15,41 @@ from a7sim.training.procedures.base import ProcedureContext, misplace_fittings, 
 
 
 @procedure("prepared model")
-def prepared_model(seated: ProcedureContext, model: str = "", orient: bool = True) -> None:
+def prepared_model(context: ProcedureContext, model: str = "", orient: bool = True) -> None:
     """Set up a model and `orient` it relatively, for the next operator.
 
     The Z counter then reads from the base line.
     """
-    workstation, chosen = seated.workstation, find_model(seated, model)
-    ProcedureContext(seated.person, workstation, chosen).set_up()
+    workstation, model_job = context.workstation, find_model(context, model)
+    ProcedureContext(context.person, workstation, model_job).set_up()
     if orient:
-        orient_model(workstation, chosen)
+        orient_model(workstation, model_job)
     active = workstation.operators.active
-    heights = workstation.controls.elements_from_zero(active, [f"bz{chosen.left_projector}"])[
-        f"bz{chosen.left_projector}"
+    heights = workstation.controls.elements_from_zero(active, [f"bz{model_job.left_projector}"])[
+        f"bz{model_job.left_projector}"
     ]
     workstation.controls.shift_counter(
         active, "Z", workstation.controls.units_per_mm * heights - workstation.controls.centre(active, 1)[2]
     )
 
 
-def take_over(seated: ProcedureContext, model: ModelJob) -> None:
+def take_over(context: ProcedureContext, model: ModelJob) -> None:
     """Continue at a prepared instrument with a mounted model and counters not preset."""
-    workstation = seated.workstation
+    workstation = context.workstation
     active = workstation.operators.active
     workstation.controls.take_over(active)
     workstation.controls.counters(active)
     workstation.begin(active, model, load_prints(workstation, model))
 
 
-def find_model(seated: ProcedureContext, name: str) -> ModelJob:
+def find_model(context: ProcedureContext, name: str) -> ModelJob:
     """Return a model of the job sheet, that of the exercise if none is named."""
-    return next((each for each in seated.workstation.job.models if each.name == name), seated.model)
+    return next((each for each in context.workstation.job.models if each.name == name), context.model)
 
 
 @procedure("absolute orientation")
 def absolute_orientation(
-    seated: ProcedureContext,
+    context: ProcedureContext,
     misread: Mapping[str, Sequence[float]] | None = None,
     points: Sequence[str] | None = None,
     knocked: Mapping[str, float] | None = None,
@@ -58,17 +58,17 @@ def absolute_orientation(
 
     Mistakes: control `misread` by amounts in m in X, Y, Z; only `points` read; elements `knocked` at the end.
     """
-    workstation = seated.workstation
-    model = seated.model if points is None else replace(seated.model, other_points=tuple(points))
-    take_over(seated, model)
-    seated.begin("absolute orientation")
+    workstation = context.workstation
+    model = context.model if points is None else replace(context.model, other_points=tuple(points))
+    take_over(context, model)
+    context.begin("absolute orientation")
     absolute_orientation_at(workstation, model, misread_control(workstation.job.control, misread or {}))
-    perturb_elements(seated, knocked or {})
+    perturb_elements(context, knocked or {})
 
 
 @procedure("A8 model")
 def a8_model(
-    seated: ProcedureContext,
+    context: ProcedureContext,
     level: bool = True,
     doubled: bool = True,
     place: str = "3",
@@ -81,29 +81,29 @@ def a8_model(
     Mistakes: not made `level`, scale units taken for mm instead of `doubled`, control `misread`, only `points` read,
     elements `knocked` at the end.
     """
-    workstation, operators = seated.workstation, seated.workstation.operators
-    name = seated.model.standard_points[place]
-    others = seated.model.other_points if points is None else tuple(points)
-    model = replace(seated.model, other_points=(*others, name))
-    take_over(seated, model)
-    seated.begin("relative orientation")
+    workstation, operators = context.workstation, context.workstation.operators
+    name = context.model.standard_points[place]
+    others = context.model.other_points if points is None else tuple(points)
+    model = replace(context.model, other_points=(*others, name))
+    take_over(context, model)
+    context.begin("relative orientation")
     orient_model(workstation, model)
-    seated.begin("absolute orientation")
+    context.begin("absolute orientation")
     if level:
         control = misread_control(workstation.job.control, misread or {})
         on_ground = absolute_orientation_at(workstation, model, control)[0]
         reading, bx = np.array(on_ground.points[name]), on_ground.elements["bx"]
     else:
         wanted = dict.fromkeys([*workstation.job.control, *model.other_points])
-        shown = [each for each in wanted if workstation.has_point(operators.active, each).all()]
-        reading = workstation.measure_points(operators.active, shown)[:, shown.index(name), 0]
+        visible = [each for each in wanted if workstation.has_point(operators.active, each).all()]
+        reading = workstation.measure_points(operators.active, visible)[:, visible.index(name), 0]
         bx = float(workstation.controls.bx(operators.active)[0])
     scales = [workstation.controls.manual.scales[axis] for axis in "XY"]
     x, y = (each - scale.at_origin for each, scale in zip(reading[:2].tolist(), scales, strict=True))
     mm = 1.0 / scales[0].units_per_mm if doubled else 1.0
     left = workstation.controls.manual.centres_on_base[0] * bx
-    seated.person.note(f"{ANSWER}x{place}={mm * x - left:.2f} y{place}={mm * y:.2f}")
-    perturb_elements(seated, knocked or {})
+    context.person.note(f"{ANSWER}x{place}={mm * x - left:.2f} y{place}={mm * y:.2f}")
+    perturb_elements(context, knocked or {})
 
 
 def misread_control(
@@ -119,7 +119,7 @@ def misread_control(
 
 @procedure("base change")
 def base_change(
-    seated: ProcedureContext,
+    context: ProcedureContext,
     kept: bool = True,
     counters: bool = True,
     scale: bool = True,
@@ -132,34 +132,34 @@ def base_change(
     Mistakes: the photograph to be `kept` turned as well, the `counters` not preset, the `scale` not transferred, common
     points not `read_again`, fittings left in `wrong_fittings` or elements `knocked`.
     """
-    workstation, model = seated.workstation, seated.model
+    workstation, model = context.workstation, context.model
     operators, plan = workstation.operators, workstation.job.plan
     active = operators.active
     models = workstation.job.models
     first = models[models.index(model) - 1]
-    take_over(seated, first)
-    seated.begin("common points")
+    take_over(context, first)
+    context.begin("common points")
     common = [name for name in map(model.standard_points.get, "135") if name]
     readings = workstation.measure_points(active, common)
     before = {name: readings[:, i] for i, name in enumerate(common)}
-    seated.begin("interior orientation")
+    context.begin("interior orientation")
     if counters:
         extend_strip(workstation, model)
     set_base_and_fittings(workstation, model.base, model.polarity)
     mount_photographs(workstation, model, {})
     workstation.begin(operators.active, model, load_prints(workstation, model))
     copy_common_photo_orientation(workstation, model)
-    seated.begin("relative orientation")
+    context.begin("relative orientation")
     method = "dependent" if kept else "independent"
     tolerated = workstation.job.tolerated_parallax_mm
     relative_orientation(
         workstation, operators.active, model, method, plan.case, plan.parallax_readings, plan.bx, tolerated
     )
-    seated.begin("scale")
+    context.begin("scale")
     if scale:
         transfer_scale(workstation, operators.active, model, before)
-    seated.begin("model coordinates")
+    context.begin("model coordinates")
     if read_again:
         workstation.measure_points(operators.active, common)
-    perturb_elements(seated, knocked or {})
-    misplace_fittings(seated, wrong_fittings or {})
+    perturb_elements(context, knocked or {})
+    misplace_fittings(context, wrong_fittings or {})

@@ -21,7 +21,7 @@ INDEPENDENT = "independent"
 
 @procedure("clear the model")
 def clear_the_model(
-    seated: ProcedureContext,
+    context: ProcedureContext,
     method: str = INDEPENDENT,
     over_correction: float | str = "computed",
     case: str = "A",
@@ -32,16 +32,16 @@ def clear_the_model(
 
     With `names_missing` the operator answers which of the points 1 to 6 do not exist, or by mistake `missing`.
     """
-    seated.take_over()
-    seated.begin("relative orientation")
-    workstation = seated.workstation
+    context.take_over()
+    context.begin("relative orientation")
+    workstation = context.workstation
     if names_missing:
-        gone = sorted(set(CASES["A"]) - set(seated.model.points_of_case("A")))
-        seated.person.note(f"{ANSWER}missing={missing or ','.join(gone)}")
+        absent = sorted(set(CASES["A"]) - set(context.model.points_of_case("A")))
+        context.person.note(f"{ANSWER}missing={missing or ','.join(absent)}")
     empirical_orientation(
         workstation,
         workstation.operators.active,
-        seated.model,
+        context.model,
         method,
         case,
         over_correction,
@@ -52,7 +52,7 @@ def clear_the_model(
 
 @procedure("numerical orientation")
 def numerical_orientation(
-    seated: ProcedureContext,
+    context: ProcedureContext,
     cases: str = "AE",
     readings: int = 3,
     sense: float = 1.0,
@@ -63,64 +63,64 @@ def numerical_orientation(
 
     `sense` is the sign with which the corrections are set, `slip_gon` the error of the sum for phi'.
     """
-    seated.take_over()
-    workstation, model = seated.workstation, seated.model
+    context.take_over()
+    workstation, model = context.workstation, context.model
     active, unknowns = workstation.operators.active, unknown_elements(INDEPENDENT, model)
     for number, case in enumerate(cases, start=1):
-        seated.begin(f"relative orientation, case {case}")
+        context.begin(f"relative orientation, case {case}")
         workstation.begin_round(active, number)
         settings = workstation.controls.elements(active, unknowns)
         labels = model.points_of_case(case)
-        seen = _parallaxes(seated, case, readings)
-        mean = seen.parallax_mm.mean(axis=0)
+        parallaxes = _measure_parallaxes(context, case, readings)
+        mean = parallaxes.parallax_mm.mean(axis=0)
         base = np.full(active.size, workstation.job.plan.bx)
-        found, _ = compute_corrections(
-            workstation, active, model, seen.places, seen.parallax_mm - mean, unknowns, base, labels
+        corrections, _ = compute_corrections(
+            workstation, active, model, parallaxes.places, parallaxes.parallax_mm - mean, unknowns, base, labels
         )
-        found["phi1"] = found["phi1"] + slip_gon
-        seated.answer({f"{case.lower()}-{name}": float(found[name][0]) for name in unknowns})
+        corrections["phi1"] = corrections["phi1"] + slip_gon
+        context.answer({f"{case.lower()}-{name}": float(corrections[name][0]) for name in unknowns})
         noted = workstation.operators.noted_elements(active, settings, {})
-        workstation.controls.set_elements(active, {name: noted[name] + sense * found[name] for name in unknowns})
+        workstation.controls.set_elements(active, {name: noted[name] + sense * corrections[name] for name in unknowns})
         if mean_on_by == "at once":
-            _put_on_by(seated, mean)
+            _set_by(context, mean)
     if mean_on_by == "in the end":
         workstation.begin_round(active, len(cases) + 1)
-        _put_on_by(seated, _parallaxes(seated, "A", readings).parallax_mm.mean(axis=0))
+        _set_by(context, _measure_parallaxes(context, "A", readings).parallax_mm.mean(axis=0))
 
 
-def _parallaxes(seated: ProcedureContext, case: str, readings: int) -> Parallaxes:
-    workstation, model = seated.workstation, seated.model
+def _measure_parallaxes(context: ProcedureContext, case: str, readings: int) -> Parallaxes:
+    workstation, model = context.workstation, context.model
     points = [model.standard_points[label] for label in model.points_of_case(case)]
-    seen = workstation.parallaxes(workstation.operators.active, points, readings)
+    parallaxes = workstation.parallaxes(workstation.operators.active, points, readings)
     workstation.operators.give_up(
-        seen.disagrees(workstation.operators.active), f"{model.name}: images too far apart to be fused"
+        parallaxes.disagrees(workstation.operators.active), f"{model.name}: images too far apart to be fused"
     )
-    return seen
+    return parallaxes
 
 
-def _put_on_by(seated: ProcedureContext, mean: Array) -> None:
+def _set_by(context: ProcedureContext, mean: Array) -> None:
     """Set by of the left-hand photograph's projector by a mean parallax."""
-    workstation, by = seated.workstation, f"by{seated.model.left_projector}"
+    workstation, by = context.workstation, f"by{context.model.left_projector}"
     active = workstation.operators.active
     workstation.controls.set_elements(active, {by: workstation.controls.elements(active, [by])[by] + mean})
 
 
 @procedure("perspective centres")
 def perspective_centres(
-    seated: ProcedureContext, hands: Sequence[int] = (1, 2), swapped: bool = False, height_in_mm: bool = False
+    context: ProcedureContext, hands: Sequence[int] = (1, 2), swapped: bool = False, height_in_mm: bool = False
 ) -> None:
     """Preset the counters on the ground at point 1, point at two levels with each eye, and answer both centres.
 
     Mistakes: only some eyes (`hands`, 1 for the left-hand photograph), each centre under the other's name (`swapped`),
     or the height above the lower level in mm instead of counter units.
     """
-    seated.take_over()
-    find_centres(seated, hands, swapped, height_in_mm)
+    context.take_over()
+    find_centres(context, hands, swapped, height_in_mm)
 
 
 @procedure("model with its centres")
 def model_with_its_centres(
-    seated: ProcedureContext,
+    context: ProcedureContext,
     hands: Sequence[int] = (1, 2),
     swapped: bool = False,
     height_in_mm: bool = False,
@@ -133,25 +133,25 @@ def model_with_its_centres(
 
     Mistakes as in `perspective_centres`, or at the end elements `knocked` or fittings left in `wrong_fittings`.
     """
-    seated.set_up()
-    seated.begin("relative orientation")
-    orient_model(seated.workstation, seated.model)
-    find_centres(seated, hands, swapped, height_in_mm)
-    perturb_elements(seated, knocked or {})
-    misplace_fittings(seated, wrong_fittings or {})
+    context.set_up()
+    context.begin("relative orientation")
+    orient_model(context.workstation, context.model)
+    find_centres(context, hands, swapped, height_in_mm)
+    perturb_elements(context, knocked or {})
+    misplace_fittings(context, wrong_fittings or {})
 
 
-def find_centres(seated: ProcedureContext, hands: Sequence[int], swapped: bool, height_in_mm: bool) -> None:
+def find_centres(context: ProcedureContext, hands: Sequence[int], swapped: bool, height_in_mm: bool) -> None:
     """Preset the counters at point 1, point at both levels and answer the centres."""
-    workstation, model, plan = seated.workstation, seated.model, seated.workstation.job.plan
-    seated.begin("model coordinates")
+    workstation, model, plan = context.workstation, context.model, context.workstation.job.plan
+    context.begin("model coordinates")
     workstation.look_at_parallaxes(workstation.operators.active, [model.standard_points["1"]])
     workstation.controls.preset(workstation.operators.active, plan.preset)
     for side in hands:
-        seated.begin(f"{side_name(side)} perspective centre")
+        context.begin(f"{side_name(side)} perspective centre")
         centre = centre_of(observe_centre(workstation, workstation.operators.active, model, side), 0)
         X, Y, Z = (float(each) for each in (centre.X0, centre.Y0, centre.Z0))
         if height_in_mm:
             Z = plan.centre_levels[0] + (Z - plan.centre_levels[0]) / workstation.controls.units_per_mm
         projector = workstation.controls.projector(3 - side if swapped else side)
-        seated.answer({f"x{projector}": X, f"y{projector}": Y, f"z{projector}": Z})
+        context.answer({f"x{projector}": X, f"y{projector}": Y, f"z{projector}": Z})

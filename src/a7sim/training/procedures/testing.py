@@ -11,7 +11,7 @@ ANSWERED = ("c", "phi", "omega")
 
 @procedure("grid test")
 def grid_test(
-    seated: ProcedureContext,
+    context: ProcedureContext,
     crosses: int = 9,
     levels: int = 2,
     pointings: int = 2,
@@ -23,13 +23,13 @@ def grid_test(
 
     Mistakes: errors answered with the other `sense`, tilts in radians, or fewer `projectors` tested.
     """
-    job = seated.workstation.job
-    order = GridTestPlan(job.certificate, job.grid_plate, crosses, levels, pointings, seated.model.polarity)
-    workstation = Workstation(seated.workstation.operators, seated.workstation.driver, order.job)
-    for sheet in measure_grid_batch(workstation, order):
+    job = context.workstation.job
+    plan = GridTestPlan(job.certificate, job.grid_plate, crosses, levels, pointings, context.model.polarity)
+    workstation = Workstation(context.workstation.operators, context.workstation.driver, plan.job)
+    for sheet in measure_grid_batch(workstation, plan):
         for name in ANSWERED:
             error = sense * float(sheet.test.errors[name][0])
-            shown = error / GON if name != "c" and in_gon else error
-            seated.person.note(f"{ANSWER}{name}{sheet.projector}={shown:+.4f}")
+            answer = error / GON if name != "c" and in_gon else error
+            context.person.note(f"{ANSWER}{name}{sheet.projector}={answer:+.4f}")
         if sheet.projector == projectors:
             return
