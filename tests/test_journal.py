@@ -228,9 +228,9 @@ def test_a_journal_of_another_seed_is_refused_at_its_line(copied):
     ("key", "value", "sentence"),
     [
         ("software", "a7sim 0.0.1", "line 1: expected a session of a7sim .*, got one of a7sim 0.0.1"),
-        ("command", "serve", "line 1: expected a session of run to go on with, got one of serve"),
+        ("command", "serve", "line 1: expected a session of run to resume, got one of serve"),
         ("scenario_hash", "0" * 64, "line 1: expected the scenario and the measurements that the session began with"),
-        ("schema_version", 2, "line 1: expected schema_version 3 to go on with, got 2, which can be replayed only"),
+        ("schema_version", 2, "line 1: expected schema_version 3 to resume, got 2, which can be replayed only"),
     ],
 )
 def test_a_journal_of_something_else_is_refused_at_line_1(copied, key, value, sentence):

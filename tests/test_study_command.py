@@ -115,7 +115,7 @@ def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, c
     ("arguments", "words"),
     [
         (("--replicates", "0"), "expected a whole number from 1"),
-        (("--replicates", "5"), "expected 12 replicates or more"),
+        (("--replicates", "5"), "expected at least the 12 replicates already done, got 5"),
     ],
 )
 def test_replicates_that_cannot_be_are_one_sentence_and_exit_code_2(study, capsys, arguments, words):
