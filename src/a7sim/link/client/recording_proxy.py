@@ -105,7 +105,10 @@ class RecordingProxy:
             while (taken := _taken(come)) is not None:
                 text, length = taken
                 self._hear(name, "<", text)
-                client.sendall(bytes(come[:length]))
+                try:
+                    client.sendall(bytes(come[:length]))
+                except OSError:  # the client is gone; the line to the instrument is not broken
+                    return
                 del come[:length]
             if not more and (gone.is_set() or self._stop.is_set()):
                 return
