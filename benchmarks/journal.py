@@ -22,7 +22,7 @@ from a7sim.journal.replay import Replay, replay_lines
 from a7sim.journal.writer import Journal, JournalOptions, make_header
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from a7sim.session import run
+from a7sim.session import RunOptions, run
 
 ASKED_OF = 100_000
 """Events of the session in which seeking must take less than a second."""
@@ -34,9 +34,9 @@ TARGETS = {"none": Target("below", 15)}
 
 
 def seconds(scenario, folder, durability):
-    journal_options = JournalOptions(durability) if durability else None
+    journal_options = JournalOptions(durability) if durability else JournalOptions()
     began = time.perf_counter()
-    run(scenario, SEED, folder if durability else None, journal_options=journal_options, force=True)
+    run(scenario, SEED, RunOptions(folder if durability else None, force=True, journal_options=journal_options))
     return time.perf_counter() - began
 
 

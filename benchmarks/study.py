@@ -47,7 +47,7 @@ def cpu_seconds(work):
 
 def sessions(scenario, seeds):
     """Return documents of sessions without their own strips."""
-    return open_batch(scenario, seeds).run(strips=False)
+    return open_batch(scenario, seeds).measure(strips=False)
 
 
 class Thesis:

@@ -29,8 +29,7 @@ from a7sim.journal.writer import Header, Journal, JournalOptions, make_header, m
 from a7sim.link.clock import Clock
 from a7sim.scenario import find_scenario, from_data, hash_scenario, load_scenario, to_data
 from a7sim.scene import PICTURES
-from a7sim.session import run, strip_combinations
-from a7sim.session.running import ProgressCallbacks
+from a7sim.session import ProgressCallbacks, RunOptions, run, strip_combinations
 from tests.support.processes import ANY_TCP_PORT, COMMAND, RunningServer, a7sim, a7sim_captured
 from tests.support.server_thread import SocketClient
 
@@ -57,7 +56,7 @@ def copied(whole, tmp_path):
 
 def resumed(folder):
     begun = find_resumable(folder, "run")
-    return run(begun.scenario, begun.seed, folder, journal_options=JournalOptions(resumes=True))
+    return run(begun.scenario, begun.seed, RunOptions(folder, journal_options=JournalOptions(resumes=True)))
 
 
 def forged(journalled, header=None, change=lambda number, data: data):
@@ -297,7 +296,7 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
     light = load_scenario("akwanga", LIGHT)
     light = msgspec.structs.replace(light, models=light.models[:1])
     whole, cut = tmp_path / "whole", tmp_path / "cut"
-    strip_combinations.run_combinations(light, 1985, whole)
+    strip_combinations.run_combinations(light, 1985, RunOptions(whole))
     begun = iter(["no", "yes"])
 
     def interrupt(activity):
@@ -305,12 +304,14 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        strip_combinations.run_combinations(light, 1985, cut, ProgressCallbacks(on_activity=interrupt))
+        strip_combinations.run_combinations(
+            light, 1985, RunOptions(cut, callbacks=ProgressCallbacks(on_activity=interrupt))
+        )
     assert not (cut / "results.json").exists()
     session = find_resumable(cut, "run")
     assert session.setting("strips") == "all"
     strip_combinations.run_combinations(
-        session.scenario, session.seed, cut, journal_options=JournalOptions(resumes=True)
+        session.scenario, session.seed, RunOptions(cut, journal_options=JournalOptions(resumes=True))
     )
     assert {name: files_of(cut / name) for name in ("case-A", "case-B")} == {
         name: files_of(whole / name) for name in ("case-A", "case-B")
@@ -459,7 +460,7 @@ def test_a_journal_on_a_read_only_disk_is_said_in_a_sentence(tmp_path, monkeypat
     with pytest.raises(
         A7SimError, match=r"session\.jsonl: expected a journal that can be written: Read-only file system"
     ):
-        run(load_scenario("dewitt-pair", LIGHT), 7, tmp_path / "out")
+        run(load_scenario("dewitt-pair", LIGHT), 7, RunOptions(tmp_path / "out"))
 
 
 # --- on the disk ------------------------------------------------------------------------------------------

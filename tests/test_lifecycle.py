@@ -8,23 +8,22 @@ import pytest
 from a7sim.errors import A7SimError
 from a7sim.operator.procedures.grid_test import GridTestPlan
 from a7sim.scenario import load_scenario
-from a7sim.session import run
+from a7sim.session import ProgressCallbacks, RunOptions, run
 from a7sim.session.bridge import run_bridge
 from a7sim.session.compiling import CompilationRequest, compile_model
 from a7sim.session.grid_test import run_grid_test
-from a7sim.session.running import ProgressCallbacks
 
 
-def calibrated(scenario, seed, out, watcher):
+def calibrated(scenario, seed, options):
     order = GridTestPlan(scenario.camera, scenario.grid_plate, 9, 1, 1, "positive")
-    return run_grid_test(scenario, seed, order, out, watcher)
+    return run_grid_test(scenario, seed, order, options)
 
 
 WORK = {
     "run": (run, "akwanga"),
     "bridge": (run_bridge, "bridge"),
     "compile": (
-        lambda scenario, seed, *of: compile_model(scenario, seed, CompilationRequest("1", interval=10.0), *of),
+        lambda scenario, seed, options: compile_model(scenario, seed, CompilationRequest("1", interval=10.0), options),
         "akwanga",
     ),
     "calibrate": (calibrated, "grid-test"),
@@ -44,7 +43,7 @@ def test_who_is_interrupted_leaves_whole_files(what, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        work(load_scenario(name), 1, out, ProgressCallbacks(on_activity=interrupt))
+        work(load_scenario(name), 1, RunOptions(out, callbacks=ProgressCallbacks(on_activity=interrupt)))
     document = results_of(out)
     assert (document["status"], document["message"].split()[-2:]) == ("interrupted", ["was", "interrupted"])
     assert document["operator"]["book_entries"] == len((out / "book.csv").read_text().splitlines()) - 1
@@ -58,7 +57,7 @@ def test_who_is_interrupted_leaves_whole_files(what, tmp_path):
 def test_who_gives_up_says_why_and_the_document_is_the_file(what, tmp_path):
     work, name = WORK[what]
     scenario = load_scenario(name, {"photos.0.laid": '"upside down"'})
-    document = work(scenario, 1, tmp_path / "out", None)
+    document = work(scenario, 1, RunOptions(tmp_path / "out"))
     assert document["status"] == "does not fit"
     assert "upside down" in document["message"]
     assert results_of(tmp_path / "out") == json.loads(json.dumps(document))
@@ -69,7 +68,7 @@ def test_what_fails_for_another_reason_says_so_in_the_file_and_goes_on_up(tmp_pa
         raise A7SimError("the lamp has burnt out")
 
     with pytest.raises(A7SimError, match="burnt out"):
-        run(load_scenario("akwanga"), 1, tmp_path / "out", ProgressCallbacks(on_activity=fail))
+        run(load_scenario("akwanga"), 1, RunOptions(tmp_path / "out", callbacks=ProgressCallbacks(on_activity=fail)))
     document = results_of(tmp_path / "out")
     assert (document["status"], document["message"]) == ("failed", "the lamp has burnt out")
 
@@ -77,5 +76,5 @@ def test_what_fails_for_another_reason_says_so_in_the_file_and_goes_on_up(tmp_pa
 def test_without_settings_of_a_plotter_nothing_is_written(tmp_path):
     scenario = msgspec.structs.replace(load_scenario("akwanga"), plotting=None)
     with pytest.raises(A7SimError, match="plan: expected the settings of a plotter"):
-        run(scenario, 1, tmp_path / "out")
+        run(scenario, 1, RunOptions(tmp_path / "out"))
     assert not (tmp_path / "out").exists()

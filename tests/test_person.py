@@ -13,7 +13,7 @@ from a7sim.operator.people.fatigue import HOUR, acuity_factor, slip_factor
 from a7sim.operator.people.slips import neighbours, transpositions
 from a7sim.scenario import PROFILES, Observer, ScenarioError, load_scenario, observer_of_skill, scenario_schema
 from a7sim.scenario.schema import FilmDeformation, PlannedSlip
-from a7sim.session import open_session, run
+from a7sim.session import RunOptions, open_session, run
 from a7sim.session.session_batch import open_batch
 from tests.support.processes import a7sim_in_process
 from tests.support.sessions import read_once
@@ -332,7 +332,7 @@ def test_a_planted_slip_happens_once_and_one_that_fits_nowhere_not_at_all():
 def test_slips_are_told_in_the_results_and_in_no_entry_of_book_or_journal(tmp_path):
     slip = PlannedSlip(kind="transposed digits", form="model coordinates", point="C1")
     observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=[slip])
-    document = run(read_once(one_model(observer)), 1, tmp_path / "out")
+    document = run(read_once(one_model(observer)), 1, RunOptions(tmp_path / "out"))
     (told,) = document["truth"]["slips"]
     assert (told["kind"], told["form"], told["point"]) == ("transposed digits", "model coordinates", "C1")
     assert told["struck"]

@@ -10,6 +10,7 @@ import pytest
 from a7sim.journal.resuming import find_resumable
 from a7sim.journal.writer import JournalOptions
 from a7sim.scenario import load_scenario
+from a7sim.session import RunOptions
 from a7sim.session.bridge import INDEPENDENT, run_bridge
 from tests.support.processes import a7sim_captured
 
@@ -76,7 +77,7 @@ def bridged(tmp_path_factory):
     scenario = load_scenario("bridge", HURRIED)
     scenario = msgspec.structs.replace(scenario, models=scenario.models[:2])
     out = tmp_path_factory.mktemp("bridged") / "whole"
-    run_bridge(scenario, 3, out)
+    run_bridge(scenario, 3, RunOptions(out))
     return out
 
 
@@ -87,7 +88,7 @@ def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridg
     shutil.rmtree(cut / INDEPENDENT)
     cut_off(bridged / INDEPENDENT, cut / INDEPENDENT, 0.3)
     begun = find_resumable(cut, "bridge")
-    document = run_bridge(begun.scenario, begun.seed, cut, journal_options=JournalOptions(resumes=True))
+    document = run_bridge(begun.scenario, begun.seed, RunOptions(cut, journal_options=JournalOptions(resumes=True)))
     assert json.loads((cut / "results.json").read_text(encoding="utf-8")) == json.loads(json.dumps(document))
     assert without_what_was_torn(files_of(cut)) == files_of(bridged)
 
@@ -103,7 +104,7 @@ def test_results_of_a_bridge_say_so_where_it_was_interrupted_among_the_independe
     begun = find_resumable(cut, "bridge")
     monkeypatch.setattr("a7sim.session.bridge.run", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        run_bridge(begun.scenario, begun.seed, cut, journal_options=JournalOptions(resumes=True))
+        run_bridge(begun.scenario, begun.seed, RunOptions(cut, journal_options=JournalOptions(resumes=True)))
     results = msgspec.json.decode((cut / "results.json").read_bytes())
     assert results["status"] == "interrupted"
     assert results["bridged"]["strip"]

@@ -15,7 +15,7 @@ from a7sim.errors import A7SimError
 from a7sim.link.client.checked_port import TwinCheckedPort, open_checked_port
 from a7sim.result_documents import as_json
 from a7sim.scenario import load_scenario
-from a7sim.session import run
+from a7sim.session import RunOptions, run
 from tests.support.gallery import READ_ONCE
 from tests.support.links import new_instrument, serve_on
 from tests.test_cli import ROOT, a7sim
@@ -173,7 +173,7 @@ def one_model():
 def test_an_operator_at_a_served_instrument_leaves_the_same_results(one_model, kind, tmp_path):
     scenario, results = one_model
     with serve_on(kind, new_instrument(scenario)) as url, open_checked_port(url, timeout=5.0) as port:
-        run(scenario, 7, tmp_path / "out", port_adapter=lambda twin: TwinCheckedPort(port, twin, url))
+        run(scenario, 7, RunOptions(tmp_path / "out", port_adapter=lambda twin: TwinCheckedPort(port, twin, url)))
     assert (tmp_path / "out" / "results.json").read_text(encoding="utf-8") == results
 
 
@@ -208,7 +208,10 @@ def test_the_operator_gets_what_was_served_and_never_the_twin(one_model):
             self.given += b"\n"
             return self.given
 
-    run(scenario, 7, port_adapter=lambda twin: Eavesdropper(Served(new_instrument(scenario).open()), twin, "url"))
+    def eavesdrop(twin):
+        return Eavesdropper(Served(new_instrument(scenario).open()), twin, "url")
+
+    run(scenario, 7, RunOptions(port_adapter=eavesdrop))
     assert len(read) > 1000
     assert all(line is given for line, given in read if line)
 
@@ -230,7 +233,7 @@ def test_an_instrument_of_another_scenario_or_seed_is_refused_in_one_sentence(on
         pytest.raises(A7SimError, match=f"{url}: the instrument served {sentence}"),
         open_checked_port(url, timeout=1.0) as port,
     ):
-        run(one_model[0], 7, port_adapter=lambda twin: TwinCheckedPort(port, twin, url))
+        run(one_model[0], 7, RunOptions(port_adapter=lambda twin: TwinCheckedPort(port, twin, url)))
 
 
 def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
@@ -242,7 +245,7 @@ def test_a_reply_that_does_not_come_is_told_from_one_that_differs(one_model):
             return b""
 
     with pytest.raises(A7SimError, match=r"url: expected an answer to \*IDN\? in time, got none"):
-        run(one_model[0], 7, port_adapter=lambda twin: TwinCheckedPort(Silent(), twin, "url"))
+        run(one_model[0], 7, RunOptions(port_adapter=lambda twin: TwinCheckedPort(Silent(), twin, "url")))
 
 
 def test_operate_holds_the_lock_and_gives_it_back():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from a7sim.session import session_batch
 from a7sim.session.batch_driver import BatchDriver
+from a7sim.study import simulating
 from a7sim.study.auditing import audit_study
 from a7sim.study.executors import InProcess
 from a7sim.study.loading import build_study
@@ -88,15 +88,15 @@ def test_a_least_count_too_much_anywhere_on_the_bench_is_found_out(worked, monke
 
 
 def test_a_strip_that_is_off_by_a_millimetre_on_the_bench_is_found_out(worked, monkeypatch):
-    truly = session_batch.strip_document
+    truly = simulating.run_all_methods_batch
 
-    def a_millimetre_off(scenario, ground, models):
-        document, strip = truly(scenario, ground, models)
-        x = document["residuals_m"]["C1"]["X"] + 0.001
-        residuals = document["residuals_m"] | {"C1": document["residuals_m"]["C1"] | {"X": x}}
-        return document | {"residuals_m": residuals}, strip
+    def a_millimetre_off(*arguments, **options):
+        documents = truly(*arguments, **options)
+        for document in documents:
+            document["strip"]["residuals_m"]["C1"]["X"] += 0.001
+        return documents
 
-    monkeypatch.setattr(session_batch, "strip_document", a_millimetre_off)
+    monkeypatch.setattr(simulating, "run_all_methods_batch", a_millimetre_off)
     (found,) = audit_study(*worked, 1)
     assert (found.place, found.others) == ("strip.residuals_m.C1.X", 0)
 

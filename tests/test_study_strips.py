@@ -1,5 +1,6 @@
 """A study whose replicate is the thesis: every case of both models worked once, twenty-five strips, claims tested."""
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -7,11 +8,11 @@ from a7sim.errors import A7SimError
 from a7sim.report.drawing import standalone
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from a7sim.session.all_methods import run_all_methods_batch
+from a7sim.session.all_methods import measure_all_methods_batch
 from a7sim.session.combination_batch import combine_strips
 from a7sim.session.strip_combinations import combinations
 from a7sim.standard_points import CASES
-from a7sim.strip_methods.strip import ground_control, models_from_documents, orient_strip, oriented_strip_document
+from a7sim.strip_methods.strip import ground_control, orient_strip, oriented_strip_document
 from a7sim.study import claims
 from a7sim.study import figures as figures_of_study
 from a7sim.study.cells import Cell
@@ -72,11 +73,11 @@ def asked(tmp_path_factory):
     by_case = {}
 
     def kept(scenario, *arguments, **options):
-        by_case[scenario.plan.case] = run_all_methods_batch(scenario, *arguments, **options)
+        by_case[scenario.plan.case] = measure_all_methods_batch(scenario, *arguments, **options)
         return by_case[scenario.plan.case]
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("a7sim.study.simulating.run_all_methods_batch", kept)
+        patched.setattr("a7sim.study.simulating.measure_all_methods_batch", kept)
         return task.run_batch(SEEDS), by_case
 
 
@@ -84,9 +85,13 @@ def asked(tmp_path_factory):
 def replicates(asked):
     """Sessions of three replicates in every case; in the second case D gave up."""
     _, by_case = asked
-    gave_up = {"status": "does not fit", "message": "said in the test", "models": []}
+    gave_up = {"status": "does not fit", "message": "said in the test", "models": ()}
     return [
-        {case: each[i] | (gave_up if (i, case) == (1, "D") else {}) for case, each in by_case.items()} for i in range(3)
+        {
+            case: msgspec.structs.replace(each[i], **gave_up) if (i, case) == (1, "D") else each[i]
+            for case, each in by_case.items()
+        }
+        for i in range(3)
     ]
 
 
@@ -97,7 +102,7 @@ def ground(scenario):
 
 def test_strips_on_arrays_are_those_of_the_computing_room(scenario, replicates, ground):
     """Every one of the twenty-five is `grounded` to a hundredth of a micron, far below the 0.1 mm that are printed."""
-    by_case = {case: models_from_documents(each["models"]) for case, each in replicates[0].items()}
+    by_case = {case: each.strip_models for case, each in replicates[0].items()}
     (documents,) = combine_strips(replicates[:1], 2, ground, scenario.strip)
     assert len(documents) == 25
     for combination, document in zip(combinations(by_case), documents, strict=True):
@@ -126,7 +131,7 @@ def test_a_session_that_gave_up_takes_only_its_own_strips_along(scenario, replic
 def test_hours_of_a_strip_of_one_case_are_those_of_its_session(scenario, replicates, ground):
     for number, case in ((0, "A"), (12, "C"), (24, "E")):
         hours = next(combine_strips(replicates[:1], 2, ground, scenario.strip))[number]["operator"]["hours"]
-        assert hours == pytest.approx(replicates[0][case]["operator"]["hours"], abs=1e-3)
+        assert hours == pytest.approx(replicates[0][case].operator["hours"], abs=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +155,7 @@ def test_cells_are_the_strips_and_a_model_does_not_know_with_which_it_is_combine
     (task,) = study.tasks
     by_case = {case: [each[case] for each in replicates] for case in CASES}
     monkeypatch.setattr(
-        "a7sim.study.simulating.run_all_methods_batch", lambda scenario, *_, **__: by_case[scenario.plan.case]
+        "a7sim.study.simulating.measure_all_methods_batch", lambda scenario, *_, **__: by_case[scenario.plan.case]
     )
     values = task.run_batch([1, 2, 3])
     assert [cell.label for cell in study.cells][:2] == ["model 1 A, model 2 A", "model 1 A, model 2 B"]
@@ -170,7 +175,7 @@ def test_one_cell_needs_no_session_but_those_of_its_own_cases(tmp_path, monkeypa
         worked_cases.append(scenario.plan.case)
         return [replicates[0][scenario.plan.case], replicates[2][scenario.plan.case]]
 
-    monkeypatch.setattr("a7sim.study.simulating.run_all_methods_batch", worked_already)
+    monkeypatch.setattr("a7sim.study.simulating.measure_all_methods_batch", worked_already)
     whole = list(combine_strips([replicates[0], replicates[2]], 2, ground, scenario.strip))
     for cell, cases in ((8, ["B", "D"]), (15, ["D", "A"]), (12, ["C"])):
         assert task.batch_documents(cell, SEEDS[::2]) == [each[cell] for each in whole]

@@ -1,6 +1,6 @@
 """Python API: connect to an instrument, run the virtual operator, run a study."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Self
@@ -15,7 +15,7 @@ from a7sim.link.client.ports import TIMEOUT_S
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.result_documents import Document
 from a7sim.scenario import Scenario
-from a7sim.session import ProgressCallbacks
+from a7sim.session import ProgressCallbacks, RunOptions
 from a7sim.session.all_methods import run_all_methods
 from a7sim.study.checkpoint import checkpoint_path
 from a7sim.study.executors import open_executor
@@ -87,16 +87,15 @@ class Operator:
         by `a7sim operate`. With `out` the files of the session are written there. Raises A7SimError; an operator who
         gives up is no error but a `status` with a `message`.
         """
-        folder = None if out is None else Path(out)
+        options = RunOptions(None if out is None else Path(out), force, watcher or ProgressCallbacks())
         if link is None:
-            return run_all_methods(self.scenario, self.seed, folder, watcher, force)
+            return run_all_methods(self.scenario, self.seed, options)
         if "plotter" not in self.scenario.work:
             ways = ", ".join(self.scenario.work)
             raise A7SimError(f"{self.scenario.title}: expected work at the plotter for the operator, got {ways}")
         with open_checked_port(link, timeout, token) as served:
-            return run_all_methods(
-                self.scenario, self.seed, folder, watcher, force, lambda twin: TwinCheckedPort(served, twin, link)
-            )
+            adapted = replace(options, port_adapter=lambda twin: TwinCheckedPort(served, twin, link))
+            return run_all_methods(self.scenario, self.seed, adapted)
 
     work = RenamedMember("run")
 

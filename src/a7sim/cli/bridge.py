@@ -34,8 +34,6 @@ def command(
     from a7sim.session.bridge import bridge_tables, run_bridge
 
     request = resolve_request(scenario, scenario_options, output)
-    with progress_bar(_POINTS_A_MODEL * len(request.scenario.models), display) as watcher:
-        document = run_bridge(
-            request.scenario, request.seed, output.folder, watcher, output.force, output.journal_options
-        )
+    with progress_bar(_POINTS_A_MODEL * len(request.scenario.models), display) as callbacks:
+        document = run_bridge(request.scenario, request.seed, output.run_options(callbacks))
     show_results(document, display, bridge_tables)

@@ -69,8 +69,6 @@ def command(
             f"--points: expected a number of crosses that are spaced evenly on the plate ({known}), got {points}"
         )
     test = GridTestPlan(camera, plate, points, levels, pointings, polarity)
-    with progress_bar(PROJECTORS * points * levels * pointings, display) as watcher:
-        document = run_grid_test(
-            request.scenario, request.seed, test, output.folder, watcher, output.force, output.journal_options
-        )
+    with progress_bar(PROJECTORS * points * levels * pointings, display) as callbacks:
+        document = run_grid_test(request.scenario, request.seed, test, output.run_options(callbacks))
     show_results(document, display, report_tables)

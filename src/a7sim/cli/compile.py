@@ -58,8 +58,6 @@ def command(
     compilation = CompilationRequest(name, contours, interval, lines, map_scale, tremor)
     if request.begun_with is not None:
         compilation = CompilationRequest.from_settings(request.begun_with)
-    with progress_bar(_POINTS, display) as watcher:
-        document = compile_model(
-            request.scenario, request.seed, compilation, output.folder, watcher, output.force, output.journal_options
-        )
+    with progress_bar(_POINTS, display) as callbacks:
+        document = compile_model(request.scenario, request.seed, compilation, output.run_options(callbacks))
     show_results(document, display, map_tables)

@@ -56,8 +56,6 @@ def command(
         raise A7SimError("--strips all: expected no --case beside it, since every case is worked")
     run_session = run_combinations if every_case else run_all_methods
     session_count = len(CASES) if every_case else 1
-    with progress_bar(POINTS_A_MODEL * session_count * len(request.scenario.models), display) as watcher:
-        document = run_session(
-            request.scenario, request.seed, output.folder, watcher, output.force, journal_options=output.journal_options
-        )
+    with progress_bar(POINTS_A_MODEL * session_count * len(request.scenario.models), display) as callbacks:
+        document = run_session(request.scenario, request.seed, output.run_options(callbacks))
     show_results(document, display, strips_table if every_case else session_tables)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from a7sim.journal.resuming import ResumableSession
     from a7sim.journal.writer import JournalOptions
     from a7sim.result_documents import Document
-    from a7sim.session import ProgressCallbacks
+    from a7sim.session import ProgressCallbacks, RunOptions
 
 DURABILITY = click.option(
     "--durability",
@@ -75,6 +75,12 @@ class OutputOptions:
         from a7sim.journal.writer import JournalOptions
 
         return JournalOptions(self.durability, self.resume is not None)
+
+    def run_options(self, callbacks: "ProgressCallbacks") -> "RunOptions":
+        """Return the options of a session with these callbacks."""
+        from a7sim.session import RunOptions
+
+        return RunOptions(self.folder, self.force, callbacks, self.journal_options)
 
 
 @dataclass(frozen=True)

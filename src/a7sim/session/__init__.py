@@ -7,12 +7,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from a7sim.session.running import PortAdapter, ProgressCallbacks, Session, direct, open_session, run
+    from a7sim.session.lifecycle import PortAdapter, ProgressCallbacks, RunOptions, Session, direct, open_session
+    from a7sim.session.running import run
 
-__all__ = ["PortAdapter", "ProgressCallbacks", "Session", "direct", "open_session", "run"]
+__all__ = ["PortAdapter", "ProgressCallbacks", "RunOptions", "Session", "direct", "open_session", "run"]
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module("a7sim.session.running"), name)
+    return getattr(import_module("a7sim.session.running" if name == "run" else "a7sim.session.lifecycle"), name)

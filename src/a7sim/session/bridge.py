@@ -1,7 +1,6 @@
 """Strip bridged at the instrument and the same strip of independent models, both on the ground."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,19 +10,19 @@ from rich.text import Text
 import a7sim
 from a7sim.errors import A7SimError
 from a7sim.journal.session_files import MODELS, RESULTS, write_atomic
-from a7sim.journal.writer import Journal, JournalOptions, make_header
+from a7sim.journal.writer import make_header
 from a7sim.operator import OperatorGaveUp
 from a7sim.operator.procedures.bridging import BridgedModels, bridge_strip, bridge_strip_batch
 from a7sim.reduction import Ground, Model, Strip, Undetermined, absolute_orientation, strip_adjustment
 from a7sim.result_documents import Document, absolute_document, adjustment_document, as_json, document_header
 from a7sim.scenario import Scenario, amend_provenance
 from a7sim.scene import Scene
-from a7sim.session.lifecycle import recorded_session
-from a7sim.session.results import hours_document, models_csv, request_document
-from a7sim.session.running import ProgressCallbacks, open_session, run
+from a7sim.session.lifecycle import RunOptions, open_session, recorded_session
+from a7sim.session.result_records import BridgeResult
+from a7sim.session.results import end_document, hours_document, models_csv, request_document
+from a7sim.session.running import run
 from a7sim.session.session_batch import open_batch
-from a7sim.strip_methods.comparator import StripResult
-from a7sim.strip_methods.strip import OrientedStrip, ground_control
+from a7sim.strip_methods.strip import OrientedStrip, StripResult, ground_control
 from a7sim.text_tables import text_table
 
 INDEPENDENT = "independent"
@@ -32,46 +31,36 @@ INDEPENDENT = "independent"
 Places = dict[str, tuple[float, float, float]]
 
 
-def run_bridge(
-    scenario: Scenario,
-    seed: int,
-    out: Path | None = None,
-    watcher: ProgressCallbacks | None = None,
-    force: bool = False,
-    journal_options: JournalOptions | None = None,
-) -> Document:
-    """Bridge a strip, measure the same models independently, and return both on the ground;
+def run_bridge(scenario: Scenario, seed: int, options: RunOptions | None = None) -> Document:
+    """Bridge a strip, measure the same models independently, and return both on the ground.
 
-    with `out`, write the files.
-
-    The files of bridging are those of `run`, and the independent models have a folder of their own. `status` is
-    'complete', or 'does not fit' with the `message` of the operator who gave up; in the folder it is 'interrupted'
+    With a folder, write the files: those of bridging as of `run`, and a subfolder of the independent models. `status`
+    is 'complete', or 'does not fit' with the `message` of the operator who gave up; in the folder it is 'interrupted'
     until the independent models are measured, too. Raises A7SimError for a plotter that cannot bridge, and for a folder
     that cannot be used, before anything is written.
     """
-    watcher = watcher or ProgressCallbacks()
-    journal_options = journal_options or JournalOptions()
+    options = options or RunOptions()
     if len(scenario.models) < 2 or "outside" not in {model.base for model in scenario.models}:
         raise A7SimError("models: expected a strip with base inside and outside in turn, as bridging needs")
-    journal = Journal(journal_options)
-    session = open_session(scenario, seed, journal.on_link_event)
+    recorded = recorded_session(scenario, seed, options)
+    session = recorded.session
     job = session.job
-    journal_options.prepare(out, force, (INDEPENDENT,))
-    done: list[Document] = []
+    options.prepare_folder((INDEPENDENT,))
+    model_documents: list[Document] = []
     places: dict[str, Places] = {}
     document = document_header("bridge") | request_document(scenario)
     document |= {"software": f"a7sim {a7sim.__version__}", "scenario": scenario.title, "seed": seed}
     document |= {"variant": scenario.instrument.variant, "status": "failed", "message": ""}
-    document["bridged"] = {"models": done}
-
-    def leaves() -> dict[str, str]:
-        return {MODELS: models_csv([_as_model(name, each) for name, each in places.items()])}
-
-    about = make_header("bridge", scenario, seed)
-    with recorded_session(document, session, journal, about, out, leaves):
-        for model in bridge_strip(session.person, job, watcher.on_point, watcher.on_activity):
+    document["bridged"] = {"models": model_documents}
+    with recorded.recording(
+        make_header("bridge", scenario, seed),
+        lambda end: document | end_document(end),
+        lambda: {MODELS: models_csv([_as_model(name, each) for name, each in places.items()])},
+    ):
+        for model in bridge_strip(session.person, job, options.callbacks.on_point, options.callbacks.on_activity):
             places[model.model.name] = model.coordinates_of(0)
-            done.append(_of_model(model))
+            model_documents.append(_of_model(model))
+    document |= end_document(recorded.end)
     if document["status"] != "complete":
         return document
     document["bridged"] |= {
@@ -79,34 +68,17 @@ def run_bridge(
         "hours": round(session.person.clock.now / 3600.0, 3),
     }
     document |= {"status": "interrupted", "message": "the session was interrupted among the independent models"}
-    _leave(document, out)
-    folder = out / INDEPENDENT if out else None
-    alone = run(
-        amend_provenance(scenario, "a7sim bridge", "a7sim run"),
-        seed,
-        folder,
-        watcher,
-        force or journal_options.resumes,
-        journal_options=journal_options.for_part(folder),
-    )
-    document |= {"status": alone["status"], "message": alone["message"]}
-    document["independent"] = {"strip": alone.get("strip", {}), "hours": alone["operator"]["hours"]}
-    _leave(document, out)
+    _write_results(document, options.folder)
+    independent = run(amend_provenance(scenario, "a7sim bridge", "a7sim run"), seed, options.for_part(INDEPENDENT))
+    document |= {"status": independent["status"], "message": independent["message"]}
+    document["independent"] = {"strip": independent.get("strip", {}), "hours": independent["operator"]["hours"]}
+    _write_results(document, options.folder)
     return document
 
 
-def _leave(document: Document, out: Path | None) -> None:
-    if out is not None:
-        write_atomic(out / RESULTS, as_json(document))
-
-
-@dataclass(frozen=True)
-class BridgeResult:
-    """Result of bridging: the strip, or the reason why there is none, and the hours."""
-
-    result: StripResult | None
-    message: str
-    operator: Document
+def _write_results(document: Document, folder: Path | None) -> None:
+    if folder is not None:
+        write_atomic(folder / RESULTS, as_json(document))
 
 
 def bridge_over_link(scenario: Scenario, seed: int) -> BridgeResult:

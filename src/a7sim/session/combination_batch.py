@@ -12,13 +12,15 @@ from a7sim.reduction import Ground, GroundFit, Model, Strip, Undetermined, forme
 from a7sim.reduction.absolute import fitted_to_ground, root_mean_square
 from a7sim.result_documents import Document
 from a7sim.scenario.schema import StripPlan
-from a7sim.strip_methods.strip import models_from_documents, orient_strip, oriented_strip_document
+from a7sim.session.result_records import SessionResult
+from a7sim.session.results import brief_model_document, model_document
+from a7sim.strip_methods.strip import orient_strip, oriented_strip_document
 
 CHUNK_SIZE = 64
 """Replicates per array, a limit of memory."""
 
-Replicate = Mapping[str, Document]
-"""Documents of the sessions of one seed, by case."""
+Replicate = Mapping[str, SessionResult]
+"""Results of the sessions of one seed, by case."""
 Cases = tuple[str, ...]
 """Of a strip's models."""
 
@@ -29,7 +31,7 @@ def cases_of_strips(cases: Sequence[str], models: int) -> list[Cases]:
 
 
 def combine_strips(
-    replicates: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan
+    replicates: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan, brief: bool = False
 ) -> Iterator[list[Document]]:
     """Yield a document for each strip of each replicate, as if one session had measured its models in these cases.
 
@@ -41,8 +43,9 @@ def combine_strips(
         some = replicates[first : first + CHUNK_SIZE]
         strips = _on_arrays(some, models, ground, plan)
         for i, each in enumerate(some):
+            documents = {case: _model_documents(session, brief) for case, session in each.items()}
             yield [
-                _document(each, cases, strips.get((i, cases)) or _by_itself(each, cases, ground, plan))
+                _document(each, documents, cases, strips.get((i, cases)) or _by_itself(each, cases, ground, plan))
                 for cases in cases_of_strips(tuple(each), models)
             ]
 
@@ -53,8 +56,8 @@ def _on_arrays(
     """Return the strips of replicates whose sessions all have the same points and full control."""
     groups: dict[tuple[Cases, ...], list[tuple[int, dict[str, list[Model]]]]] = defaultdict(list)
     for i, replicate in enumerate(some):
-        if plan.polynomial is None and all(each["status"] == "complete" for each in replicate.values()):
-            by_case = {case: models_from_documents(each["models"]) for case, each in replicate.items()}
+        if plan.polynomial is None and all(each.status == "complete" for each in replicate.values()):
+            by_case = {case: each.strip_models for case, each in replicate.items()}
             alike = {tuple(model.points for model in each) for each in by_case.values()}
             if len(alike) == 1:
                 groups[alike.pop()].append((i, by_case))
@@ -116,21 +119,27 @@ def _accuracy(residuals: Array) -> tuple[list[float], ...]:
 
 
 def _by_itself(replicate: Replicate, cases: Cases, ground: Ground, plan: StripPlan) -> Document:
-    if any(replicate[case]["status"] != "complete" for case in cases):
+    if any(replicate[case].status != "complete" for case in cases):
         return {}
-    models = [models_from_documents(replicate[case]["models"])[place] for place, case in enumerate(cases)]
+    models = [replicate[case].strip_models[place] for place, case in enumerate(cases)]
     try:
         return oriented_strip_document(orient_strip(models, ground, plan.join, plan.polynomial))
     except Undetermined as undetermined:
         raise A7SimError(f"strip of the cases {' and '.join(cases)}: {undetermined}") from undetermined
 
 
-def _document(replicate: Replicate, cases: Cases, strip: Document) -> Document:
-    gave_up = next((replicate[case] for case in cases if replicate[case]["status"] != "complete"), None)
+def _model_documents(session: SessionResult, brief: bool) -> list[Document]:
+    return [brief_model_document(each) if brief else model_document(each) for each in session.models or ()]
+
+
+def _document(
+    replicate: Replicate, documents: Mapping[str, Sequence[Document]], cases: Cases, strip: Document
+) -> Document:
+    gave_up = next((replicate[case] for case in cases if replicate[case].status != "complete"), None)
     if gave_up is not None:
-        return {"status": gave_up["status"], "message": gave_up["message"]}
-    models = [replicate[case]["models"][place] for place, case in enumerate(cases)]
-    seconds = sum(_seconds(replicate[case]["models"], place) for place, case in enumerate(cases))
+        return {"status": gave_up.status, "message": gave_up.message}
+    models = [documents[case][place] for place, case in enumerate(cases)]
+    seconds = sum(_seconds(documents[case], place) for place, case in enumerate(cases))
     return {
         "status": "complete",
         "message": "",

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -13,17 +12,16 @@ import a7sim
 from a7sim.errors import A7SimError
 from a7sim.geometry import Array, length_of
 from a7sim.journal.session_files import GEOJSON, SVG
-from a7sim.journal.writer import Journal, JournalOptions, make_header
+from a7sim.journal.writer import make_header
 from a7sim.operator.mapping.map_lines import CONTOUR, LineTarget, TracedLine, Tracing
 from a7sim.operator.mapping.plotting import TABLE_GEARS, CompiledMap, MapRequest, compile_map
 from a7sim.plotters import BASE_COMPONENTS, VARIANTS
 from a7sim.result_documents import Document, absolute_document, document_header
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
-from a7sim.session.lifecycle import recorded_session
+from a7sim.session.lifecycle import ProgressCallbacks, RunOptions, Session, recorded_session
 from a7sim.session.map_svg import to_geojson, to_svg
-from a7sim.session.results import request_document
-from a7sim.session.running import ProgressCallbacks, Session, open_session
+from a7sim.session.results import end_document, request_document
 from a7sim.strip_methods.strip import given_control
 
 OLD_MAP_M = 5.0
@@ -59,23 +57,19 @@ def compile_model(
     scenario: Scenario,
     seed: int,
     wanted: CompilationRequest,
-    out: Path | None = None,
-    watcher: ProgressCallbacks | None = None,
-    force: bool = False,
-    journal_options: JournalOptions | None = None,
+    options: RunOptions | None = None,
 ) -> Document:
     """Compile a model with the virtual operator and return the document of results; with `out`, write map and files.
 
     `status` is 'complete', or 'does not fit' with the operator's `message`. Raises A7SimError for an impossible
     request.
     """
-    watcher = watcher or ProgressCallbacks()
-    journal_options = journal_options or JournalOptions()
+    options = options or RunOptions()
     _see_that_it_can_be(scenario, wanted)
-    journal = Journal(journal_options)
-    session = open_session(scenario, seed, journal.on_link_event)
+    recorded = recorded_session(scenario, seed, options)
+    session = recorded.session
     order = _order(wanted, scenario, session.scene)
-    journal_options.prepare(out, force)
+    options.prepare_folder()
     document = document_header("compile") | {
         **request_document(scenario),
         "software": f"a7sim {a7sim.__version__}",
@@ -85,13 +79,13 @@ def compile_model(
         "status": "failed",
         "message": "",
     }
-    drawn: dict[str, str] = {}
+    drawings: dict[str, str] = {}
     header = make_header("compile", scenario, seed, **asdict(wanted))
-    with recorded_session(document, session, journal, header, out, lambda: drawn):
-        sheet = _sheet(session, wanted, order, watcher)
+    with recorded.recording(header, lambda end: document | end_document(end), lambda: drawings):
+        sheet = _sheet(session, wanted, order, options.callbacks)
         document |= _of_sheet(sheet, session.scene, scenario)
-        drawn |= {GEOJSON: to_geojson(sheet), SVG: to_svg(sheet, scenario.title)}
-    return document
+        drawings |= {GEOJSON: to_geojson(sheet), SVG: to_svg(sheet, scenario.title)}
+    return document | end_document(recorded.end)
 
 
 def _see_that_it_can_be(scenario: Scenario, wanted: CompilationRequest) -> None:
@@ -143,7 +137,9 @@ def _errand(scene: Scene, name: str) -> LineTarget:
     )
 
 
-def _sheet(session: Session, wanted: CompilationRequest, order: MapRequest, watcher: ProgressCallbacks) -> CompiledMap:
+def _sheet(
+    session: Session, wanted: CompilationRequest, order: MapRequest, callbacks: ProgressCallbacks
+) -> CompiledMap:
     models = tuple(model for model in session.job.models if model.name == wanted.model)
     control = given_control(session.scenario, session.scene)
     return compile_map(
@@ -151,8 +147,8 @@ def _sheet(session: Session, wanted: CompilationRequest, order: MapRequest, watc
         replace(session.job, models=models, control={}),
         control,
         order,
-        watcher.on_point,
-        watcher.on_activity,
+        callbacks.on_point,
+        callbacks.on_activity,
     )
 
 

@@ -1,7 +1,6 @@
 """Grid test of both projectors and its report with the true errors."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -14,16 +13,15 @@ from a7sim.geometry import GON, angles_of
 from a7sim.instrument import Autograph
 from a7sim.instrument.condition import draw_condition
 from a7sim.journal.session_files import RESIDUALS
-from a7sim.journal.writer import Journal, JournalOptions, make_header
+from a7sim.journal.writer import make_header
 from a7sim.operator.driving.controls import side_name, wrap_gon
 from a7sim.operator.procedures.grid_test import GridTestPlan, ProjectorReadings, measure_grid
 from a7sim.reduction import Adjustment
 from a7sim.reduction.grid_test import UNKNOWNS
 from a7sim.result_documents import Document, document_header, statistics_document
 from a7sim.scenario import Condition, Scenario
-from a7sim.session.lifecycle import recorded_session
-from a7sim.session.results import request_document
-from a7sim.session.running import ProgressCallbacks, open_session
+from a7sim.session.lifecycle import RunOptions, recorded_session
+from a7sim.session.results import end_document, request_document
 from a7sim.table_files import to_csv
 from a7sim.text import pluralize
 from a7sim.text_tables import text_table
@@ -37,37 +35,31 @@ def run_grid_test(
     scenario: Scenario,
     seed: int,
     order: GridTestPlan,
-    out: Path | None = None,
-    watcher: ProgressCallbacks | None = None,
-    force: bool = False,
-    journal_options: JournalOptions | None = None,
+    options: RunOptions | None = None,
 ) -> Document:
     """Test both projectors of a scenario's instrument and return the document; with `out`, write the files.
 
     `status` is 'complete', or 'does not fit' with the operator's `message`. Raises A7SimError for a plan that the plate
     or the instrument does not allow and for a folder that cannot be used, before anything is written.
     """
-    watcher = watcher or ProgressCallbacks()
-    journal_options = journal_options or JournalOptions()
-    journal = Journal(journal_options)
-    session = open_session(scenario, seed, journal.on_link_event)
+    options = options or RunOptions()
+    recorded = recorded_session(scenario, seed, options)
+    session = recorded.session
     autograph = session.autograph
     document = _header(scenario, seed, order, autograph)
-    journal_options.prepare(out, force)
+    options.prepare_folder()
     sheets: list[ProjectorReadings] = []
-
-    def leaves() -> dict[str, str]:
-        return {RESIDUALS: to_csv(RESIDUAL_COLUMNS, _residual_rows(sheets))}
-
-    about = make_header(
-        "calibrate", scenario, seed, points=order.crosses, levels=order.levels, pointings=order.pointings
-    )
-    with recorded_session(document, session, journal, about, out, leaves, called="test"):
-        for sheet in measure_grid(session.person, order, watcher.on_point, watcher.on_activity):
+    with recorded.recording(
+        make_header("calibrate", scenario, seed, points=order.crosses, levels=order.levels, pointings=order.pointings),
+        lambda end: document | end_document(end),
+        lambda: {RESIDUALS: to_csv(RESIDUAL_COLUMNS, _residual_rows(sheets))},
+        subject="test",
+    ):
+        for sheet in measure_grid(session.person, order, options.callbacks.on_point, options.callbacks.on_activity):
             sheets.append(sheet)
             truth = true_errors(autograph, draw_condition(scenario.instrument, seed), sheet.projector)
             document["projectors"][side_name(sheet.projector)] = projector_document(sheet, truth)
-    return document
+    return document | end_document(recorded.end)
 
 
 def _header(scenario: Scenario, seed: int, order: GridTestPlan, autograph: Autograph) -> Document:

@@ -12,10 +12,12 @@ from a7sim.operator import ModelRecord, Person
 from a7sim.operator.people.timesheet import Timesheet
 from a7sim.operator.procedures.absolute import GroundOrientation
 from a7sim.reduction import Model, PerspectiveCentre
-from a7sim.result_documents import Document, document_header
+from a7sim.result_documents import Document, differences_document, document_header
 from a7sim.scenario import Scenario, ScenarioWithProvenance
 from a7sim.scenario.schema import Published
-from a7sim.session.truth import TruthComparison
+from a7sim.session.result_records import CENTRE_DECIMALS, POINT_DECIMALS, ModelResult, SessionEnd, SessionResult
+from a7sim.strip_methods.a8_vs_comparator import coordinate_differences
+from a7sim.strip_methods.strip import oriented_strip_document
 from a7sim.table_files import to_csv
 
 SIDES = {1: "left", 2: "right"}
@@ -45,10 +47,46 @@ def request_document(scenario: Scenario) -> dict[str, Any]:
     return msgspec.structs.asdict(scenario.request) if isinstance(scenario, ScenarioWithProvenance) else {}
 
 
-def model_document(
-    record: ModelRecord, beside: TruthComparison, member: int = 0, published: Published | None = None
-) -> dict[str, Any]:
-    """Return the results of a model with the truth, of which this session is one member."""
+def session_document(result: SessionResult, brief: bool = False) -> Document:
+    """Return the document of a session's results.
+
+    If `brief`, the models contain only the values of the strip and of the named responses of a study.
+    """
+    document = results_header(result.scenario, result.seed) | {"status": result.status, "message": result.message}
+    if result.models is not None:
+        document["models"] = [brief_model_document(each) if brief else model_document(each) for each in result.models]
+    if result.operator is not None:
+        document["operator"] = result.operator
+    if result.slips is not None:
+        document["truth"] = {"slips": result.slips}
+    if result.strip is not None:
+        document["strip"] = oriented_strip_document(result.strip.strip)
+    elif result.strip_message:
+        document["strip"] = {"message": result.strip_message}
+    methods = result.methods
+    if methods:
+        document["ways"] = {name: oriented_strip_document(each.strip) for name, each in methods.items()}
+    if result.bridging is not None:
+        document.setdefault("operator", result.bridging.operator)
+    if "comparator" in methods and "A8" in methods:
+        differences = coordinate_differences(methods["comparator"], methods["A8"])
+        document["a8_minus_comparator_m"] = differences_document(differences)
+    return document
+
+
+def end_document(end: SessionEnd) -> Document:
+    """Return the end of a session for its document: status, operator and slips."""
+    return {
+        "status": end.status,
+        "message": end.message,
+        "operator": end.operator,
+        "truth": {"slips": end.slips},
+    }
+
+
+def model_document(result: ModelResult) -> Document:
+    """Return the results of a model with the truth."""
+    record = result.record
     orientation = record.orientation
     model = record.model
     found = {hand: _centre(centre) for hand, centre in record.centres.items()}
@@ -88,12 +126,13 @@ def model_document(
         "points": _points(record),
         "standard_points": dict(model.standard_points),
         **({"absolute_orientation": _on_ground(record.on_ground)} if record.on_ground else {}),
-        "truth": _beside_truth(record, beside, member, found) | _published_sigmas(published),
+        "truth": _beside_truth(result, found) | _published_sigmas(result.published),
     }
 
 
-def brief_model_document(record: ModelRecord, beside: TruthComparison, member: int) -> dict[str, Any]:
+def brief_model_document(result: ModelResult) -> Document:
     """Return the results of a model needed by its strip and by the named responses of a study."""
+    record = result.record
     orientation = record.orientation
     found = {hand: _centre(centre, _CENTRE_FIELDS[:3]) for hand, centre in record.centres.items()}
     return {
@@ -104,7 +143,7 @@ def brief_model_document(record: ModelRecord, beside: TruthComparison, member: i
         },
         "perspective_centres": {SIDES[hand]: centre for hand, centre in found.items()},
         "points": _points(record),
-        "truth": _differences(beside, member, found),
+        "truth": _differences(result, found),
     }
 
 
@@ -122,7 +161,10 @@ def _head_of(record: ModelRecord) -> dict[str, Any]:
 
 
 def _points(record: ModelRecord) -> dict[str, dict[str, float]]:
-    return {point: {"X": round(x, 3), "Y": round(y, 3), "Z": round(z, 3)} for point, (x, y, z) in record.points.items()}
+    return {
+        point: {axis: round(value, POINT_DECIMALS) for axis, value in zip("XYZ", coordinates, strict=True)}
+        for point, coordinates in record.points.items()
+    }
 
 
 def operator_document(person: Person, lines: int) -> dict[str, Any]:
@@ -196,26 +238,25 @@ def _on_ground(found: GroundOrientation) -> dict[str, Any]:
 
 
 def _centre(centre: PerspectiveCentre, fields: Sequence[str] = _CENTRE_FIELDS) -> dict[str, float]:
-    return {name: round(float(getattr(centre, name)), 5) for name in fields}
+    return {name: round(float(getattr(centre, name)), CENTRE_DECIMALS) for name in fields}
 
 
 def _rounded(values: Any) -> dict[str, float]:
     return {name: round(value, 6) for name, value in values.items()}
 
 
-def _beside_truth(
-    record: ModelRecord, beside: TruthComparison, member: int, found: dict[int, dict[str, float]]
-) -> dict[str, Any]:
+def _beside_truth(result: ModelResult, found: dict[int, dict[str, float]]) -> dict[str, Any]:
+    beside, member = result.comparison, result.member
     centres = {
         SIDES[hand]: {name: round(float(each[member]), 5) for name, each in beside.centres[hand].items()}
         for hand in found
     }
-    differences = _differences(beside, member, found)
+    differences = _differences(result, found)
     relative = beside.relative
     if relative is None:
         return {"centres": centres, **differences}
     exact = {name: float(each[member]) for name, each in relative.elements.items()}
-    elements = record.orientation.elements
+    elements = result.record.orientation.elements
     return {
         "centres": centres,
         "centre_differences": differences.pop("centre_differences"),
@@ -232,8 +273,9 @@ def _beside_truth(
     }
 
 
-def _differences(beside: TruthComparison, member: int, found: dict[int, dict[str, float]]) -> dict[str, Any]:
+def _differences(result: ModelResult, found: dict[int, dict[str, float]]) -> dict[str, Any]:
     """Return the differences of the results from the truth as single numbers."""
+    beside, member = result.comparison, result.member
     document: dict[str, Any] = {
         "centre_differences": {
             SIDES[hand]: {

@@ -12,9 +12,11 @@ from a7sim.operator.procedures.models import ModelRecordBatch, measure_models_ba
 from a7sim.result_documents import Document
 from a7sim.scenario import Scenario
 from a7sim.scene import RelativeTruth, Scene, SharedScene
-from a7sim.session import results
 from a7sim.session.batch_driver import BatchDriver
-from a7sim.session.running import make_job, strip_document
+from a7sim.session.lifecycle import make_job
+from a7sim.session.result_records import ModelResult, SessionResult
+from a7sim.session.results import hours_document, session_document
+from a7sim.session.running import with_strip
 from a7sim.session.truth import TruthComparison
 from a7sim.strip_methods.strip import ground_control
 
@@ -37,24 +39,22 @@ class SessionBatch:
         """
         return measure_models_batch(self.workstation)
 
-    def run(self, strips: bool = True, whole: bool = True) -> list[Document]:
-        """Run to the end and return a document per seed, as `run` does, without lines and book.
+    def run(self, strips: bool = True) -> list[Document]:
+        """Run to the end and return a document per seed, as `run` does, without lines and book."""
+        return [session_document(each) for each in self.measure(strips)]
 
-        Without `strips` they do not contain the strip on the ground, which doubles the time; unless `whole`,
-        the models contain only the keys of `brief_model_document`.
+    def measure(self, strips: bool = True) -> list[SessionResult]:
+        """Run to the end and return a result per seed, without lines and book.
+
+        Without `strips` they do not contain the strip on the ground, which doubles the time.
         """
-        model_documents: list[list[Document]] = [[] for _ in self.seeds]
+        models: list[list[ModelResult]] = [[] for _ in self.seeds]
         for records in self.measure_models():
             planned_model = next(model for model in self.scenario.models if model.name == records.model.name)
             comparison = self._compare_with_truth(records, self.scenes[0].relative_truth(planned_model))
             for member, session in enumerate(records.sessions.tolist()):
-                record = records.of(session)
-                model_documents[session].append(
-                    results.model_document(record, comparison, member, planned_model.published)
-                    if whole
-                    else results.brief_model_document(record, comparison, member)
-                )
-        return [self._document(session, models, strips) for session, models in enumerate(model_documents)]
+                models[session].append(ModelResult(records.of(session), comparison, member, planned_model.published))
+        return [self._result(session, models[session], strips) for session in range(len(self.seeds))]
 
     def _compare_with_truth(self, records: ModelRecordBatch, truth: RelativeTruth | None) -> TruthComparison:
         """Return the truth about a model of the sessions that measured it; their instruments are in the final state."""
@@ -69,18 +69,20 @@ class SessionBatch:
         elements = {name: counts[active] for name, counts in records.orientation.elements.items()}
         return TruthComparison.of(truth, centres, records.orientation.method, elements, model, batch.variant)
 
-    def _document(self, session: int, models: list[Document], strips: bool) -> Document:
+    def _result(self, session: int, models: Sequence[ModelResult], strips: bool) -> SessionResult:
         operators, scenario = self.workstation.operators, self.scenario
         reason = operators.reasons.get(session)
-        document: Document = results.results_header(scenario, self.seeds[session]) | {
-            "status": "complete" if reason is None else "does not fit",
-            "message": reason or "",
-            "models": models,
-            "operator": results.hours_document(float(operators.seconds[session]), operators.timesheet, session),
-        }
+        result = SessionResult(
+            scenario,
+            self.seeds[session],
+            "complete" if reason is None else "does not fit",
+            reason or "",
+            tuple(models),
+            hours_document(float(operators.seconds[session]), operators.timesheet, session),
+        )
         if strips and reason is None:
-            document["strip"], _ = strip_document(scenario, ground_control(scenario, self.scenes[session]), models)
-        return document
+            return with_strip(result, ground_control(scenario, self.scenes[session]))
+        return result
 
 
 def open_batch(scenario: Scenario, seeds: Sequence[int]) -> SessionBatch:

@@ -3,23 +3,24 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
-from pathlib import Path
 
 import msgspec
 
 from a7sim.errors import A7SimError
 from a7sim.journal.session_files import RESULTS, STRIPS, write_atomic
-from a7sim.journal.writer import JournalOptions, make_header, write_header_only
+from a7sim.journal.writer import make_header, write_header_only
 from a7sim.operator import ModelJob
 from a7sim.reduction import Ground, Model, Undetermined
 from a7sim.result_documents import Document, as_json
 from a7sim.scenario import Scenario, amend_provenance
 from a7sim.scenario.schema import StripPlan
 from a7sim.scene import build_scene
-from a7sim.session import results
-from a7sim.session.running import ProgressCallbacks, make_job, run
+from a7sim.session.lifecycle import RunOptions, make_job
+from a7sim.session.result_records import SessionResult
+from a7sim.session.results import results_header, strips_csv
+from a7sim.session.running import measure_session
 from a7sim.standard_points import CASES
-from a7sim.strip_methods.strip import ground_control, models_from_documents, orient_strip, oriented_strip_document
+from a7sim.strip_methods.strip import ground_control, orient_strip, oriented_strip_document
 
 MAX_STRIPS = 700
 """Strips of one command: five cases in up to four models."""
@@ -36,45 +37,30 @@ class Combination:
     models: tuple[Model, ...]
 
 
-def run_combinations(
-    scenario: Scenario,
-    seed: int,
-    out: Path | None = None,
-    watcher: ProgressCallbacks | None = None,
-    force: bool = False,
-    journal_options: JournalOptions | None = None,
-) -> Document:
+def run_combinations(scenario: Scenario, seed: int, options: RunOptions | None = None) -> Document:
     """Run a scenario in each case and return the document of all strips that the models form.
 
-    The sessions are those of `run` for each case; with `out`, their folders are written. The first session that does
-    not fit ends the run. Raises A7SimError for a scenario without ground control or with too many models.
+    The sessions are those of `run` for each case; with a folder, each has a subfolder. The first session that does not
+    fit ends the run. Raises A7SimError for a scenario without ground control or with too many models.
     """
-    watcher = watcher or ProgressCallbacks()
+    options = options or RunOptions()
     check_strips_possible(scenario)
-    journal_options = journal_options or JournalOptions()
-    journal_options.prepare(out, force, map(FOLDER_OF_CASE.format, CASES))
-    if out is not None and not journal_options.resumes:
-        write_header_only(out, make_header("run", scenario, seed, strips="all"))
-    document = results.results_header(scenario, seed) | {"case": "all", "status": "complete", "message": ""}
-    sessions: dict[str, Document] = {}
+    options.prepare_folder(tuple(map(FOLDER_OF_CASE.format, CASES)))
+    if options.folder is not None and not options.journal_options.resumes:
+        write_header_only(options.folder, make_header("run", scenario, seed, strips="all"))
+    document = results_header(scenario, seed) | {"case": "all", "status": "complete", "message": ""}
+    sessions: dict[str, SessionResult] = {}
     for case in CASES:
-        folder = out / FOLDER_OF_CASE.format(case) if out is not None else None
-        sessions[case] = run(
-            with_case(scenario, case),
-            seed,
-            folder,
-            watcher,
-            force or journal_options.resumes,
-            journal_options=journal_options.for_part(folder),
-        )
-        if sessions[case]["status"] != "complete":
-            document |= {"status": sessions[case]["status"], "message": f"case {case}: {sessions[case]['message']}"}
+        session = measure_session(with_case(scenario, case), seed, options.for_part(FOLDER_OF_CASE.format(case)))
+        sessions[case] = session
+        if session.status != "complete":
+            document |= {"status": session.status, "message": f"case {case}: {session.message}"}
             break
-    document["sessions"] = {case: each["operator"] for case, each in sessions.items()}
+    document["sessions"] = {case: each.operator for case, each in sessions.items()}
     document["strips"] = _strips(scenario, seed, sessions) if document["status"] == "complete" else []
-    if out is not None:
-        write_atomic(out / STRIPS, results.strips_csv(document["strips"]))
-        write_atomic(out / RESULTS, as_json(document))
+    if options.folder is not None:
+        write_atomic(options.folder / STRIPS, strips_csv(document["strips"]))
+        write_atomic(options.folder / RESULTS, as_json(document))
     return document
 
 
@@ -95,10 +81,10 @@ def check_strips_possible(scenario: Scenario) -> None:
         raise A7SimError("--strips all: expected ground control in the scenario, got none")
 
 
-def _strips(scenario: Scenario, seed: int, sessions: Mapping[str, Document]) -> list[Document]:
+def _strips(scenario: Scenario, seed: int, sessions: Mapping[str, SessionResult]) -> list[Document]:
     scene = build_scene(scenario, seed)
     ground, jobs = ground_control(scenario, scene), make_job(scenario, scene).models
-    by_case = {case: models_from_documents(session["models"]) for case, session in sessions.items()}
+    by_case = {case: session.strip_models for case, session in sessions.items()}
     return [_of_combination(each, jobs, ground, scenario.strip) for each in combinations(by_case)]
 
 

@@ -17,7 +17,6 @@ from a7sim.scene import Photograph, Scene
 from a7sim.standard_points import CASES
 from a7sim.strip_methods.a8_projector import Projector
 from a7sim.strip_methods.comparator import (
-    StripResult,
     add_centres,
     calibrated_fiducials,
     common_points,
@@ -29,6 +28,7 @@ from a7sim.strip_methods.comparator import (
     round_to_count,
 )
 from a7sim.strip_methods.parallax_clearing import ClearedPair, clear_parallaxes
+from a7sim.strip_methods.strip import StripResult
 
 POINTINGS = 2
 """Of each model point (thesis 3.5)."""

@@ -11,7 +11,8 @@ from a7sim.reduction.strips import is_centre
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
 from a7sim.strip_methods.a8_strip import strip_on_a8
-from a7sim.strip_methods.comparator import StripResult, strip_by_comparator
+from a7sim.strip_methods.comparator import strip_by_comparator
+from a7sim.strip_methods.strip import StripResult
 
 
 @dataclass(frozen=True)

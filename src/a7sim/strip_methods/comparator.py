@@ -24,7 +24,7 @@ from a7sim.scenario.schema import Comparator, Observer
 from a7sim.scene import NamedPoints, Photograph, Scene
 from a7sim.standard_points import CASES
 from a7sim.strip_methods.parallax_clearing import clear_parallaxes
-from a7sim.strip_methods.strip import OrientedStrip, ground_control, orient_strip
+from a7sim.strip_methods.strip import StripResult, ground_control, orient_strip
 
 COMPARATOR_STREAM = 5
 """Spawn key of the comparator's random numbers, after those of scene, instrument and operator."""
@@ -33,14 +33,6 @@ STAGE_MM = 120.0
 """Approximate position of a photograph's middle on the stage; the fiducials eliminate it."""
 STAGE_TURN = 0.005
 """Maximum rotation of a photograph on the stage, radians."""
-
-
-@dataclass(frozen=True)
-class StripResult:
-    """Strip as measured: its independent models, and its orientation to the ground."""
-
-    models: tuple[Model, ...]
-    strip: OrientedStrip
 
 
 @dataclass(frozen=True)

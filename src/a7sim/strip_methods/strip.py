@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from a7sim.errors import A7SimError
@@ -54,6 +55,13 @@ class OrientedStrip:
     def on_ground(self) -> Strip:
         """Strip in the system of the ground, each model with its own coordinates."""
         return self.formed.transformed(self.oriented.similarity)
+
+
+class StripResult(msgspec.Struct, frozen=True, eq=False):
+    """A measured strip: its independent models, and the strip on the ground."""
+
+    models: tuple[Model, ...]
+    strip: OrientedStrip
 
 
 def ground_control(scenario: Scenario, scene: Scene) -> Ground:

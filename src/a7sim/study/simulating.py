@@ -9,7 +9,12 @@ from a7sim.geometry import Array
 from a7sim.result_documents import Document
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.all_methods import run_all_methods, run_all_methods_batch
+from a7sim.session.all_methods import (
+    measure_all_methods,
+    measure_all_methods_batch,
+    run_all_methods,
+    run_all_methods_batch,
+)
 from a7sim.session.combination_batch import Cases, Replicate, cases_of_strips, combine_strips
 from a7sim.session.strip_combinations import with_case
 from a7sim.standard_points import CASES
@@ -63,7 +68,7 @@ class Task:
             return run_all_methods(self.scenario, seed)
         cases, place = self._cases_of(cell)
         (strips,) = self._strips(
-            [{case: run_all_methods(with_case(self.scenario, case), seed) for case in cases}], [seed]
+            [{case: measure_all_methods(with_case(self.scenario, case), seed) for case in cases}], [seed]
         )
         return strips[place]
 
@@ -82,15 +87,17 @@ class Task:
         if not self.strips:
             return ([each] for each in run_all_methods_batch(self.scenario, seeds, strips, whole))
         by_case = {
-            case: run_all_methods_batch(with_case(self.scenario, case), seeds, strips=False, whole=whole)
-            for case in cases
+            case: measure_all_methods_batch(with_case(self.scenario, case), seeds, strips=False) for case in cases
         }
-        return self._strips([{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))], seeds)
+        replicates = [{case: each[i] for case, each in by_case.items()} for i in range(len(seeds))]
+        return self._strips(replicates, seeds, whole)
 
-    def _strips(self, replicates: Sequence[Replicate], seeds: Sequence[int]) -> Iterator[list[Document]]:
+    def _strips(
+        self, replicates: Sequence[Replicate], seeds: Sequence[int], whole: bool = True
+    ) -> Iterator[list[Document]]:
         scenario = self.scenario
         ground = ground_control(scenario, build_scene(scenario, seeds[0]))
-        return combine_strips(replicates, len(scenario.models), ground, scenario.strip)
+        return combine_strips(replicates, len(scenario.models), ground, scenario.strip, brief=not whole)
 
     def _values(self, replicates: Iterable[Sequence[Document]]) -> Array:
         """Return responses ``(cells, responses, replicates)`` of documents by replicate and cell."""

@@ -22,7 +22,7 @@ from a7sim.reduction.least_squares import solve_least_squares
 from a7sim.result_documents import Document
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene, build_scene
-from a7sim.session.running import make_job
+from a7sim.session.lifecycle import make_job
 from a7sim.session.truth import RelativePose, true_elements
 from a7sim.standard_points import CASES, PLACES
 

@@ -8,7 +8,7 @@ from typing import Any
 from a7sim.operator import ModelJob
 from a7sim.scenario import Scenario
 from a7sim.scene import Scene
-from a7sim.session.running import make_job
+from a7sim.session.lifecycle import make_job
 from a7sim.training.action_log import ActionLog, LoggedAutograph, Reading, StudentAction
 from a7sim.training.exercise import OPENING, Exercise
 

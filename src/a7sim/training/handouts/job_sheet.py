@@ -3,7 +3,7 @@
 from a7sim.operator import Job, ModelJob
 from a7sim.scenario import Scenario
 from a7sim.scene import build_scene
-from a7sim.session.running import make_job
+from a7sim.session.lifecycle import make_job
 from a7sim.training.handouts.base import Handout, handout
 
 JOB = "job.txt"

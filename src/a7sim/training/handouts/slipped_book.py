@@ -17,7 +17,7 @@ from a7sim.operator.procedures.relative import GROSS_MM, compute_corrections, un
 from a7sim.plotters import POSITIONS_OF
 from a7sim.scenario import Scenario
 from a7sim.scenario.schema import SlipKind
-from a7sim.session.running import open_session
+from a7sim.session.lifecycle import open_session
 from a7sim.training.handouts.base import Handout, handout
 from a7sim.training.procedures import ProcedureContext
 from a7sim.training.variation import TRAINING_STREAM

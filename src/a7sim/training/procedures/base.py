@@ -18,7 +18,7 @@ from a7sim.operator.procedures.interior import InteriorOrientationBatch
 from a7sim.operator.procedures.models import load_prints, mount_photographs, orient_model, set_base_and_fittings
 from a7sim.plotters import VARIANTS
 from a7sim.reduction import Undetermined
-from a7sim.session.running import make_job
+from a7sim.session.lifecycle import make_job
 from a7sim.training.attempt_record import ANSWER
 from a7sim.training.environment import AttemptEnvironment
 from a7sim.training.exercise import PlayedRun
