@@ -219,7 +219,7 @@ def test_a_journal_of_another_seed_is_refused_at_its_line(copied):
     header = make_header("run", load_scenario("dewitt-pair", LIGHT), 8).line
     (copied / "session.jsonl").write_bytes(forged(journalled, header))
     first = next(n for n in range(2, len(journalled)) if "FID?" in journalled.event(n).text) + 1
-    with pytest.raises(A7SimError, match=rf"session\.jsonl, line {first}: expected what this session does again"):
+    with pytest.raises(A7SimError, match=rf"session\.jsonl, line {first}: expected this session's event"):
         resumed(copied)
 
 
