@@ -469,7 +469,7 @@ def test_a_journal_on_a_read_only_disk_is_said_in_a_sentence(tmp_path, monkeypat
 def synced(tmp_path, monkeypatch, durability, lines, waits=False):
     """Return how often the file was brought to the disk by lines that register (True) or not, before it was closed."""
     times = []
-    monkeypatch.setattr(append_file, "_on_disk", lambda handle: times.append(time.monotonic()))
+    monkeypatch.setattr(append_file, "_flush", lambda handle: times.append(time.monotonic()))
     file = AppendOnlyFile(tmp_path / "f", durability)
     began = time.monotonic()
     for registers in lines:
